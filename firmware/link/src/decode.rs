@@ -1,0 +1,142 @@
+//! From bytes to messages, resynchronising after noise.
+
+use crate::{CRC, Envelope, MAX_FRAME, Message, VERSION};
+use heapless::Vec;
+
+/// What could not be used, and what is known to be missing.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Messages that arrived whole.
+    pub frames: u64,
+    /// Stretches between zero bytes that were no valid frame: noise, damage, or a text.
+    pub bad_frames: u64,
+    /// Valid frames of a version that is not understood here.
+    pub other_version: u64,
+    /// Messages that are missing by their sequence numbers.
+    pub missing: u64,
+    /// Bytes that belonged to no valid frame.
+    pub discarded_bytes: u64,
+}
+
+/// A message and its sequence number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Received {
+    /// Sequence number, counted modulo 2¹⁶ by the sender.
+    pub sequence: u16,
+    /// What was said.
+    pub message: Message,
+}
+
+/// Finds the frames in a stream of bytes, given in pieces of any length.
+#[derive(Debug, Default)]
+pub struct Decoder {
+    bytes: Vec<u8, MAX_FRAME>,
+    overlong: bool,
+    expected: Option<u16>,
+    counters: Counters,
+}
+
+impl Decoder {
+    /// A decoder that has seen nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            bytes: Vec::new(),
+            overlong: false,
+            expected: None,
+            counters: Counters { frames: 0, bad_frames: 0, other_version: 0, missing: 0, discarded_bytes: 0 },
+        }
+    }
+
+    /// What was found and lost so far.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Takes the bytes up to the end of the first valid frame: the message, if one was completed, and the rest that is
+    /// still to be given.
+    pub fn feed<'a>(&mut self, bytes: &'a [u8]) -> (Option<Received>, &'a [u8]) {
+        let mut rest = bytes;
+        while let Some((&byte, tail)) = rest.split_first() {
+            rest = tail;
+            if let Some(received) = self.push(byte) {
+                return (Some(received), rest);
+            }
+        }
+        (None, rest)
+    }
+
+    /// Takes one byte: the message, if it was completed by it.
+    pub fn push(&mut self, byte: u8) -> Option<Received> {
+        if byte != 0 {
+            if self.overlong {
+                self.counters.discarded_bytes += 1;
+            } else if self.bytes.push(byte).is_err() {
+                self.overlong = true;
+                self.counters.discarded_bytes += self.bytes.len() as u64 + 1;
+                self.bytes.clear();
+            }
+            return None;
+        }
+        if core::mem::take(&mut self.overlong) {
+            self.counters.bad_frames += 1;
+            return None;
+        }
+        if self.bytes.is_empty() {
+            return None; // two zeros in a row: the end of one frame and the start of the next
+        }
+        let length = self.bytes.len() as u64;
+        let outcome = open(&mut self.bytes);
+        self.bytes.clear();
+        match outcome {
+            Opened::Valid(envelope) => return Some(self.accept(envelope)),
+            Opened::OtherVersion => self.counters.other_version += 1,
+            Opened::Damaged => {
+                self.counters.discarded_bytes += length;
+                self.counters.bad_frames += 1;
+            }
+        }
+        None
+    }
+
+    fn accept(&mut self, envelope: Envelope<Message>) -> Received {
+        let Envelope { sequence, message, .. } = envelope;
+        if let Some(expected) = self.expected {
+            self.counters.missing += u64::from(sequence.wrapping_sub(expected));
+        }
+        self.expected = Some(sequence.wrapping_add(1));
+        self.counters.frames += 1;
+        Received { sequence, message }
+    }
+}
+
+/// What became of the bytes between two zero bytes.
+enum Opened {
+    Valid(Envelope<Message>),
+    OtherVersion,
+    Damaged,
+}
+
+/// Undoes COBS, checks the CRC-32 in the last four bytes, then the version in the first, and only then looks inside.
+fn open(bytes: &mut [u8]) -> Opened {
+    let content = cobs::decode_in_place(bytes).ok().and_then(|length| bytes.get(..length));
+    let Some((body, sum)) = content.and_then(<[u8]>::split_last_chunk::<4>) else {
+        return Opened::Damaged;
+    };
+    if CRC.checksum(body) != u32::from_le_bytes(*sum) {
+        return Opened::Damaged;
+    }
+    match body.first() {
+        Some(&VERSION) => match postcard::take_from_bytes(body) {
+            Ok((envelope, _appended_fields)) => Opened::Valid(envelope),
+            Err(_) => Opened::Damaged,
+        },
+        Some(_) => Opened::OtherVersion,
+        None => Opened::Damaged,
+    }
+}
+
+#[cfg(test)]
+#[path = "decode_tests.rs"]
+mod tests;

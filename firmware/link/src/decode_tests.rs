@@ -1,0 +1,174 @@
+use super::*;
+use crate::{ChannelReport, Coefficient, Encoder, Frame, Health, MAX_COEFFICIENTS, MAX_POINTS, Point, Term};
+
+extern crate std;
+use std::vec::Vec as StdVec;
+
+fn log(text: &str) -> Message {
+    Message::Log(text.try_into().unwrap())
+}
+
+fn decode(stream: &[u8]) -> (StdVec<Received>, Counters) {
+    let mut decoder = Decoder::new();
+    let found = stream.iter().filter_map(|&byte| decoder.push(byte)).collect();
+    (found, decoder.counters())
+}
+
+/// The largest channel report there can be: every integer in its longest encoding.
+fn largest() -> Message {
+    let point = Point { n: u64::MAX, sum: u128::MAX, count: u64::MAX };
+    let coefficient =
+        Coefficient { term: Term::RateRandomWalk, value: f64::MIN_POSITIVE, low: f64::MIN, high: f64::MAX };
+    Message::Channel(ChannelReport {
+        channel: u8::MAX,
+        samples: u64::MAX,
+        missing: u64::MAX,
+        points: core::iter::repeat_n(point, MAX_POINTS).collect(),
+        coefficients: core::iter::repeat_n(coefficient, MAX_COEFFICIENTS).collect(),
+    })
+}
+
+/// Numbers from a linear congruential generator (Knuth's MMIX constants), seeded, upper bits only.
+struct Noise(u64);
+
+impl Noise {
+    fn byte(&mut self) -> u8 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 56) as u8
+    }
+}
+
+#[test]
+fn every_message_comes_back_in_order() {
+    let messages = [log("start"), largest(), Message::Health(Health { bursts: 7, ..Health::default() }), log("")];
+    let mut encoder = Encoder::new();
+    let stream: StdVec<u8> = messages.iter().flat_map(|message| encoder.encode(message).unwrap()).collect();
+    let (found, counters) = decode(&stream);
+    assert_eq!(found.iter().map(|r| r.sequence).collect::<StdVec<_>>(), [0, 1, 2, 3]);
+    assert!(found.iter().map(|r| &r.message).eq(&messages));
+    assert_eq!(counters, Counters { frames: 4, ..Counters::default() });
+}
+
+/// The bytes of one short frame worked out by hand: version 1, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is
+/// zlib's of 01 00 03 01 41; COBS puts a length before each stretch without zeros.
+#[test]
+fn a_frame_is_what_the_format_says() {
+    let frame = Encoder::new().encode(&log("A")).unwrap();
+    let [a, b, c, d] = 0xE1C4_20B3_u32.to_le_bytes();
+    assert_eq!(frame.as_slice(), [0, 2, 1, 8, 3, 1, 0x41, a, b, c, d, 0]);
+}
+
+#[test]
+fn frames_may_arrive_in_pieces_of_any_length() {
+    let mut encoder = Encoder::new();
+    let stream: StdVec<u8> = (0..5).flat_map(|_| encoder.encode(&largest()).unwrap()).collect();
+    for piece in [1, 2, 3, 7, 64, 1000, stream.len()] {
+        let mut decoder = Decoder::new();
+        let mut found = 0;
+        for mut bytes in stream.chunks(piece) {
+            loop {
+                let (received, rest) = decoder.feed(bytes);
+                found += usize::from(received.is_some());
+                bytes = rest;
+                if bytes.is_empty() {
+                    break;
+                }
+            }
+        }
+        assert_eq!((found, decoder.counters().bad_frames), (5, 0), "pieces of {piece}");
+    }
+}
+
+/// CRC-32 detects every burst of errors up to 32 bits; a changed byte may besides split or join frames, which must not
+/// cost more than the neighbours it touches.
+#[test]
+fn a_changed_byte_costs_that_frame_and_no_other() {
+    let mut encoder = Encoder::new();
+    let frames: [Frame; 3] = core::array::from_fn(|i| encoder.encode(&log(["before", "hit", "after"][i])).unwrap());
+    let start = frames[0].len();
+    for at in 1..frames[1].len() - 1 {
+        for bit in 0..8 {
+            let mut stream: StdVec<u8> = frames.iter().flatten().copied().collect();
+            stream[start + at] ^= 1 << bit;
+            let (found, counters) = decode(&stream);
+            assert_eq!(found.iter().map(|r| r.sequence).collect::<StdVec<_>>(), [0, 2], "byte {at}, bit {bit}");
+            assert_eq!(counters.missing, 1);
+            assert!((1..=2).contains(&counters.bad_frames));
+        }
+    }
+}
+
+#[test]
+fn noise_between_frames_costs_no_frame() {
+    let mut noise = Noise(1);
+    let mut encoder = Encoder::new();
+    let mut stream = StdVec::new();
+    for round in 0..200 {
+        stream.extend((0..round * 20).map(|_| noise.byte()));
+        stream.extend(encoder.encode(&log("between")).unwrap());
+    }
+    let (found, counters) = decode(&stream);
+    assert_eq!(found.len(), 200);
+    assert_eq!((counters.frames, counters.missing), (200, 0));
+    assert!(counters.bad_frames > 0 && counters.discarded_bytes > 0);
+}
+
+#[test]
+fn a_cut_frame_is_counted_and_the_next_one_read() {
+    let mut encoder = Encoder::new();
+    let [first, second, third]: [Frame; 3] = core::array::from_fn(|_| encoder.encode(&largest()).unwrap());
+    let stream: StdVec<u8> = first.iter().chain(&second[..second.len() / 2]).chain(&third).copied().collect();
+    let (found, counters) = decode(&stream);
+    assert_eq!(found.iter().map(|r| r.sequence).collect::<StdVec<_>>(), [0, 2]);
+    assert_eq!((counters.bad_frames, counters.missing), (1, 1));
+}
+
+#[test]
+fn an_endless_stream_without_zeros_is_bounded_and_counted() {
+    let mut stream = std::vec![0x55; 10 * MAX_FRAME];
+    stream.extend(Encoder::new().encode(&log("still here")).unwrap());
+    let (found, counters) = decode(&stream);
+    assert_eq!(found.len(), 1);
+    assert_eq!((counters.bad_frames, counters.discarded_bytes), (1, 10 * MAX_FRAME as u64));
+}
+
+/// A frame of version 2 with a right checksum, made by hand.
+#[test]
+fn another_version_is_told_from_damage() {
+    let body = [2, 0, 9, 9];
+    let mut content = StdVec::from(body);
+    content.extend(CRC.checksum(&body).to_le_bytes());
+    let mut frame = std::vec![0; 32];
+    let length = cobs::encode(&content, &mut frame);
+    frame.truncate(length + 1);
+    let (found, counters) = decode(&frame);
+    assert!(found.is_empty());
+    assert_eq!(counters, Counters { other_version: 1, ..Counters::default() });
+}
+
+/// Right checksum, wrong content: more points than a report may have, and a variant that does not exist.
+#[test]
+fn a_valid_checksum_over_nonsense_is_a_bad_frame() {
+    for body in [&[VERSION, 0, 1, 1, 1, 0, 0xFF][..], &[VERSION, 0, 200][..], &[VERSION][..]] {
+        let mut content = StdVec::from(body);
+        content.extend(CRC.checksum(body).to_le_bytes());
+        let mut frame = std::vec![0; 32];
+        let length = cobs::encode(&content, &mut frame);
+        frame.truncate(length + 1);
+        let (found, counters) = decode(&frame);
+        assert!(found.is_empty());
+        assert_eq!(counters.bad_frames, 1);
+    }
+}
+
+#[test]
+fn sequence_numbers_wrap_without_a_gap() {
+    let mut encoder = Encoder::new();
+    let mut decoder = Decoder::new();
+    for _ in 0..70_000 {
+        for byte in encoder.encode(&log("")).unwrap() {
+            decoder.push(byte);
+        }
+    }
+    assert_eq!(decoder.counters(), Counters { frames: 70_000, ..Counters::default() });
+}
