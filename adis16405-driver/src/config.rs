@@ -1,0 +1,228 @@
+//! What the part is told to do: gyro range, filter, sample period. Values that it would not accept cannot be built.
+
+use core::fmt;
+
+/// Full scale of the gyroscopes, SENS_AVG bits 10:8.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum GyroRange {
+    /// ±300 °/s, 0.05 °/s per count.
+    #[default]
+    Dps300,
+    /// ±150 °/s, 0.025 °/s per count; needs at least 2² filter taps.
+    Dps150,
+    /// ±75 °/s, 0.0125 °/s per count; needs at least 2⁴ filter taps.
+    Dps75,
+}
+
+impl GyroRange {
+    /// Size of one count in °/s.
+    pub const fn lsb(self) -> f64 {
+        match self {
+            GyroRange::Dps300 => 0.05,
+            GyroRange::Dps150 => 0.025,
+            GyroRange::Dps75 => 0.0125,
+        }
+    }
+
+    /// The least number of filter taps (log2) with which the part accepts this range.
+    pub const fn min_filter_taps_log2(self) -> u8 {
+        match self {
+            GyroRange::Dps300 => 0,
+            GyroRange::Dps150 => 2,
+            GyroRange::Dps75 => 4,
+        }
+    }
+
+    pub(crate) const fn field(self) -> u16 {
+        match self {
+            GyroRange::Dps300 => 0b100,
+            GyroRange::Dps150 => 0b010,
+            GyroRange::Dps75 => 0b001,
+        }
+    }
+}
+
+/// Time base of the sample period, SMPL_PRD bit 7.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TimeBase {
+    /// 0.61035 ms = 1/1638.4 s.
+    Fast,
+    /// 18.921 ms = 31/1638.4 s.
+    Slow,
+}
+
+/// Which SPI clock and stall limits hold. The data sheet (Rev. B, page 10) sets the border at SMPL_PRD = 0x08; Linux
+/// sets it at 0x0A. The stricter is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ClockMode {
+    /// SMPL_PRD ≤ 0x08: SCK up to 2 MHz (1 MHz in a burst), stall at least 9 µs.
+    Normal,
+    /// SMPL_PRD > 0x08: SCK up to 300 kHz; a stall of 75 µs, which no source at hand confirms.
+    LowPower,
+}
+
+/// Internal sample period: `time base · divisor`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SamplePeriod {
+    smpl_prd: u8,
+}
+
+impl SamplePeriod {
+    /// 819.2 samples per second, what the part does after reset (SMPL_PRD = 0x0001).
+    pub const RESET: Self = Self { smpl_prd: 0x01 };
+
+    /// `divisor` = NS + 1 time bases per sample.
+    ///
+    /// # Errors
+    /// If `divisor` is outside 2…128 (fast; 1 would select the external clock) or 1…128 (slow).
+    pub const fn from_divisor(base: TimeBase, divisor: u8) -> Result<Self, ConfigError> {
+        let (least, flag) = match base {
+            TimeBase::Fast => (2, 0x00),
+            TimeBase::Slow => (1, 0x80),
+        };
+        if divisor < least || divisor > 128 {
+            return Err(ConfigError::Divisor { base, divisor });
+        }
+        Ok(Self { smpl_prd: flag | (divisor - 1) })
+    }
+
+    /// The period whose rate is nearest to `hz`, clamped to 0.4129…819.2 samples per second; [`hz`](Self::hz) tells
+    /// what became of it.
+    ///
+    /// # Errors
+    /// If `hz` is not finite and positive.
+    pub fn nearest(hz: f64) -> Result<Self, ConfigError> {
+        if !(hz.is_finite() && hz > 0.0) {
+            return Err(ConfigError::Rate);
+        }
+        let mut best = Self::RESET;
+        for smpl_prd in 0x01..=0xFF {
+            let candidate = Self { smpl_prd };
+            if (candidate.hz() - hz).abs() < (best.hz() - hz).abs() {
+                best = candidate;
+            }
+        }
+        Ok(best)
+    }
+
+    /// From the value of SMPL_PRD; `None` for 0x00, which means an external clock.
+    pub const fn from_register(smpl_prd: u8) -> Option<Self> {
+        if smpl_prd == 0 { None } else { Some(Self { smpl_prd }) }
+    }
+
+    /// The value of SMPL_PRD.
+    pub const fn register(self) -> u8 {
+        self.smpl_prd
+    }
+
+    /// Length in ticks of 1/1638.4 s, an exact integer.
+    pub const fn ticks(self) -> u32 {
+        let divisor = (self.smpl_prd & 0x7F) as u32 + 1;
+        if self.smpl_prd & 0x80 == 0 { divisor } else { 31 * divisor }
+    }
+
+    /// Samples per second.
+    pub const fn hz(self) -> f64 {
+        1638.4 / self.ticks() as f64
+    }
+
+    /// The SPI limits that this period brings.
+    pub const fn clock_mode(self) -> ClockMode {
+        if self.smpl_prd <= 0x08 { ClockMode::Normal } else { ClockMode::LowPower }
+    }
+}
+
+impl Default for SamplePeriod {
+    fn default() -> Self {
+        Self::RESET
+    }
+}
+
+/// A configuration that the part accepts. The default is that of the part after reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Config {
+    range: GyroRange,
+    filter_taps_log2: u8,
+    sample_period: SamplePeriod,
+}
+
+impl Config {
+    /// `filter_taps_log2` is M of SENS_AVG: two cascaded averages of 2^M samples each, none for M = 0.
+    ///
+    /// # Errors
+    /// If M is above 6 or below what `range` needs.
+    pub const fn new(range: GyroRange, filter_taps_log2: u8, sample_period: SamplePeriod) -> Result<Self, ConfigError> {
+        if filter_taps_log2 > 6 || filter_taps_log2 < range.min_filter_taps_log2() {
+            return Err(ConfigError::FilterTaps { range, filter_taps_log2 });
+        }
+        Ok(Self { range, filter_taps_log2, sample_period })
+    }
+
+    /// Gyro range.
+    pub const fn range(self) -> GyroRange {
+        self.range
+    }
+
+    /// M: each filter stage averages 2^M samples.
+    pub const fn filter_taps_log2(self) -> u8 {
+        self.filter_taps_log2
+    }
+
+    /// Sample period.
+    pub const fn sample_period(self) -> SamplePeriod {
+        self.sample_period
+    }
+
+    /// The value of SENS_AVG.
+    pub const fn sens_avg(self) -> u16 {
+        self.range.field() << 8 | self.filter_taps_log2 as u16
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { range: GyroRange::Dps300, filter_taps_log2: 2, sample_period: SamplePeriod::RESET }
+    }
+}
+
+/// Why a configuration was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigError {
+    /// The sample rate is not finite and positive.
+    Rate,
+    /// The divisor does not fit the time base.
+    Divisor {
+        /// Time base asked for.
+        base: TimeBase,
+        /// Divisor asked for.
+        divisor: u8,
+    },
+    /// The number of filter taps is above 2⁶ or too small for the range.
+    FilterTaps {
+        /// Range asked for.
+        range: GyroRange,
+        /// M asked for.
+        filter_taps_log2: u8,
+    },
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            ConfigError::Rate => write!(f, "the sample rate must be a finite number above 0"),
+            ConfigError::Divisor { base: TimeBase::Fast, divisor } => {
+                write!(f, "divisor {divisor} of the 0.61035 ms time base is outside 2 to 128")
+            }
+            ConfigError::Divisor { base: TimeBase::Slow, divisor } => {
+                write!(f, "divisor {divisor} of the 18.921 ms time base is outside 1 to 128")
+            }
+            ConfigError::FilterTaps { range, filter_taps_log2 } => write!(
+                f,
+                "filter taps 2^{filter_taps_log2} are outside 2^{} to 2^6 for {range:?}",
+                range.min_filter_taps_log2()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
