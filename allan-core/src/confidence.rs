@@ -1,0 +1,100 @@
+//! How much a point of the curve is worth: equivalent degrees of freedom and the correlation between octaves.
+//!
+//! C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences" (PTTI 2003), for
+//! second differences taken every `n/P` samples.
+
+use crate::math::{abs, ln, sqrt};
+
+/// What part of a point's variance is due to which power law; the parts sum to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shares {
+    /// Angle quantization, σ² ∝ τ⁻².
+    pub quantization: f64,
+    /// Angle random walk (white rate noise), σ² ∝ τ⁻¹.
+    pub white: f64,
+    /// Bias instability (flicker rate noise), σ² constant.
+    pub flicker: f64,
+    /// Rate random walk and steeper, σ² ∝ τ.
+    pub random_walk: f64,
+}
+
+impl Shares {
+    /// White rate noise alone.
+    pub const WHITE: Self = Self { quantization: 0.0, white: 1.0, flicker: 0.0, random_walk: 0.0 };
+    /// Flicker rate noise alone.
+    pub const FLICKER: Self = Self { quantization: 0.0, white: 0.0, flicker: 1.0, random_walk: 0.0 };
+    /// Random-walk rate noise alone.
+    pub const RANDOM_WALK: Self = Self { quantization: 0.0, white: 0.0, flicker: 0.0, random_walk: 1.0 };
+    /// Angle quantization alone.
+    pub const QUANTIZATION: Self = Self { quantization: 1.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
+
+    /// The pure noise whose `d log σ² / d log τ` is nearest.
+    #[must_use]
+    pub fn of_slope(slope: f64) -> Self {
+        match slope {
+            s if s < -1.5 => Self::QUANTIZATION,
+            s if s < -0.5 => Self::WHITE,
+            s if s < 0.5 => Self::FLICKER,
+            _ => Self::RANDOM_WALK,
+        }
+    }
+
+    /// Correlation of two second differences `distance` averaging times apart.
+    fn correlation(&self, distance: f64) -> f64 {
+        let mut sum = 0.0;
+        if self.white > 0.0 {
+            sum += self.white * normalised_fourth_difference(abs, distance);
+        }
+        if self.flicker > 0.0 {
+            let law = |x: f64| if x == 0.0 { 0.0 } else { x * x * ln(abs(x)) };
+            sum += self.flicker * normalised_fourth_difference(law, distance);
+        }
+        if self.random_walk > 0.0 {
+            sum += self.random_walk * normalised_fourth_difference(|x| abs(x * x * x), distance);
+        }
+        if self.quantization > 0.0 {
+            let law = |x: f64| if x == 0.0 { 1.0 } else { 0.0 };
+            sum += self.quantization * normalised_fourth_difference(law, distance);
+        }
+        sum
+    }
+}
+
+/// The generalised autocovariance of a second difference, from the law of the phase noise.
+fn normalised_fourth_difference(law: impl Fn(f64) -> f64, x: f64) -> f64 {
+    let fourth = |x: f64| 6.0 * law(x) - 4.0 * (law(x - 1.0) + law(x + 1.0)) + law(x - 2.0) + law(x + 2.0);
+    fourth(x) / fourth(0.0)
+}
+
+/// Equivalent degrees of freedom of the mean of `count` squared differences, `overlap` to an averaging time.
+///
+/// At least 1 for a count of at least 1. Differences that a gap separates are counted as if they were neighbours.
+#[must_use]
+pub fn edf(count: u64, overlap: u32, shares: Shares) -> f64 {
+    // Beyond two averaging times only flicker noise correlates; beyond four its square is below 10⁻³.
+    let reach = if shares.flicker > 0.0 { 4 } else { 2 } * u64::from(overlap);
+    let m = count as f64;
+    let mut sum = 0.0;
+    for j in 1..=reach.min(count.saturating_sub(1)) {
+        let rho = shares.correlation(j as f64 / f64::from(overlap));
+        sum += (1.0 - j as f64 / m) * rho * rho;
+    }
+    m / (1.0 + 2.0 * sum)
+}
+
+/// Correlation of the Allan variances of two octaves `lag` octaves apart, for near-full overlap.
+///
+/// Exact for one, two and three octaves and an infinite record; beyond, the last ratio continues.
+pub(crate) fn octave_correlation(lag: usize, a: Shares, b: Shares) -> f64 {
+    const WHITE: [f64; 4] = [1.0, 0.530, 0.187, 0.066];
+    const FLICKER: [f64; 4] = [1.0, 0.689, 0.309, 0.121];
+    const RANDOM_WALK: [f64; 4] = [1.0, 0.888, 0.676, 0.488];
+    let of = |table: [f64; 4]| match table.get(lag) {
+        Some(&value) => value,
+        None => (4..=lag).fold(table[3], |value, _| value * table[3] / table[2]),
+    };
+    // Angle quantization decorrelates faster than white noise, which bounds it from above.
+    sqrt((a.white + a.quantization) * (b.white + b.quantization)) * of(WHITE)
+        + sqrt(a.flicker * b.flicker) * of(FLICKER)
+        + sqrt(a.random_walk * b.random_walk) * of(RANDOM_WALK)
+}

@@ -1,0 +1,81 @@
+//! The classical way to the coefficients: slopes of the curve, read off one after the other.
+//!
+//! Simple, and biased wherever two terms overlap; it is here to stand beside the [`fit`](crate::fit::fit).
+
+use crate::{Curve, Point, math};
+use core::f64::consts::{LN_2, PI};
+use core::ops::RangeInclusive;
+
+/// How far `d log σ / d log τ` between two octaves may be from the slope that is looked for.
+pub const SLOPE_TOLERANCE: f64 = 0.15;
+
+/// Points whose [`percentage_accuracy`] is worse are not looked at.
+pub const WORST_ACCURACY: f64 = 25.0;
+
+/// A coefficient, and the averaging times between which its slope was found, in s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coefficient {
+    /// In the unit of the coefficient's [`Kind`](crate::Kind).
+    pub value: f64,
+    /// First and last averaging time of the interval.
+    pub interval: RangeInclusive<f64>,
+}
+
+/// `100/sqrt(2(N/n − 1))`: the percentage accuracy of a point at averaging factor `n` of a record of `samples`.
+#[must_use]
+pub fn percentage_accuracy(samples: u64, n: u64) -> f64 {
+    100.0 / math::sqrt(2.0 * (samples as f64 / n as f64 - 1.0))
+}
+
+/// N: the value at 1 s of the −½ line through the longest interval that has this slope.
+#[must_use]
+pub fn angle_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
+    on_line(curve, -0.5, 1.0)
+}
+
+/// B: the lowest point of the longest flat interval times `sqrt(π/(2 ln 2))`.
+#[must_use]
+pub fn bias_instability<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
+    let flat = longest_run(curve, 0.0)?;
+    let lowest = flat.iter().map(|point| point.avar).fold(f64::INFINITY, f64::min);
+    Some(Coefficient { value: math::sqrt(lowest * PI / (2.0 * LN_2)), interval: interval(flat) })
+}
+
+/// K: the value at 3 s of the +½ line through the longest interval that has this slope.
+#[must_use]
+pub fn rate_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
+    on_line(curve, 0.5, 3.0)
+}
+
+/// The line of `slope` through the geometric mean of the points of its interval, at `tau` seconds.
+fn on_line<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64, tau: f64) -> Option<Coefficient> {
+    let run = longest_run(curve, slope)?;
+    let at_tau = |point: &Point| math::ln(point.avar) / 2.0 + slope * math::ln(tau / point.tau);
+    let mean = run.iter().map(at_tau).sum::<f64>() / run.len() as f64;
+    Some(Coefficient { value: math::exp(mean), interval: interval(run) })
+}
+
+/// The longest run of neighbouring points joined by `slope`, the first of equals; at least one octave.
+fn longest_run<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64) -> Option<&[Point]> {
+    let usable = |point: &&Point| percentage_accuracy(curve.samples(), point.n) <= WORST_ACCURACY;
+    let points = &curve.points()[..curve.points().iter().take_while(usable).count()];
+    let joined = |pair: &[Point]| {
+        let octaves = math::log2(pair[1].tau / pair[0].tau);
+        math::abs(math::log2(pair[1].avar / pair[0].avar) / 2.0 / octaves - slope) <= SLOPE_TOLERANCE
+    };
+    let mut longest: &[Point] = &[];
+    let mut start = 0;
+    for end in 1..=points.len() {
+        if end == points.len() || !joined(&points[end - 1..=end]) {
+            if end - start > longest.len().max(1) {
+                longest = &points[start..end];
+            }
+            start = end;
+        }
+    }
+    (!longest.is_empty()).then_some(longest)
+}
+
+fn interval(run: &[Point]) -> RangeInclusive<f64> {
+    run[0].tau..=run[run.len() - 1].tau
+}

@@ -1,0 +1,64 @@
+//! Degrees of freedom against the exact table for 2¹⁷ rate samples (Greenhall sums, computed independently).
+
+use allan_core::confidence::{Shares, edf};
+
+const SAMPLES: u64 = 1 << 17;
+
+fn at(n: u64, overlap: u64, shares: Shares) -> f64 {
+    edf((SAMPLES - 2 * n) * overlap / n + 1, overlap as u32, shares)
+}
+
+/// `n`, then edf of the fully overlapping estimator, and the ratio to it for P = 1, 2, 4, 8, 16.
+type Row = (u32, f64, [f64; 5]);
+
+fn assert_table(shares: Shares, table: &[Row], tolerance: f64) {
+    for &(log2_n, full, ratios) in table {
+        for (overlap, ratio) in [1, 2, 4, 8, 16].into_iter().zip(ratios) {
+            let edf = at(1 << log2_n, overlap, shares);
+            // The table has three decimals of the ratio and two of the full edf.
+            let rounding = 0.0006 * full + 0.006 * ratio;
+            assert!(
+                (edf - ratio * full).abs() < rounding + tolerance * edf,
+                "n = 2^{log2_n}, P = {overlap}: {edf} instead of {}",
+                ratio * full
+            );
+        }
+    }
+}
+
+#[test]
+fn white_noise() {
+    let table: [Row; 6] = [
+        (10, 189.75, [0.447, 0.764, 0.929, 0.982, 0.996]),
+        (11, 93.76, [0.450, 0.767, 0.931, 0.983, 0.996]),
+        (12, 45.76, [0.457, 0.773, 0.934, 0.985, 0.997]),
+        (13, 21.78, [0.470, 0.784, 0.942, 0.989, 0.999]),
+        (14, 9.82, [0.499, 0.810, 0.959, 0.998, 1.004]),
+        (15, 4.00, [0.562, 0.862, 0.994, 1.018, 1.015]),
+    ];
+    assert_table(Shares::WHITE, &table, 0.0);
+}
+
+#[test]
+fn flicker_noise() {
+    let table: [Row; 3] = [
+        (10, 147.75, [0.758, 0.974, 0.999, 1.001, 1.000]),
+        (12, 35.59, [0.771, 0.985, 1.004, 1.004, 1.002]),
+        (14, 7.59, [0.832, 1.035, 1.032, 1.018, 1.009]),
+    ];
+    // Correlations beyond four averaging times are left out.
+    assert_table(Shares::FLICKER, &table, 0.004);
+}
+
+#[test]
+fn random_walk_noise() {
+    let table: [Row; 6] = [
+        (10, 117.14, [0.965, 1.002, 1.002, 1.001, 1.000]),
+        (11, 57.80, [0.971, 1.006, 1.004, 1.002, 1.001]),
+        (12, 28.13, [0.983, 1.014, 1.008, 1.004, 1.002]),
+        (13, 13.30, [1.010, 1.030, 1.017, 1.008, 1.004]),
+        (14, 5.90, [1.072, 1.069, 1.037, 1.019, 1.010]),
+        (15, 2.24, [1.238, 1.175, 1.094, 1.048, 1.024]),
+    ];
+    assert_table(Shares::RANDOM_WALK, &table, 0.0);
+}
