@@ -92,7 +92,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     fn slope(&self, k: usize) -> f64 {
         let before = k.saturating_sub(1);
         let after = (k + 1).min(self.points.len() - 1);
-        let rise = math::log2(self.points[after].avar / self.points[before].avar);
+        let rise = math::coarse_log2(self.points[after].avar / self.points[before].avar);
         if after > before && rise.is_finite() { rise / (after - before) as f64 } else { -1.0 }
     }
 }

@@ -27,7 +27,7 @@ pub struct Term {
     pub value: f64,
     /// Lower bound; 0 when the data is compatible with the absence of the term.
     pub low: f64,
-    /// Upper bound, above 0 in any case.
+    /// Upper bound, above 0 wherever there is data.
     pub high: f64,
 }
 

@@ -1,7 +1,8 @@
 //! The only place that calls a floating-point library.
 //!
 //! Always by function, never by method: `x.sqrt()` would be `std`'s on the host and another one on the target.
-//! Every figure here ends in a report, so all of them are `libm`'s, which are the same on host and target.
+//! What ends in a reported figure is `libm`'s, the same to the bit on host and target. `micromath`, small and fast
+//! without a double-precision unit, serves where a coarse answer chooses between few cases.
 
 pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
@@ -15,6 +16,11 @@ pub(crate) fn log2(x: f64) -> f64 {
     libm::log2(x)
 }
 
+/// Base-2 logarithm of a positive ratio of neighbouring variances, within 0.2 over 2⁻⁴ to 2⁴.
+pub(crate) fn coarse_log2(x: f64) -> f64 {
+    f64::from(micromath::F32Ext::log2(x as f32))
+}
+
 pub(crate) fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
@@ -25,4 +31,14 @@ pub(crate) fn ln_gamma(x: f64) -> f64 {
 
 pub(crate) fn abs(x: f64) -> f64 {
     libm::fabs(x)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_coarse_logarithm_keeps_its_bound() {
+        let worst = (-400..=400).map(|k| f64::from(k) / 100.0).map(|log| (super::coarse_log2(log.exp2()) - log).abs());
+        let worst = worst.fold(0.0, f64::max);
+        assert!(worst < 0.2, "{worst}");
+    }
 }

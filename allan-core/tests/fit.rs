@@ -1,0 +1,107 @@
+//! The fit and the read-off against simulated noise whose coefficients are known.
+
+use allan_core::{Cascade, Curve, Kind, Model, check::ModelError, fit::fit, read_off};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const PERIOD: f64 = 0.01;
+/// Counts are a thousandth of the unit, so that rounding adds 10⁻⁶/12 to a white variance of 10⁻² and more.
+const LSB: f64 = 1e-3;
+
+/// White noise `n` in unit·√s and a random walk `k` in unit/√s, as counts.
+fn record(samples: usize, n: f64, k: f64, seed: u64) -> Cascade<20, 8> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = move || -> f64 { StandardNormal.sample(&mut rng) };
+    let (mut cascade, mut walk) = (Cascade::new(), 0.0);
+    for _ in 0..samples {
+        walk += k * PERIOD.sqrt() * normal();
+        let value = walk + n / PERIOD.sqrt() * normal();
+        cascade.push((value / LSB).round() as i32);
+    }
+    cascade
+}
+
+fn curve(cascade: &Cascade<20, 8>) -> Curve<20> {
+    cascade.curve(PERIOD).scaled(LSB)
+}
+
+fn value(model: &Model, kind: Kind) -> allan_core::fit::Term {
+    *model.terms().iter().find(|term| term.kind == kind).expect("a fitted term")
+}
+
+/// 95 % ± four standard deviations of a binomial proportion of 300 trials: 0.95 ± 4·√(0.95·0.05/300).
+const COVERAGE: core::ops::RangeInclusive<f64> = 0.8997..=1.0;
+const RECORDS: u64 = 300;
+
+#[test]
+fn intervals_cover_the_truth() {
+    let (n, k) = (0.05, 0.02);
+    let (mut n_covered, mut k_covered, mut n_ratio) = (0, 0, 0.0);
+    for seed in 0..RECORDS {
+        let model = fit(&curve(&record(1 << 15, n, k, seed)), &[Kind::AngleRandomWalk, Kind::RateRandomWalk]);
+        let (fitted_n, fitted_k) = (value(&model, Kind::AngleRandomWalk), value(&model, Kind::RateRandomWalk));
+        n_covered += u64::from((fitted_n.low..=fitted_n.high).contains(&n));
+        k_covered += u64::from((fitted_k.low..=fitted_k.high).contains(&k));
+        n_ratio += fitted_n.value / n / RECORDS as f64;
+    }
+    let share = |covered: u64| covered as f64 / RECORDS as f64;
+    assert!(COVERAGE.contains(&share(n_covered)), "N covered in {}", share(n_covered));
+    assert!(COVERAGE.contains(&share(k_covered)), "K covered in {}", share(k_covered));
+    // The best possible standard deviation of N is 1/√(2·2¹⁵); 300 records, four deviations, twice that for K's part.
+    assert!((n_ratio - 1.0).abs() < 8.0 / (2.0 * 32_768.0 * RECORDS as f64).sqrt(), "bias of N: {n_ratio}");
+}
+
+#[test]
+fn a_term_that_is_absent_gets_an_upper_bound() {
+    let absent = |seed: u64| {
+        let model = fit(&curve(&record(1 << 14, 0.05, 0.0, 1_000 + seed)), &Kind::DECLARED);
+        let (b, k) = (value(&model, Kind::BiasInstability), value(&model, Kind::RateRandomWalk));
+        assert!(b.high > 0.0 && k.high > 0.0);
+        b.low == 0.0 && k.low == 0.0
+    };
+    let clean = (0..100).filter(|&seed| absent(seed)).count();
+    assert!(clean >= 88, "claimed a term that is not there in {} of 100 records", 100 - clean);
+}
+
+#[test]
+fn a_true_model_scores_about_one_where_it_was_fitted() {
+    // The deviance of 16 correlated points less two parameters: below 2 with a wide margin on average of 50 records.
+    let score = |seed: u64| {
+        let curve = curve(&record(1 << 15, 0.05, 0.02, 2_000 + seed));
+        let model = fit(&curve, &[Kind::AngleRandomWalk, Kind::RateRandomWalk]);
+        ModelError::between(&model, &curve).expect("octaves to compare").deviance_per_point
+    };
+    let mean = (0..50).map(score).sum::<f64>() / 50.0;
+    assert!((0.4..1.3).contains(&mean), "{mean}");
+}
+
+#[test]
+fn the_read_off_finds_the_slopes_where_one_noise_rules() {
+    let white = curve(&record(1 << 17, 0.05, 0.0, 7));
+    let n = read_off::angle_random_walk(&white).expect("a −½ slope");
+    assert!((n.value / 0.05 - 1.0).abs() < 0.05, "{}", n.value);
+    assert_eq!(*n.interval.start(), PERIOD);
+    assert_eq!(read_off::rate_random_walk(&white), None);
+
+    // Points at n = 1 … 4096 of 2¹⁷ samples: the worst, 4096, has 9 % (1σ) by the formula; the mean of the run less.
+    let walk = curve(&record(1 << 17, 0.0, 0.5, 8));
+    let k = read_off::rate_random_walk(&walk).expect("a +½ slope");
+    assert!((k.value / 0.5 - 1.0).abs() < 0.2, "{}", k.value);
+    assert_eq!(read_off::angle_random_walk(&walk), None);
+}
+
+#[test]
+fn percentage_accuracy_is_the_papers_formula() {
+    // 100/√(2(N/n−1)) for an hour at 204.8 SPS: n = 1 and τ = 230 s.
+    assert!((read_off::percentage_accuracy(737_280, 1) - 0.0824).abs() < 5e-5);
+    assert!((read_off::percentage_accuracy(737_280, 47_104) - 18.47).abs() < 5e-3);
+}
+
+#[test]
+fn a_channel_that_never_changes_has_no_noise() {
+    let mut cascade = Cascade::<20, 8>::new();
+    cascade.push_slice(&[5; 1_000]);
+    let model = fit(&cascade.curve(PERIOD), &Kind::DECLARED);
+    assert!(model.terms().iter().all(|term| term.value == 0.0));
+}
