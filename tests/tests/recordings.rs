@@ -1,0 +1,101 @@
+//! Measured recordings through the whole system, against figures that were published for them.
+
+use serde_json::Value;
+use std::path::PathBuf;
+use std::process::Command;
+
+/// The folder with the recordings; `None`, said aloud, where there is none.
+fn recording(file: &str) -> Option<PathBuf> {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+    let folder = std::env::var_os("ADIS_RECORDINGS").map_or_else(|| PathBuf::from(default), PathBuf::from);
+    let path = folder.join(file);
+    if !path.exists() {
+        eprintln!("skipped: {} is absent; ADIS_RECORDINGS names the folder of the recordings", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// Runs the command-line program and returns the bytes of its JSON report.
+fn report(arguments: &[&str], recording: &PathBuf) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let json = folder.path().join("report.json");
+    let (command, options) = arguments.split_first().expect("a subcommand");
+    let output = Command::new(host_sim())
+        .arg(command)
+        .arg(recording)
+        .args(options)
+        .arg("--json")
+        .arg(&json)
+        .arg("--page")
+        .arg(folder.path())
+        .output()
+        .expect("host-sim runs");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    std::fs::read(json).expect("the report")
+}
+
+/// The program, built by cargo as another package's binary is: on demand, in the profile of the tests.
+fn host_sim() -> PathBuf {
+    let build = Command::new(env!("CARGO"))
+        .args(["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "host-sim"])
+        .status()
+        .expect("cargo runs");
+    assert!(build.success(), "host-sim does not build");
+    let test = std::env::current_exe().expect("the path of this test");
+    test.ancestors().nth(2).expect("target/debug").join("host-sim")
+}
+
+fn channel<'a>(report: &'a Value, name: &str) -> &'a Value {
+    let channels = report["channels"].as_array().expect("channels");
+    channels.iter().find(|channel| channel["name"] == name).expect("the channel")
+}
+
+/// Overlapping Allan deviations of gyro X at 0.02, 0.04 … s, as SMAC-Group/avar publishes them for this recording.
+const RUN_1_GYRO_X: [f64; 15] = [
+    0.2575, 0.1928, 0.1395, 0.1000, 0.07115, 0.05107, 0.03612, 0.02589, 0.01830, 0.01321, 0.01002, 0.008274, 0.007063,
+    0.007641, 0.007768,
+];
+
+#[test]
+fn a_static_recording_has_the_published_deviations_on_both_ways() {
+    let Some(run_1) = recording("adis16405-static/run1.csv.gz") else { return };
+    let analysed = report(&["analyze", "--rate", "100"], &run_1);
+    assert_eq!(analysed, report(&["replay", "--rate", "100"], &run_1), "replayed over the bus");
+
+    let report: Value = serde_json::from_slice(&analysed).expect("JSON");
+    assert_eq!(report["schema"], 1);
+    assert_eq!(report["samples"], 1_000_000);
+    assert_eq!(report["dropped"]["gap"], 0);
+    assert_eq!(report["channels"].as_array().map(Vec::len), Some(6));
+    let curve = channel(&report, "gyro_x")["curve"].as_array().expect("a curve");
+    for (k, expected) in RUN_1_GYRO_X.into_iter().enumerate() {
+        let point = &curve[k + 1];
+        let (tau, adev) = (point["tau_s"].as_f64().expect("τ"), point["adev"].as_f64().expect("σ"));
+        assert!((tau - 0.02 * f64::from(1 << k)).abs() < 1e-9);
+        // Full overlap up to n = 8; beyond, the estimator takes every n/8-th window of the published ones, which moves
+        // the estimate by a fraction of its own uncertainty.
+        let tolerance = match point["n"].as_u64() {
+            Some(..=8) => 5e-5,
+            _ if tau <= 1.0 => 0.01 * expected,
+            _ => 0.03 * expected,
+        };
+        assert!((adev - expected).abs() <= tolerance, "τ = {tau} s: {adev} instead of {expected}");
+    }
+}
+
+#[test]
+fn a_burst_recording_with_gaps_and_re_reads_has_the_same_report_on_both_ways() {
+    let Some(launch) = recording("adis16405-burst/launch10.csv.gz") else { return };
+    let analysed = report(&["analyze"], &launch);
+    assert_eq!(analysed, report(&["replay"], &launch), "replayed over the bus");
+
+    let report: Value = serde_json::from_slice(&analysed).expect("JSON");
+    assert_eq!(report["dropped"]["repeated"], 45);
+    assert_eq!(report["samples"], 49_425 - 45);
+    // The median period of the recording is 1.22467 ms; the data sheet's internal rate is 819.2 SPS.
+    let rate = report["sample_rate_hz"].as_f64().expect("a rate");
+    assert!((rate * 1.224_67e-3 - 1.0).abs() < 0.002, "{rate} Hz");
+    assert!(report["dropped"]["gap"].as_u64().expect("gaps") >= 15, "one stall alone lost 15 samples");
+    assert_eq!(report["channels"].as_array().map(Vec::len), Some(12));
+}
