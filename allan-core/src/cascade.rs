@@ -1,5 +1,7 @@
 //! The streaming estimator: integers in, exact sums of squared second differences out.
 
+mod block;
+
 use crate::curve::{Curve, Point};
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
@@ -80,13 +82,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
                 self.accumulate(level + Self::FINE, difference);
             }
             self.rings[level][half][slot] = sum;
-        }
-    }
-
-    /// Takes samples in order.
-    pub fn push_slice(&mut self, samples: &[i32]) {
-        for &sample in samples {
-            self.push(sample);
         }
     }
 

@@ -89,3 +89,21 @@ fn a_channel_at_8_fold_overlap_and_24_octaves_takes_less_than_4_kb() {
     assert!(size_of::<Cascade<24, 8>>() <= 4_000, "{}", size_of::<Cascade<24, 8>>());
     assert!(size_of::<Cascade<24, 4>>() <= 2_400, "{}", size_of::<Cascade<24, 4>>());
 }
+
+proptest! {
+    #[test]
+    fn slices_of_any_length_and_single_samples_are_the_same(
+        slices in prop::collection::vec((prop::collection::vec(any::<i32>(), 0..700), 0..3_u32, 0..32_u32), 1..6)
+    ) {
+        let (mut sliced, mut single) = (Cascade::<9, 8>::new(), Cascade::<9, 8>::new());
+        for (slice, missing, shift) in &slices {
+            let samples: Vec<i32> = slice.iter().map(|sample| sample >> shift).collect();
+            sliced.push_slice(&samples);
+            samples.iter().for_each(|&sample| single.push(sample));
+            sliced.gap(*missing);
+            single.gap(*missing);
+        }
+        // What was learnt, and what is still in the rings.
+        prop_assert!(sliced == single);
+    }
+}
