@@ -1,0 +1,95 @@
+//! The virtual part behind an embedded-hal SPI device, on virtual time.
+
+use std::cell::{Ref, RefCell};
+use std::convert::Infallible;
+use std::rc::Rc;
+
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+
+use super::part::VirtualAdis16405;
+
+/// SCK unless told otherwise: the highest that a burst read allows.
+pub const DEFAULT_SCK_HZ: u32 = 1_000_000;
+
+/// An SPI bus with the virtual part on it. Clones are handles on the same part.
+///
+/// A byte takes eight SCK periods of virtual time, a delay its length; nothing else takes time.
+#[derive(Clone, Debug)]
+pub struct EmulatedBus {
+    part: Rc<RefCell<VirtualAdis16405>>,
+}
+
+impl EmulatedBus {
+    /// Puts the part on a bus with an SCK of 1 MHz.
+    pub fn new(part: VirtualAdis16405) -> Self {
+        Self::with_sck_hz(part, DEFAULT_SCK_HZ)
+    }
+
+    /// Puts the part on a bus with the given SCK in Hz (at least 1).
+    pub fn with_sck_hz(mut part: VirtualAdis16405, sck_hz: u32) -> Self {
+        part.set_sck_hz(Some(sck_hz));
+        Self { part: Rc::new(RefCell::new(part)) }
+    }
+
+    /// A look at the part. Let go of it before the bus is used again.
+    pub fn part(&self) -> Ref<'_, VirtualAdis16405> {
+        self.part.borrow()
+    }
+
+    /// Waits until the next sample is there (the data-ready line rises) and returns the time in ns; `None` if none will
+    /// come.
+    pub fn wait_for_data(&self) -> Option<u64> {
+        let mut part = self.part.borrow_mut();
+        let at_ns = part.next_data_ready();
+        if at_ns == u64::MAX {
+            return None;
+        }
+        part.advance_to(at_ns);
+        Some(at_ns)
+    }
+
+    /// Lets virtual time pass until `ns`.
+    pub fn advance_to(&self, ns: u64) {
+        self.part.borrow_mut().advance_to(ns);
+    }
+}
+
+impl ErrorType for EmulatedBus {
+    type Error = Infallible;
+}
+
+impl SpiDevice<u8> for EmulatedBus {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let mut part = self.part.borrow_mut();
+        part.select();
+        for operation in operations {
+            match operation {
+                Operation::Read(read) => read.fill_with(|| part.transfer_byte(0)),
+                Operation::Write(write) => {
+                    for byte in write.iter() {
+                        part.transfer_byte(*byte);
+                    }
+                }
+                Operation::Transfer(read, write) => {
+                    for index in 0..read.len().max(write.len()) {
+                        let answer = part.transfer_byte(write.get(index).copied().unwrap_or(0));
+                        if let Some(byte) = read.get_mut(index) {
+                            *byte = answer;
+                        }
+                    }
+                }
+                Operation::TransferInPlace(bytes) => {
+                    for byte in bytes.iter_mut() {
+                        *byte = part.transfer_byte(*byte);
+                    }
+                }
+                Operation::DelayNs(ns) => {
+                    let until = part.now() + u64::from(*ns);
+                    part.advance_to(until);
+                }
+            }
+        }
+        part.deselect();
+        Ok(())
+    }
+}

@@ -1,0 +1,239 @@
+//! The virtual part and the real driver against each other. Numbers are those of the data sheet.
+
+use adis16405_driver::{Adis16405, Channel, Config, Counts, Faults, GyroRange, Judge, Register, SamplePeriod};
+
+use super::{EmulatedBus, NoiseModel, ViolationKind, VirtualAdis16405};
+
+fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
+    Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
+}
+
+fn on_bus(model: NoiseModel, config: Config) -> (EmulatedBus, Adis16405<EmulatedBus>) {
+    let bus = EmulatedBus::new(VirtualAdis16405::new(model, 1));
+    let mut imu = Adis16405::new(bus.clone(), config);
+    imu.init().unwrap();
+    (bus, imu)
+}
+
+#[test]
+fn the_driver_configures_the_part_without_a_violation() {
+    for config in [config(GyroRange::Dps300, 2, 1), config(GyroRange::Dps75, 6, 7), config(GyroRange::Dps150, 3, 8)] {
+        let (bus, mut imu) = on_bus(NoiseModel::paper(), config);
+        assert_eq!(imu.read_register(Register::ProdId), Ok(16405));
+        assert_eq!(imu.read_register(Register::SmplPrd), Ok(u16::from(config.sample_period().register())));
+        assert_eq!(imu.read_register(Register::SensAvg), Ok(config.sens_avg()));
+        assert_eq!(bus.part().violations(), []);
+    }
+}
+
+#[test]
+fn low_power_mode_needs_a_slow_clock() {
+    let slow = config(GyroRange::Dps300, 2, 15);
+    let bus = EmulatedBus::with_sck_hz(VirtualAdis16405::new(NoiseModel::paper(), 1), 300_000);
+    let mut imu = Adis16405::new(bus.clone(), slow);
+    imu.init().unwrap();
+    bus.wait_for_data();
+    imu.burst().unwrap();
+    assert_eq!(bus.part().violations(), []);
+
+    let (bus, _) = on_bus(NoiseModel::paper(), slow);
+    let kind = bus.part().violations()[0].kind;
+    assert_eq!(kind, ViolationKind::Clock { sck_hz: 1_000_000, most_hz: 300_000 });
+}
+
+#[test]
+fn the_driver_reads_what_the_part_sampled() {
+    let (bus, mut imu) = on_bus(NoiseModel::paper(), config(GyroRange::Dps300, 0, 7));
+    let mut judge = Judge::default();
+    let mut negative = 0;
+    for _ in 0..5000 {
+        bus.wait_for_data();
+        let sampled = bus.part().counts();
+        let burst = imu.burst().unwrap();
+        assert_eq!(burst.counts(), sampled);
+        assert!(judge.judge(&burst).usable);
+        negative += sampled.as_array().iter().filter(|count| **count < 0).count();
+    }
+    assert!(negative > 5000, "z senses −1 g, gyros are often below 0: {negative}");
+    assert_eq!(bus.part().samples(), 5000);
+    assert_eq!(bus.part().violations(), []);
+}
+
+#[test]
+fn samples_come_at_the_programmed_instants() {
+    // SMPL_PRD is not written (reset value 1), so sample k is at k·2/1638.4 s = k·1220703.125 ns.
+    let (bus, _) = on_bus(NoiseModel::still(), config(GyroRange::Dps300, 2, 1));
+    let taken = bus.part().samples();
+    for k in taken + 1..=100_000 {
+        let expected = (u128::from(k) * 2_000_000_000 * 10).div_ceil(16_384);
+        assert_eq!(u128::from(bus.wait_for_data().unwrap()), expected);
+    }
+}
+
+#[test]
+fn a_new_period_counts_from_the_write() {
+    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    for (smpl_prd, period_ns) in [(0x07, 4_882_812.5), (0x81, 2.0 * 31.0 * 610_351.562_5)] {
+        part.select();
+        part.transfer(0xB600 | smpl_prd);
+        part.deselect();
+        assert!(((part.next_data_ready() - part.now()) as f64 - period_ns).abs() <= 1.0, "{smpl_prd:#04x}");
+        part.advance_to(part.now() + 20_000);
+    }
+    part.select();
+    part.transfer(0xB600);
+    part.deselect();
+    assert_eq!(part.next_data_ready(), u64::MAX, "SMPL_PRD = 0 waits for an external clock");
+}
+
+#[test]
+fn new_data_is_shown_once() {
+    let (bus, mut imu) = on_bus(NoiseModel::paper(), Config::default());
+    bus.wait_for_data();
+    assert_eq!(imu.burst().unwrap().faults(), Faults::empty());
+    assert_eq!(imu.burst().unwrap().faults(), Faults::NO_NEW_DATA);
+    bus.wait_for_data();
+    assert!(imu.read_register(Register::TempOut).unwrap() >= 0x8000);
+    let burst = imu.burst().unwrap();
+    assert!(!burst.words[Channel::Temp as usize].new_data(), "read singly before");
+    assert!(burst.words[Channel::AuxAdc as usize].new_data());
+}
+
+#[test]
+fn answers_come_one_frame_later() {
+    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    let mut answers = Vec::new();
+    for word in [0x5600, 0x3800, 0x5700, 0x0000] {
+        part.select();
+        answers.push(part.transfer(word));
+        part.deselect();
+        part.advance_to(part.now() + 9_000);
+    }
+    assert_eq!(answers[1..], [0x4015, 0x0402, 0x4015]);
+    assert_eq!(part.violations(), []);
+}
+
+#[test]
+fn offsets_read_back_sign_extended_and_act_on_the_output() {
+    let (bus, mut imu) = on_bus(NoiseModel::still(), Config::default());
+    imu.write_register(Register::YgyroOff, (-56i16) as u16).unwrap();
+    imu.write_register(Register::ZacclOff, 10).unwrap();
+    assert_eq!(imu.read_register(Register::YgyroOff), Ok(0xFFC8));
+    bus.wait_for_data();
+    let counts = imu.burst().unwrap().counts();
+    assert_eq!(counts.gyro(), [0, -14, 0], "−56 · 0.0125 deg/s");
+    assert_eq!(counts.accl(), [0, 0, -290], "−1 g is −300 counts");
+}
+
+#[test]
+fn a_software_reset_restores_and_takes_time() {
+    let (bus, mut imu) = on_bus(NoiseModel::still(), config(GyroRange::Dps75, 4, 7));
+    imu.write_register(Register::GlobCmd, 0x80).unwrap();
+    imu.read_register(Register::ProdId).unwrap();
+    let at = bus.part().now();
+    assert!(bus.part().violations().iter().all(|violation| violation.kind == ViolationKind::Busy));
+    assert_eq!(bus.part().violation_count(), 2);
+    bus.advance_to(at + 100_000_000);
+    assert_eq!(imu.read_register(Register::SmplPrd), Ok(0x0001));
+    assert_eq!(imu.read_register(Register::SensAvg), Ok(0x0402));
+    assert_eq!(bus.part().violation_count(), 2);
+}
+
+#[test]
+fn diagnosis_alarms_and_clears_on_read() {
+    let mut model = NoiseModel::still();
+    model.channel_mut(Channel::Supply).bias = 4.5;
+    let (bus, mut imu) = on_bus(model, Config::default());
+    bus.wait_for_data();
+    assert_eq!(imu.burst().unwrap().faults(), Faults::SUPPLY | Faults::ERROR_ALARM);
+    assert_eq!(imu.read_register(Register::DiagStat), Ok(0x0001));
+    assert_eq!(imu.read_register(Register::DiagStat), Ok(0x0000));
+    bus.wait_for_data();
+    assert_eq!(imu.read_register(Register::DiagStat), Ok(0x0001), "it persists, so the next sample brings it back");
+}
+
+#[test]
+fn bad_use_of_the_bus_is_recorded() {
+    let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::still(), 1));
+    let mut hasty = Adis16405::new(bus.clone(), Config::default()).with_stall_ns(8_999);
+    hasty.read_register(Register::ProdId).unwrap();
+    let kind = ViolationKind::Stall { stall_ns: 8_999, least_ns: 9_000 };
+    assert_eq!(bus.part().violations().iter().map(|violation| violation.kind).collect::<Vec<_>>(), [kind]);
+
+    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    part.transfer(0x5600);
+    part.select();
+    part.transfer_byte(0x56);
+    part.deselect();
+    part.select();
+    part.transfer(0x3E00);
+    part.transfer(0x0000);
+    part.deselect();
+    part.set_sck_hz(Some(2_000_001));
+    part.advance_to(1_000_000);
+    part.select();
+    part.transfer(0x5600);
+    part.deselect();
+    let kinds: Vec<_> = part.violations().iter().map(|violation| violation.kind).collect();
+    assert_eq!(
+        kinds,
+        [
+            ViolationKind::NotSelected,
+            ViolationKind::NotSelected,
+            ViolationKind::FrameLength { bytes: 1 },
+            ViolationKind::FrameLength { bytes: 4 },
+            ViolationKind::Clock { sck_hz: 2_000_001, most_hz: 2_000_000 },
+        ]
+    );
+}
+
+#[test]
+fn an_invalid_range_and_filter_is_recorded_with_the_sample() {
+    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    part.select();
+    part.transfer(0xB901);
+    part.deselect();
+    assert_eq!(part.violations(), []);
+    part.advance_to(part.next_data_ready());
+    assert_eq!(part.violations()[0].kind, ViolationKind::Configuration { sens_avg: 0x0102 });
+}
+
+#[test]
+fn the_range_scales_the_gyros_only() {
+    let mut model = NoiseModel::still();
+    model.channel_mut(Channel::GyroZ).bias = -12.5;
+    for (range, expected) in [(GyroRange::Dps300, -250), (GyroRange::Dps150, -500), (GyroRange::Dps75, -1000)] {
+        let (bus, mut imu) = on_bus(model.clone(), config(range, 4, 1));
+        bus.wait_for_data();
+        // 5 V, 36 °C and 0.5 V in counts of 2.418 mV, 0.14 °C from 25 °C, and 0.806 mV.
+        let still = [2068, 0, 0, expected, 0, 0, -300, 400, 0, 860, 79, 620];
+        assert_eq!(imu.burst().unwrap().counts(), Counts::new(still));
+    }
+}
+
+#[test]
+fn white_noise_has_the_declared_size() {
+    let mut model = NoiseModel::still();
+    for channel in [Channel::GyroX, Channel::GyroY, Channel::GyroZ] {
+        model.channel_mut(channel).angle_random_walk = 0.0368;
+    }
+    const SAMPLES: u32 = 200_000;
+    for (taps, shrink) in [(0, 1.0), (2, 44.0 / 256.0)] {
+        let (bus, mut imu) = on_bus(model.clone(), config(GyroRange::Dps300, taps, 7));
+        let mut squares = [0.0; 3];
+        for _ in 0..SAMPLES {
+            bus.wait_for_data();
+            for (sum, count) in squares.iter_mut().zip(imu.burst().unwrap().counts().gyro()) {
+                *sum += f64::from(count).powi(2);
+            }
+        }
+        // N·√fs in counts; two averages of four weigh 1 2 3 4 3 2 1 of 16; rounding adds a twelfth of a count squared.
+        let expected = shrink * (0.0368 / 0.05f64).powi(2) * 204.8 + 1.0 / 12.0;
+        // The variance of n independent values is known to √(2/n); seven neighbours are correlated at most.
+        let tolerance = 5.0 * (2.0 * if taps == 0 { 1.0 } else { 7.0 } / f64::from(SAMPLES)).sqrt();
+        for square in squares {
+            let variance = square / f64::from(SAMPLES);
+            assert!((variance / expected - 1.0).abs() < tolerance, "{variance} counts², expected {expected}");
+        }
+    }
+}
