@@ -39,8 +39,8 @@ impl Shares {
         }
     }
 
-    /// Correlation of two second differences `distance` averaging times apart.
-    fn correlation(&self, distance: f64) -> f64 {
+    /// Correlation of two second differences `distance` averaging times of `n` samples apart.
+    fn correlation(&self, distance: f64, n: u64) -> f64 {
         let mut sum = 0.0;
         if self.white > 0.0 {
             sum += self.white * normalised_fourth_difference(abs, distance);
@@ -50,7 +50,10 @@ impl Shares {
             sum += self.flicker * normalised_fourth_difference(law, distance);
         }
         if self.random_walk > 0.0 {
-            sum += self.random_walk * normalised_fourth_difference(|x| abs(x * x * x), distance);
+            // The double sum of white noise: |k|³ − |k| at a lag of k samples.
+            let per_sample = 1.0 / (n as f64 * n as f64);
+            let law = |x: f64| abs(x) * (x * x - per_sample);
+            sum += self.random_walk * normalised_fourth_difference(law, distance);
         }
         if self.quantization > 0.0 {
             let law = |x: f64| if x == 0.0 { 1.0 } else { 0.0 };
@@ -66,17 +69,18 @@ fn normalised_fourth_difference(law: impl Fn(f64) -> f64, x: f64) -> f64 {
     fourth(x) / fourth(0.0)
 }
 
-/// Equivalent degrees of freedom of the mean of `count` squared differences, `overlap` to an averaging time.
+/// Equivalent degrees of freedom of the mean of `count` squared differences at averaging factor `n`, `overlap` to an
+/// averaging time.
 ///
 /// At least 1 for a count of at least 1. Differences that a gap separates are counted as if they were neighbours.
 #[must_use]
-pub fn edf(count: u64, overlap: u32, shares: Shares) -> f64 {
+pub fn edf(n: u64, count: u64, overlap: u32, shares: Shares) -> f64 {
     // Beyond two averaging times only flicker noise correlates; beyond four its square is below 10⁻³.
     let reach = if shares.flicker > 0.0 { 4 } else { 2 } * u64::from(overlap);
     let m = count as f64;
     let mut sum = 0.0;
     for j in 1..=reach.min(count.saturating_sub(1)) {
-        let rho = shares.correlation(j as f64 / f64::from(overlap));
+        let rho = shares.correlation(j as f64 / f64::from(overlap), n);
         sum += (1.0 - j as f64 / m) * rho * rho;
     }
     m / (1.0 + 2.0 * sum)

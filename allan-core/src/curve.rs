@@ -82,7 +82,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
 
     fn set_confidence(&mut self, mut shares: impl FnMut(&Point) -> Shares) {
         for point in &mut self.points {
-            point.edf = edf(point.count, point.overlap, shares(point));
+            point.edf = edf(point.n, point.count, point.overlap, shares(point));
             point.low = point.avar * point.edf / chi_square::quantile(0.975, point.edf);
             point.high = point.avar * point.edf / chi_square::quantile(0.025, point.edf);
         }

@@ -5,7 +5,7 @@ use allan_core::confidence::{Shares, edf};
 const SAMPLES: u64 = 1 << 17;
 
 fn at(n: u64, overlap: u64, shares: Shares) -> f64 {
-    edf((SAMPLES - 2 * n) * overlap / n + 1, overlap as u32, shares)
+    edf(n, (SAMPLES - 2 * n) * overlap / n + 1, overlap as u32, shares)
 }
 
 /// `n`, then edf of the fully overlapping estimator, and the ratio to it for P = 1, 2, 4, 8, 16.
@@ -61,4 +61,19 @@ fn random_walk_noise() {
         (15, 2.24, [1.238, 1.175, 1.094, 1.048, 1.024]),
     ];
     assert_table(Shares::RANDOM_WALK, &table, 0.0);
+}
+
+#[test]
+fn short_averaging_times() {
+    // edf·n/N of an infinite record, exact for sampled noise, full overlap at n = 1, 2, 4, 8.
+    let many = 1 << 40;
+    let per_sample = |n, shares| edf(n, many, n as u32, shares) * n as f64 / many as f64;
+    assert!((per_sample(1, Shares::WHITE) - 2.0 / 3.0).abs() < 1e-6);
+    assert!((per_sample(2, Shares::WHITE) - 8.0 / 7.0).abs() < 1e-6);
+    assert!((per_sample(8, Shares::WHITE) - 1.4713).abs() < 5e-5);
+    assert!((per_sample(1, Shares::QUANTIZATION) - 18.0 / 35.0).abs() < 1e-6);
+    for (n, kappa) in [(1, 1.0), (2, 1.0286), (4, 0.957), (8, 0.9348)] {
+        let found = per_sample(n, Shares::RANDOM_WALK);
+        assert!((found - kappa).abs() < 6e-4, "n = {n}: {found}");
+    }
 }
