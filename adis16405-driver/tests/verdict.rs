@@ -51,7 +51,7 @@ fn a_repetition_is_six_equal_inertial_words() {
     assert!(judge.judge(&burst(|_| ())).usable);
     let repeated = judge.judge(&burst(|counts| counts[10] = 21));
     assert_eq!(repeated.faults, Faults::REPEATED);
-    assert!(!repeated.usable);
+    assert!(repeated.usable, "new data may equal the last by chance");
     assert!(judge.judge(&burst(|counts| counts[6] += 1)).usable);
 
     let mut stale = burst(|counts| counts[6] += 1);
@@ -59,7 +59,7 @@ fn a_repetition_is_six_equal_inertial_words() {
     assert_eq!(judge.judge(&stale).faults, Faults::REPEATED | Faults::NO_NEW_DATA);
 
     let counters = judge.counters();
-    assert_eq!((counters.bursts, counters.unusable), (4, 2));
+    assert_eq!((counters.bursts, counters.unusable), (4, 1));
     assert_eq!(counters.get(Faults::REPEATED), 2);
     let seen: Vec<_> = counters.by_cause().filter(|(_, count)| *count > 0).collect();
     assert_eq!(seen, [("no_new_data", 1), ("repeated", 2)]);
