@@ -1,1 +1,24 @@
+//! The noise observatory without hardware: a virtual ADIS16405, recordings, replay, analysis and reports.
+//!
+//! ```text
+//! sensor (virtual part) ─► record ─┐
+//! source (files) ─► replay (bus) ──┼─► recording ─► timeline ─► analysis ─► report ─► terminal, page, JSON
+//! source (files) ──────────────────┘
+//! ```
+//!
+//! Wherever samples come from, the words are judged by the driver's code and the statistics are those of `allan-core`.
 
+pub mod analysis;
+pub mod cli;
+pub mod coefficients;
+pub mod page;
+pub mod plot;
+pub mod record;
+pub mod recording;
+pub mod replay;
+pub mod report;
+pub mod sensor;
+pub mod source;
+pub mod terminal;
+pub mod timeline;
+pub mod wording;

@@ -1,1 +1,119 @@
-fn main() {}
+//! The command line: one recording in, one report out.
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use host_sim::analysis::analyze;
+use host_sim::cli::{Cli, Command, Input, Output};
+use host_sim::record::Simulation;
+use host_sim::recording::Recording;
+use host_sim::replay::replay;
+use host_sim::report::Report;
+use host_sim::source::csv;
+use host_sim::timeline::Timeline;
+use host_sim::{page, terminal};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Where the page goes when nobody says otherwise.
+const DEFAULT_PAGE: &str = "report";
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        // Whoever read the report has seen enough, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Nothing is left to tell if standard error is closed too.
+            let _ = writeln!(io::stderr(), "error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(mut cli: Cli) -> Result<()> {
+    let report = match &cli.command {
+        None => {
+            cli.output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
+            let simulation = cli.simulate.simulation(3600.0);
+            report(&simulate(simulation, None)?, None).context("virtual sensor")?
+        }
+        Some(Command::Record { out, simulate: arguments }) => {
+            let recording = simulate(arguments.simulation(60.0), Some(out))?;
+            report(&recording, None).context("virtual sensor")?
+        }
+        Some(Command::Analyze(input)) => {
+            let recording = csv::read(&input.file, input.range.into())?;
+            report_of(input, &recording)?
+        }
+        Some(Command::Replay(input)) => {
+            let replayed = replay(&input.file, input.range.into())?;
+            if replayed.other_transactions > 0 {
+                note(format_args!("{} transactions that are no bursts", replayed.other_transactions));
+            }
+            report_of(input, &replayed.recording)?
+        }
+    };
+    write(&report, &cli.output)
+}
+
+fn simulate(simulation: Simulation, log: Option<&Path>) -> Result<Recording> {
+    let bar = ProgressBar::new(simulation.samples()?);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} samples, {eta} left") {
+        bar.set_style(style);
+    }
+    bar.set_message("virtual ADIS16405");
+    let progress = |taken| bar.set_position(taken);
+    let recording = match log {
+        Some(file) => simulation.run_logged(file, progress),
+        None => simulation.run(progress),
+    };
+    bar.finish_and_clear();
+    Ok(recording?)
+}
+
+fn report_of(input: &Input, recording: &Recording) -> Result<Report> {
+    report(recording, input.rate).with_context(|| input.file.display().to_string())
+}
+
+fn report(recording: &Recording, rate: Option<f64>) -> Result<Report> {
+    let timeline = Timeline::of(recording, rate)?;
+    for (cause, count) in &timeline.flagged {
+        note(format_args!("{count} samples used that are flagged {cause}"));
+    }
+    Ok(analyze(recording, &timeline))
+}
+
+fn write(report: &Report, output: &Output) -> Result<()> {
+    if let Some(file) = &output.json {
+        write_json(report, file).with_context(|| file.display().to_string())?;
+    }
+    let page = output.page.as_ref().map(|dir| page::write(report, dir)).transpose()?;
+    let mut out = BufWriter::new(io::stdout().lock());
+    terminal::write(report, &mut out)?;
+    if let Some(page) = page {
+        writeln!(out, "page: {}", page.display())?;
+    }
+    out.flush()?;
+    Ok(())
+}
+
+fn write_json(report: &Report, file: &Path) -> Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
+    serde_json::to_writer_pretty(&mut out, report)?;
+    writeln!(out)?;
+    out.flush()?;
+    Ok(())
+}
+
+fn note(text: std::fmt::Arguments<'_>) {
+    // A note that cannot be shown is no reason to stop.
+    let _ = writeln!(io::stderr(), "note: {text}");
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
+}

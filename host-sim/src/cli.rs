@@ -1,0 +1,106 @@
+//! What can be said on the command line.
+
+use crate::record::Simulation;
+use adis16405_driver::GyroRange;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Noise analysis of the ADIS16405 inertial sensor, with a virtual sensor, recordings and replay.
+///
+/// Without a command: one simulated hour of the virtual sensor, its report here and as a page in `report`.
+#[derive(Debug, Parser)]
+#[command(name = "host-sim", version)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// What to simulate without a command.
+    #[command(flatten)]
+    pub simulate: Simulate,
+    /// Where the report goes besides the terminal.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Analyse a table of register counts (CSV, plain or gzip).
+    Analyze(Input),
+    /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
+    Replay(Input),
+    /// Write every bus transaction of the virtual sensor to an SPI frame log, then analyse what was read.
+    Record {
+        /// The log to write; gzip if it ends in .gz.
+        out: PathBuf,
+        /// What to simulate.
+        #[command(flatten)]
+        simulate: Simulate,
+    },
+}
+
+/// A recording.
+#[derive(Debug, Args)]
+pub struct Input {
+    /// The recording.
+    pub file: PathBuf,
+    /// Sample rate in Hz; overrides what the time stamps say.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub rate: Option<f64>,
+    /// Gyro range in which the recording was taken, deg/s.
+    #[arg(long, value_enum, default_value = "300")]
+    pub range: Range,
+}
+
+/// Full scale of the gyros.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Range {
+    /// 0.05 deg/s per count.
+    #[value(name = "300")]
+    Dps300,
+    /// 0.025 deg/s per count.
+    #[value(name = "150")]
+    Dps150,
+    /// 0.0125 deg/s per count.
+    #[value(name = "75")]
+    Dps75,
+}
+
+impl From<Range> for GyroRange {
+    fn from(range: Range) -> Self {
+        match range {
+            Range::Dps300 => GyroRange::Dps300,
+            Range::Dps150 => GyroRange::Dps150,
+            Range::Dps75 => GyroRange::Dps75,
+        }
+    }
+}
+
+/// The virtual sensor's time and noise.
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Virtual time in s [default: 60 for `record`, else 3600].
+    #[arg(long, allow_negative_numbers = true)]
+    pub seconds: Option<f64>,
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+impl Simulate {
+    /// With `default_s` seconds unless told otherwise.
+    pub fn simulation(&self, default_s: f64) -> Simulation {
+        Simulation { seconds: self.seconds.unwrap_or(default_s), seed: self.seed }
+    }
+}
+
+/// Where the report goes.
+#[derive(Debug, Args)]
+pub struct Output {
+    /// Write the report as JSON.
+    #[arg(long, value_name = "OUT", global = true)]
+    pub json: Option<PathBuf>,
+    /// Write the report as a page into this folder.
+    #[arg(long, value_name = "DIR", global = true)]
+    pub page: Option<PathBuf>,
+}

@@ -1,0 +1,178 @@
+//! Logs of the SPI bus: one line a transaction (chip select low), `time_s,mosi,miso`, bytes in hexadecimal.
+//!
+//! Times are written with as many digits as they need to be read back exactly.
+
+use super::table::{self, Table};
+use super::{InputError, Reason};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// First line of every log.
+pub const HEADER: &str = "time_s,mosi,miso";
+
+const TIME: &str = "time_s";
+const MOSI: &str = "mosi";
+const MISO: &str = "miso";
+
+/// What crossed the bus while chip select was low.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame {
+    /// When chip select went low, s.
+    pub time_s: f64,
+    /// Bytes to the part; an even number.
+    pub mosi: Vec<u8>,
+    /// Bytes from the part; as many.
+    pub miso: Vec<u8>,
+}
+
+/// An open log, read frame by frame.
+pub struct Frames {
+    file: PathBuf,
+    table: Table,
+    line: u64,
+    last_s: f64,
+}
+
+impl Frames {
+    /// Opens a log, plain or gzip.
+    ///
+    /// # Errors
+    /// The file cannot be read or does not start with [`HEADER`].
+    pub fn open(file: &Path) -> Result<Self, InputError> {
+        let mut table = Table::open(file)?;
+        match table.next()? {
+            None => Err(InputError::file(file, Reason::Empty)),
+            Some((_, HEADER)) => {
+                Ok(Self { file: file.to_owned(), table, line: 1, last_s: f64::NEG_INFINITY })
+            }
+            Some((line, _)) => Err(InputError::line(file, line, Reason::NotFrameLog)),
+        }
+    }
+
+    /// Line of the frame that was read last, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// The next frame; `None` at the end of the log.
+    ///
+    /// # Errors
+    /// A line is not two equally long rows of 16-bit words at a finite time that is not before the last.
+    #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
+    pub fn next(&mut self) -> Result<Option<Frame>, InputError> {
+        let Some((line, text)) = self.table.next()? else {
+            return Ok(None);
+        };
+        let frame = parse(text, self.last_s).map_err(|(column, reason)| match column {
+            Some(column) => InputError::field(&self.file, line, column, reason),
+            None => InputError::line(&self.file, line, reason),
+        })?;
+        self.line = line;
+        self.last_s = frame.time_s;
+        Ok(Some(frame))
+    }
+}
+
+fn parse(text: &str, last_s: f64) -> Result<Frame, (Option<&'static str>, Reason)> {
+    let fields: Vec<&str> = text.split(',').map(table::field).collect();
+    let &[time, mosi, miso] = fields.as_slice() else {
+        return Err((None, Reason::FieldCount { found: fields.len(), expected: 3 }));
+    };
+    let time_s = table::time(time).map_err(|reason| (Some(TIME), reason))?;
+    if time_s < last_s {
+        return Err((Some(TIME), Reason::TimeBackwards { before: last_s, now: time_s }));
+    }
+    let mosi = bytes(mosi).map_err(|reason| (Some(MOSI), reason))?;
+    let miso = bytes(miso).map_err(|reason| (Some(MISO), reason))?;
+    if mosi.len() != miso.len() {
+        return Err((None, Reason::UnequalLengths { mosi: mosi.len(), miso: miso.len() }));
+    }
+    if mosi.is_empty() || mosi.len() % 2 == 1 {
+        return Err((None, Reason::OddBytes(mosi.len())));
+    }
+    Ok(Frame { time_s, mosi, miso })
+}
+
+fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
+    let nibble = |digit: u8| (digit as char).to_digit(16).map(|value| value as u8);
+    if text.len() % 2 == 1 {
+        return Err(Reason::NotHex(table::quote(text)));
+    }
+    text.as_bytes()
+        .chunks_exact(2)
+        .map(|pair| Some(nibble(pair[0])? << 4 | nibble(pair[1])?))
+        .collect::<Option<Vec<u8>>>()
+        .ok_or_else(|| Reason::NotHex(table::quote(text)))
+}
+
+/// A log that is being written; gzip if the name ends in `.gz`.
+#[derive(Debug)]
+pub struct FrameLog {
+    sink: Sink,
+    line: String,
+}
+
+#[derive(Debug)]
+enum Sink {
+    Plain(BufWriter<File>),
+    Gzip(GzEncoder<BufWriter<File>>),
+}
+
+impl FrameLog {
+    /// Creates `file` and writes the header.
+    ///
+    /// # Errors
+    /// As the operating system answers.
+    pub fn create(file: &Path) -> io::Result<Self> {
+        let plain = BufWriter::new(File::create(file)?);
+        let sink = if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz")) {
+            Sink::Gzip(GzEncoder::new(plain, Compression::default()))
+        } else {
+            Sink::Plain(plain)
+        };
+        let mut log = Self { sink, line: String::from(HEADER) };
+        log.write_line()?;
+        Ok(log)
+    }
+
+    /// Adds one frame.
+    ///
+    /// # Errors
+    /// As the operating system answers.
+    pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
+        self.line.clear();
+        // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
+        let _ = write!(self.line, "{},", frame.time_s);
+        for byte in &frame.mosi {
+            let _ = write!(self.line, "{byte:02X}");
+        }
+        self.line.push(',');
+        for byte in &frame.miso {
+            let _ = write!(self.line, "{byte:02X}");
+        }
+        self.write_line()
+    }
+
+    /// Writes what is buffered and closes the file; without it a gzip log is truncated.
+    ///
+    /// # Errors
+    /// As the operating system answers.
+    pub fn finish(self) -> io::Result<()> {
+        match self.sink {
+            Sink::Plain(mut plain) => plain.flush(),
+            Sink::Gzip(gzip) => gzip.finish()?.flush(),
+        }
+    }
+
+    fn write_line(&mut self) -> io::Result<()> {
+        self.line.push('\n');
+        match &mut self.sink {
+            Sink::Plain(plain) => plain.write_all(self.line.as_bytes()),
+            Sink::Gzip(gzip) => gzip.write_all(self.line.as_bytes()),
+        }
+    }
+}

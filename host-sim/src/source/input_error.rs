@@ -1,0 +1,174 @@
+//! What is wrong with an input file, and where.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file that cannot be used. Its `Display` is one line: file, line, column, reason.
+#[derive(Debug)]
+pub struct InputError {
+    /// As the user named it.
+    pub file: PathBuf,
+    /// Counted from 1, the header included; absent when the file as a whole is at fault.
+    pub line: Option<u64>,
+    /// Name of the column, where one column is at fault.
+    pub column: Option<String>,
+    /// What is wrong there.
+    pub reason: Reason,
+}
+
+/// Why a file, a line or a field is refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The operating system's answer.
+    #[error("{0}")]
+    Io(io::Error),
+    /// A folder where a file is expected.
+    #[error("is a directory, not a file")]
+    Directory,
+    /// Not a single byte, or only blank lines.
+    #[error("the file is empty")]
+    Empty,
+    /// A header and nothing after it.
+    #[error("no data after the header")]
+    NoData,
+    /// The gzip stream ends before its trailer.
+    #[error("truncated gzip: the compressed data end early")]
+    TruncatedGzip,
+    /// The gzip stream is damaged.
+    #[error("damaged gzip: {0}")]
+    DamagedGzip(io::Error),
+    /// Bytes that are no text.
+    #[error("not UTF-8 text")]
+    NotText,
+    /// More bytes without a line end than a row can have.
+    #[error("the line is longer than 65536 bytes")]
+    LongLine,
+    /// The header names no channel of the part.
+    #[error("no known column; expected names such as gyro_x_counts")]
+    NoChannel,
+    /// A frame log where a table of counts is expected.
+    #[error("this is an SPI frame log; read it with `replay`")]
+    FrameLog,
+    /// A column that is neither a channel nor a clock.
+    #[error("unknown column; known are sample, time_s and <channel>_counts")]
+    UnknownColumn,
+    /// A name that occurs twice in the header.
+    #[error("the column occurs twice")]
+    DuplicateColumn,
+    /// More or fewer fields than the header has.
+    #[error("{found} fields, the header has {expected}")]
+    FieldCount {
+        /// Fields of this line.
+        found: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// Text, or a fraction, where an integer belongs.
+    #[error("{0:?} is not a whole number")]
+    NotInteger(String),
+    /// Text where a number belongs.
+    #[error("{0:?} is not a number")]
+    NotNumber(String),
+    /// Infinity or NaN.
+    #[error("{0:?} is not a finite time")]
+    NotFinite(String),
+    /// A count that the register's field cannot hold.
+    #[error("{value} is outside {low}..={high}")]
+    OutOfField {
+        /// As read.
+        value: i64,
+        /// Smallest count of the field.
+        low: i16,
+        /// Largest count of the field.
+        high: i16,
+    },
+    /// A clock that runs backwards.
+    #[error("time {now} s is before {before} s of the row above")]
+    TimeBackwards {
+        /// Of the row above, s.
+        before: f64,
+        /// Of this row, s.
+        now: f64,
+    },
+    /// An index that repeats or decreases.
+    #[error("sample {now} does not follow {before}")]
+    IndexBackwards {
+        /// Of the row above.
+        before: u64,
+        /// Of this row.
+        now: u64,
+    },
+    /// A byte that is not written as two hexadecimal digits.
+    #[error("{0:?} is not a row of hexadecimal bytes")]
+    NotHex(String),
+    /// Bytes that do not form 16-bit words.
+    #[error("{0} bytes are no whole number of 16-bit words")]
+    OddBytes(usize),
+    /// The two lines of a full-duplex bus always carry the same number of bytes.
+    #[error("{mosi} bytes out but {miso} bytes in")]
+    UnequalLengths {
+        /// Bytes from the host.
+        mosi: usize,
+        /// Bytes from the part.
+        miso: usize,
+    },
+    /// A first line that is not that of a frame log.
+    #[error("not an SPI frame log: the first line must be `time_s,mosi,miso`")]
+    NotFrameLog,
+    /// A frame log without one burst in it.
+    #[error("no burst transaction (26 bytes that start with 3E00)")]
+    NoBurst,
+    /// The driver refused the replayed transaction.
+    #[error("replay over the bus: {0}")]
+    Bus(String),
+}
+
+impl InputError {
+    /// A fault of the file as a whole.
+    pub fn file(file: &Path, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: None, column: None, reason }
+    }
+
+    /// A fault of one line.
+    pub fn line(file: &Path, line: u64, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: Some(line), column: None, reason }
+    }
+
+    /// A fault of one field.
+    pub fn field(file: &Path, line: u64, column: &str, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: Some(line), column: Some(column.to_owned()), reason }
+    }
+}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", OneLine(&self.file.display().to_string()))?;
+        if let Some(line) = self.line {
+            write!(f, ": line {line}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, ": column {}", OneLine(column))?;
+        }
+        write!(f, ": {}", self.reason)
+    }
+}
+
+impl std::error::Error for InputError {}
+
+/// Text from outside, with its control characters escaped and cut to a length that fits a line.
+struct OneLine<'a>(&'a str);
+
+impl fmt::Display for OneLine<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars().take(200) {
+            if c.is_control() {
+                write!(f, "{}", c.escape_default())?;
+            } else {
+                write!(f, "{c}")?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,161 @@
+//! A recording gives the same report whether its counts are read or its bursts are replayed.
+
+mod common;
+
+use common::{gzip, host_sim, json_of, write};
+use host_sim::source::frame_log::{Frame, FrameLog, Frames};
+use std::fmt::Write;
+use std::path::Path;
+use tempfile::tempdir;
+
+/// Counts that fill their fields; a linear congruential generator, so that the test needs no other.
+fn noise(rows: usize, clock: &str, columns: &[&str]) -> String {
+    let mut text = format!("{clock}{}\n", columns.join(","));
+    let mut state = 12_345u64;
+    for row in 0..rows {
+        match clock {
+            "" => {}
+            "sample," => write!(text, "{},", row + row / 100).expect("a string"),
+            _ => write!(text, "{},", row as f64 / 819.2).expect("a string"),
+        }
+        for column in columns {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let count = match *column {
+                "supply_counts" => 2060 + (state >> 60) as i32,
+                "aux_adc_counts" => (state >> 52) as i32,
+                "temp_counts" => (state >> 52) as i32 - 2048,
+                _ => (state >> 50) as i32 - 8192,
+            };
+            write!(text, "{count}").expect("a string");
+            text.push(if Some(column) == columns.last() { '\n' } else { ',' });
+        }
+    }
+    text
+}
+
+fn same_both_ways(file: &Path, rate: &[&str]) -> Vec<u8> {
+    let dir = tempdir().expect("a folder");
+    let file = file.to_str().expect("UTF-8");
+    let analyzed = json_of(&dir, &[&["analyze", file], rate].concat());
+    let replayed = json_of(&dir, &[&["replay", file], rate].concat());
+    assert!(analyzed == replayed, "{file}: the reports differ");
+    let terminal = |command| host_sim(&[&[command, file], rate].concat()).stdout;
+    assert!(terminal("analyze") == terminal("replay"), "{file}: the terminal differs");
+    analyzed
+}
+
+#[test]
+fn tables_of_every_kind() {
+    let dir = tempdir().expect("a folder");
+    let all = "supply,gyro_x,gyro_y,gyro_z,accl_x,accl_y,accl_z,magn_x,magn_y,magn_z,temp,aux_adc";
+    let all: Vec<String> = all.split(',').map(|c| format!("{c}_counts")).collect();
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    let backwards: Vec<&str> = all.iter().rev().copied().collect();
+    for (name, text, rate) in [
+        ("timed.csv", noise(3000, "time_s,", &all), &[][..]),
+        ("timed_rate.csv", noise(3000, "time_s,", &all), &["--rate", "800"]),
+        ("index.csv", noise(3000, "sample,", &backwards), &["--rate", "100"]),
+        ("one.csv", noise(3000, "", &["accl_y_counts"]), &["--rate", "100"]),
+        ("pair.csv", noise(3000, "time_s,", &["temp_counts", "gyro_z_counts"]), &[]),
+    ] {
+        let plain = same_both_ways(&write(&dir, name, text.as_bytes()), rate);
+        let packed = same_both_ways(&write(&dir, &format!("{name}.gz"), &gzip(text.as_bytes())), rate);
+        assert!(plain == packed, "{name}: compression changes the report");
+        let quoted = text.replacen("gyro_z_counts", "\"gyro_z_counts\"", 1).replace('\n', "\r\n");
+        assert!(plain == same_both_ways(&write(&dir, name, quoted.as_bytes()), rate), "{name}: line ends change it");
+    }
+}
+
+#[test]
+fn the_real_recordings() {
+    for (name, rate) in [
+        ("adis16405-burst/launch10.csv.gz", &[][..]),
+        ("adis16405-static/run1.csv.gz", &["--rate", "100"]),
+    ] {
+        let Some(file) = common::recording("the_real_recordings", name) else {
+            continue;
+        };
+        let json = String::from_utf8(same_both_ways(&file, rate)).expect("UTF-8");
+        let report: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        if name.contains("launch10") {
+            assert_eq!(report["dropped"]["repeated"], 45);
+            assert_eq!(report["dropped"]["gap"], 15);
+            assert_eq!(report["samples"], 49_425 - 45);
+        } else {
+            assert_eq!(report["samples"], 1_000_000);
+            assert_eq!(report["dropped"], serde_json::json!({"gap": 0}));
+        }
+    }
+}
+
+#[test]
+fn what_is_recorded_replays() {
+    let dir = tempdir().expect("a folder");
+    for name in ["log.csv", "log.csv.gz"] {
+        let log = dir.path().join(name);
+        let log = log.to_str().expect("UTF-8");
+        let recorded = json_of(&dir, &["record", log, "--seconds", "20", "--seed", "7"]);
+        assert!(recorded == json_of(&dir, &["replay", log]), "{name}");
+        let report: serde_json::Value = serde_json::from_slice(&recorded).expect("JSON");
+        // 20 s at 204.8 samples per second.
+        assert_eq!(report["samples"].as_u64().expect("a number") + dropped(&report), 4096);
+        assert_eq!(report["dropped"]["gap"], 0);
+        let rate = report["sample_rate_hz"].as_f64().expect("a number");
+        // Data-ready times are rounded to 1 ns.
+        assert!((rate - 204.8).abs() < 1e-6, "{rate}");
+        assert_eq!(std::fs::read(log).expect("a log")[0] == 0x1f, name.ends_with(".gz"));
+    }
+}
+
+fn dropped(report: &serde_json::Value) -> u64 {
+    report["dropped"].as_object().expect("causes").values().filter_map(serde_json::Value::as_u64).sum()
+}
+
+#[test]
+fn frames_round_trip() {
+    let dir = tempdir().expect("a folder");
+    let frames: Vec<Frame> = [0.0, 1e-9, 0.1 + 0.2, 1.0 / 3.0, 123_456_789.123_456_79, 1e300]
+        .into_iter()
+        .enumerate()
+        .map(|(at, time_s)| Frame {
+            time_s,
+            mosi: (0..=255u8).skip(at).take(2 * at + 2).collect(),
+            miso: (0..=255u8).rev().take(2 * at + 2).collect(),
+        })
+        .collect();
+    for name in ["frames", "frames.gz"] {
+        let file = dir.path().join(name);
+        let mut log = FrameLog::create(&file).expect("created");
+        for frame in &frames {
+            log.write(frame).expect("written");
+        }
+        log.finish().expect("closed");
+        let mut reader = Frames::open(&file).expect("opened");
+        for frame in &frames {
+            assert_eq!(reader.next().expect("a line").as_ref(), Some(frame));
+        }
+        assert_eq!(reader.next().expect("the end"), None);
+    }
+}
+
+#[test]
+fn the_log_names_the_range() {
+    // SENS_AVG is at 0x38, its upper byte at 0x39; 0b001 is ±75 deg/s (data sheet).
+    let dir = tempdir().expect("a folder");
+    let burst = |count: u16| {
+        let data: String = (0..11).map(|_| format!("{:04X}", 0x8000 | count)).collect();
+        format!("3E00{0},00008814{data}", "0".repeat(48))
+    };
+    let rows: String = (0..8).map(|i| format!("{}.5,{}\n", i + 1, burst(i * i))).collect();
+    let log = |write: &str| format!("time_s,mosi,miso\n{write}{rows}");
+    let adev = |text: &str| {
+        let file = common::write(&dir, "log.csv", text.as_bytes());
+        let report = json_of(&dir, &["replay", file.to_str().expect("UTF-8")]);
+        let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+        let gyro = report["channels"][1].clone();
+        assert_eq!(gyro["name"], "gyro_x");
+        gyro["curve"][0]["adev"].as_f64().expect("a deviation")
+    };
+    let ratio = adev(&log("")) / adev(&log("0.5,B901,0000\n"));
+    assert!((ratio - 4.0).abs() < 1e-12, "0.05 over 0.0125 deg/s: {ratio}");
+}
