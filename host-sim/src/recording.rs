@@ -68,11 +68,7 @@ impl Recorder {
         } else {
             Faults::all() - Faults::REPEATED
         };
-        Self {
-            recording: Recording { channels, range, samples: Vec::new() },
-            judge: Judge::default(),
-            judged,
-        }
+        Self { recording: Recording { channels, range, samples: Vec::new() }, judge: Judge::default(), judged }
     }
 
     /// Adds a burst that was read at `clock`.

@@ -11,9 +11,7 @@ use crate::recording::{Clock, Recorder, Recording};
 use crate::source::csv::Rows;
 use crate::source::frame_log::{Frame, Frames};
 use crate::source::{self, InputError, Reason};
-use adis16405_driver::{
-    Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register,
-};
+use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
 use std::path::Path;
 
 /// A replayed recording and what else was on the bus.
@@ -43,9 +41,8 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
     let mut player = Player::new();
     while let Some(row) = rows.next()? {
         let answer = Burst::fresh(&row.counts).to_bytes();
-        let burst = player
-            .burst(&BURST_REQUEST, &answer)
-            .map_err(|reason| InputError::line(file, rows.line(), reason))?;
+        let burst =
+            player.burst(&BURST_REQUEST, &answer).map_err(|reason| InputError::line(file, rows.line(), reason))?;
         recorder.push(row.clock, &burst);
     }
     Ok(Replay { recording: recorder.finish(), other_transactions: 0 })

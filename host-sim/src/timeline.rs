@@ -2,7 +2,8 @@
 //!
 //! A sample that was read late is not a lost sample. A host that stalls finds several samples queued and reads them
 //! back to back, so the time stamps show one long interval and then several short ones. Such a flush is spread back, one
-//! period apart; only what the flush does not make up for is a gap.
+//! period apart; only what the flush does not make up for is a gap. Time stamps that are coarser than the period look
+//! like losses; there the rate must be given.
 
 mod deliveries;
 
@@ -15,8 +16,7 @@ use std::collections::BTreeMap;
 pub const FEWEST_SAMPLES: u64 = 4;
 
 /// Faults for which a sample is left out; the others are warnings of the part about data that are there.
-const REFUSED: Faults =
-    Faults::STUCK_LOW.union(Faults::STUCK_HIGH).union(Faults::NO_NEW_DATA).union(Faults::REPEATED);
+const REFUSED: Faults = Faults::STUCK_LOW.union(Faults::STUCK_HIGH).union(Faults::NO_NEW_DATA).union(Faults::REPEATED);
 
 /// One step along the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,11 +104,7 @@ impl Timeline {
 }
 
 /// The period in which each used sample was taken, counted from any origin, and the rate in Hz where it can be measured.
-fn slots(
-    samples: &[Sample],
-    used: &[usize],
-    rate: Option<f64>,
-) -> Result<(Vec<u64>, Option<f64>), TimelineError> {
+fn slots(samples: &[Sample], used: &[usize], rate: Option<f64>) -> Result<(Vec<u64>, Option<f64>), TimelineError> {
     let indices: Option<Vec<u64>> = used.iter().map(|&p| samples[p].clock.index).collect();
     let times: Option<Vec<f64>> = used.iter().map(|&p| samples[p].clock.time_s).collect();
     match (indices, times) {
@@ -117,11 +113,9 @@ fn slots(
             Ok((indices, measured))
         }
         (None, Some(times)) => {
-            let deliveries = match Deliveries::of(&times) {
-                Some(deliveries) => deliveries,
-                // A queue that is read in large blocks hides the period, but the rate given by the user names it.
-                None => Deliveries::with_period(&times, 1.0 / rate.ok_or(TimelineError::NoPeriod)?),
-            };
+            let period =
+                rate.map(|hz| 1.0 / hz).or_else(|| deliveries::period(&times)).ok_or(TimelineError::NoPeriod)?;
+            let deliveries = Deliveries::with_period(&times, period);
             let measured = deliveries.rate(&times);
             if rate.is_none() && measured.is_none() {
                 return Err(TimelineError::NoPeriod);

@@ -88,10 +88,37 @@ fn what_a_flush_does_not_make_up_for_is_a_gap() {
 
 #[test]
 fn jitter_under_half_a_period_is_no_gap() {
-    // Late by up to 0.45 periods, in a fixed pattern.
-    let times: Vec<f64> = (0..1000).map(|i| (f64::from(i) + 0.45 * f64::from(i * 7919 % 97) / 97.0) * PERIOD).collect();
+    // Late by up to 0.45 periods, without a pattern (the middle bits of a multiplication).
+    let jitter = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 16 & 0xFF) / 255.0;
+    let times: Vec<f64> = (0..1000).map(|i| (f64::from(i) + 0.45 * jitter(i)) * PERIOD).collect();
     let timeline = Timeline::of(&timed(&times), None).expect("a timeline");
     assert_eq!(gaps(&timeline), []);
+}
+
+#[test]
+fn a_given_rate_tells_coarse_time_stamps_from_losses() {
+    // 819.2 samples per second, read by a host whose clock ticks once a millisecond: intervals of 1 and 2 ms.
+    let times: Vec<f64> = (0..5000).map(|i| (f64::from(i) / 819.2 * 1000.0).floor() / 1000.0).collect();
+    let timeline = Timeline::of(&timed(&times), Some(819.2)).expect("a timeline");
+    // Behind the last samples there is nothing to tell late from lost.
+    assert!(gaps(&timeline).iter().all(|(after, _)| *after > 5000 - 64), "{:?}", gaps(&timeline));
+}
+
+#[test]
+fn absurd_times_do_not_panic() {
+    for times in [
+        [0.0, 1e-300, 2e-300, 3e-300, 1e300, 1e300],
+        [-1e308, -1e308, 0.0, 1.0, 1e308, 1e308],
+        [0.0, 5e-324, 1e-323, 1.5e-323, 2e-323, f64::MAX],
+        [0.0, 0.0, 0.0, 1.0, 2.0, 3.0],
+    ] {
+        for rate in [None, Some(1e-300), Some(100.0), Some(1e300)] {
+            if let Ok(timeline) = Timeline::of(&timed(&times), rate) {
+                assert!(timeline.sample_rate_hz.is_finite() && timeline.sample_rate_hz > 0.0);
+                assert_eq!(timeline.steps.iter().filter(|s| matches!(s, Step::Sample(_))).count(), 6);
+            }
+        }
+    }
 }
 
 #[test]

@@ -68,10 +68,9 @@ fn tables_of_every_kind() {
 
 #[test]
 fn the_real_recordings() {
-    for (name, rate) in [
-        ("adis16405-burst/launch10.csv.gz", &[][..]),
-        ("adis16405-static/run1.csv.gz", &["--rate", "100"]),
-    ] {
+    for (name, rate) in
+        [("adis16405-burst/launch10.csv.gz", &[][..]), ("adis16405-static/run1.csv.gz", &["--rate", "100"])]
+    {
         let Some(file) = common::recording("the_real_recordings", name) else {
             continue;
         };

@@ -89,9 +89,8 @@ impl Rows {
                 None => Err(InputError::file(&self.file, Reason::NoData)),
             };
         };
-        let checked = row(&self.columns, text).and_then(|row| {
-            follows(self.last.unwrap_or_default(), row.clock).map(|()| row)
-        });
+        let checked =
+            row(&self.columns, text).and_then(|row| follows(self.last.unwrap_or_default(), row.clock).map(|()| row));
         match checked {
             Ok(row) => {
                 self.line = line;
@@ -181,10 +180,11 @@ fn row(columns: &[Column], text: &str) -> Result<Row, Fault> {
 fn count(channel: Channel, text: &str) -> Result<i16, Reason> {
     let value: i64 = text.parse().map_err(|_| Reason::NotInteger(table::quote(text)))?;
     let (low, high) = channel.limits();
-    i16::try_from(value)
-        .ok()
-        .filter(|count| (low..=high).contains(count))
-        .ok_or(Reason::OutOfField { value, low, high })
+    i16::try_from(value).ok().filter(|count| (low..=high).contains(count)).ok_or(Reason::OutOfField {
+        value,
+        low,
+        high,
+    })
 }
 
 fn index(text: &str) -> Result<u64, Reason> {

@@ -46,9 +46,7 @@ impl Frames {
         let mut table = Table::open(file)?;
         match table.next()? {
             None => Err(InputError::file(file, Reason::Empty)),
-            Some((_, HEADER)) => {
-                Ok(Self { file: file.to_owned(), table, line: 1, last_s: f64::NEG_INFINITY })
-            }
+            Some((_, HEADER)) => Ok(Self { file: file.to_owned(), table, line: 1, last_s: f64::NEG_INFINITY }),
             Some((line, _)) => Err(InputError::line(file, line, Reason::NotFrameLog)),
         }
     }

@@ -30,11 +30,7 @@ pub fn open(file: &Path) -> Result<Input, InputError> {
     }
     let compressed = start == GZIP_MAGIC;
     let whole = BufReader::with_capacity(1 << 16, Cursor::new(start).chain(raw));
-    let bytes: Box<dyn Read> = if compressed {
-        Box::new(MultiGzDecoder::new(whole))
-    } else {
-        Box::new(whole)
-    };
+    let bytes: Box<dyn Read> = if compressed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) };
     Ok(BufReader::with_capacity(1 << 16, bytes))
 }
 

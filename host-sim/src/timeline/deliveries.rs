@@ -1,65 +1,55 @@
 //! From the times at which samples were delivered to the periods in which they were taken.
+//!
+//! A sample cannot arrive before it was taken, only after. Lateness `c_i = t_i/T − i` (in periods `T`) therefore has a
+//! lower envelope: the number of samples lost before `i`. A stall lifts `c` above the envelope until the queue has run
+//! out; a lost sample lifts the envelope itself, by one, for good.
 
-/// Longest interval inside a flush, in periods: queued samples come back to back.
-const FLUSH: f64 = 0.5;
+use std::collections::VecDeque;
+
+/// Samples over which the envelope is sought: the deepest queue whose late delivery is told from a loss. The last samples
+/// of a record have fewer after them, so there a late delivery may pass for a loss.
+const QUEUE: usize = 64;
+
+/// Share of the envelope's change that its phase follows at each sample: a period that is wrong by a fraction `ε` makes
+/// the phase lag by `ε/TRACKING` periods, so that up to 3 % is harmless.
+const TRACKING: f64 = 1.0 / 16.0;
+
+/// Intervals that are one period with jitter, in medians. Flushes are shorter, gaps and stalls longer.
+const ORDINARY: std::ops::Range<f64> = 0.4..1.6;
 
 /// Deliveries, each with the period in which its sample was taken.
 pub(super) struct Deliveries {
     /// Period of each sample, counted from the first; grows by at least one a sample.
     pub(super) slots: Vec<u64>,
-    /// Whether the sample was delivered in its own period, so that its time says when it was taken.
+    /// Whether the sample came within a period of the envelope, so that its time says when it was taken.
     on_time: Vec<bool>,
 }
 
 impl Deliveries {
-    /// Takes the median interval for the period. `None` if that is 0 or overflows.
-    pub(super) fn of(times: &[f64]) -> Option<Self> {
-        let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        if intervals.is_empty() {
-            return None;
-        }
-        let middle = intervals.len() / 2;
-        let (_, median, _) = intervals.select_nth_unstable_by(middle, f64::total_cmp);
-        let period = *median;
-        (period > 0.0 && period.is_finite()).then(|| Self::with_period(times, period))
-    }
-
     /// Lays `times` (s, not decreasing) along periods of `period` s.
-    ///
-    /// A stall (an interval that rounds to more than one period) opens a block: the intervals of the flush after it, and
-    /// the one that completes the last period, belong to the block. What the whole block lasts beyond one period a
-    /// sample is a gap, and it lies before the samples of the block, where the queue would have overflowed.
     pub(super) fn with_period(times: &[f64], period: f64) -> Self {
-        let interval = |at: usize| (times[at] - times[at - 1]) / period;
-        let mut slots: Vec<u64> = Vec::with_capacity(times.len());
+        let Some(&origin) = times.first() else {
+            return Self { slots: Vec::new(), on_time: Vec::new() };
+        };
+        let lateness: Vec<f64> =
+            times.iter().enumerate().map(|(at, time)| (time - origin) / period - at as f64).collect();
+        let envelope = least_ahead(&lateness, QUEUE);
+        let mut phase = envelope[0];
+        let mut missing = 0u64;
+        let mut slots = Vec::with_capacity(times.len());
         let mut on_time = Vec::with_capacity(times.len());
-        if !times.is_empty() {
-            slots.push(0);
-            on_time.push(true);
-        }
-        let mut at = 1;
-        while at < times.len() {
-            let mut excess = interval(at) - 1.0;
-            let mut next = at + 1;
+        for (at, (late, least)) in lateness.iter().zip(envelope).enumerate() {
+            let excess = least - missing as f64 - phase;
             if excess >= 0.5 {
-                while next < times.len() && excess >= 0.5 && interval(next) < FLUSH {
-                    excess += interval(next) - 1.0;
-                    next += 1;
-                }
-                if next < times.len() && interval(next) < 1.0 {
-                    excess += interval(next) - 1.0;
-                    next += 1;
-                }
+                // A float beyond u64 saturates.
+                missing = missing.saturating_add(excess.round() as u64);
             }
-            // A float beyond u64 saturates.
-            let missing = excess.round().max(0.0) as u64;
-            let mut slot = slots[at - 1].saturating_add(missing);
-            for late in at..next {
-                slot = slot.saturating_add(1);
-                slots.push(slot);
-                on_time.push(late + 1 == next);
+            let rest = least - missing as f64 - phase;
+            if rest.is_finite() {
+                phase += rest * TRACKING;
             }
-            at = next;
+            slots.push(missing.saturating_add(at as u64));
+            on_time.push(late - missing as f64 - phase < 1.0);
         }
         Self { slots, on_time }
     }
@@ -68,6 +58,39 @@ impl Deliveries {
     pub(super) fn rate(&self, times: &[f64]) -> Option<f64> {
         rate(&self.slots, times, |at| self.on_time[at])
     }
+}
+
+/// The period in s that the intervals between `times` show; `None` if most of them are 0.
+///
+/// It is the mean of the intervals near the median: the median alone errs when jitter is skewed.
+pub(super) fn period(times: &[f64]) -> Option<f64> {
+    let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if intervals.is_empty() {
+        return None;
+    }
+    let middle = intervals.len() / 2;
+    let median = *intervals.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let ordinary = || intervals.iter().filter(|interval| ORDINARY.contains(&(*interval / median)));
+    let period = ordinary().sum::<f64>() / ordinary().count() as f64;
+    (period > 0.0 && period.is_finite()).then_some(period)
+}
+
+/// The least of each value and the `window − 1` after it.
+fn least_ahead(values: &[f64], window: usize) -> Vec<f64> {
+    let mut least = vec![0.0; values.len()];
+    // Positions ahead whose values increase with their distance; the front is the least.
+    let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window);
+    for at in (0..values.len()).rev() {
+        while candidates.front().is_some_and(|&ahead| values[ahead] >= values[at]) {
+            candidates.pop_front();
+        }
+        candidates.push_front(at);
+        while candidates.back().is_some_and(|&ahead| ahead >= at + window) {
+            candidates.pop_back();
+        }
+        least[at] = candidates.back().map_or(values[at], |&ahead| values[ahead]);
+    }
+    least
 }
 
 /// Sample rate in Hz: one over the slope of the least-squares line of time over period, for the samples that `counts`

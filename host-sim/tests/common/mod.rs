@@ -10,12 +10,12 @@ use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// Runs the program.
-pub fn host_sim(arguments: &[&str]) -> Output {
+pub(crate) fn host_sim(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_host-sim")).args(arguments).output().expect("the program starts")
 }
 
 /// Runs the program with `--json` and returns the bytes of the report.
-pub fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
+pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     let out = dir.path().join("report.json");
     let output = host_sim(&[arguments, &["--json", out.to_str().expect("UTF-8")]].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -25,25 +25,23 @@ pub fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
 }
 
 /// Puts a file into a folder.
-pub fn write(dir: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
+pub(crate) fn write(dir: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
     let path = dir.path().join(name);
     std::fs::write(&path, bytes).expect("written");
     path
 }
 
 /// Compresses.
-pub fn gzip(bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).expect("memory");
     encoder.finish().expect("memory")
 }
 
 /// A measured recording, or `None`, with a word why, where there is none.
-pub fn recording(test: &str, name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("ADIS_RECORDINGS").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
-        PathBuf::from,
-    );
+pub(crate) fn recording(test: &str, name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("ADIS_RECORDINGS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
     let file = folder.join(name);
     if file.exists() {
         return Some(file);
