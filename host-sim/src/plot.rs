@@ -39,7 +39,8 @@ pub const DARK: [(&str, &str); 8] = [
 ];
 
 type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+type Failed = DrawingAreaErrorKind<std::io::Error>;
+type Drawn = Result<(), Failed>;
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +68,11 @@ fn draw(canvas: &Canvas<'_>, channel: &ChannelReport) -> Drawn {
         channel.curve.iter().filter(|point| [point.tau_s, point.adev].iter().all(|&value| shown(value))).collect();
     if points.is_empty() {
         let middle = (SIZE.0 as i32 / 2, SIZE.1 as i32 / 2);
-        let text = "the record is too short for a point of the curve";
+        let text = if channel.curve.is_empty() {
+            "the record is too short for a point of the curve"
+        } else {
+            "no deviation above zero: the channel did not change"
+        };
         canvas.draw(&Text::new(text, middle, ink(&FAINT_TEXT, 32).pos(panel::CENTRE)))?;
         return canvas.present();
     }

@@ -104,11 +104,10 @@ fn coefficient_table(channel: &ChannelReport) -> Table {
         let (read_off, found) = match (row.read_off, row.rule) {
             (Some(value), _) => (number(value.value), interval(value.from_s, value.to_s)),
             (None, "") => (NONE.to_owned(), NONE.to_owned()),
-            (None, _) => ("no such slope".to_owned(), NONE.to_owned()),
+            (None, _) => (NONE.to_owned(), "no such slope".to_owned()),
         };
         let [fit, bounds] = fitted(row.fit);
-        let name = format!("{} {}", words(row.kind), row.symbol);
-        vec![name.trim_end().to_owned(), unit(row.unit), read_off, found, fit, bounds]
+        vec![words(row.kind), unit(row.unit), read_off, found, fit, bounds]
     };
     table(&header, 2, coefficients::rows(channel).into_iter().map(row).collect())
 }

@@ -3,7 +3,7 @@
 /// What stands where there is no number.
 pub const NONE: &str = "–";
 
-/// `value` with four significant digits: plain from 0.0001 to 999,900, else with an exponent that is a multiple
+/// `value` with four significant digits: plain from 0.001 to 999,900, else with an exponent that is a multiple
 /// of three. [`NONE`] for what is not finite.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
@@ -20,7 +20,7 @@ pub fn number(value: f64) -> String {
     let (Ok(mantissa), Ok(exponent)) = (mantissa.parse::<f64>(), exponent.parse::<i32>()) else {
         return rounded;
     };
-    let shift = if (-4..6).contains(&exponent) { exponent } else { exponent.rem_euclid(3) };
+    let shift = if (-3..6).contains(&exponent) { exponent } else { exponent.rem_euclid(3) };
     let decimals = usize::try_from(3 - shift).unwrap_or(0);
     let digits = format!("{:.decimals$}", mantissa * 10f64.powi(shift));
     match exponent - shift {
@@ -103,9 +103,10 @@ mod tests {
             (-0.0, "0"),
             (1.0, "1.000"),
             (0.0368, "0.03680"),
-            (0.000_123_44, "0.0001234"),
+            (0.001_234_4, "0.001234"),
+            (0.000_123_44, "123.4e-6"),
             (0.000_099_994, "99.99e-6"),
-            (0.000_099_996, "0.0001000"),
+            (0.000_099_996, "100.0e-6"),
             (1.234_56e-5, "12.35e-6"),
             (1.234_56e-7, "123.5e-9"),
             (9.999_6, "10.00"),

@@ -52,10 +52,10 @@ impl<'a> Panel<'a> {
         Panel { area: canvas.apply_coord_spec(coordinates), across, up, pixels_across }
     }
 
-    /// About how wide `text` of the panel's size is, in decades: its letters are 13 pixels wide.
-    pub(super) fn text_width(&self, text: &str) -> f64 {
-        let pixels = 13.0 * text.chars().count() as f64 + 20.0;
-        pixels / self.pixels_across * (self.across.end - self.across.start)
+    /// About how wide `text` of the panel's size is, in decades and in pixels: its letters take 13 pixels.
+    pub(super) fn text_width(&self, text: &str) -> (f64, i32) {
+        let pixels = 13 * i32::try_from(text.chars().count()).unwrap_or(0) + 20;
+        (f64::from(pixels) / self.pixels_across * (self.across.end - self.across.start), pixels)
     }
 
     /// `height` moved into the panel.
@@ -157,7 +157,7 @@ struct Tick {
 
 impl Tick {
     fn label(&self) -> String {
-        if (-2..=3).contains(&self.decade) {
+        if (-3..=3).contains(&self.decade) {
             let value = f64::from(self.digit) * 10f64.powi(self.decade);
             let decimals = usize::try_from(-self.decade).unwrap_or(0);
             return format!("{value:.decimals$}");
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn decades_are_labelled() {
-        assert_eq!(labels(-3.1..4.2), ["10⁻³", "0.01", "0.1", "1", "10", "100", "1000", "10⁴"]);
+        assert_eq!(labels(-3.1..4.2), ["0.001", "0.01", "0.1", "1", "10", "100", "1000", "10⁴"]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The classical slopes, drawn where they were found and on to where they are read.
 
 use super::panel::Panel;
-use super::{Drawn, READ_OFF, shown};
+use super::{Drawn, Failed, READ_OFF, shown};
 use crate::report::{ReadOff, ReadOffValue};
 use crate::wording;
 use plotters::prelude::*;
@@ -40,7 +40,7 @@ impl Slope {
 /// What the axis must reach down to for the flat line and its label.
 pub(super) fn floor(read_off: &ReadOff) -> Option<f64> {
     let value = read_off.bias_instability.as_ref()?.value * flat_factor();
-    shown(value).then(|| value * 0.9)
+    shown(value).then_some(value * 0.9)
 }
 
 fn flat_factor() -> f64 {
@@ -49,21 +49,30 @@ fn flat_factor() -> f64 {
 
 /// −½ through N at 1 s, flat at `B·sqrt(2 ln 2/π)`, +½ through K at 3 s (IEEE Std 952, annex C).
 pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> Drawn {
-    one(area, "N", read_off.angle_random_walk.as_ref(), -0.5, 1.0, 1.0)?;
-    one(area, "B", read_off.bias_instability.as_ref(), 0.0, 1.0, flat_factor())?;
-    one(area, "K", read_off.rate_random_walk.as_ref(), 0.5, 3.0, 1.0)
+    let lines = [
+        ("N", read_off.angle_random_walk.as_ref(), -0.5, 1.0, 1.0),
+        ("B", read_off.bias_instability.as_ref(), 0.0, 1.0, flat_factor()),
+        ("K", read_off.rate_random_walk.as_ref(), 0.5, 3.0, 1.0),
+    ];
+    let mut labels: Vec<Label> = Vec::new();
+    for (symbol, value, slope, read_at, factor) in lines {
+        let Some(value) = value.filter(|v| [v.value, v.from_s, v.to_s].iter().all(|&number| shown(number))) else {
+            continue;
+        };
+        let line = Slope { slope, at: f64::log10(read_at), height: (value.value * factor).log10() };
+        if let Some(middle) = one(area, &line, value)? {
+            let label = Label::under(area, &line, middle, symbol, value);
+            labels.push(label.below(&labels));
+        }
+    }
+    labels.iter().try_for_each(|label| label.draw(area))
 }
 
-/// The line of one coefficient: its height at `read_at` seconds is `factor` times the value.
-fn one(area: &Panel<'_>, symbol: &str, value: Option<&ReadOffValue>, slope: f64, read_at: f64, factor: f64) -> Drawn {
-    let Some(value) = value else { return Ok(()) };
-    if ![value.value, value.from_s, value.to_s].iter().all(|&number| shown(number)) {
-        return Ok(());
-    }
-    let line = Slope { slope, at: read_at.log10(), height: (value.value * factor).log10() };
+/// Draws one line, and says where the middle of its visible part is.
+fn one(area: &Panel<'_>, line: &Slope, value: &ReadOffValue) -> Result<Option<f64>, Failed> {
     let (from, to) = (value.from_s.log10(), value.to_s.log10());
     let (mut start, mut end) = (from - 0.3, to + 0.3);
-    if slope != 0.0 {
+    if line.slope != 0.0 {
         start = start.min(line.at);
         end = end.max(line.at);
     }
@@ -77,23 +86,62 @@ fn one(area: &Panel<'_>, symbol: &str, value: Option<&ReadOffValue>, slope: f64,
             at += DASH;
         }
     }
-    let Some((from, to)) = line.visible(area, from, to) else { return Ok(()) };
+    let Some((from, to)) = line.visible(area, from, to) else { return Ok(None) };
     let found = vec![(from, line.height_at(from)), (to, line.height_at(to))];
     area.area.draw(&PathElement::new(found, READ_OFF.mix(0.3).stroke_width(14)))?;
-    label(area, &line, (from + to) / 2.0, symbol, value)
+    Ok(Some((from + to) / 2.0))
 }
 
-/// The value under its line, kept inside the panel.
-fn label(area: &Panel<'_>, line: &Slope, middle: f64, symbol: &str, value: &ReadOffValue) -> Drawn {
-    let text = format!("{symbol} = {} {}", wording::number(value.value), wording::unit(&value.unit));
-    let width = area.text_width(&text);
-    let (first, last) = (area.across.start + width, area.across.end - width);
-    let (h_pos, at, shift) = match line.slope {
-        slope if slope < 0.0 => (HPos::Right, middle.max(first), (-14, 14)),
-        slope if slope > 0.0 => (HPos::Left, middle.min(last), (14, 14)),
-        _ => (HPos::Right, middle.max(first), (30, 14)),
-    };
-    let place = (at, area.clamp(line.height_at(at)));
-    let anchor = Pos { h_pos, v_pos: VPos::Top };
-    area.text(place, shift, text, &READ_OFF, 28, anchor)
+/// The height of a label with the space below it, pixels.
+const LABEL: i32 = 32;
+
+/// A value as it stands in the picture.
+struct Label {
+    text: String,
+    h_pos: HPos,
+    place: (f64, f64),
+    shift: (i32, i32),
+    /// Left and right end, pixels.
+    across: (i32, i32),
+    top: i32,
+}
+
+impl Label {
+    /// Under `line`, on the side to which it does not fall, and inside the panel.
+    fn under(area: &Panel<'_>, line: &Slope, middle: f64, symbol: &str, value: &ReadOffValue) -> Self {
+        let text = format!("{symbol} = {} {}", wording::number(value.value), wording::unit(&value.unit));
+        let (width, pixels) = area.text_width(&text);
+        let (first, last) = (area.across.start + width, area.across.end - width);
+        let (h_pos, at, shift) = match line.slope {
+            slope if slope < 0.0 => (HPos::Right, middle.max(first), (-14, 14)),
+            slope if slope > 0.0 => (HPos::Left, middle.min(last), (14, 14)),
+            _ => (HPos::Right, middle.max(first), (30, 14)),
+        };
+        let place = (at, area.clamp(line.height_at(at)));
+        let (x, y) = area.area.map_coordinate(&place);
+        let x = x + shift.0;
+        let across = if matches!(h_pos, HPos::Left) { (x, x + pixels) } else { (x - pixels, x) };
+        Label { text, h_pos, place, shift, across, top: y + shift.1 }
+    }
+
+    /// Moved down until it covers none of `others`.
+    fn below(mut self, others: &[Label]) -> Self {
+        // Each step clears at least one of the others.
+        for _ in others {
+            let covered = others.iter().find(|other| self.covers(other));
+            let Some(distance) = covered.map(|other| other.top + LABEL - self.top) else { break };
+            self.top += distance;
+            self.shift.1 += distance;
+        }
+        self
+    }
+
+    fn covers(&self, other: &Label) -> bool {
+        self.across.0 < other.across.1 && other.across.0 < self.across.1 && (self.top - other.top).abs() < LABEL
+    }
+
+    fn draw(&self, area: &Panel<'_>) -> Drawn {
+        let anchor = Pos { h_pos: self.h_pos, v_pos: VPos::Top };
+        area.text(self.place, self.shift, self.text.clone(), &READ_OFF, 28, anchor)
+    }
 }

@@ -4,21 +4,21 @@ use host_sim::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
 
-pub const RATE_HZ: f64 = 100.0;
-pub const SAMPLES: u64 = 1_000_000;
+pub(crate) const RATE_HZ: f64 = 100.0;
+pub(crate) const SAMPLES: u64 = 1_000_000;
 
 /// The paper's coefficients of a gyroscope: deg/√s, deg/s, deg/s^1.5.
-pub const N: f64 = 0.0368;
-pub const B: f64 = 0.0093;
-pub const K: f64 = 0.0013;
+pub(crate) const N: f64 = 0.0368;
+pub(crate) const B: f64 = 0.0093;
+pub(crate) const K: f64 = 0.0013;
 
 /// IEEE Std 952: σ² = N²/τ + (2 ln 2/π) B² + K² τ/3.
-pub fn model(tau: f64) -> f64 {
+pub(crate) fn model(tau: f64) -> f64 {
     (N * N / tau + 2.0 * LN_2 / PI * B * B + K * K * tau / 3.0).sqrt()
 }
 
 /// Six inertial channels; `gyro_z` has a traced sinusoid, `accl_x` has no rate random walk.
-pub fn report() -> Report {
+pub(crate) fn report() -> Report {
     let channels = [
         ("gyro_x", "deg/s"),
         ("gyro_y", "deg/s"),
@@ -41,7 +41,7 @@ pub fn report() -> Report {
 }
 
 /// A record without a single octave.
-pub fn empty() -> Report {
+pub(crate) fn empty() -> Report {
     let mut report = report();
     report.samples = 1;
     report.dropped = BTreeMap::new();
@@ -56,7 +56,7 @@ pub fn empty() -> Report {
     report
 }
 
-pub fn channel(name: &str, unit: &str) -> ChannelReport {
+pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
     let scale = if unit == "g" { 1e-3 } else { 1.0 };
     let curve: Vec<CurvePoint> = (0..18).map(|octave| point(octave, scale)).collect();
     let declared = ModelReport {
@@ -100,7 +100,7 @@ fn rate_unit(unit: &str, per: &str) -> String {
     }
 }
 
-pub fn term(kind: &str, name: &str, value: f64, unit: &str) -> Term {
+pub(crate) fn term(kind: &str, name: &str, value: f64, unit: &str) -> Term {
     let parameter = Parameter { value, low: value * 0.94, high: value * 1.07, unit: unit.to_owned() };
     Term { kind: kind.to_owned(), parameters: BTreeMap::from([(name.to_owned(), parameter)]) }
 }

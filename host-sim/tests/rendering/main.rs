@@ -134,6 +134,41 @@ fn a_record_without_a_curve_is_reported_in_words() {
 }
 
 #[test]
+fn a_channel_that_never_changes_is_reported_in_words() {
+    let mut still = channel("aux_adc", "V");
+    for point in &mut still.curve {
+        (point.adev, point.low, point.high) = (0.0, 0.0, 0.0);
+    }
+    let (circles, texts) = picture(&still);
+    assert_eq!(circles, 0);
+    assert!(texts.iter().any(|text| text.contains("did not change")));
+}
+
+/// Two slopes found at the same place, as a band-limited sensor shows them.
+#[test]
+fn labels_of_slopes_do_not_cover_each_other() {
+    let mut close = channel("gyro_x", "deg/s");
+    let flat = close.read_off.bias_instability.clone().expect("a value");
+    for value in [&mut close.read_off.angle_random_walk, &mut close.read_off.rate_random_walk] {
+        let value = value.as_mut().expect("a value");
+        (value.from_s, value.to_s) = (flat.from_s, flat.to_s);
+        // Both lines pass 0.0095 deg/s at 58 s.
+        value.value = 0.0095 * if value.unit == "deg/sqrt(s)" { 58f64.sqrt() } else { (3.0 / 58.0f64).sqrt() };
+    }
+    let svg = plot::allan(&close).expect("a picture");
+    let document = roxmltree::Document::parse(&svg).expect("well-formed");
+    let height = |symbol: &str| -> i32 {
+        let mut texts = document.descendants().filter(|node| node.has_tag_name("text"));
+        let label = texts.find(|node| node.text().is_some_and(|text| text.trim().starts_with(symbol)));
+        label.and_then(|node| node.attribute("y")?.parse().ok()).expect("a label with a height")
+    };
+    // The letters are 23 pixels high; the label of the flat line reaches to both sides.
+    for other in ["N = ", "K = "] {
+        assert!((height("B = ") - height(other)).abs() >= 28, "{other}");
+    }
+}
+
+#[test]
 fn a_report_without_channels_is_written() {
     let mut report = empty();
     report.channels.clear();
