@@ -136,7 +136,7 @@ fn read_off(curve: &Curve<OCTAVES>, unit: &str) -> ReadOff {
 fn coefficient_unit(kind: Kind, unit: &str) -> String {
     match (kind, unit.strip_suffix("/s")) {
         (Kind::AngleRandomWalk, Some(angle)) => format!("{angle}/sqrt(s)"),
-        (Kind::AngleRandomWalk, None) => format!("{unit}*sqrt(s)"),
+        (Kind::AngleRandomWalk, None) => format!("{unit}/sqrt(Hz)"),
         (Kind::BiasInstability, _) => unit.to_owned(),
         (Kind::RateRandomWalk, _) => format!("{unit}/sqrt(s)"),
     }
