@@ -12,6 +12,8 @@ use plotters::prelude::*;
 
 /// Width and height of the picture, pixels; large so that whole pixels are fine enough.
 const SIZE: (u32, u32) = (1600, 1200);
+/// Width and height when there is nothing to see.
+const EMPTY: (u32, u32) = (1600, 170);
 const LEFT: i32 = 150;
 const RIGHT: i32 = 1570;
 const CURVE: Frame = Frame { left: LEFT, right: RIGHT, top: 112, bottom: 800 };
@@ -55,27 +57,36 @@ pub struct PlotError {
 /// The picture of `channel` as an SVG document of its own. Points that a logarithmic axis cannot show (zero, not
 /// finite) are left out.
 pub fn allan(channel: &ChannelReport) -> Result<String, PlotError> {
+    let points: Vec<&CurvePoint> =
+        channel.curve.iter().filter(|point| shown(point.tau_s) && shown(point.adev)).collect();
+    let size = if points.is_empty() { EMPTY } else { SIZE };
     let mut svg = String::new();
-    draw(&SVGBackend::with_string(&mut svg, SIZE).into_drawing_area(), channel)
-        .map_err(|error| PlotError { channel: channel.name.clone(), reason: error.to_string() })?;
+    let canvas = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+    let drawn = if points.is_empty() { excuse(&canvas, channel) } else { draw(&canvas, channel, &points) };
+    drop(canvas);
+    drawn.map_err(|error| PlotError { channel: channel.name.clone(), reason: error.to_string() })?;
     Ok(svg)
 }
 
-fn draw(canvas: &Canvas<'_>, channel: &ChannelReport) -> Drawn {
+fn title(canvas: &Canvas<'_>, channel: &ChannelReport) -> Drawn {
     let title = format!("{} · Allan deviation", channel.name);
-    canvas.draw(&Text::new(title, (LEFT, 26), ink(&TEXT, 36)))?;
-    let points: Vec<&CurvePoint> =
-        channel.curve.iter().filter(|point| [point.tau_s, point.adev].iter().all(|&value| shown(value))).collect();
-    if points.is_empty() {
-        let middle = (SIZE.0 as i32 / 2, SIZE.1 as i32 / 2);
-        let text = if channel.curve.is_empty() {
-            "the record is too short for a point of the curve"
-        } else {
-            "no deviation above zero: the channel did not change"
-        };
-        canvas.draw(&Text::new(text, middle, ink(&FAINT_TEXT, 32).pos(panel::CENTRE)))?;
-        return canvas.present();
-    }
+    canvas.draw(&Text::new(title, (LEFT, 26), ink(&TEXT, 36)))
+}
+
+/// Why there is nothing to see.
+fn excuse(canvas: &Canvas<'_>, channel: &ChannelReport) -> Drawn {
+    title(canvas, channel)?;
+    let text = if channel.curve.is_empty() {
+        "the record is too short for a point of the curve"
+    } else {
+        "no deviation above zero: the channel did not change"
+    };
+    canvas.draw(&Text::new(text, (LEFT, 100), ink(&FAINT_TEXT, 32)))?;
+    canvas.present()
+}
+
+fn draw(canvas: &Canvas<'_>, channel: &ChannelReport, points: &[&CurvePoint]) -> Drawn {
+    title(canvas, channel)?;
     legend(canvas, channel)?;
     let before = model_line(channel, &channel.before);
     let after = if effects_added(channel) { model_line(channel, &channel.after) } else { Vec::new() };
@@ -97,7 +108,7 @@ fn draw(canvas: &Canvas<'_>, channel: &ChannelReport) -> Drawn {
     area.label_up(&label)?;
 
     read_off::draw(&area, &channel.read_off)?;
-    curve(&area, &points)?;
+    curve(&area, points)?;
     let logs = |line: &[(f64, f64)]| -> Vec<(f64, f64)> {
         line.iter().map(|&(tau, adev)| (tau.log10(), adev.log10())).collect()
     };
