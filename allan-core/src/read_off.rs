@@ -6,8 +6,11 @@ use crate::{Curve, Point, math};
 use core::f64::consts::{LN_2, PI};
 use core::ops::RangeInclusive;
 
-/// How far `d log σ / d log τ` between two octaves may be from the slope that is looked for.
-pub const SLOPE_TOLERANCE: f64 = 0.15;
+/// How far `d log σ / d log τ` between two octaves may be from that of a −½ or +½ line.
+pub const LINE_TOLERANCE: f64 = 0.15;
+
+/// How far it may be from 0 at the flat minimum, which is the bottom of a bow: as near as to either line.
+pub const FLAT_TOLERANCE: f64 = 0.25;
 
 /// Points whose [`percentage_accuracy`] is worse are not looked at.
 pub const WORST_ACCURACY: f64 = 25.0;
@@ -36,7 +39,7 @@ pub fn angle_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option
 /// B: the lowest point of the longest flat interval times `sqrt(π/(2 ln 2))`.
 #[must_use]
 pub fn bias_instability<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
-    let flat = longest_run(curve, 0.0)?;
+    let flat = longest_run(curve, 0.0, FLAT_TOLERANCE)?;
     let lowest = flat.iter().map(|point| point.avar).fold(f64::INFINITY, f64::min);
     Some(Coefficient { value: math::sqrt(lowest * PI / (2.0 * LN_2)), interval: interval(flat) })
 }
@@ -49,19 +52,19 @@ pub fn rate_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<
 
 /// The line of `slope` through the geometric mean of the points of its interval, at `tau` seconds.
 fn on_line<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64, tau: f64) -> Option<Coefficient> {
-    let run = longest_run(curve, slope)?;
+    let run = longest_run(curve, slope, LINE_TOLERANCE)?;
     let at_tau = |point: &Point| math::ln(point.avar) / 2.0 + slope * math::ln(tau / point.tau);
     let mean = run.iter().map(at_tau).sum::<f64>() / run.len() as f64;
     Some(Coefficient { value: math::exp(mean), interval: interval(run) })
 }
 
 /// The longest run of neighbouring points joined by `slope`, the first of equals; at least one octave.
-fn longest_run<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64) -> Option<&[Point]> {
+fn longest_run<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64, tolerance: f64) -> Option<&[Point]> {
     let usable = |point: &&Point| percentage_accuracy(curve.samples(), point.n) <= WORST_ACCURACY;
     let points = &curve.points()[..curve.points().iter().take_while(usable).count()];
     let joined = |pair: &[Point]| {
         let octaves = math::log2(pair[1].tau / pair[0].tau);
-        math::abs(math::log2(pair[1].avar / pair[0].avar) / 2.0 / octaves - slope) <= SLOPE_TOLERANCE
+        math::abs(math::log2(pair[1].avar / pair[0].avar) / 2.0 / octaves - slope) <= tolerance
     };
     let mut longest: &[Point] = &[];
     let mut start = 0;
