@@ -23,16 +23,24 @@ pub fn analyze(recording: &Recording, timeline: &Timeline) -> Report {
         schema: SCHEMA,
         sample_rate_hz: timeline.sample_rate_hz,
         samples: used as u64,
-        dropped: timeline.dropped.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect(),
-        channels: recording.channels.iter().map(|&channel| analyze_channel(recording, timeline, used, channel)).collect(),
+        dropped: by_cause(&timeline.dropped),
+        flagged: by_cause(&timeline.flagged),
+        channels: recording
+            .channels
+            .iter()
+            .map(|&channel| analyze_channel(recording, timeline, used, channel))
+            .collect(),
     }
+}
+
+fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
+    counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
 fn analyze_channel(recording: &Recording, timeline: &Timeline, used: usize, channel: Channel) -> ChannelReport {
     let estimators = Estimators::run(recording, timeline, used / 2, channel);
-    let curve = |estimator: &Estimator| {
-        estimator.curve(1.0 / timeline.sample_rate_hz).scaled(channel.lsb(recording.range))
-    };
+    let curve =
+        |estimator: &Estimator| estimator.curve(1.0 / timeline.sample_rate_hz).scaled(channel.lsb(recording.range));
     let (whole, first, second) = (curve(&estimators.whole), curve(&estimators.first), curve(&estimators.second));
     let model = fit(&first, &Kind::DECLARED);
     let whole = whole.with_confidence(|point| model.shares(point.n));

@@ -81,9 +81,6 @@ fn report_of(input: &Input, recording: &Recording) -> Result<Report> {
 
 fn report(recording: &Recording, rate: Option<f64>) -> Result<Report> {
     let timeline = Timeline::of(recording, rate)?;
-    for (cause, count) in &timeline.flagged {
-        note(format_args!("{count} samples used that are flagged {cause}"));
-    }
     Ok(analyze(recording, &timeline))
 }
 

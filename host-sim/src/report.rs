@@ -20,6 +20,8 @@ pub struct Report {
     pub samples: u64,
     /// Samples that are missing or were refused, by cause; `gap` counts those that never arrived.
     pub dropped: BTreeMap<String, u64>,
+    /// Samples that were used although something about them was noticed, by cause.
+    pub flagged: BTreeMap<String, u64>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
 }

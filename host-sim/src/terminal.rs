@@ -4,6 +4,7 @@ use crate::coefficients::{self, Row};
 use crate::report::{ChannelReport, ModelError, Parameter, Report, Term};
 use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, unit, words};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 /// Widest line, columns.
@@ -16,7 +17,8 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "sample rate  {} Hz", number(report.sample_rate_hz))?;
     let length = duration(report.samples as f64 / report.sample_rate_hz);
     writeln!(out, "samples      {} used, {length}", count(report.samples))?;
-    writeln!(out, "dropped      {}", dropped(report))?;
+    writeln!(out, "dropped      {}", by_cause(&report.dropped))?;
+    writeln!(out, "flagged      {}", by_cause(&report.flagged))?;
     for channel in &report.channels {
         section(channel, out)?;
     }
@@ -27,11 +29,11 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
 }
 
 /// By cause, on one line unless there are very many.
-fn dropped(report: &Report) -> String {
-    if report.dropped.values().all(|&samples| samples == 0) {
+fn by_cause(counts: &BTreeMap<String, u64>) -> String {
+    if counts.values().all(|&samples| samples == 0) {
         return "none".to_owned();
     }
-    let causes = report.dropped.iter().filter(|(_, samples)| **samples > 0);
+    let causes = counts.iter().filter(|(_, samples)| **samples > 0);
     let told: Vec<String> = causes.map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
     told.join(", ")
 }

@@ -7,7 +7,7 @@
 
 mod deliveries;
 
-use crate::recording::{Clock, Recording, Sample};
+use crate::recording::{Recording, Sample};
 use adis16405_driver::Faults;
 use deliveries::Deliveries;
 use std::collections::BTreeMap;
@@ -15,8 +15,12 @@ use std::collections::BTreeMap;
 /// Fewest samples that give an octave: two adjacent windows of one sample in each half of the record.
 pub const FEWEST_SAMPLES: u64 = 4;
 
-/// Faults for which a sample is left out; the others are warnings of the part about data that are there.
-const REFUSED: Faults = Faults::STUCK_LOW.union(Faults::STUCK_HIGH).union(Faults::NO_NEW_DATA).union(Faults::REPEATED);
+/// Faults for which a sample is left out; the others are warnings about data that are there.
+const REFUSED: Faults = Faults::STUCK_LOW.union(Faults::STUCK_HIGH).union(Faults::NO_NEW_DATA);
+
+/// Equal neighbours closer than this part of a period are one sample read twice; farther apart they are chance, which
+/// a filtered output of few counts brings about once in a thousand samples.
+const RE_READ_WITHIN: f64 = 0.75;
 
 /// One step along the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +40,7 @@ pub struct Timeline {
     pub steps: Vec<Step>,
     /// Samples that the steps leave out, by cause; `gap` (always there) counts those that never arrived.
     pub dropped: BTreeMap<&'static str, u64>,
-    /// Samples that carry a warning of the part and are used all the same, by cause.
+    /// Samples that are used although something about them was noticed, by cause.
     pub flagged: BTreeMap<&'static str, u64>,
 }
 
@@ -64,7 +68,7 @@ impl Timeline {
     /// Lays the samples of `recording` along a line of equal periods.
     ///
     /// `rate`, in Hz, overrides what the time stamps say. Gaps are read from the sample index where there is one, else from
-    /// the time stamps; without either the samples are taken to be complete, and equal neighbours to be chance.
+    /// the time stamps; without either the samples are taken to be complete.
     ///
     /// # Errors
     /// There is no usable rate, or there are fewer than [`FEWEST_SAMPLES`] usable samples.
@@ -75,18 +79,17 @@ impl Timeline {
             return Err(TimelineError::BadRate(rate));
         }
         let samples = &recording.samples;
-        let clocked = samples.first().is_some_and(|s| s.clock != Clock::default());
-        // Without a clock a re-read cannot be told from two samples that are equal by chance.
-        let refused = if clocked { REFUSED } else { REFUSED - Faults::REPEATED };
+        let re_reads = ReReads::of(samples, rate);
         let mut dropped = BTreeMap::from([("gap", 0)]);
         let mut flagged = BTreeMap::new();
         let mut used = Vec::with_capacity(samples.len());
         for (position, sample) in samples.iter().enumerate() {
+            let refused = if re_reads.contain(samples, position) { REFUSED | Faults::REPEATED } else { REFUSED };
             match (sample.faults & refused).cause() {
                 Some(cause) => *dropped.entry(cause).or_insert(0) += 1,
                 None => {
                     used.push(position);
-                    for cause in (sample.faults - REFUSED).causes() {
+                    for cause in sample.faults.causes() {
                         *flagged.entry(cause).or_insert(0) += 1;
                     }
                 }
@@ -100,6 +103,28 @@ impl Timeline {
         dropped.insert("gap", never_arrived);
         let sample_rate_hz = rate.or(measured).ok_or(TimelineError::NoRate)?;
         Ok(Self { sample_rate_hz, steps, dropped, flagged })
+    }
+}
+
+/// What tells a sample that was read twice from two that are equal by chance: it comes too soon.
+struct ReReads {
+    /// Shortest interval between two samples that were both taken, s; 0 where there is no clock.
+    shortest: f64,
+}
+
+impl ReReads {
+    fn of(samples: &[Sample], rate: Option<f64>) -> Self {
+        let times: Option<Vec<f64>> = samples.iter().map(|sample| sample.clock.time_s).collect();
+        let period = times.and_then(|times| rate.map(f64::recip).or_else(|| deliveries::period(&times)));
+        Self { shortest: RE_READ_WITHIN * period.unwrap_or(0.0) }
+    }
+
+    fn contain(&self, samples: &[Sample], position: usize) -> bool {
+        let time = |position: usize| samples.get(position).and_then(|sample| sample.clock.time_s);
+        match (position.checked_sub(1).and_then(time), time(position)) {
+            (Some(previous), Some(now)) => now - previous < self.shortest,
+            _ => false,
+        }
     }
 }
 

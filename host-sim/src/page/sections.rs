@@ -25,6 +25,9 @@ pub(super) fn summary(report: &Report) -> Markup {
                         @for (cause, samples) in &report.dropped {
                             li { span { (words(cause)) } " " b { (count(*samples)) } }
                         }
+                        @for (cause, samples) in &report.flagged {
+                            li { span { (words(cause)) ", used" } " " b { (count(*samples)) } }
+                        }
                     }
                 }
             }

@@ -30,12 +30,13 @@ pub(crate) fn report() -> Report {
     let mut channels: Vec<ChannelReport> = channels.iter().map(|(name, unit)| channel(name, unit)).collect();
     channels[3].read_off.rate_random_walk = None;
     trace_sinusoid(&mut channels[2]);
-    let dropped = [("gap", 212), ("no_new_data", 3), ("repeated", 1804)];
+    let dropped = [("gap", 212), ("no_new_data", 3)];
     Report {
         schema: SCHEMA,
         sample_rate_hz: RATE_HZ,
         samples: SAMPLES,
         dropped: dropped.map(|(cause, samples)| (cause.to_owned(), samples)).into(),
+        flagged: [("repeated".to_owned(), 1804)].into(),
         channels,
     }
 }
@@ -45,6 +46,7 @@ pub(crate) fn empty() -> Report {
     let mut report = report();
     report.samples = 1;
     report.dropped = BTreeMap::new();
+    report.flagged = BTreeMap::new();
     report.channels.truncate(1);
     let channel = &mut report.channels[0];
     channel.samples = 1;

@@ -172,7 +172,7 @@ fn labels_of_slopes_do_not_cover_each_other() {
 fn a_report_without_channels_is_written() {
     let mut report = empty();
     report.channels.clear();
-    assert!(text(&report).contains("dropped      none"));
+    assert!(text(&report).contains("dropped      none\nflagged      none"));
     assert!(html(&report).contains("Samples dropped"));
 }
 
