@@ -30,53 +30,53 @@ pub fn percentage_accuracy(samples: u64, n: u64) -> f64 {
     100.0 / math::sqrt(2.0 * (samples as f64 / n as f64 - 1.0))
 }
 
-/// N: the value at 1 s of the −½ line through the longest interval that has this slope.
+/// N: the value at 1 s of the −½ line through the longest interval of this slope left of the minimum.
 #[must_use]
 pub fn angle_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
-    on_line(curve, -0.5, 1.0)
+    let (points, lowest) = judged(curve)?;
+    on_line(&points[..=lowest], -0.5, 1.0)
 }
 
-/// B: the lowest point of the longest flat interval times `sqrt(π/(2 ln 2))`.
+/// B: the minimum times `sqrt(π/(2 ln 2))`, if it lies in a flat interval.
 #[must_use]
 pub fn bias_instability<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
-    let flat = longest_run(curve, 0.0, FLAT_TOLERANCE)?;
-    let lowest = flat.iter().map(|point| point.avar).fold(f64::INFINITY, f64::min);
-    Some(Coefficient { value: math::sqrt(lowest * PI / (2.0 * LN_2)), interval: interval(flat) })
+    let (points, lowest) = judged(curve)?;
+    let tau = points[lowest].tau;
+    let flat = runs(points, 0.0, FLAT_TOLERANCE).find(|run| interval(run).contains(&tau))?;
+    Some(Coefficient { value: math::sqrt(points[lowest].avar * PI / (2.0 * LN_2)), interval: interval(flat) })
 }
 
-/// K: the value at 3 s of the +½ line through the longest interval that has this slope.
+/// K: the value at 3 s of the +½ line through the longest interval of this slope right of the minimum.
 #[must_use]
 pub fn rate_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<Coefficient> {
-    on_line(curve, 0.5, 3.0)
+    let (points, lowest) = judged(curve)?;
+    on_line(&points[lowest..], 0.5, 3.0)
 }
 
-/// The line of `slope` through the geometric mean of the points of its interval, at `tau` seconds.
-fn on_line<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64, tau: f64) -> Option<Coefficient> {
-    let run = longest_run(curve, slope, LINE_TOLERANCE)?;
+/// The points that are accurate enough, and which of them is the lowest.
+fn judged<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<(&[Point], usize)> {
+    let accurate = |point: &&Point| percentage_accuracy(curve.samples(), point.n) <= WORST_ACCURACY;
+    let points = &curve.points()[..curve.points().iter().take_while(accurate).count()];
+    let lowest = (0..points.len()).min_by(|&a, &b| points[a].avar.total_cmp(&points[b].avar))?;
+    Some((points, lowest))
+}
+
+/// The line of `slope` through the geometric mean of the points of its longest interval, at `tau` seconds.
+fn on_line(points: &[Point], slope: f64, tau: f64) -> Option<Coefficient> {
+    let run =
+        runs(points, slope, LINE_TOLERANCE).reduce(|best, run| if run.len() > best.len() { run } else { best })?;
     let at_tau = |point: &Point| math::ln(point.avar) / 2.0 + slope * math::ln(tau / point.tau);
     let mean = run.iter().map(at_tau).sum::<f64>() / run.len() as f64;
     Some(Coefficient { value: math::exp(mean), interval: interval(run) })
 }
 
-/// The longest run of neighbouring points joined by `slope`, the first of equals; at least one octave.
-fn longest_run<const OCTAVES: usize>(curve: &Curve<OCTAVES>, slope: f64, tolerance: f64) -> Option<&[Point]> {
-    let usable = |point: &&Point| percentage_accuracy(curve.samples(), point.n) <= WORST_ACCURACY;
-    let points = &curve.points()[..curve.points().iter().take_while(usable).count()];
-    let joined = |pair: &[Point]| {
-        let octaves = math::log2(pair[1].tau / pair[0].tau);
-        math::abs(math::log2(pair[1].avar / pair[0].avar) / 2.0 / octaves - slope) <= tolerance
+/// Runs of two and more neighbouring points that are joined by `slope`, within `tolerance`.
+fn runs(points: &[Point], slope: f64, tolerance: f64) -> impl Iterator<Item = &[Point]> {
+    let joined = move |left: &Point, right: &Point| {
+        let octaves = math::log2(right.tau / left.tau);
+        math::abs(math::log2(right.avar / left.avar) / 2.0 / octaves - slope) <= tolerance
     };
-    let mut longest: &[Point] = &[];
-    let mut start = 0;
-    for end in 1..=points.len() {
-        if end == points.len() || !joined(&points[end - 1..=end]) {
-            if end - start > longest.len().max(1) {
-                longest = &points[start..end];
-            }
-            start = end;
-        }
-    }
-    (!longest.is_empty()).then_some(longest)
+    points.chunk_by(joined).filter(|run| run.len() > 1)
 }
 
 fn interval(run: &[Point]) -> RangeInclusive<f64> {
