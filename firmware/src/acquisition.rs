@@ -4,8 +4,8 @@ use adis16405_driver::{Adis16405, Burst, Error, Register};
 use embedded_hal::spi::SpiDevice;
 use heapless::spsc;
 
-/// Bursts that may wait for the main loop, plus the one slot that the queue needs: 0.3 s at 204.8 samples a second.
-pub const QUEUE_SLOTS: usize = 64;
+/// Bursts that may wait for the main loop, and the one slot that the queue needs: 1.2 s at 204.8 samples a second.
+pub const QUEUE_SLOTS: usize = 256;
 
 /// The queue between the interrupt and the main loop.
 pub type Queue = spsc::Queue<Arrival, QUEUE_SLOTS>;

@@ -75,7 +75,8 @@ fn main() -> ! {
     let spi_clock_hz = sampling::spi_clock_hz(rcc.clocks.pclk2().raw());
     assert!(spi_clock_hz <= spi_clock::BURST_LIMIT_HZ, "serial clock above the burst limit");
     let select = gpioa.pa4.into_push_pull_output_in_state(PinState::High);
-    let bus = ExclusiveDevice::new(bus, select, device.TIM5.delay_us(&mut rcc)).expect("the pin cannot fail");
+    let stall = sampling::Stall(device.TIM5.delay_us(&mut rcc));
+    let bus = ExclusiveDevice::new(bus, select, stall).expect("the pin cannot fail");
     let mut sensor = Adis16405::new(bus, CONFIG);
 
     defmt::info!("SCK {=u32} Hz", spi_clock_hz);

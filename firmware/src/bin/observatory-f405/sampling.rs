@@ -2,12 +2,23 @@
 
 use core::cell::RefCell;
 use critical_section::Mutex;
+use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::ExclusiveDevice;
 use firmware::{Acquisition, Arrival, spi_clock};
 use stm32f4xx_hal::gpio::{ExtiPin, Input, Output, PA4, PB0};
 use stm32f4xx_hal::{interrupt, pac, spi::Spi, timer::DelayUs};
 
-pub(crate) type Bus = ExclusiveDevice<Spi<pac::SPI1>, PA4<Output>, DelayUs<pac::TIM5>>;
+pub(crate) type Bus = ExclusiveDevice<Spi<pac::SPI1>, PA4<Output>, Stall>;
+
+/// Pauses on the bus, rounded up to microseconds. The `delay_ns` of stm32f4xx-hal 0.23 takes its argument for
+/// microseconds and would wait a thousand times too long.
+pub(crate) struct Stall(pub(crate) DelayUs<pac::TIM5>);
+
+impl DelayNs for Stall {
+    fn delay_ns(&mut self, ns: u32) {
+        DelayNs::delay_us(&mut self.0, ns.div_ceil(1000));
+    }
+}
 
 struct Sampling {
     acquisition: Acquisition<'static, Bus>,

@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Every check and test of the noise observatory, from a clean checkout.
+#
+# Needs rustup with its default toolchain and a C compiler; installs with rustup what is missing and says so. Fails,
+# and never skips, if something cannot be had. The emulator is the crate rigless, compiled here; it asks for a newer
+# Rust than it needs, hence --ignore-rust-version.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+step() { printf '\n== %s\n' "$*"; }
+run() {
+    printf '+ %s\n' "$*"
+    "$@"
+}
+
+MCU=thumbv7em-none-eabihf  # Cortex-M4F: the firmware
+SMALL=thumbv6m-none-eabi   # Cortex-M0+: the two libraries
+
+step "tools"
+command -v rustup >/dev/null || { echo "rustup is missing: install it from https://rustup.rs" >&2; exit 1; }
+command -v cc >/dev/null || { echo "a C compiler is missing: install it with: apt-get install gcc libc6-dev" >&2; exit 1; }
+for target in "$MCU" "$SMALL"; do
+    rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
+done
+for component in rustfmt clippy; do
+    rustup component list --installed | grep -q "^$component" || run rustup component add "$component"
+done
+run cargo --version
+
+step "format"
+run cargo fmt --all --check
+
+step "lints and builds for microcontrollers"
+run cargo clippy --locked --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --release -- -D warnings
+for target in "$MCU" "$SMALL"; do
+    run cargo clippy --locked --package adis16405-driver --package allan-core --target "$target" -- -D warnings
+done
+
+step "lints for the host"
+run cargo clippy --locked --workspace --all-targets --ignore-rust-version -- -D warnings
+
+step "documentation"
+RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps --package adis16405-driver --package allan-core
+
+step "tests, the image in the emulator among them"
+run cargo test --locked --workspace --ignore-rust-version
+
+step "all passed"
