@@ -17,7 +17,7 @@ MCU=thumbv7em-none-eabihf  # Cortex-M4F: the firmware
 SMALL=thumbv6m-none-eabi   # Cortex-M0+: the two libraries
 
 step "tools"
-command -v rustup >/dev/null || { echo "rustup is missing: install it from https://rustup.rs" >&2; exit 1; }
+command -v rustup >/dev/null || { echo "rustup is missing: install Rust with rustup" >&2; exit 1; }
 command -v cc >/dev/null || { echo "a C compiler is missing: install it with: apt-get install gcc libc6-dev" >&2; exit 1; }
 for target in "$MCU" "$SMALL"; do
     rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
