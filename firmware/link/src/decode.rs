@@ -90,9 +90,9 @@ impl Decoder {
         let outcome = open(&mut self.bytes);
         self.bytes.clear();
         match outcome {
-            Opened::Valid(envelope) => return Some(self.accept(envelope)),
-            Opened::OtherVersion => self.counters.other_version += 1,
-            Opened::Damaged => {
+            Ok(envelope) => return Some(self.accept(envelope)),
+            Err(Refused::OtherVersion) => self.counters.other_version += 1,
+            Err(Refused::Damaged) => {
                 self.counters.discarded_bytes += length;
                 self.counters.bad_frames += 1;
             }
@@ -111,29 +111,28 @@ impl Decoder {
     }
 }
 
-/// What became of the bytes between two zero bytes.
-enum Opened {
-    Valid(Envelope<Message>),
+/// Why the bytes between two zero bytes are no message.
+enum Refused {
     OtherVersion,
     Damaged,
 }
 
 /// Undoes COBS, checks the CRC-32 in the last four bytes, then the version in the first, and only then looks inside.
-fn open(bytes: &mut [u8]) -> Opened {
+fn open(bytes: &mut [u8]) -> Result<Envelope<Message>, Refused> {
     let content = cobs::decode_in_place(bytes).ok().and_then(|length| bytes.get(..length));
     let Some((body, sum)) = content.and_then(<[u8]>::split_last_chunk::<4>) else {
-        return Opened::Damaged;
+        return Err(Refused::Damaged);
     };
     if CRC.checksum(body) != u32::from_le_bytes(*sum) {
-        return Opened::Damaged;
+        return Err(Refused::Damaged);
     }
     match body.first() {
         Some(&VERSION) => match postcard::take_from_bytes(body) {
-            Ok((envelope, _appended_fields)) => Opened::Valid(envelope),
-            Err(_) => Opened::Damaged,
+            Ok((envelope, _appended_fields)) => Ok(envelope),
+            Err(_) => Err(Refused::Damaged),
         },
-        Some(_) => Opened::OtherVersion,
-        None => Opened::Damaged,
+        Some(_) => Err(Refused::OtherVersion),
+        None => Err(Refused::Damaged),
     }
 }
 
