@@ -46,6 +46,7 @@ pub(crate) fn recording(test: &str, name: &str) -> Option<PathBuf> {
     if file.exists() {
         return Some(file);
     }
-    println!("{test}: skipped, {} is not there (set ADIS_RECORDINGS)", file.display());
+    // Not by a macro, which the test harness would hide.
+    writeln!(std::io::stderr(), "skipped {test}: {} is absent (set ADIS_RECORDINGS)", file.display()).expect("stderr");
     None
 }
