@@ -20,12 +20,11 @@ impl ModelError {
     /// logarithm: it makes the error infinite.
     #[must_use]
     pub fn between<const OCTAVES: usize>(model: &Model, curve: &Curve<OCTAVES>) -> Option<Self> {
-        let curve = curve.clone().with_confidence(|point| model.shares(point.n));
         let (mut deviance, mut square, mut points) = (0.0, 0.0, 0);
         for point in curve.points().iter().filter(|point| point.n <= curve.samples() / 8) {
             let ratio = point.avar / model.avar(point.n);
             let log = math::ln(ratio);
-            deviance += point.edf * (ratio - 1.0 - log);
+            deviance += point.edf_of(model.shares(point.n)) * (ratio - 1.0 - log);
             square += log * log / 4.0;
             points += 1;
         }

@@ -26,6 +26,13 @@ pub struct Point {
     pub high: f64,
 }
 
+impl Point {
+    /// Equivalent degrees of freedom if the variance is due to noises in these `shares`.
+    pub(crate) fn edf_of(&self, shares: Shares) -> f64 {
+        edf(self.n, self.count, self.overlap, shares)
+    }
+}
+
 /// Allan variance at up to `OCTAVES` octave-spaced averaging factors, shortest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve<const OCTAVES: usize> {
@@ -82,7 +89,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
 
     fn set_confidence(&mut self, mut shares: impl FnMut(&Point) -> Shares) {
         for point in &mut self.points {
-            point.edf = edf(point.n, point.count, point.overlap, shares(point));
+            point.edf = point.edf_of(shares(point));
             point.low = point.avar * point.edf / chi_square::quantile(0.975, point.edf);
             point.high = point.avar * point.edf / chi_square::quantile(0.025, point.edf);
         }

@@ -200,11 +200,10 @@ impl Problem {
 
     /// Takes the degrees of freedom from the mixture of noises that `model` says.
     fn weigh<const OCTAVES: usize>(&mut self, curve: &Curve<OCTAVES>, model: &Model) {
-        let curve = curve.clone().with_confidence(|point| model.shares(point.n));
         let points = curve.points().iter().filter(|point| point.avar > 0.0);
         for (octave, point) in self.octaves.iter_mut().zip(points) {
-            octave.edf = point.edf;
             octave.shares = model.shares(point.n);
+            octave.edf = point.edf_of(octave.shares);
         }
     }
 

@@ -7,12 +7,10 @@ use crate::report::{
 use crate::timeline::{Step, Timeline};
 use adis16405_driver::Channel;
 use allan_core::{Cascade, Curve, Kind, Model, check, fit::fit, read_off};
+use firmware::{OCTAVES, OVERLAP};
 use std::collections::BTreeMap;
 
-/// As on the target: 24 octaves reach 8,388,608 samples, 11 h at 204.8 SPS.
-const OCTAVES: usize = 24;
-const OVERLAP: usize = 8;
-
+/// The target's own.
 type Estimator = Cascade<OCTAVES, OVERLAP>;
 
 /// Analyses every channel of a recording along its timeline.

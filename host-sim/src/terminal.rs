@@ -1,8 +1,8 @@
 //! The report as text: at most 100 columns, the same in a terminal and in a file.
 
 use crate::coefficients::{self, Row};
-use crate::report::{ChannelReport, ModelError, Parameter, Report, Term};
-use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, unit, words};
+use crate::report::{ChannelReport, Parameter, Report, Term};
+use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -134,15 +134,11 @@ fn term_table(terms: &[Term]) -> Table {
 }
 
 fn error_table(channel: &ChannelReport) -> Table {
-    let percent = |error: &ModelError| match error.rms_percent {
-        Some(value) => format!("{} %", number(value)),
-        None => NONE.to_owned(),
-    };
     let rows = [("before", &channel.before), ("after", &channel.after)].map(|(name, model)| {
         vec![
             name.to_owned(),
-            percent(&model.fitted),
-            percent(&model.unseen),
+            percent(model.fitted.rms_percent),
+            percent(model.unseen.rms_percent),
             optional(model.fitted.deviance_per_point),
             optional(model.unseen.deviance_per_point),
         ]

@@ -115,7 +115,7 @@ struct ReReads {
 impl ReReads {
     fn of(samples: &[Sample], rate: Option<f64>) -> Self {
         let times: Option<Vec<f64>> = samples.iter().map(|sample| sample.clock.time_s).collect();
-        let period = times.and_then(|times| rate.map(f64::recip).or_else(|| deliveries::period(&times)));
+        let period = times.and_then(|times| period(&times, rate));
         Self { shortest: RE_READ_WITHIN * period.unwrap_or(0.0) }
     }
 
@@ -128,6 +128,11 @@ impl ReReads {
     }
 }
 
+/// Sample period in s, as `rate` tells or else as the `times` show.
+fn period(times: &[f64], rate: Option<f64>) -> Option<f64> {
+    rate.map(f64::recip).or_else(|| deliveries::period(times))
+}
+
 /// The period in which each used sample was taken, counted from any origin, and the rate in Hz where it can be measured.
 fn slots(samples: &[Sample], used: &[usize], rate: Option<f64>) -> Result<(Vec<u64>, Option<f64>), TimelineError> {
     let indices: Option<Vec<u64>> = used.iter().map(|&p| samples[p].clock.index).collect();
@@ -138,8 +143,7 @@ fn slots(samples: &[Sample], used: &[usize], rate: Option<f64>) -> Result<(Vec<u
             Ok((indices, measured))
         }
         (None, Some(times)) => {
-            let period =
-                rate.map(|hz| 1.0 / hz).or_else(|| deliveries::period(&times)).ok_or(TimelineError::NoPeriod)?;
+            let period = period(&times, rate).ok_or(TimelineError::NoPeriod)?;
             let deliveries = Deliveries::with_period(&times, period);
             let measured = deliveries.rate(&times);
             if rate.is_none() && measured.is_none() {

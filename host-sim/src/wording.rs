@@ -34,6 +34,11 @@ pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), number)
 }
 
+/// A percentage with its sign, or [`NONE`].
+pub fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| NONE.to_owned(), |value| format!("{} %", number(value)))
+}
+
 /// A whole number with its thousands apart: `1,000,000`.
 pub fn count(value: u64) -> String {
     let digits = value.to_string();

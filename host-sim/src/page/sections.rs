@@ -2,7 +2,7 @@
 
 use crate::coefficients::{self, Row};
 use crate::report::{ChannelReport, ModelError, ModelReport, Parameter, Report};
-use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, unit, words};
+use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
 use maud::{Markup, PreEscaped, html};
 
 /// The record in four numbers, and what was dropped.
@@ -69,7 +69,7 @@ pub(super) fn overview(report: &Report) -> Markup {
                                 @for row in coefficients::rows(channel).iter().take(3) {
                                     td.number { (quantity(row.fit)) }
                                 }
-                                td.number { (percent(&channel.after.unseen)) }
+                                td.number { (percent(channel.after.unseen.rms_percent)) }
                                 td { (effect_names(channel)) }
                             }
                         }
@@ -95,10 +95,6 @@ fn quantity(parameter: Option<&Parameter>) -> Markup {
             None => { (NONE) }
         }
     }
-}
-
-fn percent(error: &ModelError) -> String {
-    error.rms_percent.map_or_else(|| NONE.to_owned(), |value| format!("{} %", number(value)))
 }
 
 /// One channel with its picture and tables.
@@ -252,7 +248,7 @@ fn error_table(channel: &ChannelReport) -> Markup {
 }
 
 fn error_cell(error: &ModelError) -> Markup {
-    html! { td.number { (percent(error)) span.under { (optional(error.deviance_per_point)) } } }
+    html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) } } }
 }
 
 fn curve_table(channel: &ChannelReport) -> Markup {
