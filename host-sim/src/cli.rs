@@ -90,7 +90,7 @@ pub struct Simulate {
 impl Simulate {
     /// With `default_s` seconds unless told otherwise.
     pub fn simulation(&self, default_s: f64) -> Simulation {
-        Simulation { seconds: self.seconds.unwrap_or(default_s), seed: self.seed }
+        Simulation::of_paper(self.seconds.unwrap_or(default_s), self.seed)
     }
 }
 

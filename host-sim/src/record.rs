@@ -1,14 +1,17 @@
 //! The virtual sensor, read by the real driver over the emulated bus.
 
+mod host;
 mod logged_bus;
 
+pub use host::Host;
 pub use logged_bus::{LoggedBus, LoggedBusError};
 
 use crate::recording::{Clock, Recorder, Recording};
-use crate::sensor::{EmulatedBus, NoiseModel, VirtualAdis16405};
+use crate::sensor::{EmulatedBus, Hidden, NoiseModel, VirtualAdis16405};
 use crate::source::frame_log::FrameLog;
 use adis16405_driver::{Adis16405, Channel, Config, ConfigError, GyroRange, SamplePeriod};
 use embedded_hal::spi::SpiDevice;
+use host::Reader;
 use std::cell::RefCell;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,12 +24,18 @@ pub const SAMPLE_RATE_HZ: f64 = 204.8;
 pub const LONGEST_S: f64 = 86_400.0;
 
 /// What to simulate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
-    /// Virtual time to record, s.
+    /// Virtual time to record, s, at the nominal sample rate.
     pub seconds: f64,
-    /// Of the noise; the same seed gives the same samples.
+    /// Of all that is random; the same seed gives the same samples.
     pub seed: u64,
+    /// What is declared.
+    pub noise: NoiseModel,
+    /// What is not.
+    pub hidden: Hidden,
+    /// Who reads the part.
+    pub host: Host,
 }
 
 /// Why a simulation gave no recording.
@@ -64,7 +73,12 @@ pub enum RecordError {
 }
 
 impl Simulation {
-    /// Samples that the simulation takes.
+    /// The part of [`NoiseModel::paper`], hiding nothing, read by a perfect host.
+    pub fn of_paper(seconds: f64, seed: u64) -> Self {
+        Self { seconds, seed, noise: NoiseModel::paper(), hidden: Hidden::default(), host: Host::default() }
+    }
+
+    /// Samples that the part takes.
     ///
     /// # Errors
     /// The duration is not positive, not finite or above [`LONGEST_S`].
@@ -83,7 +97,7 @@ impl Simulation {
     pub fn run(&self, progress: impl FnMut(u64)) -> Result<Recording, RecordError> {
         let samples = self.samples()?;
         let bus = self.bus();
-        read(&bus, bus.clone(), samples, progress)
+        self.read(&bus, bus.clone(), samples, progress)
     }
 
     /// Runs the simulation and writes every transaction to the frame log `file`.
@@ -97,7 +111,7 @@ impl Simulation {
         let bus = self.bus();
         let logged = LoggedBus::new(bus.clone(), Rc::clone(&log));
         let failure = logged.failure();
-        let recording = read(&bus, logged, samples, progress);
+        let recording = self.read(&bus, logged, samples, progress);
         if let Some(reason) = failure.take() {
             return Err(fail(reason));
         }
@@ -108,39 +122,43 @@ impl Simulation {
     }
 
     fn bus(&self) -> EmulatedBus {
-        EmulatedBus::new(VirtualAdis16405::new(NoiseModel::paper(), self.seed))
+        EmulatedBus::new(VirtualAdis16405::hiding(&self.hidden, self.noise.clone(), self.seed))
     }
-}
 
-/// Reads `samples` samples through `device`, which is `bus` or a layer over it.
-fn read<SPI: SpiDevice<u8>>(
-    bus: &EmulatedBus,
-    device: SPI,
-    samples: u64,
-    mut progress: impl FnMut(u64),
-) -> Result<Recording, RecordError> {
-    let mut driver = Adis16405::new(device, config().map_err(RecordError::Config)?);
-    driver.init().map_err(|e| RecordError::Driver(e.to_string()))?;
-    let mut recorder = Recorder::new(Channel::ALL.to_vec(), driver.config().range());
-    for taken in 0..samples {
-        if taken % 1024 == 0 {
-            progress(taken);
+    /// Reads `samples` samples through `device`, which is `bus` or a layer over it.
+    fn read<SPI: SpiDevice<u8>>(
+        &self,
+        bus: &EmulatedBus,
+        device: SPI,
+        samples: u64,
+        mut progress: impl FnMut(u64),
+    ) -> Result<Recording, RecordError> {
+        let mut driver = Adis16405::new(device, self.config().map_err(RecordError::Config)?);
+        driver.init().map_err(|e| RecordError::Driver(e.to_string()))?;
+        let mut recorder = Recorder::new(Channel::ALL.to_vec(), driver.config().range());
+        let mut reader = Reader::new(self.host, self.hidden.missed_fraction(), self.seed);
+        for taken in 0..samples {
+            if taken % 1024 == 0 {
+                progress(taken);
+            }
+            let ready_ns = bus.wait_for_data().ok_or(RecordError::Silent(taken))?;
+            if let Some(time_s) = reader.stamp(ready_ns) {
+                let burst = driver.burst().map_err(|e| RecordError::Driver(e.to_string()))?;
+                recorder.push(Clock::at(time_s), &burst);
+            }
         }
-        let ready_ns = bus.wait_for_data().ok_or(RecordError::Silent(taken))?;
-        let burst = driver.burst().map_err(|e| RecordError::Driver(e.to_string()))?;
-        recorder.push(Clock::at(seconds(ready_ns)), &burst);
+        progress(samples);
+        let part = bus.part();
+        if let Some(first) = part.violations().first() {
+            return Err(RecordError::Violations { count: part.violation_count(), first: format!("{first:?}") });
+        }
+        Ok(recorder.finish())
     }
-    progress(samples);
-    let part = bus.part();
-    if let Some(first) = part.violations().first() {
-        return Err(RecordError::Violations { count: part.violation_count(), first: format!("{first:?}") });
-    }
-    Ok(recorder.finish())
-}
 
-/// No digital filter: the declared model has no term for its bandwidth.
-fn config() -> Result<Config, ConfigError> {
-    Config::new(GyroRange::Dps300, 0, SamplePeriod::nearest(SAMPLE_RATE_HZ)?)
+    /// The declared model has no term for the filter's bandwidth, so unless something is hidden there is none.
+    fn config(&self) -> Result<Config, ConfigError> {
+        Config::new(GyroRange::Dps300, self.hidden.taps_log2(), SamplePeriod::nearest(SAMPLE_RATE_HZ)?)
+    }
 }
 
 /// Virtual time in s.

@@ -193,7 +193,8 @@ impl GaussMarkov {
     }
 }
 
-fn gauss(random: &mut ChaCha8Rng) -> f64 {
+/// A standard normal number.
+pub(super) fn gauss(random: &mut ChaCha8Rng) -> f64 {
     random.sample(StandardNormal)
 }
 

@@ -2,6 +2,7 @@
 
 use adis16405_driver::{Channel, Counts, GyroRange};
 
+use super::effect::{EffectSource, Hidden};
 use super::filter::Bartlett;
 use super::noise::{NoiseModel, NoiseSource};
 use super::police::{self, Record, Violation, ViolationKind};
@@ -35,6 +36,7 @@ pub struct VirtualAdis16405 {
     next_sample_sixteenths: Option<u64>,
     busy_until_ns: u64,
     noise: NoiseSource,
+    hidden: EffectSource,
     filters: [Bartlett; 12],
     registers: RegisterFile,
     counts: [i16; 12],
@@ -62,6 +64,11 @@ struct Burst {
 impl VirtualAdis16405 {
     /// A part just after its start-up, with reset values, at time 0. The same model and seed give the same samples.
     pub fn new(model: NoiseModel, seed: u64) -> Self {
+        Self::hiding(&Hidden::default(), model, seed)
+    }
+
+    /// The same part with effects that its noise model does not declare.
+    pub fn hiding(hidden: &Hidden, model: NoiseModel, seed: u64) -> Self {
         let registers = RegisterFile::reset();
         let taps = setting(registers.read(registers::SENS_AVG)).taps_log2;
         let mut part = Self {
@@ -69,6 +76,7 @@ impl VirtualAdis16405 {
             next_sample_sixteenths: None,
             busy_until_ns: 0,
             noise: NoiseSource::new(&model, seed, 1.0),
+            hidden: EffectSource::new(hidden, seed),
             filters: std::array::from_fn(|_| Bartlett::new(taps)),
             registers,
             counts: [0; 12],
@@ -299,7 +307,8 @@ impl VirtualAdis16405 {
     fn period_sixteenths(&self) -> Option<u64> {
         let smpl_prd = u64::from(self.registers.read(registers::SMPL_PRD));
         let base = if smpl_prd & 0x80 == 0 { 1 } else { SLOW_TICKS };
-        (smpl_prd != 0).then_some((smpl_prd % 0x80 + 1) * base * TICK_SIXTEENTHS)
+        let nominal = (smpl_prd % 0x80 + 1) * base * TICK_SIXTEENTHS;
+        (smpl_prd != 0).then(|| (nominal as f64 / self.hidden.clock_ratio()).round() as u64)
     }
 
     fn take_sample(&mut self) {
@@ -313,10 +322,16 @@ impl VirtualAdis16405 {
         if !valid {
             self.record.add(self.now_ns, ViolationKind::Configuration { sens_avg });
         }
-        let values = self.noise.sample();
+        let (time_s, period_s) = (at as f64 / 16e9, period as f64 / 16e9);
+        let mut values = self.noise.sample();
+        self.hidden.disturb(&mut values, time_s, period_s);
+        let stale = self.hidden.stale();
         for (index, channel) in Channel::ALL.into_iter().enumerate() {
             let sensed = if filtered(channel) { self.filters[index].filter(values[index]) } else { values[index] };
-            let value = self.corrected(channel, sensed);
+            let value = self.hidden.digitize(channel, self.corrected(channel, sensed), period_s);
+            if stale {
+                continue;
+            }
             let (low, high) = channel.limits();
             let counts = ((value - channel.zero()) / channel.lsb(range)).round();
             self.counts[index] = counts.clamp(f64::from(low), f64::from(high)) as i16;
