@@ -24,6 +24,8 @@ pub struct Point {
     pub low: f64,
     /// Upper 95 % bound of `avar`.
     pub high: f64,
+    /// Excess kurtosis of the differences: 0 for Gaussian noise. `None` if they are all 0 or too large to say.
+    pub kurtosis: Option<f64>,
 }
 
 impl Point {

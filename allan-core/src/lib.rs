@@ -33,6 +33,7 @@ mod cascade;
 pub mod check;
 mod chi_square;
 pub mod confidence;
+mod coupling;
 mod curve;
 pub mod fit;
 mod math;
@@ -40,6 +41,7 @@ pub mod read_off;
 mod term;
 
 pub use cascade::Cascade;
+pub use coupling::{Coupling, Covariance};
 pub use curve::{Curve, Point};
 pub use fit::Model;
 pub use term::Kind;

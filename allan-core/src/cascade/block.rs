@@ -1,11 +1,12 @@
 //! Many samples at once: the same differences level by level, in loops that a compiler can vectorise.
 
+use super::moments::{Moments, fourth_power, unit_bits};
 use super::{Cascade, second_difference};
 
 /// Samples that are taken together.
 const BLOCK: usize = 256;
-/// Running sums of earlier samples that a block's differences reach back to: `2·OVERLAP` for the largest one.
-const HISTORY: usize = 32;
+/// Running sums of earlier samples that a block's differences reach back to.
+const HISTORY: usize = 2 * 16;
 
 /// Running sums of one level: those of the past in front, then the block's own.
 struct Sums {
@@ -27,43 +28,50 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     fn push_block(&mut self, block: &[i32], sums: &mut Sums) {
         sums.past = self.elapsed;
         sums.new = block.len();
-        self.recall(0, sums);
+        for back in 0..OVERLAP {
+            sums.values[HISTORY - 1 - back] = self.recent[Self::slot(sums.past.wrapping_sub(back as u64))];
+        }
         for (slot, &sample) in sums.values[HISTORY..].iter_mut().zip(block) {
             self.sum = self.sum.wrapping_add(i64::from(sample));
             *slot = self.sum;
         }
         self.samples += block.len() as u64;
         self.elapsed += block.len() as u64;
-
-        for octave in 0..=Self::FINE {
-            self.accumulate_block(octave, 1 << octave, sums);
+        for back in 0..OVERLAP {
+            self.recent[Self::slot(self.elapsed.wrapping_sub(back as u64))] = sums.before(back);
         }
-        self.keep(0, sums);
-        for level in 1..OCTAVES - Self::FINE {
-            sums.halve();
+
+        for level in 0..Self::LEVELS {
+            self.recall(level, sums);
+            if level == 0 {
+                for octave in 0..Self::FINE {
+                    self.accumulate_block(octave, 1 << octave, sums);
+                }
+            }
+            self.accumulate_block(level + Self::FINE, OVERLAP, sums);
+            self.keep(level, sums);
+            sums.halve(OVERLAP);
             if sums.new == 0 {
                 break;
             }
-            self.recall(level, sums);
-            self.accumulate_block(level + Self::FINE, OVERLAP, sums);
-            self.keep(level, sums);
         }
     }
 
-    /// Brings the ring of a level in front of its new sums.
+    /// Brings what the level's line holds in front of the sums that the level above left.
     fn recall(&self, level: usize, sums: &mut Sums) {
-        for back in 0..2 * OVERLAP as u64 {
-            let (half, slot) = Self::slot(sums.past.wrapping_sub(back));
-            sums.values[HISTORY - 1 - back as usize] = self.rings[level][half][slot];
+        for back in OVERLAP..2 * OVERLAP {
+            let slot = Self::slot(sums.past.wrapping_sub(back as u64));
+            sums.values[HISTORY - 1 - back] = self.lines[level][slot];
         }
     }
 
-    /// Writes the new sums of a level into its ring.
+    /// Fills the level's line anew.
     fn keep(&mut self, level: usize, sums: &Sums) {
-        for index in sums.new.saturating_sub(2 * OVERLAP)..sums.new {
-            let (half, slot) = Self::slot(sums.past + 1 + index as u64);
-            self.rings[level][half][slot] = sums.values[HISTORY + index];
+        let last = sums.past + sums.new as u64;
+        for back in OVERLAP..2 * OVERLAP {
+            self.lines[level][Self::slot(last.wrapping_sub(back as u64))] = sums.before(back);
         }
+        self.oldest[level] = sums.before(2 * OVERLAP);
     }
 
     /// The differences over `reach` steps of a level that end in the block.
@@ -79,39 +87,57 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let oldest = &sums.values[first - 2 * reach..][..newest.len()];
         let differences =
             || newest.iter().zip(middle).zip(oldest).map(|((&new, &mid), &old)| second_difference(new, mid, old));
-        self.squares[octave] = self.squares[octave].saturating_add(sum_of_squares(differences));
-        self.differences[octave] += newest.len() as u64;
+        let (squares, fourths) = sums_of_powers(unit_bits(octave), differences);
+        self.moments[octave].add_sums(squares, fourths);
     }
 }
 
 impl Sums {
-    /// Leaves every second running sum: those of the next level.
-    fn halve(&mut self) {
+    /// The sum of `back` steps before the newest.
+    fn before(&self, back: usize) -> i64 {
+        self.values[HISTORY + self.new - 1 - back]
+    }
+
+    /// Leaves every second running sum: those of the next level, the last `history` of the past among them.
+    fn halve(&mut self, history: usize) {
         let odd = (self.past & 1) as usize;
         let new = (self.new + odd) / 2;
         for index in 0..new {
             self.values[HISTORY + index] = self.values[HISTORY + 2 * index + 1 - odd];
+        }
+        for back in 0..history {
+            self.values[HISTORY - 1 - back] = self.values[HISTORY - 1 - odd - 2 * back];
         }
         self.past >>= 1;
         self.new = new;
     }
 }
 
-/// At most [`BLOCK`] squares: those of numbers below 2²⁸ fit in 64 bits together.
-fn sum_of_squares<I: Iterator<Item = i64>>(differences: impl Fn() -> I) -> u128 {
-    let widest = differences().fold(0, |bits, difference| bits | difference.unsigned_abs());
+/// Sums of the second and, of magnitudes rounded by `bits` digits, the fourth powers of at most [`BLOCK`] differences.
+fn sums_of_powers<I: Iterator<Item = i64>>(bits: u32, differences: impl Fn() -> I) -> (u128, u128) {
+    let square_of = |x: i32| u64::from(x.unsigned_abs()) * u64::from(x.unsigned_abs());
+    let widest = differences().fold(0, |digits, difference| digits | difference.unsigned_abs());
     if widest < 1 << 28 {
-        let sum: u64 = differences()
-            .map(|difference| {
-                let magnitude = u64::from((difference as i32).unsigned_abs());
-                magnitude * magnitude
-            })
-            .sum();
-        u128::from(sum)
+        // Squares below 2⁵⁶, 256 of which fit in 64 bits. Of the fourth power, (a·2²⁸ + b)², the parts fit likewise.
+        const HALF: u64 = (1 << 28) - 1;
+        let half_unit = 1 << bits >> 1;
+        let (mut squares, mut high, mut mixed, mut low) = (0_u64, 0_u64, 0_u64, 0_u64);
+        for difference in differences() {
+            let difference = difference as i32;
+            squares += square_of(difference);
+            let square = square_of((difference + half_unit) >> bits);
+            let (a, b) = (square >> 28, square & HALF);
+            high += a * a;
+            mixed += a * b;
+            low += b * b;
+        }
+        (u128::from(squares), (u128::from(high) << 56) + (u128::from(mixed) << 29) + u128::from(low))
     } else {
-        differences().fold(0, |sum: u128, difference| {
+        let mut moments = Moments::NONE;
+        for difference in differences() {
             let magnitude = u128::from(difference.unsigned_abs());
-            sum.saturating_add(magnitude * magnitude)
-        })
+            moments.add_sums(magnitude * magnitude, fourth_power(difference, bits));
+        }
+        (moments.squares, moments.fourths)
     }
 }

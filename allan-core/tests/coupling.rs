@@ -1,0 +1,97 @@
+//! Allan covariance: the compensation formula to the bit, gaps, merging.
+
+use allan_core::{Cascade, Coupling};
+use proptest::prelude::*;
+
+const OCTAVES: usize = 9;
+
+struct Pair {
+    y: Cascade<OCTAVES, 8>,
+    c: Cascade<OCTAVES, 8>,
+    coupling: Coupling<OCTAVES>,
+}
+
+impl Pair {
+    fn new() -> Self {
+        Self { y: Cascade::new(), c: Cascade::new(), coupling: Coupling::new() }
+    }
+
+    fn push(&mut self, (y, c): (i32, i32)) {
+        self.y.push(y);
+        self.c.push(c);
+        self.coupling.observe(&self.y, &self.c);
+    }
+
+    fn gap(&mut self) {
+        self.y.gap(1);
+        self.c.gap(1);
+    }
+}
+
+fn samples() -> impl Strategy<Value = Vec<(i32, i32)>> {
+    let range = -(1 << 23)..1_i32 << 23;
+    prop::collection::vec((range.clone(), range), 1..700)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn compensation_is_foretold_to_the_bit(stretches in prop::collection::vec(samples(), 1..4), beta in -20..20_i32) {
+        let (mut pair, mut compensated) = (Pair::new(), Cascade::<OCTAVES, 8>::new());
+        for stretch in &stretches {
+            pair.gap();
+            compensated.gap(1);
+            for &(y, c) in stretch {
+                pair.push((y, c));
+                compensated.push(y - beta * c);
+            }
+        }
+        for octave in 0..OCTAVES {
+            let (product, count) = pair.coupling.sum_of_products(octave).unwrap();
+            let (y, c) = (pair.y.sum_of_squares(octave).unwrap(), pair.c.sum_of_squares(octave).unwrap());
+            let beta = i128::from(beta);
+            let left = y.0 as i128 - 2 * beta * product + beta * beta * c.0 as i128;
+            prop_assert_eq!(compensated.sum_of_squares(octave), Some((left as u128, count)));
+        }
+        prop_assert_eq!(pair.coupling.out_of_step(), 0);
+    }
+
+    #[test]
+    fn merging_is_a_gap_at_the_seam(samples in samples(), seam in 0.0..1.0) {
+        let (first, second) = samples.split_at((samples.len() as f64 * seam) as usize);
+        let (mut whole, mut early, mut late) = (Pair::new(), Pair::new(), Pair::new());
+        first.iter().for_each(|&sample| { whole.push(sample); early.push(sample); });
+        whole.gap();
+        second.iter().for_each(|&sample| { whole.push(sample); late.push(sample); });
+        early.coupling.merge(&late.coupling);
+        prop_assert_eq!(early.coupling, whole.coupling);
+    }
+}
+
+#[test]
+fn a_gap_that_only_one_channel_heard_of_is_counted() {
+    let mut pair = Pair::new();
+    (0..100).for_each(|k| pair.push((k * k, k)));
+    let before = pair.coupling.points();
+    pair.y.gap(1);
+    (0..50).for_each(|k| pair.push((k * k, k)));
+    assert_eq!(pair.coupling.points(), before);
+    assert_eq!(pair.coupling.out_of_step(), 50);
+}
+
+#[test]
+fn a_sum_beyond_its_range_is_withdrawn() {
+    // Full swing at n = 2⁸, over and over: products of 2⁸⁰. 48 doublings pass 2¹²⁷.
+    let mut pair = Pair::new();
+    for k in 0..4 << OCTAVES {
+        let level = if k >> (OCTAVES - 1) & 1 == 0 { i32::MIN } else { i32::MAX };
+        pair.push((level, level));
+    }
+    assert!(pair.coupling.sum_of_products(OCTAVES - 1).unwrap().0 > 1 << 80);
+    for _ in 0..48 {
+        pair.coupling.merge(&pair.coupling.clone());
+    }
+    assert_eq!(pair.coupling.sum_of_products(OCTAVES - 1), None);
+    assert!(pair.coupling.points().iter().all(|point| point.n < 1 << (OCTAVES - 1)));
+}
