@@ -1,90 +1,34 @@
-//! The driver over a blocking [`SpiDevice`].
+//! The shell over a blocking [`SpiDevice`].
 
+use core::pin::pin;
+
+use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Operation, SpiDevice};
 
-use crate::config::{ClockMode, Config};
+use crate::alarm::{Alarm, AlarmNumber};
+use crate::compensation::Compensation;
+use crate::config::{Config, GyroRange};
+use crate::diagnosis::Diagnosis;
+use crate::driver::{Adis16405, Blocking};
 use crate::error::Error;
-use crate::frame::{BURST_BYTES, BURST_REQUEST, Burst};
-use crate::register::{Access, Register};
+use crate::frame::{BURST_BYTES, BURST_REQUEST, Burst, spaced_burst};
+use crate::offset::{FactoryRestore, GyroBias};
+use crate::pin::{DacLevel, Gpio, Signal};
+use crate::port::{Port, Step};
+use crate::product::Product;
+use crate::register::Register;
+use crate::sample::Sample;
+use crate::self_test::{FlashTest, SelfTest, Stimulus};
+use crate::session::{Refusal, Session};
+use crate::shell::procedures;
+use crate::sleep::Sleep;
+#[cfg(doc)]
+use crate::timing::Timing;
 
-/// Default stall after a frame in normal mode, as Analog Devices' evaluation tool has it. The part needs 9 µs.
-const STALL_NORMAL_NS: u32 = 16_000;
-/// Default stall after a frame in low-power mode; no source at hand confirms it.
-const STALL_LOW_POWER_NS: u32 = 75_000;
-
-const PRODUCTS: [u16; 2] = [16405, 16400];
-
-/// An ADIS16405 or ADIS16400 on an SPI bus.
-///
-/// Every 16-bit frame is a transaction of its own, so chip select is high between frames; the stall is part of the
-/// transaction, after the frame. The device must therefore support [`Operation::DelayNs`].
-#[derive(Debug)]
-pub struct Adis16405<SPI> {
-    spi: SPI,
-    config: Config,
-    stall_ns: u32,
-}
-
-impl<SPI: SpiDevice<u8>> Adis16405<SPI> {
-    /// Takes the bus; nothing is sent before [`init`](Self::init). The stall is 16 µs, or 75 µs if the sample period
-    /// puts the part into low-power mode.
+impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
+    /// Takes the bus; nothing is sent before [`init`](Self::init).
     pub fn new(spi: SPI, config: Config) -> Self {
-        let stall_ns = match config.sample_period().clock_mode() {
-            ClockMode::Normal => STALL_NORMAL_NS,
-            ClockMode::LowPower => STALL_LOW_POWER_NS,
-        };
-        Self { spi, config, stall_ns }
-    }
-
-    /// Sets the pause after each frame in ns.
-    #[must_use]
-    pub fn with_stall_ns(mut self, stall_ns: u32) -> Self {
-        self.stall_ns = stall_ns;
-        self
-    }
-
-    /// Checks that an ADIS16405 or ADIS16400 answers, then configures it.
-    ///
-    /// Only bytes that differ are written, the lower byte first, and a register that was written is read back.
-    ///
-    /// # Errors
-    /// [`Error::Product`] if something else answers, [`Error::Verify`] if a register did not take its value.
-    pub fn init(&mut self) -> Result<(), Error<SPI::Error>> {
-        let answer = self.read_register(Register::ProdId)?;
-        if !PRODUCTS.contains(&answer) {
-            return Err(Error::Product { answer });
-        }
-        self.configure(Register::SmplPrd, u16::from(self.config.sample_period().register()))?;
-        self.configure(Register::SensAvg, self.config.sens_avg())
-    }
-
-    /// Reads a register: two frames, the answer comes in the second. Bits outside the register's width are as the
-    /// part sends them.
-    ///
-    /// # Errors
-    /// [`Error::WriteOnly`] for GLOB_CMD (reading it would start a burst) and SLP_CNT.
-    pub fn read_register(&mut self, register: Register) -> Result<u16, Error<SPI::Error>> {
-        if register.access() == Access::Write {
-            return Err(Error::WriteOnly(register));
-        }
-        self.frame(register.read_frame())?;
-        // The second frame asks for FLASH_CNT, the one read without any effect.
-        Ok(u16::from_be_bytes(self.frame(Register::FlashCnt.read_frame())?))
-    }
-
-    /// Writes a register, the lower byte first; the upper byte only if the register has one. Does not read it back.
-    ///
-    /// # Errors
-    /// [`Error::ReadOnly`] if it cannot be written.
-    pub fn write_register(&mut self, register: Register, value: u16) -> Result<(), Error<SPI::Error>> {
-        if register.access() == Access::Read {
-            return Err(Error::ReadOnly(register));
-        }
-        self.frame(register.write_low_frame(value))?;
-        if register.bits() > 8 {
-            self.frame(register.write_high_frame(value))?;
-        }
-        Ok(())
+        Self::on(spi, config)
     }
 
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
@@ -93,40 +37,78 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI> {
     /// Only of the bus: whether the data can be believed is for [`Judge`](crate::Judge) to say.
     pub fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
-        self.spi
-            .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(self.stall_ns)])?;
+        let stall_ns = self.state.stall_ns();
+        match self.state.timing.word_gap_ns {
+            0 => self
+                .spi
+                .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)])?,
+            gap_ns => self.spi.transaction(&mut spaced_burst(&mut answer, gap_ns, stall_ns))?,
+        }
         Ok(Burst::from_bytes(&answer))
     }
 
-    /// What [`init`](Self::init) sets.
-    pub fn config(&self) -> Config {
-        self.config
+    /// Reads a burst as a sample that knows its range and bias.
+    ///
+    /// # Errors
+    /// Only of the bus, as [`burst`](Self::burst).
+    pub fn sample(&mut self) -> Result<Sample, Error<SPI::Error>> {
+        let burst = self.burst()?;
+        Ok(self.sample_of(burst))
     }
+}
 
-    /// Gives the bus back.
-    pub fn release(self) -> SPI {
-        self.spi
-    }
+macro_rules! methods {
+    ($(
+        $(#[$doc:meta])*
+        $pace:ident fn $name:ident $([const $length:ident: usize])? ($($argument:ident: $type:ty),*) -> $output:ty;
+    )*) => {
+        impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
+            $(methods! {
+                @$pace [$(#[$doc])*] $name [$(const $length: usize)?] [$($argument: $type,)*] [$($argument),*] $output
+            })*
+        }
+    };
+    (@framed [$($doc:tt)*] $name:ident [$($n:tt)*] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
+        $($doc)*
+        pub fn $name<$($n)*>(&mut self, $($declared)*) -> Result<$output, Error<SPI::Error>> {
+            let port = Port::new();
+            run(&mut self.spi, &mut NoPause, &port, Session::new(&port, &mut self.state).$name($($passed)*))
+        }
+    };
+    (@paced [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
+        $($doc)*
+        pub fn $name(&mut self, $($declared)* delay: &mut impl DelayNs) -> Result<$output, Error<SPI::Error>> {
+            let port = Port::new();
+            run(&mut self.spi, delay, &port, Session::new(&port, &mut self.state).$name($($passed)*))
+        }
+    };
+}
+procedures!(methods);
 
-    fn configure(&mut self, register: Register, value: u16) -> Result<(), Error<SPI::Error>> {
-        let expected = value & register.mask();
-        let different = (self.read_register(register)? & register.mask()) ^ expected;
-        if different == 0 {
-            return Ok(());
-        }
-        if different & 0x00FF != 0 {
-            self.frame(register.write_low_frame(expected))?;
-        }
-        if different & 0xFF00 != 0 {
-            self.frame(register.write_high_frame(expected))?;
-        }
-        let answer = self.read_register(register)? & register.mask();
-        if answer == expected { Ok(()) } else { Err(Error::Verify { register, expected, answer }) }
-    }
-
-    fn frame(&mut self, request: [u8; 2]) -> Result<[u8; 2], Error<SPI::Error>> {
+fn run<SPI: SpiDevice<u8>, T>(
+    spi: &mut SPI,
+    delay: &mut impl DelayNs,
+    port: &Port,
+    procedure: impl Future<Output = Result<T, Refusal>>,
+) -> Result<T, Error<SPI::Error>> {
+    let mut procedure = pin!(procedure);
+    loop {
         let mut answer = [0; 2];
-        self.spi.transaction(&mut [Operation::Transfer(&mut answer, &request), Operation::DelayNs(self.stall_ns)])?;
-        Ok(answer)
+        match port.resume(procedure.as_mut()) {
+            Ok(result) => return result.map_err(Error::over_bus),
+            Err(Step::Frame { request, stall_ns }) => {
+                spi.transaction(&mut [Operation::Transfer(&mut answer, &request), Operation::DelayNs(stall_ns)])?;
+            }
+            Err(Step::Select { ns }) => spi.transaction(&mut [Operation::DelayNs(ns)])?,
+            Err(Step::Pause { us }) => delay.delay_us(us),
+        }
+        port.answer(answer);
     }
+}
+
+/// For procedures of frames alone.
+struct NoPause;
+
+impl DelayNs for NoPause {
+    fn delay_ns(&mut self, _: u32) {}
 }

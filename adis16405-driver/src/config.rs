@@ -24,6 +24,15 @@ impl GyroRange {
         }
     }
 
+    /// Size of one count in 10⁻⁶ °/s.
+    pub const fn lsb_udps(self) -> i32 {
+        match self {
+            GyroRange::Dps300 => 50_000,
+            GyroRange::Dps150 => 25_000,
+            GyroRange::Dps75 => 12_500,
+        }
+    }
+
     /// The least number of filter taps (log2) with which the part accepts this range.
     pub const fn min_filter_taps_log2(self) -> u8 {
         match self {
@@ -33,7 +42,17 @@ impl GyroRange {
         }
     }
 
-    pub(crate) const fn field(self) -> u16 {
+    /// The range that a value of SENS_AVG selects; `None` for codes that the data sheet does not define.
+    pub const fn from_sens_avg(sens_avg: u16) -> Option<Self> {
+        match sens_avg >> 8 & 0b111 {
+            0b100 => Some(GyroRange::Dps300),
+            0b010 => Some(GyroRange::Dps150),
+            0b001 => Some(GyroRange::Dps75),
+            _ => None,
+        }
+    }
+
+    const fn field(self) -> u16 {
         match self {
             GyroRange::Dps300 => 0b100,
             GyroRange::Dps150 => 0b010,
@@ -132,6 +151,16 @@ impl SamplePeriod {
     }
 }
 
+/// What makes the part take a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SampleClock {
+    /// Its own clock.
+    Internal(SamplePeriod),
+    /// A clock at pin DIO4/CLKIN, SMPL_PRD = 0. Known of sibling parts (up to 1.1 kHz); no source at hand confirms it
+    /// for this one.
+    External,
+}
+
 impl Default for SamplePeriod {
     fn default() -> Self {
         Self::RESET
@@ -144,6 +173,7 @@ pub struct Config {
     range: GyroRange,
     filter_taps_log2: u8,
     sample_period: SamplePeriod,
+    external_clock: bool,
 }
 
 impl Config {
@@ -155,7 +185,47 @@ impl Config {
         if filter_taps_log2 > 6 || filter_taps_log2 < range.min_filter_taps_log2() {
             return Err(ConfigError::FilterTaps { range, filter_taps_log2 });
         }
-        Ok(Self { range, filter_taps_log2, sample_period })
+        Ok(Self { range, filter_taps_log2, sample_period, external_clock: false })
+    }
+
+    /// The same with another range.
+    ///
+    /// # Errors
+    /// If the range needs more filter taps than there are.
+    pub const fn with_range(mut self, range: GyroRange) -> Result<Self, ConfigError> {
+        self.range = range;
+        self.checked()
+    }
+
+    /// The same with another filter.
+    ///
+    /// # Errors
+    /// If M is above 6 or below what the range needs.
+    pub const fn with_filter_taps_log2(mut self, filter_taps_log2: u8) -> Result<Self, ConfigError> {
+        self.filter_taps_log2 = filter_taps_log2;
+        self.checked()
+    }
+
+    /// The same with the internal clock and another sample period.
+    #[must_use]
+    pub const fn with_sample_period(mut self, sample_period: SamplePeriod) -> Self {
+        self.sample_period = sample_period;
+        self.external_clock = false;
+        self
+    }
+
+    /// The same with [`SampleClock::External`]: without a clock at its pin the part takes no samples.
+    #[must_use]
+    pub const fn with_external_clock(mut self) -> Self {
+        self.external_clock = true;
+        self
+    }
+
+    const fn checked(self) -> Result<Self, ConfigError> {
+        match Self::new(self.range, self.filter_taps_log2, self.sample_period) {
+            Ok(_) => Ok(self),
+            Err(error) => Err(error),
+        }
     }
 
     /// Gyro range.
@@ -168,9 +238,22 @@ impl Config {
         self.filter_taps_log2
     }
 
-    /// Sample period.
+    /// Period of the internal clock, also while an external one is selected.
     pub const fn sample_period(self) -> SamplePeriod {
         self.sample_period
+    }
+
+    /// What makes the part take a sample.
+    pub const fn sample_clock(self) -> SampleClock {
+        if self.external_clock { SampleClock::External } else { SampleClock::Internal(self.sample_period) }
+    }
+
+    /// The value of SMPL_PRD.
+    pub const fn smpl_prd(self) -> u8 {
+        match self.sample_clock() {
+            SampleClock::Internal(period) => period.register(),
+            SampleClock::External => 0,
+        }
     }
 
     /// The value of SENS_AVG.
@@ -181,7 +264,12 @@ impl Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { range: GyroRange::Dps300, filter_taps_log2: 2, sample_period: SamplePeriod::RESET }
+        Self {
+            range: GyroRange::Dps300,
+            filter_taps_log2: 2,
+            sample_period: SamplePeriod::RESET,
+            external_clock: false,
+        }
     }
 }
 

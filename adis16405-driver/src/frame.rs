@@ -1,6 +1,9 @@
 //! What crosses the wire: output words and the burst read.
 
-use crate::sample::{Channel, Counts};
+use embedded_hal::spi::Operation;
+
+use crate::channel::Channel;
+use crate::sample::Counts;
 use crate::status::{Faults, burst_faults};
 
 /// Bytes in a burst read: the request and twelve output words.
@@ -12,6 +15,24 @@ pub const BURST_REQUEST: [u8; BURST_BYTES] = {
     request[0] = 0x3E;
     request
 };
+
+/// The operations of a burst read with a pause of `gap_ns` between its words and the stall at its end.
+pub(crate) fn spaced_burst(
+    answer: &mut [u8; BURST_BYTES],
+    gap_ns: u32,
+    stall_ns: u32,
+) -> [Operation<'_, u8>; BURST_BYTES] {
+    static REQUEST: [u8; BURST_BYTES] = BURST_REQUEST;
+    let mut words = answer.chunks_exact_mut(2).zip(REQUEST.chunks_exact(2));
+    core::array::from_fn(|index| {
+        // Words and pauses take turns: as many operations as there are bytes.
+        let word = if index % 2 == 0 { words.next() } else { None };
+        match word {
+            Some((answer, request)) => Operation::Transfer(answer, request),
+            None => Operation::DelayNs(if index == BURST_BYTES - 1 { stall_ns } else { gap_ns }),
+        }
+    })
+}
 
 const NEW_DATA: u16 = 1 << 15;
 const ERROR_ALARM: u16 = 1 << 14;
@@ -36,9 +57,14 @@ impl OutputWord {
         self.0 & ERROR_ALARM != 0
     }
 
+    /// The data field as it is, without the flags and without a sign.
+    pub const fn field(self, channel: Channel) -> u16 {
+        self.0 & field_mask(channel)
+    }
+
     /// The data field as a count, sign-extended where the channel is signed. Bits above the field are ignored.
     pub const fn counts(self, channel: Channel) -> i16 {
-        let field = self.0 & field_mask(channel);
+        let field = self.field(channel);
         if channel.signed() {
             let shift = 16 - channel.bits();
             ((field << shift) as i16) >> shift

@@ -29,18 +29,47 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-pub mod blocking;
+pub mod alarm;
+#[cfg(feature = "async")]
+mod asynch;
+mod blocking;
+pub mod channel;
+pub mod compensation;
 pub mod config;
+pub mod diagnosis;
+pub mod driver;
 pub mod error;
 pub mod frame;
+pub mod offset;
+pub mod pin;
+mod port;
+mod procedure;
+pub mod product;
 pub mod register;
 pub mod sample;
+pub mod self_test;
+mod session;
+mod shell;
+pub mod sleep;
 pub mod status;
+pub mod timing;
 
-pub use blocking::Adis16405;
-pub use config::{ClockMode, Config, ConfigError, GyroRange, SamplePeriod, TimeBase};
+pub use alarm::{Alarm, AlarmNumber, Threshold, Watch};
+pub use channel::Channel;
+pub use compensation::Compensation;
+pub use config::{ClockMode, Config, ConfigError, GyroRange, SampleClock, SamplePeriod, TimeBase};
+pub use diagnosis::Diagnosis;
+#[cfg(feature = "async")]
+pub use driver::Async;
+pub use driver::{Adis16405, Blocking};
 pub use error::Error;
 pub use frame::{BURST_BYTES, BURST_REQUEST, Burst, OutputWord};
+pub use offset::{FactoryRestore, GyroBias};
+pub use pin::{DacLevel, Dio, Gpio, Line, Polarity, Signal};
+pub use product::Product;
 pub use register::{Access, Register};
-pub use sample::{Channel, Counts};
+pub use sample::{Counts, Sample};
+pub use self_test::{FlashTest, SelfTest, Stimulus};
+pub use sleep::Sleep;
 pub use status::{Counters, Faults, Judge, Verdict};
+pub use timing::{ByMode, Timing};

@@ -1,134 +1,7 @@
-//! What one sample is: twelve channels, each a sign-extended register count.
+//! One sample: twelve sign-extended counts, and what they mean.
 
+use crate::channel::Channel;
 use crate::config::GyroRange;
-
-/// An output register, in the order of a burst read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(u8)]
-pub enum Channel {
-    /// Supply voltage, SUPPLY_OUT.
-    Supply,
-    /// Angular rate about x, XGYRO_OUT.
-    GyroX,
-    /// Angular rate about y, YGYRO_OUT.
-    GyroY,
-    /// Angular rate about z, ZGYRO_OUT.
-    GyroZ,
-    /// Specific force along x, XACCL_OUT.
-    AcclX,
-    /// Specific force along y, YACCL_OUT.
-    AcclY,
-    /// Specific force along z, ZACCL_OUT.
-    AcclZ,
-    /// Magnetic field along x, XMAGN_OUT.
-    MagnX,
-    /// Magnetic field along y, YMAGN_OUT.
-    MagnY,
-    /// Magnetic field along z, ZMAGN_OUT.
-    MagnZ,
-    /// Internal temperature, TEMP_OUT.
-    Temp,
-    /// Auxiliary analog input, AUX_ADC.
-    AuxAdc,
-}
-
-impl Channel {
-    /// All channels in burst order.
-    pub const ALL: [Channel; 12] = [
-        Channel::Supply,
-        Channel::GyroX,
-        Channel::GyroY,
-        Channel::GyroZ,
-        Channel::AcclX,
-        Channel::AcclY,
-        Channel::AcclZ,
-        Channel::MagnX,
-        Channel::MagnY,
-        Channel::MagnZ,
-        Channel::Temp,
-        Channel::AuxAdc,
-    ];
-
-    /// The gyroscopes, then the accelerometers.
-    pub const INERTIAL: [Channel; 6] =
-        [Channel::GyroX, Channel::GyroY, Channel::GyroZ, Channel::AcclX, Channel::AcclY, Channel::AcclZ];
-
-    /// Name in reports and file headers, such as `gyro_x`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Channel::Supply => "supply",
-            Channel::GyroX => "gyro_x",
-            Channel::GyroY => "gyro_y",
-            Channel::GyroZ => "gyro_z",
-            Channel::AcclX => "accl_x",
-            Channel::AcclY => "accl_y",
-            Channel::AcclZ => "accl_z",
-            Channel::MagnX => "magn_x",
-            Channel::MagnY => "magn_y",
-            Channel::MagnZ => "magn_z",
-            Channel::Temp => "temp",
-            Channel::AuxAdc => "aux_adc",
-        }
-    }
-
-    /// Width of the data field in bits: 12 for supply, temperature and auxiliary input, else 14.
-    ///
-    /// Sources disagree on 12 or 14 bits for the supply; its data need 12 (5 V is count 2068).
-    pub const fn bits(self) -> u32 {
-        match self {
-            Channel::Supply | Channel::Temp | Channel::AuxAdc => 12,
-            _ => 14,
-        }
-    }
-
-    /// True for two's complement, false for offset binary (supply, auxiliary input).
-    pub const fn signed(self) -> bool {
-        !matches!(self, Channel::Supply | Channel::AuxAdc)
-    }
-
-    /// Least and greatest count that the field can hold.
-    pub const fn limits(self) -> (i16, i16) {
-        if self.signed() {
-            let half = 1i16 << (self.bits() - 1);
-            (-half, half - 1)
-        } else {
-            (0, (1i16 << self.bits()) - 1)
-        }
-    }
-
-    /// Unit of [`lsb`](Self::lsb): `V`, `deg/s`, `g`, `gauss` or `degC`.
-    pub const fn unit(self) -> &'static str {
-        match self {
-            Channel::Supply | Channel::AuxAdc => "V",
-            Channel::GyroX | Channel::GyroY | Channel::GyroZ => "deg/s",
-            Channel::AcclX | Channel::AcclY | Channel::AcclZ => "g",
-            Channel::MagnX | Channel::MagnY | Channel::MagnZ => "gauss",
-            Channel::Temp => "degC",
-        }
-    }
-
-    /// Size of one count in [`unit`](Self::unit); only the gyroscopes depend on `range`.
-    ///
-    /// For the temperature sources give 0.14 °C and 0.1357 °C; 0.14 °C, which most drivers use, is taken here.
-    pub const fn lsb(self, range: GyroRange) -> f64 {
-        match self {
-            Channel::Supply => 2.418e-3,
-            Channel::GyroX | Channel::GyroY | Channel::GyroZ => range.lsb(),
-            Channel::AcclX | Channel::AcclY | Channel::AcclZ => 3.33e-3,
-            Channel::MagnX | Channel::MagnY | Channel::MagnZ => 0.5e-3,
-            Channel::Temp => 0.14,
-            Channel::AuxAdc => 0.806e-3,
-        }
-    }
-
-    /// Value at count 0 in [`unit`](Self::unit): 25 for the temperature, else 0.
-    pub const fn zero(self) -> f64 {
-        match self {
-            Channel::Temp => 25.0,
-            _ => 0.0,
-        }
-    }
-}
 
 /// The twelve sign-extended counts of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -164,4 +37,119 @@ impl Counts {
     pub const fn magn(&self) -> [i16; 3] {
         [self.0[7], self.0[8], self.0[9]]
     }
+}
+
+/// The counts of one sample with what it takes to scale them, so that a scale is never that of another range.
+///
+/// Values with a unit come twice: as `f32`, and as exact `i32` in a millionth (temperature: a thousandth) of the unit
+/// for targets without an FPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Sample {
+    counts: Counts,
+    range: GyroRange,
+    host_bias_x: i16,
+}
+
+/// One count of a bias register of the gyros, 0.0125 °/s, in 10⁻⁶ °/s.
+const BIAS_UDPS: i32 = 12_500;
+
+impl Sample {
+    /// Counts that were taken in `range`.
+    pub const fn new(counts: Counts, range: GyroRange) -> Self {
+        Self { counts, range, host_bias_x: 0 }
+    }
+
+    /// Adds a bias correction in counts of 0.0125 °/s to the x rate: see [`GyroBias`](crate::GyroBias).
+    #[must_use]
+    pub const fn with_host_bias_x(mut self, host_bias_x: i16) -> Self {
+        self.host_bias_x = host_bias_x;
+        self
+    }
+
+    /// The counts as the part sent them, without the host's bias correction.
+    pub const fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// The gyro range in which the sample was taken.
+    pub const fn range(&self) -> GyroRange {
+        self.range
+    }
+
+    /// Bias correction that the host adds to the x rate, in counts of 0.0125 °/s.
+    pub const fn host_bias_x(&self) -> i16 {
+        self.host_bias_x
+    }
+
+    /// Angular rates about x, y, z in 10⁻⁶ °/s, bias correction included.
+    pub fn gyro_udps(&self) -> [i32; 3] {
+        let lsb = self.range.lsb_udps();
+        let [x, y, z] = self.counts.gyro().map(|count| i32::from(count) * lsb);
+        [x + i32::from(self.host_bias_x) * BIAS_UDPS, y, z]
+    }
+
+    /// Angular rates about x, y, z in °/s, bias correction included.
+    pub fn gyro_dps(&self) -> [f32; 3] {
+        self.gyro_udps().map(millionths)
+    }
+
+    /// Specific forces along x, y, z in 10⁻⁶ g.
+    pub fn accl_ug(&self) -> [i32; 3] {
+        self.counts.accl().map(|count| i32::from(count) * 3_330)
+    }
+
+    /// Specific forces along x, y, z in g.
+    pub fn accl_g(&self) -> [f32; 3] {
+        self.accl_ug().map(millionths)
+    }
+
+    /// Magnetic field along x, y, z in 10⁻⁶ gauss.
+    pub fn magn_ugauss(&self) -> [i32; 3] {
+        self.counts.magn().map(|count| i32::from(count) * 500)
+    }
+
+    /// Magnetic field along x, y, z in gauss.
+    pub fn magn_gauss(&self) -> [f32; 3] {
+        self.magn_ugauss().map(millionths)
+    }
+
+    /// Supply voltage in 10⁻⁶ V.
+    pub fn supply_uv(&self) -> i32 {
+        i32::from(self.counts.get(Channel::Supply)) * 2_418
+    }
+
+    /// Supply voltage in V.
+    pub fn supply_v(&self) -> f32 {
+        millionths(self.supply_uv())
+    }
+
+    /// Voltage at the auxiliary input in 10⁻⁶ V.
+    pub fn aux_adc_uv(&self) -> i32 {
+        i32::from(self.counts.get(Channel::AuxAdc)) * 806
+    }
+
+    /// Voltage at the auxiliary input in V.
+    pub fn aux_adc_v(&self) -> f32 {
+        millionths(self.aux_adc_uv())
+    }
+
+    /// Internal temperature in 10⁻⁶ °C, with `udegc_per_count`: sources give 140,000 (most drivers) and 135,700 (Analog
+    /// Devices' register map).
+    pub fn temp_udegc(&self, udegc_per_count: i32) -> i32 {
+        25_000_000i32.saturating_add(i32::from(self.counts.get(Channel::Temp)).saturating_mul(udegc_per_count))
+    }
+
+    /// Internal temperature in 10⁻³ °C, at 0.14 °C a count: see [`temp_udegc`](Self::temp_udegc).
+    pub fn temp_mdegc(&self) -> i32 {
+        25_000 + 140 * i32::from(self.counts.get(Channel::Temp))
+    }
+
+    /// Internal temperature in °C, at 0.14 °C a count: see [`temp_udegc`](Self::temp_udegc).
+    pub fn temp_degc(&self) -> f32 {
+        self.temp_mdegc() as f32 * 1e-3
+    }
+}
+
+fn millionths(value: i32) -> f32 {
+    value as f32 * 1e-6
 }

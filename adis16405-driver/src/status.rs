@@ -1,7 +1,7 @@
 //! Whether a burst can be believed: faults by cause, and how often each was seen.
 
+use crate::channel::Channel;
 use crate::frame::{Burst, OutputWord};
-use crate::sample::Channel;
 
 bitflags::bitflags! {
     /// Reasons to doubt a burst.

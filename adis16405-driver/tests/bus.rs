@@ -28,6 +28,12 @@ fn write(address: u8, byte: u8) -> Vec<Transaction<u8>> {
     frame([0x80 | address, byte], [0xA5, 0x5A]).to_vec()
 }
 
+/// What ends an `init`: XGYRO_OFF to ZGYRO_OFF in four frames, each with the answer to the one before.
+fn gyro_offsets(x: u16) -> Vec<Transaction<u8>> {
+    let frames = [([0x1A, 0], 0xA55A), ([0x1C, 0], x), ([0x1E, 0], 0x0000), ([0, 0], 0x0000)];
+    frames.into_iter().flat_map(|(sent, answer)| frame(sent, u16::to_be_bytes(answer))).collect()
+}
+
 fn on_bus<T>(config: Config, expected: &[Vec<Transaction<u8>>], run: impl FnOnce(&mut Adis16405<Mock<u8>>) -> T) -> T {
     let mut imu = Adis16405::new(Mock::new(&expected.concat()), config);
     let result = run(&mut imu);
@@ -47,7 +53,7 @@ fn new_sends_nothing() {
 #[test]
 fn init_of_a_part_that_is_already_configured_only_reads() {
     for product in [16405, 16400] {
-        let bus = [read(0x56, product), read(0x36, 0x0001), read(0x38, 0x0402)];
+        let bus = [read(0x56, product), read(0x36, 0x0001), read(0x38, 0x0402), gyro_offsets(0)];
         on_bus(Config::default(), &bus, |imu| imu.init()).unwrap();
     }
 }
@@ -63,6 +69,7 @@ fn init_writes_the_lower_byte_first_and_reads_back() {
         write(0x38, 0x04),
         write(0x39, 0x01),
         read(0x38, 0x0104),
+        gyro_offsets(0),
     ];
     on_bus(config(GyroRange::Dps75, 4, 0x07), &bus, |imu| imu.init()).unwrap();
 }
@@ -70,9 +77,23 @@ fn init_writes_the_lower_byte_first_and_reads_back() {
 #[test]
 fn init_writes_only_the_byte_that_changes() {
     // Bits outside the registers (SMPL_PRD has 8, SENS_AVG 11) must not matter.
-    let bus = [read(0x56, 0x4015), read(0x36, 0xFF01), read(0x38, 0xF802), write(0x39, 0x04), read(0x38, 0xF402)];
+    let bus = [
+        read(0x56, 0x4015),
+        read(0x36, 0xFF01),
+        read(0x38, 0xF802),
+        write(0x39, 0x04),
+        read(0x38, 0xF402),
+        gyro_offsets(0),
+    ];
     on_bus(Config::default(), &bus, |imu| imu.init()).unwrap();
-    let bus = [read(0x56, 0x4015), read(0x36, 0x0001), read(0x38, 0x0402), write(0x38, 0x06), read(0x38, 0x0406)];
+    let bus = [
+        read(0x56, 0x4015),
+        read(0x36, 0x0001),
+        read(0x38, 0x0402),
+        write(0x38, 0x06),
+        read(0x38, 0x0406),
+        gyro_offsets(0),
+    ];
     on_bus(config(GyroRange::Dps300, 6, 0x01), &bus, |imu| imu.init()).unwrap();
 }
 
