@@ -16,7 +16,7 @@ pub struct ModelError {
 impl ModelError {
     /// Compares the measured variance `v` with the modelled one `m`; `None` when no octave can be compared.
     ///
-    /// The degrees of freedom are those of the model's own mixture of noises. A variance of 0 on either side has no
+    /// The degrees of freedom are those of the model's own mixture of terms. A variance of 0 on either side has no
     /// logarithm: it makes the error infinite.
     #[must_use]
     pub fn between<const OCTAVES: usize>(model: &Model, curve: &Curve<OCTAVES>) -> Option<Self> {
@@ -24,7 +24,7 @@ impl ModelError {
         for point in curve.points().iter().filter(|point| point.n <= curve.samples() / 8) {
             let ratio = point.avar / model.avar(point.n);
             let log = math::ln(ratio);
-            deviance += point.edf_of(model.shares(point.n)) * (ratio - 1.0 - log);
+            deviance += model.edf(point) * (ratio - 1.0 - log);
             square += log * log / 4.0;
             points += 1;
         }

@@ -31,6 +31,11 @@ pub(crate) fn quantile(p: f64, dof: f64) -> f64 {
     x
 }
 
+/// Probability that a χ² variable with `dof > 0` degrees of freedom exceeds `x`.
+pub(crate) fn upper_tail(x: f64, dof: f64) -> f64 {
+    (1.0 - gamma_p(dof / 2.0, x / 2.0)).clamp(0.0, 1.0)
+}
+
 /// The regularised lower incomplete gamma function `P(a, x)` (NIST Handbook 6.5.29 and 6.5.31).
 fn gamma_p(a: f64, x: f64) -> f64 {
     let front = exp(a * ln(x) - x - ln_gamma(a));

@@ -37,11 +37,12 @@ mod coupling;
 mod curve;
 pub mod fit;
 mod math;
+pub mod model;
 pub mod read_off;
-mod term;
+pub mod term;
 
 pub use cascade::Cascade;
 pub use coupling::{Coupling, Covariance};
 pub use curve::{Curve, Point};
-pub use fit::Model;
+pub use model::Model;
 pub use term::Kind;

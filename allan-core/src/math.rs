@@ -25,6 +25,23 @@ pub(crate) fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
 
+/// `exp(x) − 1`, exact near 0.
+pub(crate) fn expm1(x: f64) -> f64 {
+    libm::expm1(x)
+}
+
+pub(crate) fn sin(x: f64) -> f64 {
+    libm::sin(x)
+}
+
+pub(crate) fn cos(x: f64) -> f64 {
+    libm::cos(x)
+}
+
+pub(crate) fn floor(x: f64) -> f64 {
+    libm::floor(x)
+}
+
 pub(crate) fn ln_gamma(x: f64) -> f64 {
     libm::lgamma(x)
 }

@@ -26,7 +26,7 @@ fn curve(cascade: &Cascade<20, 8>) -> Curve<20> {
     cascade.curve(PERIOD).scaled(LSB)
 }
 
-fn value(model: &Model, kind: Kind) -> allan_core::fit::Term {
+fn value(model: &Model, kind: Kind) -> allan_core::model::Term {
     *model.terms().iter().find(|term| term.kind == kind).expect("a fitted term")
 }
 

@@ -7,22 +7,48 @@ pub(crate) type Matrix<const N: usize> = [[f64; N]; N];
 
 /// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns.
 ///
-/// Tries every set of unknowns that may be positive: with so few of them that is both the simplest and the surest
-/// way, and it always ends.
+/// The active-set method of C. Lawson and R. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
 pub(crate) fn non_negative<const N: usize>(a: &Matrix<N>, b: &Vector<N>, count: usize) -> Vector<N> {
-    let mut best = ([0.0; N], 0.0);
-    for set in 1_usize..1 << count {
-        let Some(x) = solve(a, b, set) else { continue };
-        if x.iter().any(|&entry| entry < 0.0) {
+    let mut x = [0.0; N];
+    let (mut free, mut refused) = (0_usize, 0_usize);
+    // Each round lowers the objective, so no set of free unknowns comes twice; rounding could make it seem so.
+    for _ in 0..4 * N {
+        let pull = |i: usize| (b[i] - dot(&a[i], &x)) / sqrt(a[i][i]);
+        let candidates = (0..count).filter(|i| (free | refused) >> i & 1 == 0 && a[*i][*i] > 0.0);
+        let Some(entering) = candidates.max_by(|&i, &j| pull(i).total_cmp(&pull(j))) else { break };
+        if pull(entering) <= 1e-12 * sqrt(b[entering] * b[entering] / a[entering][entering]) {
+            break;
+        }
+        let Some((next, set)) = settle(a, b, &x, free | 1 << entering) else {
+            refused |= 1 << entering;
             continue;
+        };
+        if next[entering] <= 0.0 {
+            refused |= 1 << entering;
         }
-        // At the unconstrained minimum over the set the objective is −½ bᵀx.
-        let objective = -0.5 * b.iter().zip(&x).map(|(b, x)| b * x).sum::<f64>();
-        if objective < best.1 {
-            best = (x, objective);
-        }
+        (x, free) = (next, set);
     }
-    best.0
+    x
+}
+
+/// Goes from `x` towards the minimum over the unknowns in `free`, and frees fewer whenever one would turn negative.
+fn settle<const N: usize>(a: &Matrix<N>, b: &Vector<N>, x: &Vector<N>, mut free: usize) -> Option<(Vector<N>, usize)> {
+    let mut x = *x;
+    while free != 0 {
+        let target = solve(a, b, free)?;
+        let blocking = |i: &usize| free >> i & 1 == 1 && target[*i] <= 0.0;
+        let reach = |i: usize| if x[i] > target[i] { x[i] / (x[i] - target[i]) } else { 0.0 };
+        let Some(first) = (0..N).filter(blocking).min_by(|&i, &j| reach(i).total_cmp(&reach(j))) else {
+            return Some((target, free));
+        };
+        let step = reach(first);
+        for (i, entry) in x.iter_mut().enumerate().filter(|(i, _)| free >> i & 1 == 1) {
+            *entry = (*entry + step * (target[i] - *entry)).max(0.0);
+        }
+        x[first] = 0.0;
+        free &= !(1 << first);
+    }
+    Some((x, free))
 }
 
 /// The inverse of the leading `count × count` block; `None` if it is singular.
@@ -39,17 +65,21 @@ pub(crate) fn inverse<const N: usize>(a: &Matrix<N>, count: usize) -> Option<Mat
     Some(inverse)
 }
 
+pub(crate) fn dot<const N: usize>(a: &Vector<N>, b: &Vector<N>) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Solves `Ax = b` for the unknowns in the bit set, the others being 0, by Cholesky's decomposition of the matrix
 /// scaled to a unit diagonal (the terms' squares differ by many orders of magnitude).
-fn solve<const N: usize>(a: &Matrix<N>, b: &Vector<N>, set: usize) -> Option<Vector<N>> {
+pub(crate) fn solve<const N: usize>(a: &Matrix<N>, b: &Vector<N>, set: usize) -> Option<Vector<N>> {
     let chosen = |i: &usize| set >> i & 1 == 1;
     let scale = |i: usize| sqrt(a[i][i]);
     let mut factor = [[0.0; N]; N];
     let mut x = [0.0; N];
     for i in (0..N).filter(chosen) {
         for j in (0..=i).filter(chosen) {
-            let dot: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let rest = a[i][j] / (scale(i) * scale(j)) - dot;
+            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+            let rest = a[i][j] / (scale(i) * scale(j)) - known;
             if i != j {
                 factor[i][j] = rest / factor[j][j];
             } else if rest > 1e-12 {
@@ -58,12 +88,12 @@ fn solve<const N: usize>(a: &Matrix<N>, b: &Vector<N>, set: usize) -> Option<Vec
                 return None; // singular, or not a number
             }
         }
-        let dot: f64 = (0..i).map(|k| factor[i][k] * x[k]).sum();
-        x[i] = (b[i] / scale(i) - dot) / factor[i][i];
+        let known: f64 = (0..i).map(|k| factor[i][k] * x[k]).sum();
+        x[i] = (b[i] / scale(i) - known) / factor[i][i];
     }
     for i in (0..N).rev().filter(chosen) {
-        let dot: f64 = (i + 1..N).map(|k| factor[k][i] * x[k]).sum();
-        x[i] = (x[i] - dot) / factor[i][i];
+        let known: f64 = (i + 1..N).map(|k| factor[k][i] * x[k]).sum();
+        x[i] = (x[i] - known) / factor[i][i];
     }
     for (i, entry) in x.iter_mut().enumerate().filter(|(i, _)| chosen(i)) {
         *entry /= scale(i);
