@@ -15,15 +15,14 @@ pub const OVERLAP: usize = 8;
 pub fn channel_report(channel: Channel, estimator: &Cascade<OCTAVES, OVERLAP>, config: Config) -> ChannelReport {
     let curve = estimator.curve(1.0 / config.sample_period().hz()).scaled(channel.lsb(config.range()));
     let model = fit(&curve, &Kind::DECLARED);
-    let coefficients = model.terms().iter().map(|term| Coefficient {
-        term: match term.kind {
+    let coefficients = model.terms().iter().filter_map(|term| {
+        let kind = match term.kind {
             Kind::AngleRandomWalk => Term::AngleRandomWalk,
             Kind::BiasInstability => Term::BiasInstability,
             Kind::RateRandomWalk => Term::RateRandomWalk,
-        },
-        value: term.value,
-        low: term.low,
-        high: term.high,
+            _ => return None,
+        };
+        Some(Coefficient { term: kind, value: term.value, low: term.low, high: term.high })
     });
     let points = (0..OCTAVES).filter_map(|octave| {
         let (sum, count) = estimator.sum_of_squares(octave)?;

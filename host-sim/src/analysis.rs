@@ -6,6 +6,7 @@ use crate::report::{
 };
 use crate::timeline::{Step, Timeline};
 use adis16405_driver::Channel;
+use allan_core::term::CoefficientUnit;
 use allan_core::{Cascade, Curve, Kind, Model, check, fit::fit, read_off};
 use firmware::{OCTAVES, OVERLAP};
 use std::collections::BTreeMap;
@@ -98,10 +99,10 @@ fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {
 }
 
 fn model_report(model: &Model, unit: &str, [whole, first, second]: [&Curve<OCTAVES>; 3]) -> ModelReport {
-    let term = |term: &allan_core::fit::Term| Term {
+    let term = |term: &allan_core::model::Term| Term {
         kind: term.kind.name().to_owned(),
         parameters: BTreeMap::from([(
-            "value".to_owned(),
+            term.kind.coefficient().to_owned(),
             Parameter { value: term.value, low: term.low, high: term.high, unit: coefficient_unit(term.kind, unit) },
         )]),
     };
@@ -140,10 +141,14 @@ fn read_off(curve: &Curve<OCTAVES>, unit: &str) -> ReadOff {
 
 /// The unit of a coefficient of a channel in `unit`.
 fn coefficient_unit(kind: Kind, unit: &str) -> String {
-    match (kind, unit.strip_suffix("/s")) {
-        (Kind::AngleRandomWalk, Some(angle)) => format!("{angle}/sqrt(s)"),
-        (Kind::AngleRandomWalk, None) => format!("{unit}/sqrt(Hz)"),
-        (Kind::BiasInstability, _) => unit.to_owned(),
-        (Kind::RateRandomWalk, _) => format!("{unit}/sqrt(s)"),
+    match (kind.unit(), unit.strip_suffix("/s")) {
+        (CoefficientUnit::TimesSecond, Some(angle)) => angle.to_owned(),
+        (CoefficientUnit::TimesSecond, None) => format!("{unit}*s"),
+        (CoefficientUnit::TimesRootSecond, Some(angle)) => format!("{angle}/sqrt(s)"),
+        (CoefficientUnit::TimesRootSecond, None) => format!("{unit}/sqrt(Hz)"),
+        (CoefficientUnit::Itself, _) => unit.to_owned(),
+        (CoefficientUnit::PerRootSecond, _) => format!("{unit}/sqrt(s)"),
+        (CoefficientUnit::PerSecond, Some(angle)) => format!("{angle}/s^2"),
+        (CoefficientUnit::PerSecond, None) => format!("{unit}/s"),
     }
 }

@@ -42,12 +42,11 @@ pub(super) fn judge(problem: &Problem) -> Goodness {
             }
         }
     }
+    // The traces of the matrix and of its square.
     let (mut mean, mut square) = (0.0, 0.0);
-    for i in 0..count {
-        mean += residual[i][i];
-        for j in 0..count {
-            square += residual[i][j] * residual[j][i];
-        }
+    for (i, row) in residual.iter().enumerate().take(count) {
+        mean += row[i];
+        square += row.iter().zip(&residual).take(count).map(|(entry, other)| entry * other[i]).sum::<f64>();
     }
     let dof = mean * mean / square;
     let p_value = if mean > 1e-9 { chi_square::upper_tail(deviance * mean / square, dof) } else { 1.0 };
