@@ -21,4 +21,5 @@ pub mod sensor;
 pub mod source;
 pub mod terminal;
 pub mod timeline;
+pub mod trace;
 pub mod wording;

@@ -1,0 +1,88 @@
+//! A sample clock that does not run at the nominal rate.
+
+use super::normal::{NORMAL_975, upper_tail};
+use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
+use crate::recording::Recording;
+use crate::timeline::{Step, Timeline};
+use adis16405_driver::SamplePeriod;
+
+/// Standard deviation of the clock of an ordinary host, which the rate is measured by: 20 parts in a million, as of a
+/// crystal that nobody has trimmed.
+pub const HOST_CLOCK: f64 = 20e-6;
+/// Farther from every rate that the part can be set to, the rate is not the part's.
+const FARTHEST: f64 = 0.04;
+/// Stretches whose rates tell how well the rate is known.
+const STRETCHES: usize = 8;
+/// Shortest record whose stretches tell it.
+const FEWEST_SAMPLES: usize = 100 * STRETCHES;
+
+/// Compares the rate that the time stamps show with the nearest that the part can be set to.
+#[must_use]
+pub fn find(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
+    let (slots, times) = stamps(recording, timeline)?;
+    if slots.len() < FEWEST_SAMPLES {
+        return None;
+    }
+    let rates: Option<Vec<f64>> = (0..STRETCHES)
+        .map(|stretch| {
+            let range = slots.len() * stretch / STRETCHES..slots.len() * (stretch + 1) / STRETCHES;
+            rate(&slots[range.clone()], &times[range])
+        })
+        .collect();
+    let rates = rates?;
+    let measured = rate(&slots, &times)?;
+    let mean = rates.iter().sum::<f64>() / STRETCHES as f64;
+    let scatter = rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>() / (STRETCHES * (STRETCHES - 1)) as f64;
+    let nominal = SamplePeriod::nearest(measured).ok()?.hz();
+    let error = (scatter / (measured * measured) + HOST_CLOCK * HOST_CLOCK).sqrt();
+    let off = measured / nominal - 1.0;
+    let z = off.abs() / error;
+    let p_value = 2.0 * upper_tail(z);
+    if off.abs() > FARTHEST || p_value > SIGNIFICANCE {
+        return None;
+    }
+    let half = NORMAL_975 * error * measured;
+    let evidence = format!(
+        "{measured:.4} Hz by the time stamps, {:+.1} ppm from the nominal {nominal:.4} Hz, {z:.1} σ of an ordinary host's \
+         clock; the tolerance of the part's oscillator",
+        1e6 * off,
+    );
+    Some(Finding {
+        effect: effect(
+            "sample_clock",
+            [("rate_hz", parameter(measured, measured - half, measured + half, "Hz"))],
+            evidence,
+        ),
+        deviance: z * z,
+        p_value,
+        repair: Repair::Done,
+    })
+}
+
+/// Periods and time stamps of the used samples; `None` where some have no time stamp.
+fn stamps(recording: &Recording, timeline: &Timeline) -> Option<(Vec<f64>, Vec<f64>)> {
+    let (mut slots, mut times, mut slot) = (Vec::new(), Vec::new(), 0.0);
+    for step in &timeline.steps {
+        match *step {
+            Step::Gap(missing) => slot += f64::from(missing),
+            Step::Sample(position) => {
+                slots.push(slot);
+                times.push(recording.samples[position].clock.time_s?);
+                slot += 1.0;
+            }
+        }
+    }
+    Some((slots, times))
+}
+
+/// Hz; one over the slope of the least-squares line of time over period.
+fn rate(slots: &[f64], times: &[f64]) -> Option<f64> {
+    let count = slots.len() as f64;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
+    let (mean_slot, mean_time) = (mean(slots), mean(times));
+    let (squares, products) = slots.iter().zip(times).fold((0.0, 0.0), |(squares, products), (slot, time)| {
+        (squares + (slot - mean_slot).powi(2), products + (slot - mean_slot) * (time - mean_time))
+    });
+    let rate = squares / products;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}

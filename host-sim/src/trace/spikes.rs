@@ -1,0 +1,243 @@
+//! Spikes: single samples that do not belong to their neighbours.
+//!
+//! Each sample is compared with what its neighbours tell of it by the best linear interpolation, which follows from the
+//! covariance of the data. In white noise that is the mean; in filtered noise, a line or a drift it is much better. The
+//! error is normal, so the largest of N is judged by N times the normal tail.
+
+use super::normal::{NORMAL_975, any_of, density, poisson_bounds, quantile, upper_tail};
+use super::{Finding, Repair, SIGNIFICANCE, Series, effect, parameter};
+
+/// Neighbours on each side.
+const REACH: usize = 6;
+
+/// Where the estimate of a standard deviation cuts its tails, in standard deviations; a normal law has 7·10⁻⁶ beyond.
+const CLIP: f64 = 4.5;
+
+/// The sample before a spike and that after it differ by less than this part of the spike; else it is a jump.
+const SETTLED: f64 = 0.5;
+
+/// Least part of the spikes that is taken to be seen: of still smaller ones nothing is known.
+const LEAST_SEEN: f64 = 0.05;
+
+/// Looks for spikes in one channel.
+#[must_use]
+pub fn find(series: &Series) -> Option<Finding> {
+    if series.values.len() < 100 * REACH {
+        return None;
+    }
+    let interpolation = Interpolation::of(series)?;
+    let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / series.values.len() as f64);
+    let (spikes, jumps) = interpolation.spikes(series, threshold);
+    if spikes.len() <= jumps {
+        return None;
+    }
+    let sizes: Vec<f64> = spikes.iter().map(|spike| spike.error.abs()).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let hours = series.duration_s() / 3600.0;
+    let size = Size::of(&sizes, threshold, interpolation.deviation);
+    let count = sizes.len() as f64;
+    let (fewest, most) = poisson_bounds(count);
+    let rate = |count: f64, seen: f64| count / seen / hours;
+    let z = largest / interpolation.deviation;
+    let evidence = format!(
+        "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {z:.1} σ; \
+         an electrical disturbance or a damaged word",
+        sizes.len(),
+        threshold / interpolation.deviation,
+    );
+    let mut positions: Vec<usize> = spikes.iter().map(|spike| spike.position).collect();
+    positions.sort_unstable();
+    Some(Finding {
+        effect: effect(
+            "spikes",
+            [
+                (
+                    "rate",
+                    parameter(rate(count, size.seen), rate(fewest, size.seen_most), rate(most, size.seen_least), "1/h"),
+                ),
+                ("size", parameter(size.value, size.low, size.high, series.unit)),
+            ],
+            evidence,
+        ),
+        deviance: sizes.iter().map(|size| (size / interpolation.deviation).powi(2)).sum(),
+        p_value: any_of(2.0 * upper_tail(z), series.values.len() as f64),
+        repair: Repair::LeaveOut(positions),
+    })
+}
+
+/// The best linear interpolation of a sample from its neighbours.
+struct Interpolation {
+    weights: [f64; REACH],
+    mean: f64,
+    /// Standard deviation of its error, at least half a count: rounding is not normal.
+    deviation: f64,
+}
+
+struct Spike {
+    position: usize,
+    error: f64,
+}
+
+impl Interpolation {
+    fn of(series: &Series) -> Option<Self> {
+        let mean = series.values.iter().sum::<f64>() / series.values.len() as f64;
+        let mut interpolation = Self { weights: [0.5 / REACH as f64; REACH], mean, deviation: 0.0 };
+        // The neighbours' mean finds the gross spikes, which would spoil the covariance.
+        let errors = interpolation.errors(series, &series.values);
+        let rough = clipped_deviation(&errors);
+        let mut clean = series.values.clone();
+        for (value, error) in clean.iter_mut().zip(&errors) {
+            if error.abs() > CLIP * rough {
+                *value -= error;
+            }
+        }
+        interpolation.weights = weights(&covariance(series, &clean, mean))?;
+        let deviation = clipped_deviation(&interpolation.errors(series, &series.values));
+        interpolation.deviation = deviation.max(0.5 * series.resolution);
+        Some(interpolation)
+    }
+
+    fn error(&self, values: &[f64], position: usize) -> f64 {
+        let pairs = self
+            .weights
+            .iter()
+            .enumerate()
+            .map(|(at, weight)| weight * (values[position - at - 1] + values[position + at + 1] - 2.0 * self.mean));
+        values[position] - self.mean - pairs.sum::<f64>()
+    }
+
+    /// The error of every sample; 0 next to a gap or an end.
+    fn errors(&self, series: &Series, values: &[f64]) -> Vec<f64> {
+        let inner = REACH..values.len() - REACH;
+        let error = |position: usize| {
+            let complete = inner.contains(&position) && series.is_gapless(position - REACH, position + REACH);
+            if complete { self.error(values, position) } else { 0.0 }
+        };
+        (0..values.len()).map(error).collect()
+    }
+
+    /// The spikes above `threshold`, the largest first, and the number of candidates that are jumps of the level.
+    fn spikes(&self, series: &Series, threshold: f64) -> (Vec<Spike>, usize) {
+        let mut values = series.values.clone();
+        let errors = self.errors(series, &values);
+        let mut candidates: Vec<usize> = (0..errors.len()).filter(|&at| errors[at].abs() > threshold).collect();
+        candidates.sort_by(|a, b| errors[*b].abs().total_cmp(&errors[*a].abs()));
+        let (mut spikes, mut jumps) = (Vec::new(), 0);
+        for position in candidates {
+            // A spike nearby has been taken out meanwhile.
+            let error = self.error(&values, position);
+            if error.abs() <= threshold {
+                continue;
+            }
+            let side = |from: usize| values[from..from + REACH].iter().sum::<f64>() / REACH as f64;
+            if (side(position + 1) - side(position - REACH)).abs() > SETTLED * error.abs() {
+                jumps += 1;
+                continue;
+            }
+            values[position] -= error;
+            spikes.push(Spike { position, error });
+        }
+        (spikes, jumps)
+    }
+}
+
+/// Standard deviation of the non-zero entries of `errors` without outliers.
+fn clipped_deviation(errors: &[f64]) -> f64 {
+    let mut limit = f64::INFINITY;
+    let mut deviation = 0.0;
+    for _ in 0..12 {
+        let kept = errors.iter().filter(|error| **error != 0.0 && error.abs() <= limit);
+        let (count, squares) = kept.fold((0u64, 0.0), |(count, sum), error| (count + 1, sum + error * error));
+        deviation = (squares / count.max(1) as f64).sqrt();
+        limit = CLIP * deviation;
+    }
+    deviation
+}
+
+/// Autocovariance at lags 0 to 2·[`REACH`].
+fn covariance(series: &Series, values: &[f64], mean: f64) -> [f64; 2 * REACH + 1] {
+    std::array::from_fn(|lag| {
+        let pairs = (0..values.len() - lag).filter(|&at| series.is_gapless(at, at + lag));
+        let (count, sum) = pairs
+            .fold((0u64, 0.0), |(count, sum), at| (count + 1, sum + (values[at] - mean) * (values[at + lag] - mean)));
+        sum / count.max(1) as f64
+    })
+}
+
+/// Minimises the variance of the error: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)`. `None` for a channel that never changes.
+fn weights(covariance: &[f64; 2 * REACH + 1]) -> Option<[f64; REACH]> {
+    let mut matrix = [[0.0; REACH + 1]; REACH];
+    for (j, row) in matrix.iter_mut().enumerate() {
+        for (i, entry) in row[..REACH].iter_mut().enumerate() {
+            *entry = covariance[i.abs_diff(j)] + covariance[i + j + 2];
+        }
+        // So little white noise more keeps the equations solvable for a pure line.
+        row[j] += 1e-9 * covariance[0];
+        row[REACH] = covariance[j + 1];
+    }
+    // Gaussian elimination; the matrix is that of a covariance, so positive definite.
+    for pivot in 0..REACH {
+        if matrix[pivot][pivot] <= 0.0 {
+            return None;
+        }
+        for row in pivot + 1..REACH {
+            let (above, below) = matrix.split_at_mut(row);
+            let factor = below[0][pivot] / above[pivot][pivot];
+            for (entry, over) in below[0].iter_mut().zip(&above[pivot]) {
+                *entry -= factor * over;
+            }
+        }
+    }
+    let mut weights = [0.0; REACH];
+    for row in (0..REACH).rev() {
+        let known: f64 = (row + 1..REACH).map(|column| matrix[row][column] * weights[column]).sum();
+        weights[row] = (matrix[row][REACH] - known) / matrix[row][row];
+    }
+    Some(weights)
+}
+
+/// Size of the spikes, and the part of them that exceeds the threshold.
+struct Size {
+    value: f64,
+    low: f64,
+    high: f64,
+    seen: f64,
+    seen_least: f64,
+    seen_most: f64,
+}
+
+impl Size {
+    /// Spikes of one size are seen when noise lifts them above the threshold, so the mean of those seen is too large:
+    /// it is `s + σ·φ(a)/Q(a)`, `a = (threshold − s)/σ`. Where their sizes scatter more than noise does, it stands.
+    fn of(sizes: &[f64], threshold: f64, deviation: f64) -> Self {
+        let count = sizes.len() as f64;
+        let mean = sizes.iter().sum::<f64>() / count;
+        let scatter = (sizes.iter().map(|size| (size - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let half = NORMAL_975 * scatter.max(deviation) / count.sqrt();
+        if scatter > 1.5 * deviation {
+            return Self {
+                value: mean,
+                low: mean - half,
+                high: mean + half,
+                seen: 1.0,
+                seen_least: 1.0,
+                seen_most: 1.0,
+            };
+        }
+        let size = |mean: f64| {
+            let seen_mean = |size: f64| {
+                let a = (threshold - size) / deviation;
+                size + deviation * density(a) / upper_tail(a)
+            };
+            let (mut low, mut high) = ((threshold - 5.0 * deviation).max(0.0), mean);
+            for _ in 0..50 {
+                let middle = 0.5 * (low + high);
+                if seen_mean(middle) < mean { low = middle } else { high = middle }
+            }
+            0.5 * (low + high)
+        };
+        let seen = |size: f64| upper_tail((threshold - size) / deviation).max(LEAST_SEEN);
+        let (value, low, high) = (size(mean), size((mean - half).max(threshold)), size(mean + half));
+        Self { value, low, high, seen: seen(value), seen_least: seen(low), seen_most: seen(high) }
+    }
+}
