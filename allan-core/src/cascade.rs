@@ -6,6 +6,7 @@ mod moments;
 pub(crate) use moments::Moments;
 
 use crate::curve::{Curve, Point};
+use crate::noise_type::Noise;
 use core::mem::replace;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
@@ -200,18 +201,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
         let points = (0..OCTAVES).filter(|&octave| self.count(octave) > 0).map(|octave| {
             let n = 1_u64 << octave;
-            let (moments, count) = (&self.moments[octave], self.count(octave));
-            Point {
-                n,
-                tau: n as f64 * sample_period,
-                avar: moments.squares as f64 / (2.0 * count as f64 * n as f64 * n as f64),
-                count,
-                overlap: n.min(OVERLAP as u64) as u32,
-                edf: 0.0,
-                low: 0.0,
-                high: 0.0,
-                kurtosis: moments.excess_kurtosis(octave, count),
-            }
+            let overlap = n.min(OVERLAP as u64) as u32;
+            Point::new(n, sample_period, &self.moments[octave], octave, self.count(octave), overlap, Noise::White)
         });
         Curve::new(sample_period, self.samples, points.collect())
     }
@@ -276,6 +267,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Default for Cascade<OCTAVES, OV
 
 /// Exact although the running sums wrap, because the true difference fits.
 #[inline]
-fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
+pub(crate) fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
     newest.wrapping_sub(middle).wrapping_sub(middle.wrapping_sub(oldest))
 }

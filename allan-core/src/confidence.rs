@@ -1,9 +1,12 @@
 //! How much a point of the curve is worth: equivalent degrees of freedom and the correlation between octaves.
 //!
 //! C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences" (PTTI 2003), for
-//! second differences taken every `n/P` samples.
+//! differences taken every `n/P` samples.
+
+mod law;
 
 use crate::math::{abs, ln, sqrt};
+pub(crate) use law::{Difference, Law};
 
 /// What part of a point's variance is due to which power law; the parts sum to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,45 +31,28 @@ impl Shares {
     /// Angle quantization alone.
     pub const QUANTIZATION: Self = Self { quantization: 1.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
 
-    /// The pure noise whose `d log σ² / d log τ` is nearest.
-    #[must_use]
-    pub fn of_slope(slope: f64) -> Self {
-        match slope {
-            s if s < -1.5 => Self::QUANTIZATION,
-            s if s < -0.5 => Self::WHITE,
-            s if s < 0.5 => Self::FLICKER,
-            _ => Self::RANDOM_WALK,
-        }
-    }
-
-    /// Correlation of two second differences `distance` averaging times of `n` samples apart.
-    fn correlation(&self, distance: f64, n: u64) -> f64 {
+    /// Correlation of two differences `distance` averaging times of `n` samples apart.
+    fn correlation(&self, difference: Difference, distance: f64, n: u64) -> f64 {
         let mut sum = 0.0;
         if self.white > 0.0 {
-            sum += self.white * normalised_fourth_difference(abs, distance);
+            sum += self.white * difference.correlation(abs, distance);
         }
         if self.flicker > 0.0 {
             let law = |x: f64| if x == 0.0 { 0.0 } else { x * x * ln(abs(x)) };
-            sum += self.flicker * normalised_fourth_difference(law, distance);
+            sum += self.flicker * difference.correlation(law, distance);
         }
         if self.random_walk > 0.0 {
             // The double sum of white noise: |k|³ − |k| at a lag of k samples.
             let per_sample = 1.0 / (n as f64 * n as f64);
             let law = |x: f64| abs(x) * (x * x - per_sample);
-            sum += self.random_walk * normalised_fourth_difference(law, distance);
+            sum += self.random_walk * difference.correlation(law, distance);
         }
         if self.quantization > 0.0 {
             let law = |x: f64| if x == 0.0 { 1.0 } else { 0.0 };
-            sum += self.quantization * normalised_fourth_difference(law, distance);
+            sum += self.quantization * difference.correlation(law, distance);
         }
         sum
     }
-}
-
-/// The generalised autocovariance of a second difference, from the law of the phase noise.
-fn normalised_fourth_difference(law: impl Fn(f64) -> f64, x: f64) -> f64 {
-    let fourth = |x: f64| 6.0 * law(x) - 4.0 * (law(x - 1.0) + law(x + 1.0)) + law(x - 2.0) + law(x + 2.0);
-    fourth(x) / fourth(0.0)
 }
 
 /// Equivalent degrees of freedom of the mean of `count` squared differences at averaging factor `n`, `overlap` to an
@@ -75,15 +61,7 @@ fn normalised_fourth_difference(law: impl Fn(f64) -> f64, x: f64) -> f64 {
 /// At least 1 for a count of at least 1. Differences that a gap separates are counted as if they were neighbours.
 #[must_use]
 pub fn edf(n: u64, count: u64, overlap: u32, shares: Shares) -> f64 {
-    // Beyond two averaging times only flicker noise correlates; beyond four its square is below 10⁻³.
-    let reach = if shares.flicker > 0.0 { 4 } else { 2 } * u64::from(overlap);
-    let m = count as f64;
-    let mut sum = 0.0;
-    for j in 1..=reach.min(count.saturating_sub(1)) {
-        let rho = shares.correlation(j as f64 / f64::from(overlap), n);
-        sum += (1.0 - j as f64 / m) * rho * rho;
-    }
-    m / (1.0 + 2.0 * sum)
+    Law::new(Difference::Second, n, count, overlap, shares).edf
 }
 
 /// Correlation of the Allan variances of two octaves `lag` octaves apart, for near-full overlap.

@@ -1,8 +1,9 @@
 //! The measured Allan variance, octave by octave.
 
-use crate::chi_square;
-use crate::confidence::{Shares, edf};
-use crate::math;
+use crate::cascade::Moments;
+use crate::confidence::{Difference, Law, Shares};
+use crate::math::log2;
+use crate::noise_type::{Level, Noise, identify};
 use heapless::Vec;
 
 /// One averaging factor of a [`Curve`].
@@ -20,18 +21,43 @@ pub struct Point {
     pub overlap: u32,
     /// Equivalent degrees of freedom of `avar`.
     pub edf: f64,
-    /// Lower 95 % bound of `avar`, by χ² with `edf` degrees of freedom.
+    /// Lower 95 % bound of `avar`.
     pub low: f64,
     /// Upper 95 % bound of `avar`.
     pub high: f64,
     /// Excess kurtosis of the differences: 0 for Gaussian noise. `None` if they are all 0 or too large to say.
     pub kurtosis: Option<f64>,
+    /// The power law that rules around this averaging time.
+    pub noise: Noise,
 }
 
 impl Point {
-    /// Equivalent degrees of freedom if the variance is due to noises in these `shares`.
-    pub(crate) fn edf_of(&self, shares: Shares) -> f64 {
-        edf(self.n, self.count, self.overlap, shares)
+    /// A point without confidence yet. `octave` is the one that the moments were rounded for.
+    pub(crate) fn new(
+        n: u64,
+        sample_period: f64,
+        moments: &Moments,
+        octave: usize,
+        count: u64,
+        overlap: u32,
+        noise: Noise,
+    ) -> Self {
+        Self {
+            n,
+            tau: n as f64 * sample_period,
+            avar: moments.squares as f64 / (2.0 * count as f64 * n as f64 * n as f64),
+            count,
+            overlap,
+            edf: 0.0,
+            low: 0.0,
+            high: 0.0,
+            kurtosis: moments.excess_kurtosis(octave, count),
+            noise,
+        }
+    }
+
+    fn level(&self) -> Level {
+        Level { octave: log2(self.n as f64), variance: self.avar, weight: self.count as f64 / f64::from(self.overlap) }
     }
 }
 
@@ -44,12 +70,17 @@ pub struct Curve<const OCTAVES: usize> {
 }
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    pub(crate) fn new(sample_period: f64, samples: u64, points: Vec<Point, OCTAVES>) -> Self {
-        let mut curve = Self { sample_period, samples, points };
-        let slopes: Vec<f64, OCTAVES> = (0..curve.points.len()).map(|k| curve.slope(k)).collect();
-        let mut slopes = slopes.iter();
-        curve.set_confidence(|_| slopes.next().map_or(Shares::WHITE, |&slope| Shares::of_slope(slope)));
-        curve
+    pub(crate) fn new(sample_period: f64, samples: u64, mut points: Vec<Point, OCTAVES>) -> Self {
+        let levels: Vec<Level, OCTAVES> = points.iter().map(Point::level).collect();
+        for (at, point) in points.iter_mut().enumerate() {
+            point.noise = identify(&levels, at);
+        }
+        Self::of_named(sample_period, samples, points)
+    }
+
+    /// Of points whose noise type is known already.
+    pub(crate) fn of_named(sample_period: f64, samples: u64, points: Vec<Point, OCTAVES>) -> Self {
+        Self { sample_period, samples, points }.with_confidence(|point| point.noise.shares())
     }
 
     /// Seconds between samples.
@@ -84,24 +115,12 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
 
     /// The same curve with the confidence of the noise that `shares` tells for each point.
     #[must_use]
-    pub fn with_confidence(mut self, shares: impl FnMut(&Point) -> Shares) -> Self {
-        self.set_confidence(shares);
-        self
-    }
-
-    fn set_confidence(&mut self, mut shares: impl FnMut(&Point) -> Shares) {
+    pub fn with_confidence(mut self, mut shares: impl FnMut(&Point) -> Shares) -> Self {
         for point in &mut self.points {
-            point.edf = point.edf_of(shares(point));
-            point.low = point.avar * point.edf / chi_square::quantile(0.975, point.edf);
-            point.high = point.avar * point.edf / chi_square::quantile(0.025, point.edf);
+            let law = Law::new(Difference::Second, point.n, point.count, point.overlap, shares(point));
+            point.edf = law.edf;
+            (point.low, point.high) = law.bounds(point.avar);
         }
-    }
-
-    /// `d log σ² / d log τ` around point `k`.
-    fn slope(&self, k: usize) -> f64 {
-        let before = k.saturating_sub(1);
-        let after = (k + 1).min(self.points.len() - 1);
-        let rise = math::coarse_log2(self.points[after].avar / self.points[before].avar);
-        if after > before && rise.is_finite() { rise / (after - before) as f64 } else { -1.0 }
+        self
     }
 }

@@ -29,6 +29,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod between;
 mod cascade;
 pub mod check;
 mod chi_square;
@@ -36,13 +37,18 @@ pub mod confidence;
 mod coupling;
 mod curve;
 pub mod fit;
+mod hadamard;
 mod math;
 pub mod model;
+mod noise_type;
 pub mod read_off;
 pub mod term;
 
+pub use between::Between;
 pub use cascade::Cascade;
 pub use coupling::{Coupling, Covariance};
 pub use curve::{Curve, Point};
+pub use hadamard::{Hadamard, HadamardPoint};
 pub use model::Model;
+pub use noise_type::Noise;
 pub use term::Kind;
