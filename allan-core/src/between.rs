@@ -1,5 +1,8 @@
 //! Averaging factors between the octaves, which make a narrow line visible.
 
+#[cfg(feature = "serde")]
+mod state;
+
 use crate::Cascade;
 use crate::cascade::{Moments, second_difference};
 use crate::curve::{Curve, Point};
@@ -27,8 +30,8 @@ const FACTORS: [u64; 3] = [5, 6, 7];
 /// As of [`Cascade`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Between<const OCTAVES: usize, const OVERLAP: usize> {
-    pub(crate) moments: [[Moments; FACTORS.len()]; OCTAVES],
-    pub(crate) counts: [[u64; FACTORS.len()]; OCTAVES],
+    moments: [[Moments; FACTORS.len()]; OCTAVES],
+    counts: [[u64; FACTORS.len()]; OCTAVES],
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Between<OCTAVES, OVERLAP> {

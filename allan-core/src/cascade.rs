@@ -2,6 +2,8 @@
 
 mod block;
 mod moments;
+#[cfg(feature = "serde")]
+mod state;
 
 pub(crate) use moments::Moments;
 
@@ -23,7 +25,7 @@ use core::mem::replace;
 /// `n ≤ 2²³` no sum exceeds `2¹¹⁵`: nothing is ever rounded. Should wider samples fill the 128 bits all the same,
 /// the sum stays at its maximum and [`is_saturated`](Self::is_saturated) says so. Fourth powers are summed in 128
 /// bits too, of differences rounded to `√(n/512)` counts at `n > 2¹⁰`; where they fill up (over
-/// 2⁴⁰ samples: white noise above 2¹⁸ counts, or averages over `n = 2²³` that differ by more than 2¹⁰ counts
+/// 2⁴⁰ samples: white noise above 2¹⁷ counts, or averages over `n = 2²³` that differ by more than 2¹⁰ counts
 /// throughout) the kurtosis is `None`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
@@ -83,6 +85,25 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             moments: [Moments::NONE; OCTAVES],
             differences: [0; OCTAVES],
         }
+    }
+
+    /// The estimator that has taken `sample` so many times, at once: to start tests and benchmarks late in a record.
+    #[must_use]
+    pub fn after_constant(sample: i32, samples: u64) -> Self {
+        let sum_at = |step: u64, level: usize| i64::from(sample).wrapping_mul((step << level) as i64);
+        let mut cascade = Self { samples, elapsed: samples, sum: sum_at(samples, 0), ..Self::new() };
+        for back in 0..samples.min(OVERLAP as u64) {
+            cascade.recent[Self::slot(samples - back)] = sum_at(samples - back, 0);
+        }
+        let overlap = OVERLAP as u64;
+        for level in 0..Self::LEVELS {
+            let step = samples >> level;
+            for back in overlap..step.min(2 * overlap) {
+                cascade.lines[level][Self::slot(step - back)] = sum_at(step - back, level);
+            }
+            cascade.oldest[level] = sum_at(step.saturating_sub(2 * overlap), level);
+        }
+        cascade
     }
 
     /// Bytes that an estimator takes.

@@ -1,5 +1,8 @@
 //! What two channels have in common at every octave, without a second pass over the data.
 
+#[cfg(feature = "serde")]
+mod state;
+
 use crate::Cascade;
 use heapless::Vec;
 

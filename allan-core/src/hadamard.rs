@@ -1,5 +1,8 @@
 //! Hadamard variance: third differences, which a drift of the rate leaves alone.
 
+#[cfg(feature = "serde")]
+mod state;
+
 use crate::Cascade;
 use crate::confidence::{Difference, Law, Shares};
 use crate::noise_type::{Level, identify};
@@ -63,8 +66,8 @@ impl HadamardPoint {
 /// has no point any more.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hadamard<const OCTAVES: usize, const OVERLAP: usize> {
-    pub(crate) squares: [u128; OCTAVES],
-    pub(crate) counts: [u64; OCTAVES],
+    squares: [u128; OCTAVES],
+    counts: [u64; OCTAVES],
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {

@@ -42,6 +42,8 @@ mod math;
 pub mod model;
 mod noise_type;
 pub mod read_off;
+#[cfg(feature = "serde")]
+mod state;
 pub mod term;
 
 pub use between::Between;
