@@ -7,11 +7,13 @@
 
 mod bounds;
 mod goodness;
+mod improvement;
 mod least_squares;
 mod problem;
 mod shape;
 
 pub use goodness::Goodness;
+pub(crate) use improvement::{Baseline, Rival};
 
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind};

@@ -45,6 +45,7 @@ pub mod read_off;
 #[cfg(feature = "serde")]
 mod state;
 pub mod term;
+pub mod trace;
 
 pub use between::Between;
 pub use cascade::Cascade;

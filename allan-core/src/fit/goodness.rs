@@ -54,7 +54,7 @@ pub(super) fn judge(problem: &Problem) -> Goodness {
 }
 
 /// The directions in the space of standardised residuals that the fit can follow, made orthonormal.
-fn orthonormal(problem: &Problem) -> Vec<[f64; MAX_POINTS], MAX_PARAMETERS> {
+pub(super) fn orthonormal(problem: &Problem) -> Vec<[f64; MAX_POINTS], MAX_PARAMETERS> {
     let mut directions: Vec<[f64; MAX_POINTS], MAX_PARAMETERS> = Vec::new();
     for mut direction in tangents(problem) {
         for known in &directions {

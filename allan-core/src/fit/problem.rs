@@ -11,6 +11,7 @@ pub(super) const MAX_POINTS: usize = 32;
 const SCORING_ROUNDS: usize = 60;
 
 /// A measured point with what is known of it before the coefficients are.
+#[derive(Clone)]
 pub(super) struct Measured {
     pub(super) n: u64,
     pub(super) avar: f64,
@@ -39,16 +40,13 @@ impl Problem {
             shares: Shares::WHITE,
             basis: [0.0; MAX_TERMS],
         };
-        let mut problem = Self {
+        Self {
             sample_period: curve.sample_period(),
-            kinds: kinds.iter().copied().take(MAX_TERMS).collect(),
+            kinds: Vec::new(),
             points: positive(curve).map(measured).take(MAX_POINTS).collect(),
             squares: [0.0; MAX_TERMS],
-        };
-        for term in 0..problem.kinds.len() {
-            problem.set_kind(term, problem.kinds[term]);
         }
-        problem
+        .with_kinds(kinds)
     }
 
     /// At the coefficients of a model, weighed by it.
@@ -60,6 +58,20 @@ impl Problem {
         }
         problem.weigh(curve, model);
         problem
+    }
+
+    /// The same points at the same weights, with other terms.
+    pub(super) fn with_kinds(&self, kinds: &[Kind]) -> Self {
+        let mut other = Self {
+            sample_period: self.sample_period,
+            kinds: kinds.iter().copied().take(MAX_TERMS).collect(),
+            points: self.points.clone(),
+            squares: [0.0; MAX_TERMS],
+        };
+        for term in 0..other.kinds.len() {
+            other.set_kind(term, other.kinds[term]);
+        }
+        other
     }
 
     /// Alternates between the coefficients and the degrees of freedom that follow from them.

@@ -1,0 +1,86 @@
+//! What another set of terms gains over a fitted model, measured against what chance would gain.
+
+use super::bounds::correlation;
+use super::goodness::orthonormal;
+use super::least_squares::dot;
+use super::problem::{MAX_POINTS, Measured, Problem};
+use super::shape;
+use crate::math::{ln, sqrt};
+use crate::model::{MAX_TERMS, Model};
+use crate::{Curve, Kind};
+use heapless::Vec;
+
+/// A fitted model, ready to be compared with others at the weights that it gives to the points.
+pub(crate) struct Baseline {
+    problem: Problem,
+    deviance: f64,
+    /// What its own parameters can explain.
+    explained: Vec<[f64; MAX_POINTS], { super::bounds::MAX_PARAMETERS }>,
+}
+
+/// Another set of terms beside a baseline.
+#[derive(Debug, Clone)]
+pub(crate) struct Rival {
+    pub(crate) kinds: Vec<Kind, MAX_TERMS>,
+    /// Fall of the deviance in units of its scatter: without a cause it is χ² with one degree of freedom.
+    pub(crate) score: f64,
+}
+
+impl Baseline {
+    pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
+        let mut problem = Problem::of(curve, model);
+        let deviance = problem.minimise();
+        let explained = orthonormal(&problem);
+        Self { problem, deviance, explained }
+    }
+
+    /// Fits the coefficients of `kinds`.
+    pub(crate) fn rival(&self, kinds: &[Kind]) -> Rival {
+        let (problem, deviance) = self.fitted(kinds);
+        Rival { kinds: problem.kinds.clone(), score: self.score(&problem, deviance) }
+    }
+
+    /// Fits the coefficients of `kinds` and their shapes.
+    pub(crate) fn shaped_rival(&self, kinds: &[Kind]) -> Rival {
+        let (mut problem, _) = self.fitted(kinds);
+        let mut kinds = problem.kinds.clone();
+        shape::search(&mut problem, &mut kinds);
+        let deviance = problem.minimise();
+        Rival { kinds, score: self.score(&problem, deviance) }
+    }
+
+    fn fitted(&self, kinds: &[Kind]) -> (Problem, f64) {
+        let mut problem = self.problem.with_kinds(kinds);
+        let deviance = problem.minimise();
+        (problem, deviance)
+    }
+
+    /// Chance moves correlated points together: the fall of the deviance is divided by the variance of the residual
+    /// along the change of the model.
+    fn score(&self, rival: &Problem, deviance: f64) -> f64 {
+        let fall = self.deviance - deviance;
+        if fall <= 0.0 {
+            return 0.0;
+        }
+        let mut change = [0.0; MAX_POINTS];
+        for ((entry, old), new) in change.iter_mut().zip(&self.problem.points).zip(&rival.points) {
+            let ratio = dot(&new.basis, &rival.squares) / dot(&old.basis, &self.problem.squares);
+            *entry = sqrt(old.edf / 2.0) * ln(ratio);
+        }
+        for known in &self.explained {
+            let along = dot(&change, known);
+            change.iter_mut().zip(known).for_each(|(entry, known)| *entry -= along * known);
+        }
+        let length = dot(&change, &change);
+        let scatter: f64 = pairs(&self.problem.points, &change).sum::<f64>() / length;
+        if length > 0.0 && scatter > 0.0 { fall / scatter.max(1.0) } else { 0.0 }
+    }
+}
+
+/// The terms of `changeᵀ·R·change`, with the correlations R of the points.
+fn pairs<'a>(points: &'a [Measured], change: &'a [f64; MAX_POINTS]) -> impl Iterator<Item = f64> + 'a {
+    let of = move |(i, a): (usize, &'a Measured)| {
+        points.iter().enumerate().map(move |(j, b)| change[i] * change[j] * correlation(a, b))
+    };
+    points.iter().enumerate().flat_map(of)
+}

@@ -1,0 +1,131 @@
+//! The loop: fit what is declared, look at the residual, name the term that is missing, add it, fit again.
+//!
+//! Works on curves alone, so it runs wherever the estimator does. What a curve cannot show — where a line stands to a
+//! thousandth, when a step came — is for those who have the samples; the lines that they found are candidates here.
+
+mod candidate;
+
+use crate::fit::{Baseline, Goodness, Rival, fit, fit_shapes, goodness};
+use crate::model::{MAX_TERMS, Model};
+use crate::{Curve, Kind, math};
+use candidate::{Family, families};
+use heapless::Vec;
+
+/// Terms beyond the declared ones that a trace can add.
+pub const MAX_ADDED: usize = MAX_TERMS - Kind::DECLARED.len();
+
+/// What one more parameter has to lower the deviance by, in units of its scatter, to be believed: the square of 3.7
+/// standard deviations.
+const CONVINCING: f64 = 14.0;
+/// What each further parameter has to earn.
+const PER_PARAMETER: f64 = 4.0;
+
+/// A term that the declared model lacked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Which of the terms of the final model it is.
+    pub term: usize,
+    /// How much the deviance fell when it was added, in units of its scatter: the square of a number of standard
+    /// deviations.
+    pub score: f64,
+    /// Where the residual was largest in units of its uncertainty before the term was added.
+    pub residual: Residual,
+}
+
+/// Measured against modelled at one averaging factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Averaging factor, samples.
+    pub n: u64,
+    /// `σ/σ_model − 1`.
+    pub excess: f64,
+    /// The same in standard deviations.
+    pub sigmas: f64,
+}
+
+/// What [`trace`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// The declared model, fitted.
+    pub before: Model,
+    /// How well it describes the curve.
+    pub before_goodness: Goodness,
+    /// The model with what was missing.
+    pub after: Model,
+    /// How well that describes the curve.
+    pub after_goodness: Goodness,
+    /// What was added, in the order in which it was found. Empty: nothing is missing.
+    pub found: Vec<Found, MAX_ADDED>,
+}
+
+/// Where lines are looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lines<'a> {
+    /// In the curve itself, which sees strong ones.
+    InTheCurve,
+    /// Nowhere but at these terms, which a spectrum has shown.
+    Known(&'a [Kind]),
+}
+
+/// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
+#[must_use]
+pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
+    let before = fit(curve, &Kind::DECLARED);
+    let before_goodness = goodness(curve, &before);
+    let families = families(curve, lines);
+    let mut after = before.clone();
+    let mut found: Vec<Found, MAX_ADDED> = Vec::new();
+    while after.terms().len() < MAX_TERMS && !found.is_full() {
+        let Some(rival) = most_telling(&Baseline::new(curve, &after), &kinds(&after), &families) else { break };
+        let residual = largest_residual(curve, &after);
+        let term = rival.kinds.len().min(after.terms().len());
+        // A filter has taken the place of the white noise.
+        let term = if rival.kinds.len() == after.terms().len() { 0 } else { term };
+        after = fit_shapes(curve, &rival.kinds);
+        // There is room: the loop ends when it is full.
+        let _ = found.push(Found { term, score: rival.score, residual });
+    }
+    let after_goodness = goodness(curve, &after);
+    Trace { before, before_goodness, after, after_goodness, found }
+}
+
+fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
+    model.terms().iter().map(|term| term.kind).collect()
+}
+
+/// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
+fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family]) -> Option<Rival> {
+    let of_family = |family: &Family| {
+        let rivals = family.shapes.iter().filter_map(|shape| with(kinds, shape)).map(|kinds| baseline.rival(&kinds));
+        let best = rivals.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let best = baseline.shaped_rival(&best.kinds);
+        let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
+        (best.score > cost).then_some((best.score - cost, best))
+    };
+    families.iter().filter_map(of_family).max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, rival)| rival)
+}
+
+/// The model with one term more; `None` where it has one that would be the same.
+fn with(kinds: &[Kind], candidate: &Kind) -> Option<Vec<Kind, MAX_TERMS>> {
+    let mut with: Vec<Kind, MAX_TERMS> = kinds.iter().copied().collect();
+    if let Kind::Filtered(_) = candidate {
+        let white = with.iter_mut().find(|kind| **kind == Kind::AngleRandomWalk)?;
+        *white = *candidate;
+        return Some(with);
+    }
+    if kinds.contains(candidate) {
+        return None;
+    }
+    with.push(*candidate).ok()?;
+    Some(with)
+}
+
+fn largest_residual<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Residual {
+    let of = |point: &crate::Point| {
+        let excess = math::sqrt(point.avar / model.avar(point.n)) - 1.0;
+        Residual { n: point.n, excess, sigmas: excess * math::sqrt(2.0 * model.edf(point)) }
+    };
+    let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
+    let residuals = curve.points().iter().filter(|point| point.avar > 0.0).map(of);
+    residuals.max_by(|a, b| math::abs(a.sigmas).total_cmp(&math::abs(b.sigmas))).unwrap_or(nothing)
+}
