@@ -113,6 +113,17 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self
     }
 
+    /// The same points with another variance.
+    pub(crate) fn with_avar(mut self, avar: impl Fn(&Point) -> f64) -> Self {
+        for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
+            let ratio = avar(point) / point.avar;
+            point.avar *= ratio;
+            point.low *= ratio;
+            point.high *= ratio;
+        }
+        self
+    }
+
     /// The same curve with the confidence of the noise that `shares` tells for each point.
     #[must_use]
     pub fn with_confidence(mut self, mut shares: impl FnMut(&Point) -> Shares) -> Self {

@@ -8,7 +8,7 @@
 mod bounds;
 mod goodness;
 mod improvement;
-mod least_squares;
+pub(crate) mod least_squares;
 mod problem;
 mod shape;
 

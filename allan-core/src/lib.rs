@@ -33,6 +33,7 @@ mod between;
 mod cascade;
 pub mod check;
 mod chi_square;
+pub mod common_mode;
 pub mod confidence;
 mod coupling;
 mod curve;
@@ -44,6 +45,8 @@ mod noise_type;
 pub mod read_off;
 #[cfg(feature = "serde")]
 mod state;
+pub mod regression;
+pub mod telegraph;
 pub mod term;
 pub mod trace;
 

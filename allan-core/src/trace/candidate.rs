@@ -46,5 +46,7 @@ pub(super) fn families<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines)
 /// Values from `low` to `high`, `density` to an octave, as many as there is room for.
 fn octaves(low: f64, high: f64, density: f64) -> impl Iterator<Item = f64> {
     let factor = crate::math::exp(core::f64::consts::LN_2 / density);
-    core::iter::successors(Some(low), move |value| Some(value * factor)).take_while(move |&v| v <= high).take(MAX_SHAPES)
+    core::iter::successors(Some(low), move |value| Some(value * factor))
+        .take_while(move |&v| v <= high)
+        .take(MAX_SHAPES)
 }

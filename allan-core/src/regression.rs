@@ -1,0 +1,255 @@
+//! How much of a channel follows other channels: regression at every octave at once, from curves and couplings alone.
+//!
+//! In the differences of an octave a channel is `d(y) = Σ βᵢ·d(cᵢ) + d(e)`. Each octave is worth its degrees of
+//! freedom over the variance of the rest `e`, which is the fitted model's. A covariate that is measured with noise of
+//! its own would make `β` too small; what its curve shows as white is taken off first.
+
+use crate::confidence::{Shares, octave_correlation};
+use crate::coupling::Covariance;
+use crate::fit::{
+    fit,
+    least_squares::{Matrix, Vector, inverse, solve},
+};
+use crate::math::sqrt;
+use crate::{Curve, Kind, Model, Point};
+use heapless::Vec;
+
+/// Covariates that can be taken at once.
+pub const MAX_COVARIATES: usize = 8;
+/// A share of a covariate's variance that is its own noise above which an octave says nothing about the sensitivity.
+const NOISE_SHARE: f64 = 0.5;
+/// Standard deviations from 0 from which on a sensitivity is believed: slow channels have few degrees of freedom, and a
+/// chance likeness of two random walks goes far.
+const DOUBT: f64 = 5.0;
+
+/// A measured quantity that a channel may follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariate<const POINTS: usize> {
+    curve: Curve<POINTS>,
+    noise: Model,
+    /// Variance of one step of its converter where no noise dithers it; 0 where it does.
+    step: f64,
+}
+
+impl<const POINTS: usize> Covariate<POINTS> {
+    /// A covariate with its curve in a physical unit, in which its converter has steps of `lsb`.
+    #[must_use]
+    pub fn new(curve: Curve<POINTS>, lsb: f64) -> Self {
+        let noise = fit(
+            &curve,
+            &[Kind::Quantization, Kind::AngleRandomWalk, Kind::BiasInstability, Kind::RateRandomWalk, Kind::RateRamp],
+        );
+        let white =
+            noise.terms().iter().copied().filter(|t| matches!(t.kind, Kind::Quantization | Kind::AngleRandomWalk));
+        let noise = Model::new(curve.sample_period(), white);
+        let dithered = curve.points().first().is_some_and(|point| point.avar > 0.2 * lsb * lsb);
+        Self { curve, noise, step: if dithered { 0.0 } else { lsb * lsb / 12.0 } }
+    }
+
+    /// Another stretch of the same covariate, whose noise is known from this one.
+    #[must_use]
+    pub fn continued(&self, curve: Curve<POINTS>) -> Self {
+        Self { curve, noise: self.noise.clone(), step: self.step }
+    }
+
+    /// Allan variance of what was really there to be followed, and of all that was measured.
+    fn signal(&self, n: u64) -> Option<(f64, f64)> {
+        let measured = self.curve.points().iter().find(|point| point.n == n)?.avar;
+        let noise = self.noise.avar(n);
+        let told = measured > 0.0 && noise < NOISE_SHARE * measured && measured > 4.0 * self.step;
+        told.then_some((measured - noise, measured))
+    }
+}
+
+/// The coupling of two channels in the product of their physical units.
+pub type Shared<const POINTS: usize> = Vec<Covariance, POINTS>;
+
+/// A channel, the covariates that it may follow, and what they share.
+#[derive(Debug)]
+pub struct Beside<'a, const POINTS: usize> {
+    /// The channel.
+    pub channel: &'a Curve<POINTS>,
+    /// At most [`MAX_COVARIATES`].
+    pub covariates: &'a [Covariate<POINTS>],
+    /// The channel with each covariate.
+    pub with_channel: &'a [Shared<POINTS>],
+    /// The covariates with each other: `i` with `j < i` at `i·(i−1)/2 + j`.
+    pub mutual: &'a [Shared<POINTS>],
+}
+
+/// How a channel follows a covariate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// Which covariate.
+    pub covariate: usize,
+    /// In the channel's unit over the covariate's.
+    pub value: f64,
+    /// Standard deviation of the value.
+    pub error: f64,
+}
+
+impl Sensitivity {
+    /// Distance from 0 in standard deviations.
+    #[must_use]
+    pub fn sigmas(&self) -> f64 {
+        crate::math::abs(self.value) / self.error
+    }
+}
+
+impl<const POINTS: usize> Beside<'_, POINTS> {
+    /// The covariates that the channel follows beyond doubt, the clearest chosen first.
+    #[must_use]
+    pub fn followed(&self) -> Vec<Sensitivity, MAX_COVARIATES> {
+        let mut followed: Vec<Sensitivity, MAX_COVARIATES> = Vec::new();
+        while followed.len() < self.covariates.len() {
+            let rest = self.rest(&followed);
+            let others = (0..self.covariates.len()).filter(|i| followed.iter().all(|known| known.covariate != *i));
+            let tried = others.filter_map(|next| {
+                let chosen: Vec<usize, MAX_COVARIATES> =
+                    followed.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
+                self.sensitivities(&chosen, &rest)
+            });
+            let clarity = |tried: &Vec<Sensitivity, MAX_COVARIATES>| tried.last().map_or(0.0, Sensitivity::sigmas);
+            let Some(best) = tried.max_by(|a, b| clarity(a).total_cmp(&clarity(b))) else { break };
+            if clarity(&best) < DOUBT {
+                break;
+            }
+            // What is left is smaller now: weigh the octaves by that.
+            let chosen: Vec<usize, MAX_COVARIATES> = best.iter().map(|known| known.covariate).collect();
+            followed = self.sensitivities(&chosen, &self.rest(&best)).unwrap_or(best);
+        }
+        followed
+    }
+
+    /// What the channel would be without the covariates, as far as N, B and K describe it.
+    fn rest(&self, followed: &[Sensitivity]) -> Rest<POINTS> {
+        let curve = self.compensated(followed);
+        Rest { model: fit(&curve, &Kind::DECLARED), curve }
+    }
+
+    /// Sensitivities to the covariates in `chosen`.
+    ///
+    /// `None` where the covariates move too little, or too much alike.
+    fn sensitivities(&self, chosen: &[usize], rest: &Rest<POINTS>) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
+        let count = chosen.len().min(MAX_COVARIATES);
+        let mut normal: Matrix<MAX_COVARIATES> = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
+        let mut right: Vector<MAX_COVARIATES> = [0.0; MAX_COVARIATES];
+        let mut told: Vec<Told, POINTS> = Vec::new();
+        for point in rest.curve.points() {
+            let Some(octave) = self.told(point, chosen, &rest.model) else { continue };
+            for (i, row) in normal.iter_mut().enumerate().take(count) {
+                right[i] += octave.weight * octave.with_channel[i];
+                for (entry, signal) in row.iter_mut().zip(octave.signal[i]) {
+                    *entry += octave.weight * signal;
+                }
+            }
+            // As many as the curve has points.
+            let _ = told.push(octave);
+        }
+        let value = solve(&normal, &right, (1 << count) - 1)?;
+        let inverse = inverse(&normal, count)?;
+        let scatter = scatter(&told, count);
+        let error = |i: usize| {
+            let row = &inverse[i];
+            let along = |j: usize| (0..count).map(|k| row[k] * scatter[j][k]).sum::<f64>();
+            sqrt((0..count).map(|j| row[j] * along(j)).sum())
+        };
+        Some((0..count).map(|i| Sensitivity { covariate: chosen[i], value: value[i], error: error(i) }).collect())
+    }
+
+    /// The channel's curve less what follows the covariates.
+    #[must_use]
+    pub fn compensated(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
+        self.channel.clone().with_avar(|point| {
+            let of = |a: &Sensitivity| {
+                let square = self.shared(a.covariate, a.covariate, point.n);
+                let others = sensitivities.iter().filter(|b| b.covariate < a.covariate);
+                let products = others.map(|b| 2.0 * b.value * self.shared(a.covariate, b.covariate, point.n));
+                let followed = covariance(&self.with_channel[a.covariate], point.n);
+                a.value * (a.value * square - 2.0 * followed + products.sum::<f64>())
+            };
+            // An estimate of what is left can come out below 0 where almost nothing is.
+            let least = 0.01 * point.avar;
+            (point.avar + sensitivities.iter().map(of).sum::<f64>()).max(least)
+        })
+    }
+
+    fn told(&self, point: &Point, chosen: &[usize], rest: &Model) -> Option<Told> {
+        // What the model lacks is noise to the regression too.
+        let variance = rest.avar(point.n).max(point.avar);
+        if variance <= 0.0 {
+            return None;
+        }
+        let mut octave = Told {
+            weight: rest.edf(point) / variance,
+            shares: rest.shares(point.n),
+            with_channel: [0.0; MAX_COVARIATES],
+            signal: [[0.0; MAX_COVARIATES]; MAX_COVARIATES],
+            measured: [0.0; MAX_COVARIATES],
+        };
+        for (i, &covariate) in chosen.iter().enumerate().take(MAX_COVARIATES) {
+            let (_, measured) = self.covariates[covariate].signal(point.n).unwrap_or_default();
+            octave.measured[i] = measured;
+            if measured > 0.0 {
+                octave.with_channel[i] = covariance(&self.with_channel[covariate], point.n);
+            }
+            for (j, &other) in chosen.iter().enumerate().take(MAX_COVARIATES) {
+                octave.signal[i][j] = self.shared(covariate, other, point.n);
+            }
+        }
+        Some(octave)
+    }
+
+    /// What two covariates have in common, noise taken off; 0 at an octave that says nothing of either.
+    fn shared(&self, a: usize, b: usize, n: u64) -> f64 {
+        let signal = |covariate: usize| self.covariates[covariate].signal(n);
+        match (signal(a), signal(b)) {
+            (Some((signal, _)), Some(_)) if a == b => signal,
+            (Some(_), Some(_)) => {
+                let (high, low) = (a.max(b), a.min(b));
+                covariance(&self.mutual[high * (high - 1) / 2 + low], n)
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// A channel without what it follows: measured, and modelled.
+struct Rest<const POINTS: usize> {
+    curve: Curve<POINTS>,
+    model: Model,
+}
+
+/// What one octave tells.
+struct Told {
+    /// Degrees of freedom over the variance of the rest.
+    weight: f64,
+    shares: Shares,
+    with_channel: Vector<MAX_COVARIATES>,
+    signal: Matrix<MAX_COVARIATES>,
+    measured: Vector<MAX_COVARIATES>,
+}
+
+/// Covariance of the right side of the normal equations: octaves are not independent.
+fn scatter(told: &[Told], count: usize) -> Matrix<MAX_COVARIATES> {
+    let mut scatter = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
+    for (k, a) in told.iter().enumerate() {
+        for (l, b) in told.iter().enumerate() {
+            let correlation = octave_correlation(k.abs_diff(l), a.shares, b.shares) * sqrt(a.weight * b.weight);
+            for (i, row) in scatter.iter_mut().enumerate().take(count) {
+                for (j, entry) in row.iter_mut().enumerate().take(count) {
+                    let of = |octave: &Told| {
+                        if i == j { octave.measured[i] } else { octave.signal[i][j] }
+                    };
+                    let sign = if of(a) * of(b) < 0.0 { -1.0 } else { 1.0 };
+                    *entry += correlation * sign * sqrt(crate::math::abs(of(a) * of(b)));
+                }
+            }
+        }
+    }
+    scatter
+}
+
+fn covariance(shared: &[Covariance], n: u64) -> f64 {
+    shared.iter().find(|covariance| covariance.n == n).map_or(0.0, |covariance| covariance.covariance)
+}
