@@ -3,8 +3,8 @@
 use embedded_hal::spi::Operation;
 
 use crate::channel::Channel;
+use crate::fault::{Faults, burst_faults};
 use crate::sample::Counts;
-use crate::status::{Faults, burst_faults};
 
 /// Bytes in a burst read: the request and twelve output words.
 pub const BURST_BYTES: usize = 26;
@@ -124,7 +124,8 @@ impl Burst {
         Counts::new(counts)
     }
 
-    /// Faults that this burst shows by itself; [`Faults::REPEATED`] needs a [`Judge`](crate::Judge).
+    /// Faults that this burst shows by itself; [`Faults::REPEATED`], [`Faults::FROZEN`] and [`Faults::X_SIGN`] need a
+    /// [`Judge`](crate::Judge).
     pub fn faults(&self) -> Faults {
         burst_faults(self)
     }

@@ -62,11 +62,11 @@ impl Recorder {
     /// Starts an empty recording of `channels`.
     pub fn new(mut channels: Vec<Channel>, range: GyroRange) -> Self {
         channels.sort();
-        // A re-read shows in the six inertial words together; fewer may be equal by chance.
+        // Re-reads and frozen outputs show in the six inertial words together; fewer may be equal by chance.
         let judged = if Channel::INERTIAL.iter().all(|c| channels.contains(c)) {
             Faults::all()
         } else {
-            Faults::all() - Faults::REPEATED
+            Faults::all() - Faults::REPEATED - Faults::FROZEN
         };
         Self { recording: Recording { channels, range, samples: Vec::new() }, judge: Judge::default(), judged }
     }

@@ -16,7 +16,8 @@ use std::collections::BTreeMap;
 pub const FEWEST_SAMPLES: u64 = 4;
 
 /// Faults for which a sample is left out; the others are warnings about data that are there.
-const REFUSED: Faults = Faults::STUCK_LOW.union(Faults::STUCK_HIGH).union(Faults::NO_NEW_DATA);
+const REFUSED: Faults =
+    Faults::all().difference(Faults::REPEATED).difference(Faults::ERROR_ALARM).difference(Faults::SUPPLY);
 
 /// Equal neighbours closer than this part of a period are one sample read twice; farther apart they are chance, which
 /// a filtered output of few counts brings about once in a thousand samples.

@@ -1,9 +1,10 @@
 //! The virtual part behind an embedded-hal SPI device, on virtual time.
 
-use std::cell::{Ref, RefCell};
+use std::cell::{Ref, RefCell, RefMut};
 use std::convert::Infallible;
 use std::rc::Rc;
 
+use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
 use super::part::VirtualAdis16405;
@@ -36,8 +37,17 @@ impl EmulatedBus {
         self.part.borrow()
     }
 
-    /// Waits until the next sample is there (the data-ready line rises) and returns the time in ns; `None` if none will
-    /// come.
+    /// The part, to be changed: broken, unplugged, its pins driven. Let go of it before the bus is used again.
+    pub fn part_mut(&self) -> RefMut<'_, VirtualAdis16405> {
+        self.part.borrow_mut()
+    }
+
+    /// A delay on the part's time.
+    pub fn delay(&self) -> VirtualDelay {
+        VirtualDelay { part: Rc::clone(&self.part) }
+    }
+
+    /// Waits until the data-ready line rises and returns the time in ns; `None` if it will not.
     pub fn wait_for_data(&self) -> Option<u64> {
         let mut part = self.part.borrow_mut();
         let at_ns = part.next_data_ready();
@@ -91,5 +101,32 @@ impl SpiDevice<u8> for EmulatedBus {
         }
         part.deselect();
         Ok(())
+    }
+}
+
+/// Asynchronous use: every future is ready at once, as virtual time waits for nobody.
+impl embedded_hal_async::spi::SpiDevice<u8> for EmulatedBus {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        SpiDevice::transaction(self, operations)
+    }
+}
+
+/// A delay that lets virtual time pass.
+#[derive(Clone, Debug)]
+pub struct VirtualDelay {
+    part: Rc<RefCell<VirtualAdis16405>>,
+}
+
+impl DelayNs for VirtualDelay {
+    fn delay_ns(&mut self, ns: u32) {
+        let mut part = self.part.borrow_mut();
+        let until = part.now() + u64::from(ns);
+        part.advance_to(until);
+    }
+}
+
+impl embedded_hal_async::delay::DelayNs for VirtualDelay {
+    async fn delay_ns(&mut self, ns: u32) {
+        DelayNs::delay_ns(self, ns);
     }
 }

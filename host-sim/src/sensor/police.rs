@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::part::Activity;
+
 /// Least pause between frames in normal mode, ns.
 pub const MIN_STALL_NORMAL_NS: u64 = 9_000;
 /// Least pause between frames in low-power mode, ns; no source at hand confirms it.
@@ -51,8 +53,18 @@ pub enum ViolationKind {
     },
     /// Clocked without chip select.
     NotSelected,
-    /// Addressed while it recovers from a reset.
-    Busy,
+    /// Addressed while the bus must be silent.
+    Busy {
+        /// What the part was doing.
+        activity: Activity,
+    },
+    /// A register was read that cannot be read, or a byte written that cannot be written.
+    Address {
+        /// Address of the byte.
+        address: u8,
+        /// True for a write.
+        write: bool,
+    },
     /// A sample was taken with a combination of range and filter taps that the part does not allow.
     Configuration {
         /// SENS_AVG.
@@ -70,7 +82,13 @@ impl fmt::Display for Violation {
             ViolationKind::FrameLength { bytes } => write!(f, "chip select rose after {bytes} bytes"),
             ViolationKind::Clock { sck_hz, most_hz } => write!(f, "SCK of {sck_hz} Hz, at most {most_hz} Hz allowed"),
             ViolationKind::NotSelected => write!(f, "clocked without chip select"),
-            ViolationKind::Busy => write!(f, "addressed while it recovers from a reset"),
+            ViolationKind::Busy { activity } => write!(f, "addressed while busy with {activity:?}"),
+            ViolationKind::Address { address, write: true } => {
+                write!(f, "write to {address:#04x}, which cannot be written")
+            }
+            ViolationKind::Address { address, write: false } => {
+                write!(f, "read of {address:#04x}, which cannot be read")
+            }
             ViolationKind::Configuration { sens_avg } => {
                 write!(f, "SENS_AVG {sens_avg:#06x} has too few taps for its range, or no valid range")
             }

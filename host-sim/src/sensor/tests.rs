@@ -1,8 +1,11 @@
 //! The virtual part and the real driver against each other. Numbers are those of the data sheet.
 
+mod procedures;
+mod registers;
+
 use adis16405_driver::{Adis16405, Channel, Config, Counts, Faults, GyroRange, Judge, Register, SamplePeriod};
 
-use super::{EmulatedBus, NoiseModel, ViolationKind, VirtualAdis16405};
+use super::{Activity, EmulatedBus, NoiseModel, ViolationKind, VirtualAdis16405};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
@@ -131,7 +134,12 @@ fn a_software_reset_restores_and_takes_time() {
     imu.write_register(Register::GlobCmd, 0x80).unwrap();
     imu.read_register(Register::ProdId).unwrap();
     let at = bus.part().now();
-    assert!(bus.part().violations().iter().all(|violation| violation.kind == ViolationKind::Busy));
+    assert!(
+        bus.part()
+            .violations()
+            .iter()
+            .all(|violation| violation.kind == ViolationKind::Busy { activity: Activity::Reset })
+    );
     assert_eq!(bus.part().violation_count(), 2);
     bus.advance_to(at + 100_000_000);
     assert_eq!(imu.read_register(Register::SmplPrd), Ok(0x0001));
