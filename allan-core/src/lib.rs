@@ -43,9 +43,9 @@ mod math;
 pub mod model;
 mod noise_type;
 pub mod read_off;
+pub mod regression;
 #[cfg(feature = "serde")]
 mod state;
-pub mod regression;
 pub mod telegraph;
 pub mod term;
 pub mod trace;

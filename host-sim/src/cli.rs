@@ -1,8 +1,10 @@
 //! What can be said on the command line.
 
 use crate::record::Simulation;
+use crate::undeclared::{self, Kind, Plan};
 use adis16405_driver::GyroRange;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Noise analysis of the ADIS16405 inertial sensor, with a virtual sensor, recordings and replay.
@@ -37,6 +39,54 @@ pub enum Command {
         #[command(flatten)]
         simulate: Simulate,
     },
+    /// Hide effects at random in recordings of the virtual sensor and tell how well the analysis names them.
+    Undeclared(Undeclared),
+}
+
+/// Recordings with hidden effects.
+#[derive(Debug, Args)]
+pub struct Undeclared {
+    /// Kind that is hidden alone; may be repeated [default: all].
+    #[arg(long, value_enum)]
+    pub kind: Vec<Kind>,
+    /// Recordings a kind.
+    #[arg(long, default_value_t = 40)]
+    pub per_kind: u64,
+    /// Recordings with nothing hidden.
+    #[arg(long, default_value_t = 200)]
+    pub nothing: u64,
+    /// Recordings with two effects.
+    #[arg(long, default_value_t = 200)]
+    pub pairs: u64,
+    /// Length of a recording, s.
+    #[arg(long, default_value_t = 1800.0)]
+    pub seconds: f64,
+    /// Recordings that are examined at a time [default: one a core].
+    #[arg(long)]
+    pub jobs: Option<NonZeroUsize>,
+    /// First seed of each group of recordings.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..undeclared::GROUP / 2))]
+    pub seed: u64,
+    /// Take the seeds that are kept for the end.
+    #[arg(long)]
+    pub sealed: bool,
+}
+
+impl Undeclared {
+    /// What is asked for.
+    pub fn plan(&self) -> Plan {
+        let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        Plan {
+            kinds: if self.kind.is_empty() { Kind::ALL.to_vec() } else { self.kind.clone() },
+            per_kind: self.per_kind,
+            empty: self.nothing,
+            pairs: self.pairs,
+            seconds: self.seconds,
+            seed: self.seed,
+            sealed: self.sealed,
+            jobs: self.jobs.map_or_else(cores, NonZeroUsize::get),
+        }
+    }
 }
 
 /// A recording.

@@ -22,4 +22,5 @@ pub mod source;
 pub mod terminal;
 pub mod timeline;
 pub mod trace;
+pub mod undeclared;
 pub mod wording;

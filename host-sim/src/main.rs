@@ -1,6 +1,6 @@
 //! The command line: one recording in, one report out.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Parser;
 use host_sim::analysis::analyze;
 use host_sim::cli::{Cli, Command, Input, Output};
@@ -10,8 +10,10 @@ use host_sim::replay::replay;
 use host_sim::report::Report;
 use host_sim::source::csv;
 use host_sim::timeline::Timeline;
+use host_sim::undeclared::Plan;
 use host_sim::{page, terminal};
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -49,6 +51,7 @@ fn run(mut cli: Cli) -> Result<()> {
             let recording = csv::read(&input.file, input.range.into())?;
             report_of(input, &recording)?
         }
+        Some(Command::Undeclared(arguments)) => return benchmark(&arguments.plan(), &cli.output),
         Some(Command::Replay(input)) => {
             let replayed = replay(&input.file, input.range.into())?;
             if replayed.other_transactions > 0 {
@@ -75,6 +78,28 @@ fn simulate(simulation: Simulation, log: Option<&Path>) -> Result<Recording> {
     Ok(recording?)
 }
 
+fn benchmark(plan: &Plan, output: &Output) -> Result<()> {
+    if output.page.is_some() {
+        bail!("undeclared has no page: leave out --page");
+    }
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} recordings, {eta} left") {
+        bar.set_style(style);
+    }
+    let table = plan.run(|done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    if let Some(file) = &output.json {
+        write_json(&table, file).with_context(|| file.display().to_string())?;
+    }
+    let mut out = BufWriter::new(io::stdout().lock());
+    table.write(&mut out)?;
+    out.flush()?;
+    Ok(())
+}
+
 fn report_of(input: &Input, recording: &Recording) -> Result<Report> {
     report(recording, input.rate).with_context(|| input.file.display().to_string())
 }
@@ -98,7 +123,7 @@ fn write(report: &Report, output: &Output) -> Result<()> {
     Ok(())
 }
 
-fn write_json(report: &Report, file: &Path) -> Result<()> {
+fn write_json(report: &impl Serialize, file: &Path) -> Result<()> {
     let mut out = BufWriter::new(File::create(file)?);
     serde_json::to_writer_pretty(&mut out, report)?;
     writeln!(out)?;

@@ -4,9 +4,9 @@
 //! by chance anywhere in the record. A [`Finding`] carries the repair that takes the effect out of the data.
 
 pub mod bias_step;
-mod block;
+pub(crate) mod block;
 pub mod deliveries;
-mod normal;
+pub(crate) mod normal;
 pub mod sample_clock;
 pub mod series;
 pub mod spikes;

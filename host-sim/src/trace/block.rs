@@ -5,7 +5,7 @@ use super::Series;
 use std::f64::consts::{LN_2, PI};
 
 /// Stretches of a record.
-pub(super) const BLOCKS: usize = 128;
+pub(crate) const BLOCKS: usize = 128;
 /// A block with fewer than this part of its samples is left out.
 const FILLED: f64 = 0.25;
 /// Fewest samples that a whole block holds.
@@ -16,20 +16,20 @@ const FLICKER: [f64; 4] = [0.0, 0.05, 0.5, 5.0];
 const WALK: [f64; 6] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 /// Blocks of a record.
-pub(super) struct Blocks {
+pub(crate) struct Blocks {
     /// Slots in a block.
-    pub(super) width: u64,
+    pub(crate) width: u64,
     /// The blocks that are filled, by number.
-    pub(super) numbers: Vec<usize>,
+    pub(crate) numbers: Vec<usize>,
     /// Mean of each.
-    pub(super) means: Vec<f64>,
+    pub(crate) means: Vec<f64>,
     /// Filled part of each.
     fills: Vec<f64>,
 }
 
 impl Blocks {
     /// `None` if the record is too short.
-    pub(super) fn of(series: &Series) -> Option<Self> {
+    pub(crate) fn of(series: &Series) -> Option<Self> {
         let width = (series.slots.last()? + 1) / BLOCKS as u64;
         if width < FEWEST {
             return None;
@@ -53,7 +53,7 @@ impl Blocks {
     }
 
     /// The part of each block that lies at or after `slot`.
-    pub(super) fn step_at(&self, slot: u64) -> Vec<f64> {
+    pub(crate) fn step_at(&self, slot: u64) -> Vec<f64> {
         let after = |&number: &usize| {
             let start = number as u64 * self.width;
             1.0 - (slot.saturating_sub(start)).min(self.width) as f64 / self.width as f64
@@ -62,21 +62,9 @@ impl Blocks {
     }
 
     /// The noises that the record is judged by, each with its factored covariance.
-    pub(super) fn noises(&self) -> Vec<Whitening> {
+    pub(crate) fn noises(&self) -> Vec<Whitening> {
         let mixtures = FLICKER.iter().flat_map(|&flicker| WALK.iter().map(move |&walk| (flicker, walk)));
-        mixtures.filter_map(|(flicker, walk)| self.whitening(flicker, walk)).collect()
-    }
-
-    fn whitening(&self, flicker: f64, walk: f64) -> Option<Whitening> {
-        let flicker: Vec<f64> = flicker_covariance().iter().map(|covariance| flicker * covariance).collect();
-        let entry = |row: usize, column: usize| {
-            let (first, second) = (self.numbers[column], self.numbers[row]);
-            // Means over a block of a walk from the beginning: the middle of the earlier one, a third into a shared one.
-            let walked = if row == column { first as f64 + 1.0 / 3.0 } else { first as f64 + 0.5 };
-            let white = if row == column { 1.0 / self.fills[row] } else { 0.0 };
-            white + flicker[second - first] + walk * walked
-        };
-        Whitening::of(self.numbers.len(), entry)
+        mixtures.filter_map(|(flicker, walk)| Whitening::of_noise(&self.numbers, &self.fills, flicker, walk)).collect()
     }
 }
 
@@ -104,7 +92,7 @@ fn flicker_covariance() -> Vec<f64> {
 }
 
 /// A covariance `L·Lᵀ` and its inverse at work.
-pub(super) struct Whitening {
+pub(crate) struct Whitening {
     /// Rows of L up to the diagonal.
     rows: Vec<Vec<f64>>,
     log_determinant: f64,
@@ -112,6 +100,20 @@ pub(super) struct Whitening {
 }
 
 impl Whitening {
+    /// For blocks of these numbers and fills, in noise of white variance 1 for the mean of a whole block, of flicker with
+    /// `flicker` = B², and of a walk that grows by the variance `walk` over a block.
+    pub(crate) fn of_noise(numbers: &[usize], fills: &[f64], flicker: f64, walk: f64) -> Option<Self> {
+        let flicker: Vec<f64> = flicker_covariance().iter().map(|covariance| flicker * covariance).collect();
+        let entry = |row: usize, column: usize| {
+            let (first, second) = (numbers[column], numbers[row]);
+            // Means over a block of a walk from the beginning: the middle of the earlier one, a third into a shared one.
+            let walked = if row == column { first as f64 + 1.0 / 3.0 } else { first as f64 + 0.5 };
+            let white = if row == column { 1.0 / fills[row] } else { 0.0 };
+            white + flicker[second - first] + walk * walked
+        };
+        Self::of(numbers.len(), entry)
+    }
+
     fn of(size: usize, entry: impl Fn(usize, usize) -> f64) -> Option<Self> {
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(size);
         for row in 0..size {
@@ -145,23 +147,23 @@ impl Whitening {
     }
 
     /// White, and without the level that nobody knows.
-    pub(super) fn free(&self, values: &[f64]) -> Vec<f64> {
+    pub(crate) fn free(&self, values: &[f64]) -> Vec<f64> {
         without(self.whitened(values), &self.ones)
     }
 
     /// −2 ln of the highest likelihood of residuals with this sum of squares, the scale of the noise being free.
-    pub(super) fn deviance(&self, squares: f64) -> f64 {
+    pub(crate) fn deviance(&self, squares: f64) -> f64 {
         let count = self.rows.len() as f64;
         count * (squares / count).ln() + self.log_determinant
     }
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// What is left of `values` without its part along `direction`, which need not be of length 1.
-pub(super) fn without(mut values: Vec<f64>, direction: &[f64]) -> Vec<f64> {
+pub(crate) fn without(mut values: Vec<f64>, direction: &[f64]) -> Vec<f64> {
     let norm = dot(direction, direction);
     if norm > 0.0 {
         let part = dot(&values, direction) / norm;

@@ -3,20 +3,20 @@
 use std::f64::consts::{PI, SQRT_2};
 
 /// 97.5 % point of the normal law.
-pub(super) const NORMAL_975: f64 = 1.959_963_984_540_054;
+pub(crate) const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 /// Probability that a standard normal number exceeds `z`.
-pub(super) fn upper_tail(z: f64) -> f64 {
+pub(crate) fn upper_tail(z: f64) -> f64 {
     0.5 * libm::erfc(z / SQRT_2)
 }
 
 /// Density of the standard normal law.
-pub(super) fn density(z: f64) -> f64 {
+pub(crate) fn density(z: f64) -> f64 {
     (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
 }
 
 /// The `z ≥ 0` that a standard normal number exceeds with `probability` (at most ½).
-pub(super) fn quantile(probability: f64) -> f64 {
+pub(crate) fn quantile(probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
@@ -26,12 +26,12 @@ pub(super) fn quantile(probability: f64) -> f64 {
 }
 
 /// Probability that one of `trials` independent ones succeeds, each with `probability`.
-pub(super) fn any_of(probability: f64, trials: f64) -> f64 {
+pub(crate) fn any_of(probability: f64, trials: f64) -> f64 {
     -(trials * (-probability).ln_1p()).exp_m1()
 }
 
 /// Probability that a Poisson number of the given mean is `count` or more.
-pub(super) fn poisson_tail(count: u64, mean: f64) -> f64 {
+pub(crate) fn poisson_tail(count: u64, mean: f64) -> f64 {
     if count == 0 {
         return 1.0;
     }
@@ -53,7 +53,7 @@ pub(super) fn poisson_tail(count: u64, mean: f64) -> f64 {
 }
 
 /// 95 % bounds of the mean of a Poisson number that came out as `count` (Byar's approximation of the exact ones).
-pub(super) fn poisson_bounds(count: f64) -> (f64, f64) {
+pub(crate) fn poisson_bounds(count: f64) -> (f64, f64) {
     let bound = |count: f64, z: f64| count * (1.0 - 1.0 / (9.0 * count) + z / (3.0 * count.sqrt())).powi(3);
     let low = if count > 0.0 { bound(count, -NORMAL_975).max(0.0) } else { 0.0 };
     (low, bound(count + 1.0, NORMAL_975))

@@ -13,7 +13,7 @@ pub mod surroundings;
 #[cfg(test)]
 mod tests;
 
-pub(super) use source::EffectSource;
+pub(crate) use source::EffectSource;
 pub use surroundings::Surroundings;
 
 use adis16405_driver::Channel;

@@ -1,0 +1,20 @@
+//! Waveforms that are known up to their size, in noise that walks: regression on the means of blocks.
+
+use super::spectrum::Record;
+use crate::sensor::ChannelNoise;
+use crate::trace::block::{BLOCKS, Whitening, dot};
+
+/// Expected log likelihood ratio of `values`, one a block, against a constant level in the declared noise.
+pub(crate) fn ratio(values: &[f64], noise: &ChannelNoise, resolution: f64, record: Record) -> f64 {
+    let block_s = record.seconds / BLOCKS as f64;
+    // Of the mean of a block.
+    let white = (noise.angle_random_walk.powi(2) + resolution * resolution / 12.0 * record.period_s) / block_s;
+    let flicker = noise.bias_instability.powi(2) / white;
+    let walk = noise.rate_random_walk.powi(2) * block_s / white;
+    let numbers: Vec<usize> = (0..BLOCKS).collect();
+    let fills = vec![1.0; BLOCKS];
+    Whitening::of_noise(&numbers, &fills, flicker, walk).map_or(0.0, |whitening| {
+        let shape = whitening.free(values);
+        0.5 * dot(&shape, &shape) / white
+    })
+}
