@@ -5,7 +5,7 @@ use super::{Finding, Repair, Series, bias_step, deliveries, sample_clock, spikes
 use crate::record::{Host, Simulation};
 use crate::recording::Recording;
 use crate::sensor::effect::surroundings::TemperatureCourse;
-use crate::sensor::{Effect, Hidden, NoiseModel, Surroundings};
+use crate::sensor::{Effect, Hidden, Surroundings};
 use crate::timeline::Timeline;
 use adis16405_driver::Channel;
 
@@ -162,7 +162,6 @@ fn a_clock_that_is_off_is_told_from_a_host_that_is() {
     let simulation = |effects: Vec<Effect>, clock_ratio: f64| Simulation {
         hidden: Hidden { effects, ..Hidden::default() },
         host: Host { latency_s: 30e-6, clock_ratio },
-        noise: NoiseModel::still(),
         ..Simulation::of_paper(100.0, 10)
     };
     let find = |case: Case| sample_clock::find(&case.recording, &case.timeline);
