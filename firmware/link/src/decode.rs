@@ -1,5 +1,6 @@
 //! From bytes to messages, resynchronising after noise.
 
+use crate::text::{self, Line};
 use crate::{CRC, Envelope, MAX_FRAME, Message, VERSION};
 use heapless::Vec;
 
@@ -8,23 +9,42 @@ use heapless::Vec;
 pub struct Counters {
     /// Messages that arrived whole.
     pub frames: u64,
-    /// Stretches between zero bytes that were no valid frame: noise, damage, or a text.
+    /// Lines of text.
+    pub lines: u64,
+    /// Stretches between zero bytes that were neither: noise or damage.
     pub bad_frames: u64,
     /// Valid frames of a version that is not understood here.
     pub other_version: u64,
     /// Messages that are missing by their sequence numbers.
     pub missing: u64,
-    /// Bytes that belonged to no valid frame.
+    /// Bytes that belonged to neither frame nor line.
     pub discarded_bytes: u64,
 }
 
-/// A message and its sequence number.
+/// What was found in the stream.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Received {
-    /// Sequence number, counted modulo 2¹⁶ by the sender.
-    pub sequence: u16,
-    /// What was said.
-    pub message: Message,
+#[allow(clippy::large_enum_variant, reason = "looked at and dropped one at a time")]
+pub enum Received {
+    /// A message.
+    Message {
+        /// Its number, counted modulo 2¹⁶ by the sender.
+        sequence: u16,
+        /// What was said.
+        message: Message,
+    },
+    /// A line of text.
+    Line(Line),
+}
+
+impl Received {
+    /// The message, if it is one.
+    #[must_use]
+    pub fn message(self) -> Option<Message> {
+        match self {
+            Self::Message { message, .. } => Some(message),
+            Self::Line(_) => None,
+        }
+    }
 }
 
 /// Finds the frames in a stream of bytes, given in pieces of any length.
@@ -44,7 +64,7 @@ impl Decoder {
             bytes: Vec::new(),
             overlong: false,
             expected: None,
-            counters: Counters { frames: 0, bad_frames: 0, other_version: 0, missing: 0, discarded_bytes: 0 },
+            counters: Counters { frames: 0, lines: 0, bad_frames: 0, other_version: 0, missing: 0, discarded_bytes: 0 },
         }
     }
 
@@ -54,8 +74,8 @@ impl Decoder {
         self.counters
     }
 
-    /// Takes the bytes up to the end of the first valid frame: the message, if one was completed, and the rest that is
-    /// still to be given.
+    /// Takes the bytes up to the end of the first valid frame or line: what was completed, and the rest that is still to
+    /// be given.
     pub fn feed<'a>(&mut self, bytes: &'a [u8]) -> (Option<Received>, &'a [u8]) {
         let mut rest = bytes;
         while let Some((&byte, tail)) = rest.split_first() {
@@ -67,7 +87,7 @@ impl Decoder {
         (None, rest)
     }
 
-    /// Takes one byte: the message, if it was completed by it.
+    /// Takes one byte: the message or line that it completed, if any.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         if byte != 0 {
             if self.overlong {
@@ -87,6 +107,11 @@ impl Decoder {
             return None; // two zeros in a row: the end of one frame and the start of the next
         }
         let length = self.bytes.len() as u64;
+        if let Some(line) = text::line(&self.bytes) {
+            self.bytes.clear();
+            self.counters.lines += 1;
+            return Some(Received::Line(line));
+        }
         let outcome = open(&mut self.bytes);
         self.bytes.clear();
         match outcome {
@@ -107,7 +132,7 @@ impl Decoder {
         }
         self.expected = Some(sequence.wrapping_add(1));
         self.counters.frames += 1;
-        Received { sequence, message }
+        Received::Message { sequence, message }
     }
 }
 

@@ -1,5 +1,8 @@
 use super::*;
-use crate::{ChannelReport, Coefficient, Encoder, Frame, Health, MAX_COEFFICIENTS, MAX_POINTS, Point, Term};
+use crate::{
+    ChannelReport, Coefficient, Encoder, Frame, Health, MAX_COEFFICIENTS, MAX_POINTS, MAX_RAW, ModelError, Point, Raw,
+    RawBurst, Term, line_bytes,
+};
 
 extern crate std;
 use std::vec::Vec as StdVec;
@@ -14,6 +17,14 @@ fn decode(stream: &[u8]) -> (StdVec<Received>, Counters) {
     (found, decoder.counters())
 }
 
+fn sequences(found: &[Received]) -> StdVec<u16> {
+    let sequence = |received: &Received| match received {
+        Received::Message { sequence, .. } => Some(*sequence),
+        Received::Line(_) => None,
+    };
+    found.iter().filter_map(sequence).collect()
+}
+
 /// The largest channel report there can be: every integer in its longest encoding.
 fn largest() -> Message {
     let point = Point { n: u64::MAX, sum: u128::MAX, count: u64::MAX };
@@ -25,7 +36,15 @@ fn largest() -> Message {
         missing: u64::MAX,
         points: core::iter::repeat_n(point, MAX_POINTS).collect(),
         coefficients: core::iter::repeat_n(coefficient, MAX_COEFFICIENTS).collect(),
+        unseen: Some(ModelError { deviance_per_point: f64::MAX, rms_percent: f64::MAX }),
     })
+}
+
+/// A full message of the raw stream, every integer in its longest encoding.
+fn raw() -> Message {
+    let burst = RawBurst { after_us: u32::MAX, periods: u32::MAX, words: [[0xA5, 0x5A]; 12] };
+    let bursts = core::iter::repeat_n(burst, MAX_RAW).collect();
+    Message::Raw(Raw { first: u64::MAX, at_us: u64::MAX, sens_avg: u16::MAX, bursts })
 }
 
 /// Numbers from a linear congruential generator (Knuth's MMIX constants), seeded, upper bits only.
@@ -40,22 +59,23 @@ impl Noise {
 
 #[test]
 fn every_message_comes_back_in_order() {
-    let messages = [log("start"), largest(), Message::Health(Health { bursts: 7, ..Health::default() }), log("")];
+    let messages =
+        [log("start"), largest(), Message::Health(Health { bursts: 7, ..Health::default() }), raw(), log("")];
     let mut encoder = Encoder::new();
     let stream: StdVec<u8> = messages.iter().flat_map(|message| encoder.encode(message).unwrap()).collect();
     let (found, counters) = decode(&stream);
-    assert_eq!(found.iter().map(|r| r.sequence).collect::<StdVec<_>>(), [0, 1, 2, 3]);
-    assert!(found.iter().map(|r| &r.message).eq(&messages));
-    assert_eq!(counters, Counters { frames: 4, ..Counters::default() });
+    assert_eq!(sequences(&found), [0, 1, 2, 3, 4]);
+    assert!(found.into_iter().filter_map(Received::message).eq(messages));
+    assert_eq!(counters, Counters { frames: 5, ..Counters::default() });
 }
 
-/// The bytes of one short frame worked out by hand: version 1, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is
-/// zlib's of 01 00 03 01 41; COBS puts a length before each stretch without zeros.
+/// The bytes of one short frame worked out by hand: version 2, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is
+/// zlib's of 02 00 03 01 41; COBS puts a length before each stretch without zeros.
 #[test]
 fn a_frame_is_what_the_format_says() {
     let frame = Encoder::new().encode(&log("A")).unwrap();
-    let [a, b, c, d] = 0xE1C4_20B3_u32.to_le_bytes();
-    assert_eq!(frame.as_slice(), [0, 2, 1, 8, 3, 1, 0x41, a, b, c, d, 0]);
+    let [a, b, c, d] = 0xA664_5A63_u32.to_le_bytes();
+    assert_eq!(frame.as_slice(), [0, 2, 2, 8, 3, 1, 0x41, a, b, c, d, 0]);
 }
 
 #[test]
@@ -91,7 +111,7 @@ fn a_changed_byte_costs_that_frame_and_no_other() {
             let mut stream: StdVec<u8> = frames.iter().flatten().copied().collect();
             stream[start + at] ^= 1 << bit;
             let (found, counters) = decode(&stream);
-            assert_eq!(found.iter().map(|r| r.sequence).collect::<StdVec<_>>(), [0, 2], "byte {at}, bit {bit}");
+            assert_eq!(sequences(&found), [0, 2], "byte {at}, bit {bit}");
             assert_eq!(counters.missing, 1);
             assert!((1..=2).contains(&counters.bad_frames));
         }
@@ -119,7 +139,7 @@ fn a_cut_frame_is_counted_and_the_next_one_read() {
     let [first, second, third]: [Frame; 3] = core::array::from_fn(|_| encoder.encode(&largest()).unwrap());
     let stream: StdVec<u8> = first.iter().chain(&second[..second.len() / 2]).chain(&third).copied().collect();
     let (found, counters) = decode(&stream);
-    assert_eq!(found.iter().map(|r| r.sequence).collect::<StdVec<_>>(), [0, 2]);
+    assert_eq!(sequences(&found), [0, 2]);
     assert_eq!((counters.bad_frames, counters.missing), (1, 1));
 }
 
@@ -132,10 +152,10 @@ fn an_endless_stream_without_zeros_is_bounded_and_counted() {
     assert_eq!((counters.bad_frames, counters.discarded_bytes), (1, 10 * MAX_FRAME as u64));
 }
 
-/// A frame of version 2 with a right checksum, made by hand.
+/// A frame of version 3 with a right checksum, made by hand.
 #[test]
 fn another_version_is_told_from_damage() {
-    let body = [2, 0, 9, 9];
+    let body = [3, 0, 9, 9];
     let mut content = StdVec::from(body);
     content.extend(CRC.checksum(&body).to_le_bytes());
     let mut frame = std::vec![0; 32];
@@ -171,4 +191,30 @@ fn sequence_numbers_wrap_without_a_gap() {
         }
     }
     assert_eq!(decoder.counters(), Counters { frames: 70_000, ..Counters::default() });
+}
+
+#[test]
+fn lines_of_text_are_told_from_noise_and_disturb_no_frame() {
+    let mut encoder = Encoder::new();
+    let line = |text: &str| line_bytes(&text.try_into().unwrap());
+    let mut stream = StdVec::new();
+    stream.extend(encoder.encode(&log("before")).unwrap());
+    stream.extend(line("? help"));
+    stream.extend(line(""));
+    stream.extend(b"no line without its end\0");
+    stream.extend(encoder.encode(&log("after")).unwrap());
+    let (found, counters) = decode(&stream);
+    let [Received::Message { .. }, Received::Line(help), Received::Line(empty), Received::Message { .. }] = &found[..]
+    else {
+        panic!("{found:?}");
+    };
+    assert_eq!((help.as_str(), empty.as_str()), ("? help", ""));
+    assert_eq!((counters.frames, counters.lines, counters.bad_frames, counters.missing), (2, 2, 1, 0));
+}
+
+/// A line cannot hold what would end it or be taken for a frame.
+#[test]
+fn a_line_is_printable() {
+    let line = line_bytes(&"0.05 °/s\0\n".try_into().unwrap());
+    assert_eq!(line.as_slice(), b"\x000.05 ??/s??\r\n\0");
 }

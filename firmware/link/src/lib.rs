@@ -4,6 +4,9 @@
 //! endian), made free of zero bytes by COBS and enclosed in a zero byte at either end. The leading zero ends
 //! whatever noise or text came before, so that it costs a receiver the noise and never the frame.
 //!
+//! Between frames there may be lines of plain text, for a person with any terminal program: printable ASCII that ends in
+//! CR LF, enclosed in zero bytes too.
+//!
 //! [`Encoder`] turns messages into frames, [`Decoder`] finds the frames in a stream of bytes and counts what it
 //! could not use. Neither panics, whatever it is fed.
 #![no_std]
@@ -13,20 +16,23 @@
 mod decode;
 mod encode;
 mod message;
+mod text;
 
 pub use decode::{Counters, Decoder, Received};
 pub use encode::{Encoder, Frame};
 pub use message::{
-    ChannelReport, Coefficient, Health, Hello, MAX_COEFFICIENTS, MAX_POINTS, MAX_TEXT, Message, Point, Term,
+    Boot, BootCause, ChannelReport, Coefficient, Health, Hello, MAX_COEFFICIENTS, MAX_POINTS, MAX_RAW, MAX_TEXT,
+    Message, ModelError, Point, Raw, RawBurst, Term,
 };
+pub use text::{Line, line_bytes};
 
 /// Version of the format. Messages and their fields are only ever appended to within a version.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// Longest frame in bytes, both zero bytes included.
 ///
 /// A channel report with [`MAX_POINTS`] points and [`MAX_COEFFICIENTS`] coefficients, every integer in its longest
-/// encoding, takes 1 380 bytes before COBS, which adds one byte in 254.
+/// encoding, takes 1 397 bytes before COBS, which adds one byte in 254.
 pub const MAX_FRAME: usize = 1408;
 
 /// What COBS encloses: the message between the version and sequence number and the checksum.

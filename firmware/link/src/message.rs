@@ -9,6 +9,8 @@ pub const MAX_POINTS: usize = 28;
 pub const MAX_COEFFICIENTS: usize = 8;
 /// Longest log line in bytes.
 pub const MAX_TEXT: usize = 120;
+/// Most bursts in one message of the raw stream.
+pub const MAX_RAW: usize = 16;
 
 /// One message. Variants are only ever appended: their position is their number on the wire.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,6 +24,8 @@ pub enum Message {
     Health(Health),
     /// One line for a person.
     Log(String<MAX_TEXT>),
+    /// Bursts as they came off the bus, while a recording is asked for.
+    Raw(Raw),
 }
 
 /// Who speaks and with which settings.
@@ -37,10 +41,51 @@ pub struct Hello {
     pub filter_taps_log2: u8,
     /// Programmed sample rate in Hz.
     pub sample_rate_hz: f64,
+    /// Sample rate in Hz measured against the microcontroller's clock; `None` until two samples have come.
+    pub measured_rate_hz: Option<f64>,
     /// Serial clock of the sensor's bus that was really set, in Hz.
     pub spi_clock_hz: u32,
     /// Time since the application started, in microseconds.
     pub uptime_us: u64,
+    /// Whether the sensor answers and is being sampled.
+    pub sampling: bool,
+    /// Epochs finished before this one.
+    pub epoch: u32,
+    /// Length of an epoch in s, 0 for one that never ends.
+    pub epoch_s: u32,
+    /// How the application came to start.
+    pub boot: Boot,
+}
+
+/// How the application came to start.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Boot {
+    /// Why the microcontroller started.
+    pub cause: BootCause,
+    /// Starts since the supply came on, this one included, as far as the retained memory tells.
+    pub starts: u32,
+    /// Channels whose statistics were carried over from before the start.
+    pub kept_channels: u8,
+    /// What the panic or fault before this start left; empty if there was none.
+    pub last_words: String<MAX_TEXT>,
+}
+
+/// Why the microcontroller started. Variants are only ever appended.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BootCause {
+    /// Nothing that the reset flags tell.
+    #[default]
+    Unknown,
+    /// The supply came on.
+    PowerOn,
+    /// The supply dipped below the brown-out threshold.
+    BrownOut,
+    /// The reset pin.
+    Pin,
+    /// The firmware itself: a command, or a panic.
+    Software,
+    /// The watchdog.
+    Watchdog,
 }
 
 /// What one channel has shown so far: exact sums, and the model fitted to them.
@@ -54,8 +99,43 @@ pub struct ChannelReport {
     pub missing: u64,
     /// The curve, by rising averaging factor.
     pub points: Vec<Point, MAX_POINTS>,
-    /// The fitted model.
+    /// The fitted model; none for the covariates.
     pub coefficients: Vec<Coefficient, MAX_COEFFICIENTS>,
+    /// How wrong the model of the epoch before is on this epoch's curve; `None` without either.
+    pub unseen: Option<ModelError>,
+}
+
+/// How wrong a model is on a curve that it was not fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ModelError {
+    /// `mean edf·(ln(m/v) + v/m − 1)` over the octaves with enough data; about 1 for a true model.
+    pub deviance_per_point: f64,
+    /// `100·sqrt(mean (½ ln(v/m))²)`.
+    pub rms_percent: f64,
+}
+
+/// Bursts in a row, as they came off the bus.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Raw {
+    /// Number of the first burst's sample since sampling began; grows by one a sample period, by more across a gap.
+    pub first: u64,
+    /// Time of its data-ready edge, in microseconds since the application started.
+    pub at_us: u64,
+    /// Register SENS_AVG that holds for all of them: range and filter.
+    pub sens_avg: u16,
+    /// The bursts.
+    pub bursts: Vec<RawBurst, MAX_RAW>,
+}
+
+/// One burst of the raw stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RawBurst {
+    /// Microseconds since the edge of the burst before; 0 for the first of a message.
+    pub after_us: u32,
+    /// Sample periods since the burst before; 0 for the first of a message.
+    pub periods: u32,
+    /// The twelve output words, most significant byte first.
+    pub words: [[u8; 2]; 12],
 }
 
 /// One averaging factor of a curve, as exact integers.
@@ -95,7 +175,8 @@ pub struct Coefficient {
     pub high: f64,
 }
 
-/// What was lost and why, since the application started. Every count stops at its largest value.
+/// What was lost and why, since the application started or the statistics were reset. Every count stops at its largest
+/// value.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Health {
     /// Bursts that arrived, usable or not.
@@ -120,4 +201,26 @@ pub struct Health {
     pub queue_full: u32,
     /// Most bursts that ever waited in the queue.
     pub queue_peak: u32,
+    /// Data-ready edges that never came, by the time between those that did.
+    pub lost_edges: u32,
+    /// Data-ready edges that came out of step.
+    pub stray_edges: u32,
+    /// Bursts not used because the sensor had been silent or out of step and was not yet checked.
+    pub unchecked: u32,
+    /// How often the sensor was lost and sought again.
+    pub recoveries: u32,
+    /// Messages of the raw stream that found no room on the line.
+    pub raw_dropped: u32,
+    /// Bytes lost because they came faster than they were read.
+    pub serial_overruns: u32,
+    /// Commands that were not understood.
+    pub bad_commands: u32,
+    /// Part of the time that the processor was awake, in 1/1000.
+    pub awake_permille: u32,
+    /// Longest sampling interrupt in processor cycles.
+    pub sampling_cycles: u32,
+    /// Longest turn of the estimators in processor cycles, interruptions included.
+    pub estimator_cycles: u32,
+    /// Most bytes of stack ever used.
+    pub stack_bytes: u32,
 }
