@@ -1,10 +1,12 @@
 //! The streaming estimator: integers in, exact sums of squared second differences out.
 
 mod block;
+mod checkpoint;
 mod moments;
 #[cfg(feature = "serde")]
 mod state;
 
+pub use checkpoint::Learnt;
 pub(crate) use moments::Moments;
 
 use crate::curve::{Curve, Point};

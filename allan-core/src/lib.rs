@@ -51,7 +51,7 @@ pub mod term;
 pub mod trace;
 
 pub use between::Between;
-pub use cascade::Cascade;
+pub use cascade::{Cascade, Learnt};
 pub use coupling::{Coupling, Covariance};
 pub use curve::{Curve, Point};
 pub use hadamard::{Hadamard, HadamardPoint};
