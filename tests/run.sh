@@ -31,7 +31,7 @@ step "format"
 run cargo fmt --all --check
 
 step "lints and builds for microcontrollers"
-run cargo clippy --locked --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --release -- -D warnings
+run cargo clippy --locked --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --profile image -- -D warnings
 for target in "$MCU" "$SMALL"; do
     run cargo clippy --locked --package adis16405-driver --package allan-core --target "$target" -- -D warnings
 done

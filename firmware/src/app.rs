@@ -1,206 +1,394 @@
-//! The application: judges bursts, feeds the estimators, reports in time and on request.
+//! The application's main loop: commands, care for the sensor, epochs, and what is kept over a restart.
 
-use crate::acquisition::Arrival;
-use crate::summary::{OCTAVES, OVERLAP, channel_report};
-use adis16405_driver::{Burst, Channel, Config, Faults, Judge};
-use allan_core::Cascade;
-use core::fmt::Write;
-use link::{ChannelReport, Encoder, Frame, Health, Hello, Message};
+mod answer;
+mod report;
 
-/// What is fixed while the application runs.
-#[derive(Debug, Clone, Copy)]
-pub struct Settings {
-    /// What the sensor was told.
-    pub config: Config,
-    /// What the sensor answered when asked for its product.
-    pub product_id: u16,
-    /// Serial clock that was really set, in Hz.
+use crate::board::Board;
+use crate::command::{Command, Mistake, Parser};
+use crate::estimators::CHANNELS;
+use crate::last_words::line;
+use crate::retained::{Retained, Settings};
+use crate::sensor::{Identity, auto_null, bring_up};
+use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase};
+use allan_core::Model;
+use answer::Answer;
+use core::fmt::Arguments;
+use heapless::Deque;
+use link::{Boot, Line, Message};
+use report::Report;
+
+/// What a board knows when it starts the application.
+pub struct Start {
+    /// Serial clock of the sensor's bus that was really set, in Hz.
     pub spi_clock_hz: u32,
-    /// Time between reports in microseconds; 0 for reports on request only.
-    pub report_interval_us: u64,
+    /// Why the microcontroller started, and its last words.
+    pub boot: Boot,
+    /// What survived the start.
+    pub retained: Retained,
 }
 
-/// Where frames go.
-pub trait Sink {
-    /// Takes the whole frame, or nothing of it if there is no room now.
-    fn offer(&mut self, frame: &[u8]) -> bool;
-}
+/// Configuration of a first start: 204.8 samples a second, ±300 °/s, no filter.
+pub const FIRST_CONFIG: Config = {
+    let Ok(period) = SamplePeriod::from_divisor(TimeBase::Fast, 8) else { panic!("divisor") };
+    let Ok(config) = Config::new(GyroRange::Dps300, 0, period) else { panic!("filter") };
+    config
+};
 
-/// The frame of a line for a person, cut to what a message holds.
-pub fn log_frame(encoder: &mut Encoder, text: core::fmt::Arguments<'_>) -> Option<Frame> {
-    let mut line = heapless::String::new();
-    let _cut = line.write_fmt(text);
-    encoder.encode(&Message::Log(line))
-}
+/// Settings of a first start: a report every ten seconds, no epochs.
+const FIRST: Settings = Settings {
+    smpl_prd: FIRST_CONFIG.sample_period().register(),
+    sens_avg: FIRST_CONFIG.sens_avg(),
+    epoch_s: 0,
+    epoch: 0,
+    interval_s: 10,
+    starts: 0,
+};
 
-/// Version of the firmware, from the manifest.
-const VERSION: (u8, u8, u8) = (
-    decimal(env!("CARGO_PKG_VERSION_MAJOR")),
-    decimal(env!("CARGO_PKG_VERSION_MINOR")),
-    decimal(env!("CARGO_PKG_VERSION_PATCH")),
-);
+/// Serial clock that the sensor takes in its low-power mode, in Hz (data sheet Rev. B, page 10).
+const LOW_POWER_HZ: u32 = 300_000;
+/// Pause between attempts to find the sensor.
+const RETRY_US: u64 = 1_000_000;
+/// How long auto-null stays armed.
+const ARMED_US: u64 = 10_000_000;
+/// Pause between two records that are kept; all of them take ten times as long.
+const KEEP_US: u64 = 100_000;
+/// Lines of text that may wait for room.
+const LINES: usize = 4;
 
-/// A number of the manifest; one that does not fit does not compile.
-const fn decimal(digits: &str) -> u8 {
-    match u8::from_str_radix(digits, 10) {
-        Ok(number) => number,
-        Err(_) => panic!("a version number above 255"),
-    }
-}
-
-/// Messages of a report: who speaks, six channels, health.
-const REPORT_MESSAGES: usize = Channel::INERTIAL.len() + 2;
-
-/// The application's state: six estimators, the verdicts, and how far the report under way has come.
+/// The state of the main loop.
 pub struct App {
+    start: Start,
     settings: Settings,
-    estimators: [Cascade<OCTAVES, OVERLAP>; 6],
-    judge: Judge,
-    health: Health,
-    encoder: Encoder,
-    unsent: Option<Frame>,
-    /// Messages of the report that are still to be made.
-    report: core::ops::Range<usize>,
+    config: Config,
+    product_id: u16,
+    sensor: Sensor,
+    parser: Parser,
+    lines: Deque<Line, LINES>,
+    answer: Option<Answer>,
+    report: Report,
+    /// What the epoch before has learnt of each inertial channel.
+    learnt: [Option<Model>; 6],
+    epoch_began_us: u64,
     next_report_us: u64,
+    next_keep_us: u64,
+    keep: usize,
+    armed_until_us: u64,
+    recoveries: u32,
+    bad_commands: u32,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Sensor {
+    /// To be identified, tested and configured at this time.
+    Sought { at_us: u64 },
+    /// Sampled since this time.
+    Sampled { since_us: u64 },
+}
+
+/// The configuration that registers with these values mean.
+fn config(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
+    let range = match sens_avg >> 8 {
+        0b100 => GyroRange::Dps300,
+        0b010 => GyroRange::Dps150,
+        0b001 => GyroRange::Dps75,
+        _ => return None,
+    };
+    Config::new(range, sens_avg as u8, SamplePeriod::from_register(smpl_prd)?).ok()
 }
 
 impl App {
-    /// An application that has seen nothing; the first report is due after one interval.
-    ///
-    /// `encoder` numbers its messages on from those that were sent while the sensor was sought.
-    #[must_use]
-    pub fn new(settings: Settings, encoder: Encoder) -> Self {
+    /// Goes on with what survived, if anything did: the settings, and the statistics of each channel.
+    pub fn new(mut start: Start, board: &mut impl Board) -> Self {
+        let kept = start.retained.settings().and_then(|kept| Some((kept, config(kept.smpl_prd, kept.sens_avg)?)));
+        let fresh = kept.is_none();
+        let (mut settings, config) = kept.unwrap_or((FIRST, FIRST_CONFIG));
+        settings.starts = settings.starts.saturating_add(1);
+        start.boot.starts = settings.starts;
+        board.estimators(|estimators| estimators.begin(config));
+        for index in 0..CHANNELS.len() {
+            if let Some(estimator) = start.retained.estimator(index).filter(|_| !fresh) {
+                board.estimators(|estimators| estimators.resume(index, estimator));
+                start.boot.kept_channels += 1;
+            }
+        }
+        start.retained.keep_settings(settings, fresh);
+        let now_us = board.now_us();
         Self {
+            start,
             settings,
-            estimators: [const { Cascade::new() }; 6],
-            judge: Judge::default(),
-            health: Health::default(),
-            encoder,
-            unsent: None,
-            report: 0..0,
-            next_report_us: settings.report_interval_us,
+            config,
+            product_id: 0,
+            sensor: Sensor::Sought { at_us: now_us },
+            parser: Parser::default(),
+            lines: Deque::new(),
+            answer: None,
+            report: Report::default(),
+            learnt: [const { None }; 6],
+            epoch_began_us: now_us,
+            next_report_us: now_us + interval_us(settings),
+            next_keep_us: now_us + KEEP_US,
+            keep: 0,
+            armed_until_us: 0,
+            recoveries: 0,
+            bad_commands: 0,
         }
     }
 
-    /// Takes what the next data-ready edge brought; `waiting` is how many more the queue holds.
-    pub fn take(&mut self, arrival: Arrival, waiting: usize) {
-        let health = &mut self.health;
-        health.queue_peak = health.queue_peak.max(u32::try_from(waiting).unwrap_or(u32::MAX).saturating_add(1));
-        if arrival.dropped > 0 {
-            health.queue_full = health.queue_full.saturating_add(arrival.dropped);
-            self.gap(arrival.dropped);
+    /// One turn: every command that has come, and at most one message. False if there is nothing more to do before the
+    /// next interrupt.
+    pub fn turn(&mut self, board: &mut impl Board) -> bool {
+        board.alive();
+        while let Some(byte) = board.received() {
+            match self.parser.push(byte) {
+                Some(Ok(command)) => self.obey(command, board),
+                Some(Err(mistake)) => self.refuse(mistake, board),
+                None => {}
+            }
         }
-        match arrival.burst {
-            Some(burst) => self.burst(&burst),
-            None => {
-                self.health.bus_errors = self.health.bus_errors.saturating_add(1);
-                self.gap(1);
+        self.watch(board);
+        self.keep(board);
+        self.look_at_clock(board);
+        self.speak(board)
+    }
+
+    #[inline(never)] // so that its stack is not everybody's
+    fn obey(&mut self, command: Command, board: &mut impl Board) {
+        let now_us = board.now_us();
+        match command {
+            Command::Help => self.answer = Some(Answer::help()),
+            Command::Table => self.answer = Some(Answer::table()),
+            Command::Faults => self.answer = Some(Answer::faults()),
+            Command::Status => self.answer = Some(Answer::status()),
+            Command::Version => self.say(board, format_args!("{}", answer::VERSION_LINE)),
+            Command::Report => self.report.start(false),
+            Command::ResetStatistics => {
+                self.begin_epoch(board, 0);
+                self.recoveries = 0;
+                self.bad_commands = 0;
+                self.say(board, format_args!("statistics forgotten"));
+            }
+            Command::Rate(millihertz) => match SamplePeriod::nearest(f64::from(millihertz) / 1000.0) {
+                Ok(period) => {
+                    self.configure(board, Config::new(self.config.range(), self.config.filter_taps_log2(), period));
+                }
+                Err(error) => self.say(board, format_args!("{error}")),
+            },
+            Command::Range(range) => {
+                let taps = self.config.filter_taps_log2().max(range.min_filter_taps_log2());
+                self.configure(board, Config::new(range, taps, self.config.sample_period()));
+            }
+            Command::Filter(taps) => {
+                self.configure(board, Config::new(self.config.range(), taps, self.config.sample_period()));
+            }
+            Command::Epoch(seconds) => {
+                self.settings.epoch_s = seconds;
+                self.start.retained.keep_settings(self.settings, false);
+                self.say(
+                    board,
+                    format_args!("epoch of {seconds} s; this one began {} s ago", self.epoch_age_s(now_us)),
+                );
+            }
+            Command::Interval(seconds) => {
+                self.settings.interval_s = seconds;
+                self.next_report_us = now_us + interval_us(self.settings);
+                self.start.retained.keep_settings(self.settings, false);
+                self.say(board, format_args!("reports every {seconds} s"));
+            }
+            Command::Raw(on) => {
+                board.estimators(|estimators| estimators.set_raw(on));
+                self.say(board, format_args!("stream of raw bursts {}", if on { "on" } else { "off" }));
+            }
+            Command::SelfTest => {
+                board.sample(false);
+                self.sensor = Sensor::Sought { at_us: now_us };
+            }
+            Command::ArmNull => {
+                self.armed_until_us = now_us + ARMED_US;
+                self.say(board, format_args!("keep the sensor still; null within 10 s nulls its bias"));
+            }
+            Command::Null => self.null(board, now_us),
+            Command::Restart => {
+                (0..CHANNELS.len()).for_each(|index| self.keep_channel(board, index));
+                board.restart();
             }
         }
     }
 
-    /// Takes a byte that a person or a program sent: `r` asks for a report. Others are ignored.
-    pub fn command(&mut self, byte: u8) {
-        if byte == b'r' {
-            self.start_report();
+    fn refuse(&mut self, mistake: Mistake, board: &mut impl Board) {
+        self.bad_commands = self.bad_commands.saturating_add(1);
+        match mistake {
+            Mistake::Unknown(byte) => {
+                let key = char::from(byte).escape_default();
+                self.say(board, format_args!("{key} is no command; ? lists them"));
+            }
+            Mistake::Line(letter) => {
+                self.say(board, format_args!("no such {} command; ? lists them", char::from(letter)));
+            }
         }
     }
 
-    /// Sends at most one message to `sink`. `now_us` is the time since the start, in microseconds.
-    ///
-    /// True if there is more to send.
-    pub fn poll(&mut self, now_us: u64, sink: &mut impl Sink) -> bool {
-        if self.settings.report_interval_us > 0 && now_us >= self.next_report_us {
-            let late = (now_us - self.next_report_us) / self.settings.report_interval_us;
-            self.next_report_us += (late + 1) * self.settings.report_interval_us;
-            self.start_report();
+    fn configure(&mut self, board: &mut impl Board, config: Result<Config, adis16405_driver::ConfigError>) {
+        let config = match config {
+            Ok(config) => config,
+            Err(error) => return self.say(board, format_args!("{error}")),
+        };
+        let low_power = config.sample_period().clock_mode() == ClockMode::LowPower;
+        if low_power && self.start.spi_clock_hz > LOW_POWER_HZ {
+            let clock_hz = self.start.spi_clock_hz;
+            return self.say(
+                board,
+                format_args!("below 182 SPS the sensor takes a serial clock of {LOW_POWER_HZ} Hz, not {clock_hz} Hz"),
+            );
         }
-        if self.unsent.is_none()
-            && let Some(index) = self.report.next()
-        {
-            let message = self.message(index, now_us);
-            self.unsent = self.encoder.encode(&message);
-        }
-        if let Some(frame) = &self.unsent
-            && sink.offer(frame)
-        {
-            self.unsent = None;
-        }
-        self.unsent.is_some() || !self.report.is_empty()
+        board.sample(false);
+        self.config = config;
+        self.settings.smpl_prd = config.sample_period().register();
+        self.settings.sens_avg = config.sens_avg();
+        self.begin_epoch(board, 0);
+        board.estimators(|estimators| estimators.begin(config));
+        self.sensor = Sensor::Sought { at_us: board.now_us() };
+        self.say(board, format_args!("statistics forgotten: the sensor is configured anew"));
     }
 
-    /// What would be reported of one channel now; `None` if it is not an inertial one.
-    #[must_use]
-    pub fn channel(&self, channel: Channel) -> Option<ChannelReport> {
-        let index = Channel::INERTIAL.iter().position(|&inertial| inertial == channel)?;
-        Some(channel_report(channel, &self.estimators[index], self.settings.config))
-    }
-
-    /// What was lost so far.
-    #[must_use]
-    pub fn health(&self) -> Health {
-        let counters = self.judge.counters();
-        Health {
-            bursts: counters.bursts,
-            used: counters.bursts - counters.unusable,
-            no_new_data: counters.get(Faults::NO_NEW_DATA),
-            error_alarm: counters.get(Faults::ERROR_ALARM),
-            supply: counters.get(Faults::SUPPLY),
-            stuck_low: counters.get(Faults::STUCK_LOW),
-            stuck_high: counters.get(Faults::STUCK_HIGH),
-            repeated: counters.get(Faults::REPEATED),
-            ..self.health
+    fn null(&mut self, board: &mut impl Board, now_us: u64) {
+        if now_us >= core::mem::take(&mut self.armed_until_us) {
+            return self.say(board, format_args!("not armed: arm first, then null within 10 s"));
+        }
+        board.sample(false);
+        self.sensor = Sensor::Sought { at_us: now_us };
+        let done = auto_null(board.bus(), self.config).map_err(|error| line(format_args!("{error}")));
+        match done {
+            Ok(()) => {
+                self.begin_epoch(board, 0);
+                self.say(board, format_args!("bias nulled, statistics forgotten"));
+            }
+            Err(error) => self.say(board, format_args!("bias not nulled: {error}")),
         }
     }
 
-    fn burst(&mut self, burst: &Burst) {
-        if !self.judge.judge(burst).usable {
-            self.gap(1);
+    /// Finds the sensor, and finds out when it is lost.
+    #[inline(never)]
+    fn watch(&mut self, board: &mut impl Board) {
+        let now_us = board.now_us();
+        match self.sensor {
+            Sensor::Sought { at_us } if now_us >= at_us => self.seek(board),
+            Sensor::Sought { .. } => {}
+            Sensor::Sampled { since_us } => {
+                let (doubtful, silent) =
+                    board.estimators(|estimators| (estimators.is_doubtful(), estimators.is_silent_at(now_us)));
+                if doubtful || silent {
+                    self.recoveries = self.recoveries.saturating_add(1);
+                    let what = if silent { "no data-ready edges" } else { "silent, stuck or out of step" };
+                    self.log(board, format_args!("sensor: {what}; seeking it"));
+                    board.sample(false);
+                    self.sensor = Sensor::Sought { at_us: now_us.max(since_us + RETRY_US) };
+                }
+            }
+        }
+    }
+
+    fn seek(&mut self, board: &mut impl Board) {
+        let found = bring_up(board.bus(), self.config).map_err(|trouble| line(format_args!("{trouble}")));
+        let now_us = board.now_us();
+        match found {
+            Ok(Identity { product, tested, diagnosis }) => {
+                self.product_id = product.prod_id();
+                let test = if tested { "passed" } else { "did not run" };
+                let (product, diagnosis) = (self.product_id, diagnosis.bits());
+                self.log(board, format_args!("sensor: ADIS{product}, self-test {test}, DIAG_STAT {diagnosis:#06x}"));
+                board.estimators(|estimators| estimators.trust(now_us));
+                board.sample(true);
+                self.sensor = Sensor::Sampled { since_us: now_us };
+            }
+            Err(trouble) => {
+                self.log(board, format_args!("sensor: {trouble}; trying again"));
+                self.sensor = Sensor::Sought { at_us: now_us + RETRY_US };
+            }
+        }
+    }
+
+    /// Keeps one record now and then, so that a restart costs a second of statistics.
+    fn keep(&mut self, board: &mut impl Board) {
+        let now_us = board.now_us();
+        if now_us >= self.next_keep_us {
+            self.next_keep_us = now_us + KEEP_US;
+            self.keep = (self.keep + 1) % CHANNELS.len();
+            self.keep_channel(board, self.keep);
+        }
+    }
+
+    fn keep_channel(&mut self, board: &mut impl Board, index: usize) {
+        if let Some(estimator) = board.estimators(|estimators| estimators.get(index).cloned()) {
+            self.start.retained.keep_estimator(index, &estimator);
+        }
+    }
+
+    fn look_at_clock(&mut self, board: &mut impl Board) {
+        let now_us = board.now_us();
+        let epoch_us = u64::from(self.settings.epoch_s) * 1_000_000;
+        if epoch_us > 0 && now_us >= self.epoch_began_us + epoch_us {
+            self.epoch_began_us = now_us;
+            self.report.start(true);
+        }
+        let interval_us = interval_us(self.settings);
+        if interval_us > 0 && now_us >= self.next_report_us {
+            // However late: one report makes up for those that were missed.
+            self.next_report_us += ((now_us - self.next_report_us) / interval_us + 1) * interval_us;
+            self.report.start(false);
+        }
+    }
+
+    /// The statistics begin again, as epoch number `epoch`.
+    fn begin_epoch(&mut self, board: &mut impl Board, epoch: u32) {
+        board.estimators(|estimators| if epoch == 0 { estimators.forget() } else { estimators.begin_epoch() });
+        self.settings.epoch = epoch;
+        self.epoch_began_us = board.now_us();
+        if epoch == 0 {
+            self.learnt = [const { None }; 6];
+            self.report = Report::default();
+        }
+        self.start.retained.keep_settings(self.settings, true);
+    }
+
+    /// Sends what there is room for. False if nothing is left or no room.
+    fn speak(&mut self, board: &mut impl Board) -> bool {
+        while let Some(line) = self.lines.front() {
+            if !board.outbox(|outbox| outbox.line(line)) {
+                return false;
+            }
+            self.lines.pop_front();
+        }
+        if !board.outbox(|outbox| outbox.has_room()) {
+            return false;
+        }
+        self.answer(board);
+        self.report(board);
+        self.answer.is_some() || self.report.is_under_way()
+    }
+
+    /// A line of text, behind those that wait. The oldest gives way when there are too many.
+    fn say(&mut self, board: &mut impl Board, text: Arguments<'_>) {
+        let line = line(text);
+        if self.lines.is_empty() && board.outbox(|outbox| outbox.line(&line)) {
             return;
         }
-        let counts = burst.counts();
-        for (estimator, channel) in self.estimators.iter_mut().zip(Channel::INERTIAL) {
-            estimator.push(i32::from(counts.get(channel)));
+        if self.lines.is_full() {
+            self.lines.pop_front();
         }
+        let _room_was_made = self.lines.push_back(line);
     }
 
-    fn gap(&mut self, missing: u32) {
-        for estimator in &mut self.estimators {
-            estimator.gap(missing);
-        }
+    /// A line in a message, for a program too.
+    fn log(&mut self, board: &mut impl Board, text: Arguments<'_>) {
+        let line = line(text);
+        board.outbox(|outbox| outbox.send(&Message::Log(line)));
     }
 
-    /// A report that is under way is finished first and counts as the one asked for.
-    fn start_report(&mut self) {
-        if self.report.is_empty() {
-            self.report = 0..REPORT_MESSAGES;
-        }
+    fn epoch_age_s(&self, now_us: u64) -> u64 {
+        (now_us - self.epoch_began_us) / 1_000_000
     }
+}
 
-    fn message(&self, index: usize, now_us: u64) -> Message {
-        match index.checked_sub(1) {
-            None => Message::Hello(self.hello(now_us)),
-            Some(k) if k < Channel::INERTIAL.len() => {
-                Message::Channel(channel_report(Channel::INERTIAL[k], &self.estimators[k], self.settings.config))
-            }
-            Some(_) => Message::Health(self.health()),
-        }
-    }
-
-    fn hello(&self, now_us: u64) -> Hello {
-        let config = self.settings.config;
-        Hello {
-            firmware: VERSION,
-            product_id: self.settings.product_id,
-            gyro_full_scale: match config.range() {
-                adis16405_driver::GyroRange::Dps300 => 300,
-                adis16405_driver::GyroRange::Dps150 => 150,
-                adis16405_driver::GyroRange::Dps75 => 75,
-            },
-            filter_taps_log2: config.filter_taps_log2(),
-            sample_rate_hz: config.sample_period().hz(),
-            spi_clock_hz: self.settings.spi_clock_hz,
-            uptime_us: now_us,
-        }
-    }
+fn interval_us(settings: Settings) -> u64 {
+    u64::from(settings.interval_s) * 1_000_000
 }

@@ -1,23 +1,40 @@
 //! The application that characterises an ADIS16405 while it runs: the same code on every board and on the host.
 //!
 //! ```text
-//! data-ready edge ─► Acquisition ─► queue ─► App ─► link frames ─► Sink
-//!   (interrupt)      one burst      bursts   judge, estimate, report
+//! data-ready edge ─► Sampler ─► queue ─► Estimators ─► App ─► Outbox ─► serial port
+//!  (interrupts)      bursts              (below them)  (main loop)
 //! ```
 //!
-//! A board brings pins, clocks and interrupts, and calls [`Acquisition::on_data_ready`] from the interrupt and
-//! [`App::take`], [`App::command`] and [`App::poll`] from its main loop.
+//! A board brings pins, clocks and interrupts: it calls the [`Sampler`] at data-ready edges and at the ends of bursts,
+//! [`estimate`] at a lower priority, and [`run`] from its main program, with itself as a [`Chip`]. Nothing of a higher
+//! priority ever waits for anything of a lower one.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
 pub mod acquisition;
-pub mod app;
+mod app;
+mod board;
+pub mod cadence;
+pub mod command;
+mod desk;
+mod estimators;
+mod last_words;
+pub mod outbox;
+pub mod retained;
+pub mod sensor;
 pub mod spi_clock;
 mod summary;
+pub mod table;
 mod uptime;
 
-pub use acquisition::{Acquisition, Arrival, Queue, bring_up};
-pub use app::{App, Settings, Sink, log_frame};
-pub use summary::{OCTAVES, OVERLAP, channel_report};
+pub use acquisition::{Arrival, Arrivals, Sampler};
+pub use app::{App, FIRST_CONFIG, Start};
+pub use board::{Board, Meters};
+pub use desk::{Chip, Desk, Locks, run};
+pub use estimators::{CHANNELS, Estimator, Estimators, estimate};
+pub use last_words::LastWords;
+pub use outbox::{Outbox, Outgoing};
+pub use retained::Retained;
+pub use summary::{OCTAVES, OVERLAP, channel_model, channel_report};
 pub use uptime::Uptime;

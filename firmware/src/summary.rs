@@ -1,38 +1,62 @@
 //! From an estimator to what is reported of it: exact sums, and the declared model fitted to them.
 
+use crate::estimators::Estimator;
 use adis16405_driver::{Channel, Config};
-use allan_core::fit::fit;
-use allan_core::{Cascade, Kind};
-use link::{ChannelReport, Coefficient, Point, Term};
+use allan_core::{Curve, Kind, Model, check, fit::fit};
+use link::{ChannelReport, Coefficient, ModelError, Point, Term};
 
 /// Octaves of averaging factors: up to 2²³ samples, 11 hours at 204.8 samples a second.
 pub const OCTAVES: usize = 24;
 /// Overlap of the differences.
 pub const OVERLAP: usize = 8;
 
-/// What is reported of one channel.
+/// The curve of one channel in its unit.
+fn curve(channel: Channel, estimator: &Estimator, config: Config) -> Curve<OCTAVES> {
+    estimator.curve(1.0 / config.sample_period().hz()).scaled(channel.lsb(config.range()))
+}
+
+/// The declared model fitted to one channel, in its unit.
 #[must_use]
-pub fn channel_report(channel: Channel, estimator: &Cascade<OCTAVES, OVERLAP>, config: Config) -> ChannelReport {
-    let curve = estimator.curve(1.0 / config.sample_period().hz()).scaled(channel.lsb(config.range()));
-    let model = fit(&curve, &Kind::DECLARED);
-    let coefficients = model.terms().iter().filter_map(|term| {
-        let kind = match term.kind {
-            Kind::AngleRandomWalk => Term::AngleRandomWalk,
-            Kind::BiasInstability => Term::BiasInstability,
-            Kind::RateRandomWalk => Term::RateRandomWalk,
-            _ => return None,
-        };
-        Some(Coefficient { term: kind, value: term.value, low: term.low, high: term.high })
+#[inline(never)] // so that its stack is not everybody's
+pub fn channel_model(channel: Channel, estimator: &Estimator, config: Config) -> Model {
+    fit(&curve(channel, estimator, config), &Kind::DECLARED)
+}
+
+/// What is reported of one channel. `model` is fitted to it, `previous` to the epoch before.
+#[must_use]
+pub fn channel_report(
+    channel: Channel,
+    estimator: &Estimator,
+    config: Config,
+    model: Option<&Model>,
+    previous: Option<&Model>,
+) -> ChannelReport {
+    let coefficients = model.into_iter().flat_map(Model::terms).filter_map(|term| {
+        let (value, low, high) = (term.value, term.low, term.high);
+        Some(Coefficient { term: term_of(term.kind)?, value, low, high })
     });
     let points = (0..OCTAVES).filter_map(|octave| {
         let (sum, count) = estimator.sum_of_squares(octave)?;
         (count > 0).then_some(Point { n: 1 << octave, sum, count })
     });
+    let unseen = previous
+        .and_then(|previous| check::ModelError::between(previous, &curve(channel, estimator, config)))
+        .map(|error| ModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent });
     ChannelReport {
         channel: channel as u8,
         samples: estimator.len(),
         missing: estimator.missing(),
         points: points.take(link::MAX_POINTS).collect(),
         coefficients: coefficients.take(link::MAX_COEFFICIENTS).collect(),
+        unseen,
     }
+}
+
+fn term_of(kind: Kind) -> Option<Term> {
+    Some(match kind {
+        Kind::AngleRandomWalk => Term::AngleRandomWalk,
+        Kind::BiasInstability => Term::BiasInstability,
+        Kind::RateRandomWalk => Term::RateRandomWalk,
+        _ => return None,
+    })
 }

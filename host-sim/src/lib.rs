@@ -11,6 +11,7 @@
 pub mod analysis;
 pub mod cli;
 pub mod coefficients;
+pub mod device;
 pub mod page;
 pub mod plot;
 pub mod record;

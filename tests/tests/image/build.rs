@@ -21,10 +21,10 @@ fn build() -> PathBuf {
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
         .args(["build", "--package", "firmware", "--bin", NAME, "--features", "board-f405", "--target", TARGET])
-        .args(["--release", "--locked", "--target-dir"])
+        .args(["--profile", "image", "--locked", "--target-dir"])
         .arg(&target)
         .status()
         .expect("cargo starts");
     assert!(status.success(), "the image does not build; its target comes with `rustup target add {TARGET}`");
-    target.join(TARGET).join("release").join(NAME)
+    target.join(TARGET).join("image").join(NAME)
 }

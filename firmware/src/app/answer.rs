@@ -1,0 +1,166 @@
+//! Answers for a person: lines of text, made one at a time.
+
+use super::{App, Sensor};
+use crate::board::Board;
+use crate::command::HELP;
+use crate::estimators::CHANNELS;
+use crate::last_words::line;
+use crate::summary::{OCTAVES, channel_model};
+use crate::table::{HEAD, Short, row};
+use adis16405_driver::Channel;
+use link::{Health, Line};
+
+/// What `v` answers.
+pub(super) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
+
+/// An answer and how many of its lines were sent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Answer {
+    kind: Kind,
+    next: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Help,
+    Table,
+    Faults,
+    Status,
+}
+
+impl Answer {
+    pub(super) const fn help() -> Self {
+        Self { kind: Kind::Help, next: 0 }
+    }
+
+    pub(super) const fn table() -> Self {
+        Self { kind: Kind::Table, next: 0 }
+    }
+
+    pub(super) const fn faults() -> Self {
+        Self { kind: Kind::Faults, next: 0 }
+    }
+
+    pub(super) const fn status() -> Self {
+        Self { kind: Kind::Status, next: 0 }
+    }
+}
+
+/// A line of an answer.
+enum Next {
+    Line(Line),
+    /// Nothing to say here; there is more.
+    Nothing,
+    End,
+}
+
+impl From<Option<Line>> for Next {
+    fn from(line: Option<Line>) -> Self {
+        line.map_or(Self::Nothing, Self::Line)
+    }
+}
+
+impl App {
+    /// Makes and sends the next line of the answer under way.
+    #[inline(never)] // so that its stack is not everybody's
+    pub(super) fn answer(&mut self, board: &mut impl Board) {
+        let Some(Answer { kind, next }) = self.answer else { return };
+        let made = match kind {
+            Kind::Help => HELP.get(next).map_or(Next::End, |text| Next::Line(line(format_args!("{text}")))),
+            Kind::Table => self.table_line(board, next),
+            Kind::Faults => faults_line(&self.health(board), next),
+            Kind::Status => self.status_line(board, next),
+        };
+        self.answer = match made {
+            Next::End => None,
+            Next::Nothing => Some(Answer { kind, next: next + 1 }),
+            Next::Line(line) => {
+                let sent = board.outbox(|outbox| outbox.line(&line));
+                Some(Answer { kind, next: next + usize::from(sent) })
+            }
+        };
+    }
+
+    /// Head, a row for every octave, a line of coefficients for every inertial channel.
+    fn table_line(&self, board: &mut impl Board, index: usize) -> Next {
+        if let Some(head) = HEAD.get(index) {
+            return Next::Line(line(format_args!("{head}")));
+        }
+        let index = index - HEAD.len();
+        if index < OCTAVES {
+            return board.estimators(|estimators| row(estimators, index)).into();
+        }
+        let index = index - OCTAVES;
+        let Some(&channel) = Channel::INERTIAL.get(index) else { return Next::End };
+        let Some(estimator) = board.estimators(|estimators| estimators.get(index).cloned()) else { return Next::End };
+        let model = channel_model(channel, &estimator, self.config);
+        let mut text = line(format_args!("{}", channel.name()));
+        for term in model.terms() {
+            // What does not fit is cut.
+            let (value, low, high) = (Short(term.value), Short(term.low), Short(term.high));
+            let _ = text.push_str(&line(format_args!("  {} ({low}..{high})", value)));
+        }
+        Next::Line(text)
+    }
+
+    fn status_line(&self, board: &mut impl Board, index: usize) -> Next {
+        let now_us = board.now_us();
+        let boot = &self.start.boot;
+        let text = match index {
+            0 => {
+                let state = if matches!(self.sensor, Sensor::Sampled { .. }) { "sampled" } else { "sought" };
+                line(format_args!("up {} s, sensor {state}, SCK {} Hz", now_us / 1_000_000, self.start.spi_clock_hz))
+            }
+            1 => {
+                let measured = board.estimators(|estimators| estimators.measured_hz());
+                let programmed = Short(self.config.sample_period().hz());
+                let (sens_avg, measured) = (self.config.sens_avg(), Short(measured.unwrap_or(f64::NAN)));
+                line(format_args!("rate {programmed} Hz, measured {measured} Hz, SENS_AVG {sens_avg:#06x}"))
+            }
+            2 => {
+                let samples = board.estimators(|estimators| estimators.get(0).map(|estimator| estimator.len()));
+                let (epoch, length) = (self.settings.epoch, self.settings.epoch_s);
+                let (samples, age) = (samples.unwrap_or(0), self.epoch_age_s(now_us));
+                line(format_args!("{samples} samples, epoch {epoch}, begun {age} s ago, length {length} s"))
+            }
+            3 => line(format_args!("start {}: {:?}, {} channels kept", boot.starts, boot.cause, boot.kept_channels)),
+            4 if !boot.last_words.is_empty() => line(format_args!("last words: {}", boot.last_words)),
+            _ => return Next::End,
+        };
+        Next::Line(text)
+    }
+}
+
+/// A line for each counter that is not 0.
+fn faults_line(health: &Health, index: usize) -> Next {
+    let counters = [
+        ("bursts", health.bursts),
+        ("used", health.used),
+        ("no_new_data", health.no_new_data),
+        ("error_alarm", health.error_alarm),
+        ("supply", health.supply),
+        ("stuck_low", health.stuck_low),
+        ("stuck_high", health.stuck_high),
+        ("repeated", health.repeated),
+        ("bus_errors", health.bus_errors),
+        ("queue_full", health.queue_full),
+        ("queue_peak", health.queue_peak),
+        ("lost_edges", health.lost_edges),
+        ("stray_edges", health.stray_edges),
+        ("unchecked", health.unchecked),
+        ("recoveries", health.recoveries),
+        ("raw_dropped", health.raw_dropped),
+        ("serial_overruns", health.serial_overruns),
+        ("bad_commands", health.bad_commands),
+        ("awake_permille", health.awake_permille),
+        ("sampling_cycles", health.sampling_cycles),
+        ("estimator_cycles", health.estimator_cycles),
+        ("stack_bytes", health.stack_bytes),
+    ];
+    match counters.get(index) {
+        Some((name, count)) => (*count > 0).then(|| line(format_args!("{name} {count}"))).into(),
+        None => Next::End,
+    }
+}
+
+const _: () = assert!(CHANNELS.len() >= Channel::INERTIAL.len());

@@ -1,0 +1,180 @@
+//! Memory that a warm reset leaves alone: statistics, settings and last words, each with a checksum.
+//!
+//! The memory is an array of atomic words, so that whatever it holds after the supply came on is a valid value. There is
+//! one slot more than there are records. A record is always written into the slot of which a newer version exists, or
+//! none, so that a reset in the middle of it costs that version and never the one before.
+
+use crate::estimators::{CHANNELS, Estimator};
+use crate::summary::OCTAVES;
+use allan_core::Learnt;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// Words of a record: the samples, the missing ones, and for every octave two sums of 128 and a count of 64 bits.
+const PAYLOAD: usize = 4 + OCTAVES * 10;
+/// Payload, and before it the kind, the version and the generation, after it the checksum.
+const SLOT_WORDS: usize = PAYLOAD + 4;
+/// Records: the settings, then the channels.
+const KINDS: usize = 1 + CHANNELS.len();
+const SETTINGS: usize = 0;
+/// Told from memory that holds something else; in the upper half of a slot's first word. Changes with the layout.
+const MAGIC: u32 = 0xAD15_0000;
+
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// The memory, for a section that is not initialised at the start.
+pub type Memory = [[AtomicU32; SLOT_WORDS]; KINDS + 1];
+
+/// What [`Memory`] is where it is initialised: nothing kept.
+#[must_use]
+pub const fn blank() -> Memory {
+    [const { [const { AtomicU32::new(0) }; SLOT_WORDS] }; KINDS + 1]
+}
+
+/// What is kept besides the statistics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Value of SMPL_PRD.
+    pub smpl_prd: u8,
+    /// Value of SENS_AVG.
+    pub sens_avg: u16,
+    /// Length of an epoch in s.
+    pub epoch_s: u32,
+    /// Epochs finished.
+    pub epoch: u32,
+    /// Seconds between reports.
+    pub interval_s: u32,
+    /// Starts since the supply came on.
+    pub starts: u32,
+}
+
+/// The records in a [`Memory`].
+pub struct Retained {
+    memory: &'static Memory,
+    /// Statistics of another generation are out of date.
+    generation: u32,
+    version: u32,
+    /// Slot of the newest version of each record.
+    newest: [Option<usize>; KINDS],
+    settings: Option<Settings>,
+}
+
+impl Retained {
+    /// Finds the records that are whole.
+    #[must_use]
+    pub fn open(memory: &'static Memory) -> Self {
+        let mut retained = Self { memory, generation: 0, version: 0, newest: [None; KINDS], settings: None };
+        for (index, slot) in memory.iter().enumerate() {
+            let Some((kind, version)) = whole(slot) else { continue };
+            let newer = retained.newest[kind].is_none_or(|other| word(&memory[other], 1) < version);
+            if newer {
+                retained.newest[kind] = Some(index);
+            }
+            retained.version = retained.version.max(version);
+        }
+        if let Some(slot) = retained.newest[SETTINGS].map(|index| &memory[index]) {
+            retained.generation = word(slot, 2);
+            let at = |index: usize| word(slot, 3 + index);
+            retained.settings = Some(Settings {
+                smpl_prd: at(0) as u8,
+                sens_avg: at(1) as u16,
+                epoch_s: at(2),
+                epoch: at(3),
+                interval_s: at(4),
+                starts: at(5),
+            });
+        }
+        retained
+    }
+
+    /// Forgets everything, as after the supply came on.
+    pub fn clear(&mut self) {
+        for slot in self.memory {
+            slot[0].store(0, Relaxed);
+        }
+        *self = Self::open(self.memory);
+    }
+
+    /// The settings that were kept.
+    #[must_use]
+    pub fn settings(&self) -> Option<Settings> {
+        self.settings
+    }
+
+    /// The statistics of [`CHANNELS`]`[index]` that were kept under these settings.
+    #[must_use]
+    pub fn estimator(&self, index: usize) -> Option<Estimator> {
+        let slot = &self.memory[self.newest.get(1 + index).copied()??];
+        if word(slot, 2) != self.generation {
+            return None;
+        }
+        let wide = |at| u64::from(word(slot, 3 + at)) | u64::from(word(slot, 4 + at)) << 32;
+        let sum = |at| u128::from(wide(at)) | u128::from(wide(at + 2)) << 64;
+        let learnt = core::array::from_fn(|octave| {
+            let at = 4 + 10 * octave;
+            Learnt { squares: sum(at), fourths: sum(at + 4), count: wide(at + 8) }
+        });
+        Some(Estimator::resumed(wide(0), wide(2), &learnt))
+    }
+
+    /// Keeps the settings. Statistics that were kept under others are out of date with `fresh`.
+    pub fn keep_settings(&mut self, settings: Settings, fresh: bool) {
+        self.generation = self.generation.wrapping_add(u32::from(fresh));
+        self.settings = Some(settings);
+        let Settings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts } = settings;
+        let words = [u32::from(smpl_prd), u32::from(sens_avg), epoch_s, epoch, interval_s, starts];
+        self.write(SETTINGS, words);
+    }
+
+    /// Keeps what the estimator of [`CHANNELS`]`[index]` has learnt.
+    pub fn keep_estimator(&mut self, index: usize, estimator: &Estimator) {
+        let halves = |wide: u64| [wide as u32, (wide >> 32) as u32];
+        let octaves = (0..OCTAVES).flat_map(|octave| {
+            let Learnt { squares, fourths, count } = estimator.learnt(octave).unwrap_or_default();
+            let upper = |sum: u128| (sum >> 64) as u64;
+            [squares as u64, upper(squares), fourths as u64, upper(fourths), count].into_iter().flat_map(halves)
+        });
+        let words = [estimator.len(), estimator.missing()].into_iter().flat_map(halves).chain(octaves);
+        if index < CHANNELS.len() {
+            self.write(1 + index, words);
+        }
+    }
+
+    fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
+        // There is one slot more than kinds, so one is nobody's newest.
+        let Some(free) = (0..self.memory.len()).find(|index| !self.newest.contains(&Some(*index))) else { return };
+        let slot = &self.memory[free];
+        self.version = self.version.wrapping_add(1);
+        slot[0].store(MAGIC | kind as u32, Relaxed);
+        slot[1].store(self.version, Relaxed);
+        slot[2].store(self.generation, Relaxed);
+        let words = words.into_iter().chain(core::iter::repeat(0));
+        for (cell, word) in slot[3..SLOT_WORDS - 1].iter().zip(words) {
+            cell.store(word, Relaxed);
+        }
+        slot[SLOT_WORDS - 1].store(checksum(&slot[..SLOT_WORDS - 1]), Relaxed);
+        self.newest[kind] = Some(free);
+    }
+}
+
+fn word(slot: &[AtomicU32], index: usize) -> u32 {
+    slot[index].load(Relaxed)
+}
+
+fn checksum(words: &[AtomicU32]) -> u32 {
+    let mut digest = CRC.digest();
+    for word in words {
+        digest.update(&word.load(Relaxed).to_le_bytes());
+    }
+    digest.finalize()
+}
+
+/// The kind and version of the record in a slot, if it is whole.
+fn whole(slot: &[AtomicU32; SLOT_WORDS]) -> Option<(usize, u32)> {
+    let kind = (word(slot, 0) ^ MAGIC) as usize;
+    let intact = kind < KINDS && word(slot, SLOT_WORDS - 1) == checksum(&slot[..SLOT_WORDS - 1]);
+    intact.then(|| (kind, word(slot, 1)))
+}
+
+#[cfg(test)]
+#[path = "retained_tests.rs"]
+mod tests;

@@ -1,0 +1,100 @@
+use super::*;
+
+extern crate std;
+use std::boxed::Box;
+
+const KEPT: Settings = Settings { smpl_prd: 7, sens_avg: 0x0400, epoch_s: 3600, epoch: 2, interval_s: 10, starts: 3 };
+
+fn memory() -> &'static Memory {
+    Box::leak(Box::new(blank()))
+}
+
+fn estimator(samples: i32) -> Estimator {
+    let mut estimator = Estimator::new();
+    (0..samples).for_each(|k| estimator.push(k * k % 8191 - 4096));
+    estimator.gap(5);
+    estimator
+}
+
+fn learnt(estimator: &Estimator) -> (u64, u64, [Learnt; OCTAVES]) {
+    let sums = core::array::from_fn(|octave| estimator.learnt(octave).unwrap());
+    (estimator.len(), estimator.missing(), sums)
+}
+
+#[test]
+fn what_was_kept_is_found_after_a_restart() {
+    let memory = memory();
+    let mut before = Retained::open(memory);
+    assert_eq!(before.settings(), None);
+    assert!(before.estimator(0).is_none());
+    before.keep_settings(KEPT, true);
+    for round in 1..4 {
+        (0..CHANNELS.len()).for_each(|index| before.keep_estimator(index, &estimator(100 * round + index as i32)));
+    }
+    let after = Retained::open(memory);
+    assert_eq!(after.settings(), Some(KEPT));
+    for index in 0..CHANNELS.len() {
+        assert_eq!(learnt(&after.estimator(index).unwrap()), learnt(&estimator(300 + index as i32)));
+    }
+}
+
+/// A sum that needs all of its 128 bits.
+#[test]
+fn wide_sums_are_kept_whole() {
+    let memory = memory();
+    let mut retained = Retained::open(memory);
+    retained.keep_settings(KEPT, true);
+    let sums = core::array::from_fn(|octave| Learnt {
+        squares: u128::MAX - octave as u128,
+        fourths: u128::MAX / 3 + octave as u128,
+        count: u64::MAX - octave as u64,
+    });
+    let wide = Estimator::resumed(u64::MAX, 1 << 33, &sums);
+    retained.keep_estimator(3, &wide);
+    assert_eq!(learnt(&Retained::open(memory).estimator(3).unwrap()), learnt(&wide));
+}
+
+#[test]
+fn statistics_under_other_settings_are_out_of_date() {
+    let memory = memory();
+    let mut retained = Retained::open(memory);
+    retained.keep_settings(KEPT, true);
+    retained.keep_estimator(1, &estimator(50));
+    retained.keep_settings(Settings { epoch_s: 60, ..KEPT }, false);
+    assert!(Retained::open(memory).estimator(1).is_some());
+    retained.keep_settings(KEPT, true);
+    assert!(Retained::open(memory).estimator(1).is_none());
+    retained.clear();
+    assert_eq!(Retained::open(memory).settings(), None);
+}
+
+/// A bit flips in any word of the slot written last: the version before it is found.
+#[test]
+fn damage_costs_one_version_and_no_more() {
+    for word in 0..SLOT_WORDS {
+        let memory = memory();
+        let mut retained = Retained::open(memory);
+        retained.keep_settings(KEPT, true);
+        retained.keep_estimator(2, &estimator(100));
+        retained.keep_estimator(2, &estimator(200));
+        let slot = retained.newest[3].unwrap();
+        memory[slot][word].fetch_xor(0x10, Relaxed);
+        assert_eq!(Retained::open(memory).estimator(2).map(|estimator| estimator.len()), Some(100), "word {word}");
+    }
+}
+
+/// The reset comes after any number of words of the new version were written.
+#[test]
+fn a_reset_while_writing_costs_that_version_only() {
+    let memory = memory();
+    let mut retained = Retained::open(memory);
+    retained.keep_settings(KEPT, true);
+    retained.keep_estimator(0, &estimator(100));
+    retained.keep_estimator(0, &estimator(200));
+    let newest = retained.newest[1].unwrap();
+    let free = (0..memory.len()).find(|index| !retained.newest.contains(&Some(*index))).unwrap();
+    for (done, (to, from)) in memory[free].iter().zip(&memory[newest]).enumerate() {
+        assert_eq!(Retained::open(memory).estimator(0).map(|estimator| estimator.len()), Some(200), "{done} words");
+        to.store(!from.load(Relaxed), Relaxed);
+    }
+}
