@@ -67,7 +67,8 @@ pub fn edf(n: u64, count: u64, overlap: u32, shares: Shares) -> f64 {
 /// Correlation of the Allan variances of two octaves `lag` octaves apart, for near-full overlap.
 ///
 /// Exact for one, two and three octaves and an infinite record; beyond, the last ratio continues.
-pub(crate) fn octave_correlation(lag: usize, a: Shares, b: Shares) -> f64 {
+#[must_use]
+pub fn octave_correlation(lag: usize, a: Shares, b: Shares) -> f64 {
     const WHITE: [f64; 4] = [1.0, 0.530, 0.187, 0.066];
     const FLICKER: [f64; 4] = [1.0, 0.689, 0.309, 0.121];
     const RANDOM_WALK: [f64; 4] = [1.0, 0.888, 0.676, 0.488];

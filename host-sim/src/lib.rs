@@ -21,6 +21,7 @@ pub mod report;
 pub mod sensor;
 pub mod source;
 pub mod terminal;
+pub mod time_course;
 pub mod timeline;
 pub mod trace;
 pub mod undeclared;

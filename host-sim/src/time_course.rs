@@ -1,0 +1,49 @@
+//! What moves while a record is made, and what a model is worth that knows it.
+//!
+//! ```text
+//! Series ─► Parts ─► Stationarity ─► which part of the fitted half predicts best
+//!             │                       │
+//!             └─► epochs ─► Moving: level and line, epoch by epoch ─► Tracked: each epoch foretold from those before
+//! ```
+//!
+//! The record is cut in the middle. Verdicts, shapes and gains come from the fitted half alone; only [`tracking`] looks at
+//! the unseen half, at each epoch after it was foretold, and its results are kept apart.
+
+pub mod moving;
+pub mod parts;
+pub mod stationarity;
+pub mod tracking;
+
+#[cfg(test)]
+mod tests;
+
+pub use parts::Parts;
+pub use stationarity::{Stationarity, stationarity};
+
+use allan_core::{Curve, Point};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Chance, over all that is compared in a channel, at which something that stands still is taken to move.
+pub const SIGNIFICANCE: f64 = 0.01;
+
+/// `mean edf·(ln(m/v) + v/m − 1)` over the octaves with `n ≤ M/8`, of variances that no single model gives.
+///
+/// The same figure as that of [`ModelError`](allan_core::check::ModelError).
+pub fn deviance_per_point<const POINTS: usize>(
+    curve: &Curve<POINTS>,
+    modelled: impl Fn(u64) -> f64,
+    edf: impl Fn(&Point) -> f64,
+) -> f64 {
+    let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8);
+    let of = |point: &Point| {
+        let ratio = point.avar / modelled(point.n);
+        edf(point) * (ratio - 1.0 - ratio.ln())
+    };
+    points().map(of).sum::<f64>() / points().count() as f64
+}
+
+/// Probability of a χ² of `freedom` degrees above `value`.
+fn chi_square_tail(value: f64, freedom: f64) -> f64 {
+    // Degrees of freedom are numbers of epochs, above 0.
+    ChiSquared::new(freedom).map_or(1.0, |law| law.sf(value.max(0.0)))
+}
