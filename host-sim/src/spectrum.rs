@@ -1,0 +1,20 @@
+//! The other view of the noise: how its power is spread over frequency.
+//!
+//! All densities are one-sided: their integral over 0 … fs/2 is the variance. White noise N has the density `2N²`,
+//! flicker noise B `B²/(πf)`, a random walk K `K²/(2π²f²)`.
+//!
+//! ```text
+//! Grid ─► Periodogram ─► Background ─► lines   (line: sinusoids and resonances, the whole record at once)
+//!        └► Welch ─► Shape ─► N, B, K            (independent of the Allan variance)
+//! ```
+
+mod background;
+pub mod line;
+mod lorentz;
+mod periodogram;
+pub mod shape;
+mod sine;
+pub mod welch;
+
+pub use line::{Line, lines};
+pub use welch::Welch;

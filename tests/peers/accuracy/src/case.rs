@@ -1,0 +1,52 @@
+//! The three cases: series whose noise is known.
+
+use adis16405_driver::Channel;
+use host_sim::sensor::NoiseModel;
+use host_sim::sensor::noise::NoiseSource;
+
+/// Samples of a series.
+pub(crate) const SAMPLES: usize = 1_000_000;
+/// Seconds between them.
+pub(crate) const SAMPLE_PERIOD: f64 = 0.01;
+/// Series that are generated and handed on together, one a channel.
+pub(crate) const BATCH: usize = 6;
+
+/// N, B, K; a coefficient that a method does not give is absent.
+pub(crate) type Coefficients = [Option<f64>; 3];
+
+/// A mixture of noises, in an arbitrary unit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Case {
+    pub(crate) name: &'static str,
+    /// N, B, K.
+    pub(crate) truth: [f64; 3],
+}
+
+/// The curve is lowest where `N²/τ = K²τ/3`: near 100 s, or near 1000 s for the weak random walk.
+pub(crate) const CASES: [Case; 3] = [
+    Case { name: "S1", truth: [2e-3, 0.0, 3.464e-5] },
+    Case { name: "S2", truth: [2e-3, 4e-4, 3.464e-5] },
+    Case { name: "S3", truth: [2e-3, 0.0, 3.464e-6] },
+];
+
+impl Case {
+    /// [`BATCH`] independent series of [`SAMPLES`] samples.
+    pub(crate) fn series(&self, seed: u64) -> Vec<Vec<f64>> {
+        let channels = &Channel::ALL[1..=BATCH];
+        let mut model = NoiseModel::still();
+        for &channel in channels {
+            let noise = model.channel_mut(channel);
+            noise.bias = 0.0;
+            [noise.angle_random_walk, noise.bias_instability, noise.rate_random_walk] = self.truth;
+        }
+        let mut source = NoiseSource::new(&model, seed, SAMPLE_PERIOD);
+        let mut series = vec![Vec::new(); BATCH];
+        for _ in 0..SAMPLES {
+            let values = source.sample();
+            for (series, &channel) in series.iter_mut().zip(channels) {
+                series.push(values[channel as usize]);
+            }
+        }
+        series
+    }
+}

@@ -1,0 +1,37 @@
+//! This project's own estimator and fit.
+
+use crate::case::{Case, Coefficients, SAMPLE_PERIOD};
+use allan_core::{Cascade, Kind, Model, fit::fit};
+
+/// Counts in the standard deviation of the white noise: rounding adds 1/12 count², a part in 10⁷.
+const COUNTS: f64 = 1000.0;
+
+/// Fits `kinds` to the curve of a series; coefficients and bounds are in the unit of the series.
+pub(crate) fn fitted(case: &Case, series: &[f64], kinds: &[Kind]) -> Model {
+    let lsb = case.truth[0] / SAMPLE_PERIOD.sqrt() / COUNTS;
+    let mut cascade = Cascade::<24, 8>::new();
+    for value in series {
+        cascade.push((value / lsb).round() as i32);
+    }
+    fit(&cascade.curve(SAMPLE_PERIOD), kinds).scaled(lsb)
+}
+
+/// The terms that the case is made of.
+pub(crate) fn true_kinds(case: &Case) -> Vec<Kind> {
+    Kind::DECLARED.into_iter().zip(case.truth).filter(|(_, value)| *value > 0.0).map(|(kind, _)| kind).collect()
+}
+
+/// N, B, K of a model.
+pub(crate) fn coefficients(model: &Model) -> Coefficients {
+    Kind::DECLARED.map(|kind| model.terms().iter().find(|term| term.kind == kind).map(|term| term.value))
+}
+
+/// Whether the 95 % bounds of N, B, K hold the truth.
+pub(crate) fn covered(case: &Case, model: &Model) -> [Option<bool>; 3] {
+    let mut truth = case.truth.into_iter();
+    Kind::DECLARED.map(|kind| {
+        let truth = truth.next()?;
+        let term = model.terms().iter().find(|term| term.kind == kind)?;
+        Some((term.low..=term.high).contains(&truth))
+    })
+}
