@@ -8,6 +8,8 @@ use crate::register::Register;
 
 /// One of the two alarms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AlarmNumber {
     /// Alarm 1.
     One,
@@ -17,6 +19,8 @@ pub enum AlarmNumber {
 
 /// On which side of its threshold an alarm is raised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Threshold {
     /// When the value is above so many counts.
     Above(i16),
@@ -26,6 +30,8 @@ pub enum Threshold {
 
 /// What an alarm watches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Watch {
     /// The output itself.
     Level,
@@ -35,6 +41,8 @@ pub enum Watch {
 
 /// An alarm: when it is raised, DIAG_STAT bit 8 or 9 and the error flag of every output word say so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Alarm {
     /// The output that is watched.
     pub source: Channel,

@@ -5,6 +5,8 @@ use crate::config::GyroRange;
 /// An output register, in the order of a burst read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Channel {
     /// Supply voltage, SUPPLY_OUT.
     Supply,

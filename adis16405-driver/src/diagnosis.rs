@@ -8,6 +8,7 @@ bitflags::bitflags! {
     /// Bits 12 to 10 are z, y, x gyro after three sources; Linux has x and z the other way round. That a condition that
     /// persists comes back with the next sample is not confirmed by any source at hand.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Diagnosis: u16 {
         /// Supply below 4.75 V.
         const SUPPLY_LOW = 1 << 0;

@@ -9,6 +9,7 @@ use crate::register::Register;
 
 /// An error of the bus, or an answer that the part must not give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error<E> {
     /// The SPI bus failed.
     Spi(E),

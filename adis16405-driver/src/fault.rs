@@ -6,6 +6,7 @@ use crate::frame::{Burst, OutputWord};
 bitflags::bitflags! {
     /// Reasons to doubt a burst.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Faults: u16 {
         /// The new-data bit of some word is clear: it was read before.
         const NO_NEW_DATA = 1 << 0;

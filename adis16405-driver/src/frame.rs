@@ -39,6 +39,8 @@ const ERROR_ALARM: u16 = 1 << 14;
 
 /// An output register as read: bit 15 new data, bit 14 error or alarm, below them the 12- or 14-bit field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OutputWord(pub u16);
 
 impl OutputWord {
@@ -80,6 +82,8 @@ const fn field_mask(channel: Channel) -> u16 {
 
 /// The twelve output words of one burst read, in the order of [`Channel::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Burst {
     /// Output words, SUPPLY_OUT first.
     pub words: [OutputWord; 12],

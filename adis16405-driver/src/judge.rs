@@ -10,6 +10,8 @@ fn usable(faults: Faults) -> bool {
 
 /// The judgement of one burst.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Verdict {
     /// What is wrong with it.
     pub faults: Faults,
@@ -19,6 +21,8 @@ pub struct Verdict {
 
 /// How many bursts showed each fault; all counts saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counters {
     /// Bursts judged.
     pub bursts: u32,

@@ -34,14 +34,18 @@ pub mod alarm;
 mod asynch;
 mod blocking;
 pub mod channel;
+pub mod clock;
 pub mod compensation;
 pub mod config;
 pub mod diagnosis;
 pub mod driver;
 pub mod error;
 pub mod fault;
+pub mod filter;
 pub mod frame;
 pub mod judge;
+#[cfg(feature = "defmt")]
+mod log;
 pub mod offset;
 pub mod pin;
 mod port;
@@ -53,18 +57,22 @@ pub mod self_test;
 mod session;
 mod shell;
 pub mod sleep;
+#[cfg(feature = "serde")]
+mod stored;
 pub mod timing;
 
 pub use alarm::{Alarm, AlarmNumber, Threshold, Watch};
 pub use channel::Channel;
+pub use clock::{ClockMode, SampleClock, SamplePeriod, TimeBase};
 pub use compensation::Compensation;
-pub use config::{ClockMode, Config, ConfigError, GyroRange, SampleClock, SamplePeriod, TimeBase};
+pub use config::{Config, ConfigError, GyroRange};
 pub use diagnosis::Diagnosis;
 #[cfg(feature = "async")]
 pub use driver::Async;
 pub use driver::{Adis16405, Blocking};
 pub use error::Error;
 pub use fault::Faults;
+pub use filter::Filter;
 pub use frame::{BURST_BYTES, BURST_REQUEST, Burst, OutputWord};
 pub use judge::{Counters, Judge, Verdict};
 pub use offset::{FactoryRestore, GyroBias};

@@ -6,6 +6,8 @@
 /// that follow too (reported for all units tested). A negative correction of x is therefore kept by the driver, which
 /// adds it to the rates of its [`Sample`](crate::Sample)s; the raw counts do not contain it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroBias {
     /// XGYRO_OFF, YGYRO_OFF and ZGYRO_OFF.
     pub part: [i16; 3],
@@ -23,6 +25,8 @@ impl GyroBias {
 
 /// The user's corrections that a restore of the factory calibration overwrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FactoryRestore {
     /// Gyro bias, 0.0125 °/s per count.
     pub gyro: GyroBias,

@@ -2,6 +2,8 @@
 
 /// A pin that can carry a signal of the part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Line {
     /// DIO1.
     #[default]
@@ -12,6 +14,8 @@ pub enum Line {
 
 /// The level that means "yes".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Polarity {
     /// High when active.
     #[default]
@@ -22,6 +26,8 @@ pub enum Polarity {
 
 /// Where and how a signal appears. The default is how data ready comes out of a reset: on DIO1, active high.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Signal {
     /// The pin.
     pub line: Line,
@@ -55,6 +61,7 @@ impl Signal {
 bitflags::bitflags! {
     /// A set of the general-purpose lines.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Dio: u8 {
         /// DIO1.
         const DIO1 = 1 << 0;
@@ -70,6 +77,8 @@ bitflags::bitflags! {
 /// GPIO_CTRL: direction and level of the general-purpose lines. Data ready and alarm output take a line over whatever is
 /// set here (not confirmed by any source at hand).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gpio {
     /// Lines that the part drives; the others are inputs.
     pub outputs: Dio,
@@ -79,6 +88,9 @@ pub struct Gpio {
 
 /// A level of the auxiliary analog output, 12 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u16", into = "u16"))]
 pub struct DacLevel(u16);
 
 impl DacLevel {

@@ -4,6 +4,8 @@
 ///
 /// Both have the same registers and scales; they differ in the temperature range over which they were calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Product {
     /// ADIS16400, PROD_ID 0x4010.
     Adis16400,

@@ -2,6 +2,8 @@
 
 /// Whether a register may be read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Access {
     /// Read only.
     Read,
@@ -15,6 +17,8 @@ macro_rules! registers {
     ($($(#[$doc:meta])* $variant:ident $name:literal $address:literal $access:ident $bits:literal,)*) => {
         /// A register of the ADIS16405, named as in the data sheet; the value is the address of its lower byte.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[repr(u8)]
         pub enum Register { $($(#[$doc])* $variant = $address,)* }
 

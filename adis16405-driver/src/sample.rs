@@ -5,6 +5,8 @@ use crate::config::GyroRange;
 
 /// The twelve sign-extended counts of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counts([i16; 12]);
 
 impl Counts {
@@ -44,6 +46,8 @@ impl Counts {
 /// Values with a unit come twice: as `f32`, and as exact `i32` in a millionth (temperature: a thousandth) of the unit
 /// for targets without an FPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sample {
     counts: Counts,
     range: GyroRange,

@@ -4,6 +4,8 @@ use crate::diagnosis::Diagnosis;
 
 /// Outcome of the internal self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SelfTest {
     /// What DIAG_STAT held before; reading it cleared it.
     pub before: Diagnosis,
@@ -22,6 +24,8 @@ impl SelfTest {
 
 /// Outcome of the flash memory test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlashTest {
     /// What DIAG_STAT held before; reading it cleared it.
     pub before: Diagnosis,
@@ -40,6 +44,8 @@ impl FlashTest {
 
 /// Direction in which the manual self-test deflects the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Stimulus {
     /// MSC_CTRL bit 8.
     Positive,

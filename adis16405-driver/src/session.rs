@@ -2,7 +2,8 @@
 
 use core::convert::Infallible;
 
-use crate::config::{ClockMode, Config};
+use crate::clock::ClockMode;
+use crate::config::Config;
 use crate::error::Error;
 use crate::port::{Port, Step};
 use crate::register::{Access, Register};

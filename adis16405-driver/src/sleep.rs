@@ -4,6 +4,8 @@ use core::num::NonZeroU8;
 
 /// How long the part sleeps (SLP_CNT).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Sleep {
     /// So many half seconds; then it wakes by itself.
     HalfSeconds(NonZeroU8),

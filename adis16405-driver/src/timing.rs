@@ -1,9 +1,11 @@
 //! How long the part needs for what. Sources disagree on some of these times, so all can be set.
 
-use crate::config::ClockMode;
+use crate::clock::ClockMode;
 
 /// A time that is longer in low-power mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ByMode {
     /// In [`ClockMode::Normal`].
     pub normal: u32,
@@ -26,6 +28,8 @@ impl ByMode {
 /// Not confirmed by any source at hand, so check them against your data sheet: the low-power stall, the times of a flash
 /// update, a factory restore and an auto-null, and where low-power mode begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timing {
     /// Stall after a frame, ns. The part needs 9 µs in normal mode; Analog Devices' evaluation tool keeps 16 µs. The
     /// 75 µs of low-power mode are unconfirmed.

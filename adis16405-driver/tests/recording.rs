@@ -1,9 +1,11 @@
-//! Output words of a real, still ADIS16405 (psas/stm32, `adis16405_log.txt-example`), decoded.
+//! Output words and bursts of real, still ADIS16405s (psas/stm32, `adis16405_log.txt-example`; psas/Launch-10), decoded.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 
-use adis16405_driver::{Channel, GyroRange, OutputWord};
+use adis16405_driver::{Burst, Channel, Faults, GyroRange, Judge, OutputWord};
+use flate2::read::GzDecoder;
 
 /// Columns of the recording after the time stamp.
 const COLUMNS: [Channel; 9] = [
@@ -18,23 +20,25 @@ const COLUMNS: [Channel; 9] = [
     Channel::MagnZ,
 ];
 
-fn recording() -> PathBuf {
+/// The recording; `None`, said aloud, where it is absent.
+fn recording(test: &str, file: &str) -> Option<PathBuf> {
     let recordings = match std::env::var_os("ADIS_RECORDINGS") {
         Some(folder) => PathBuf::from(folder),
         None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
     };
-    recordings.join("adis16405-words/stm32.csv")
+    let path = recordings.join(file);
+    if !path.exists() {
+        // Not by a macro, which the test harness would hide.
+        writeln!(std::io::stderr(), "skipped {test}: {} is absent", path.display()).unwrap();
+        return None;
+    }
+    Some(path)
 }
 
 #[test]
 fn recorded_words_are_those_of_a_still_sensor() {
-    let path = recording();
-    if !path.exists() {
-        // Not by a macro, which the test harness would hide.
-        let mut console = std::io::stderr();
-        writeln!(console, "skipped recorded_words_are_those_of_a_still_sensor: {} is absent", path.display()).unwrap();
-        return;
-    }
+    let test = "recorded_words_are_those_of_a_still_sensor";
+    let Some(path) = recording(test, "adis16405-words/stm32.csv") else { return };
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
     assert_eq!(
@@ -75,4 +79,39 @@ fn recorded_words_are_those_of_a_still_sensor() {
         let farthest = (median - rates[0]).max(rates[rates.len() - 1] - median);
         assert!(farthest < 2.1, "{:?} strays {farthest} deg/s from {median}", COLUMNS[gyro]);
     }
+}
+
+/// Counts are put back into their fields with plain arithmetic; what the driver makes of them must be the same counts.
+#[test]
+fn recorded_bursts_survive_the_wire_and_chance_repetitions_are_told() {
+    let test = "recorded_bursts_survive_the_wire_and_chance_repetitions_are_told";
+    let Some(path) = recording(test, "adis16405-burst/launch10.csv.gz") else { return };
+    let mut lines = BufReader::new(GzDecoder::new(File::open(path).unwrap())).lines().map(Result::unwrap);
+    assert!(lines.next().unwrap().starts_with("time_s,supply_counts,gyro_x_counts,"));
+
+    let mut judge = Judge::default();
+    let mut previous = Burst::default();
+    let (mut bursts, mut other_words) = (0, 0);
+    for line in lines {
+        let counts: Vec<i32> = line.split(',').skip(1).map(|field| field.parse().unwrap()).collect();
+        assert_eq!(counts.len(), 12);
+        let mut bytes = vec![0xA5, 0x5A];
+        for (index, count) in counts.iter().enumerate() {
+            // Supply, temperature and auxiliary input have 12 bits, the others 14; bit 15 is new data.
+            let modulus = if matches!(index, 0 | 10 | 11) { 1 << 12 } else { 1 << 14 };
+            bytes.extend(((count.rem_euclid(modulus) | 0x8000) as u16).to_be_bytes());
+        }
+        let burst = Burst::from_bytes(&bytes.try_into().unwrap());
+        assert!(burst.counts().as_array().iter().map(|count| i32::from(*count)).eq(counts));
+
+        let verdict = judge.judge(&burst);
+        assert!(verdict.usable && (verdict.faults - Faults::REPEATED).is_empty(), "{line}: {:?}", verdict.faults);
+        if verdict.faults.contains(Faults::REPEATED) {
+            other_words += u32::from(burst != previous);
+        }
+        previous = burst;
+        bursts += 1;
+    }
+    // Of the 45 neighbours with equal inertial words 37 differ in others: new samples, equal by chance.
+    assert_eq!((bursts, judge.counters().get(Faults::REPEATED), other_words), (49_425, 45, 37));
 }

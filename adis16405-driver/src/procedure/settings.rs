@@ -1,6 +1,7 @@
 //! Rate, range and filter, one at a time.
 
-use crate::config::{GyroRange, SamplePeriod};
+use crate::clock::SamplePeriod;
+use crate::config::GyroRange;
 use crate::error::Error;
 use crate::session::{Refusal, Session};
 

@@ -1,6 +1,7 @@
 //! From power-on or reset to a part that is configured.
 
-use crate::config::{ClockMode, Config, GyroRange};
+use crate::clock::ClockMode;
+use crate::config::{Config, GyroRange};
 use crate::error::Error;
 use crate::product::Product;
 use crate::register::Register;

@@ -1,0 +1,182 @@
+//! Single registers and bursts.
+
+use adis16405_driver::{Access, Adis16405, Config, Error, GyroRange, Register, SamplePeriod, Timing};
+use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+
+use crate::harness::{Frames, NONE, STALL_NS, frame_with, read, read_all, write};
+
+fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
+    Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
+}
+
+#[test]
+fn new_sends_nothing() {
+    Adis16405::new(Mock::new(&[]), Config::default()).release().done();
+    #[cfg(feature = "async")]
+    Adis16405::new_async(Mock::new(&[]), Config::default()).release().done();
+}
+
+#[test]
+fn a_read_is_two_frames_and_several_overlap() {
+    let value =
+        both!(Config::default(); [read(0x3C, 0x1234)]; NONE; |imu, delay| imu.read_register(Register::DiagStat));
+    assert_eq!(value, Ok(0x1234));
+    let registers = [Register::XgyroOut, Register::TempOut, Register::ProdId];
+    let bus = [read_all(&[(0x04, 0x8001), (0x16, 0x8002), (0x56, 0x4015)])];
+    let values = both!(Config::default(); bus; NONE; |imu, delay| imu.read_registers(registers));
+    assert_eq!(values, Ok([0x8001, 0x8002, 0x4015]));
+    let nothing = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.read_registers([]));
+    assert_eq!(nothing, Ok([]));
+}
+
+#[test]
+fn the_low_power_mode_stalls_longer() {
+    let slow = |answer: [u8; 2], sent: [u8; 2]| frame_with(75_000, &sent, &answer);
+    let bus = [slow([0, 0], [0x3C, 0]), slow([0x12, 0x34], [0, 0])];
+    let low_power = config(GyroRange::Dps300, 2, 0x09);
+    assert_eq!(both!(low_power; bus; NONE; |imu, delay| imu.read_register(Register::DiagStat)), Ok(0x1234));
+}
+
+/// Linux has the border of low-power mode one higher.
+#[test]
+fn the_border_of_low_power_mode_can_be_set() {
+    let timing = Timing { normal_mode_max_smpl_prd: 0x09, ..Timing::DEFAULT };
+    let config = config(GyroRange::Dps300, 2, 0x09);
+    let value = both!(config, with [.with_timing(timing)]; [read(0x00, 7)]; NONE; |imu, delay| imu.flash_writes());
+    assert_eq!(value, Ok(7));
+}
+
+#[test]
+fn the_stall_can_be_set() {
+    let bus = [frame_with(9_000, &[0xBE, 0x80], &[0, 0])];
+    let written = both!(Config::default(), with [.with_stall_ns(9_000)]; bus; NONE;
+        |imu, delay| imu.write_register(Register::GlobCmd, 0x80));
+    assert_eq!(written, Ok(()));
+}
+
+#[test]
+fn registers_are_written_byte_by_byte_the_lower_first() {
+    let bus = [write(0x1A, 0x34), write(0x1B, 0x12)];
+    let written = both!(Config::default(); bus; NONE; |imu, delay| imu.write_register(Register::XgyroOff, 0x1234));
+    assert_eq!(written, Ok(()));
+    let bus = [write(0x36, 0x07)];
+    let written = both!(Config::default(); bus; NONE; |imu, delay| imu.write_register(Register::SmplPrd, 0xFF07));
+    assert_eq!(written, Ok(()), "SMPL_PRD has one byte");
+}
+
+#[test]
+fn an_update_writes_the_bytes_that_change_and_reads_back() {
+    let update = |bus: Vec<Frames>, mask, value| both!(Config::default(); bus.clone(); NONE; |imu, delay| imu.update_register(Register::AlmCtrl, mask, value));
+    assert_eq!(update(vec![read(0x48, 0x1234)], 0x00F0, 0x0030), Ok(()), "nothing changes");
+    assert_eq!(update(vec![read(0x48, 0x1234), write(0x48, 0x54), read(0x48, 0x1254)], 0x00F0, 0xFF5F), Ok(()));
+    assert_eq!(update(vec![read(0x48, 0x1234), write(0x49, 0xA2), read(0x48, 0xA234)], 0xF000, 0xA000), Ok(()));
+    let both_bytes = vec![read(0x48, 0x1234), write(0x48, 0xCD), write(0x49, 0xAB), read(0x48, 0xABCD)];
+    assert_eq!(update(both_bytes, 0xFFFF, 0xABCD), Ok(()));
+    // Bits outside the mask may change by themselves.
+    assert_eq!(update(vec![read(0x48, 0x1234), write(0x48, 0x54), read(0x48, 0xFF5F)], 0x00F0, 0x0050), Ok(()));
+    let refused = update(vec![read(0x48, 0x1234), write(0x48, 0x54), read(0x48, 0x1234)], 0x00F0, 0x0050);
+    assert_eq!(refused, Err(Error::Verify { register: Register::AlmCtrl, expected: 0x0050, answer: 0x0030 }));
+}
+
+#[test]
+fn verification_can_be_left_out() {
+    let bus = [read(0x36, 0x0001), write(0x36, 0x05)];
+    let written = both!(Config::default(), with [.with_verified_writes(false)]; bus; NONE;
+        |imu, delay| imu.update_register(Register::SmplPrd, 0xFFFF, 0x05));
+    assert_eq!(written, Ok(()));
+}
+
+#[test]
+fn access_is_respected_without_touching_the_bus() {
+    for &register in Register::ALL {
+        if register.access() == Access::Read {
+            let refused = Err(Error::ReadOnly(register));
+            let empty = [Frames::new()];
+            assert_eq!(both!(Config::default(); empty; NONE; |imu, delay| imu.write_register(register, 0)), refused);
+            let empty = [Frames::new()];
+            assert_eq!(
+                both!(Config::default(); empty; NONE; |imu, delay| imu.update_register(register, 1, 1)),
+                refused
+            );
+        }
+    }
+    for register in [Register::GlobCmd, Register::SlpCnt] {
+        let refused = Err(Error::WriteOnly(register));
+        let read = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.read_register(register));
+        assert_eq!(read, refused.map(|()| 0));
+        let several = both!(Config::default(); [Frames::new()]; NONE;
+            |imu, delay| imu.read_registers([Register::ProdId, register]));
+        assert_eq!(several, refused.map(|()| [0, 0]));
+        let updated = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.update_register(register, 1, 1));
+        assert_eq!(updated, refused);
+    }
+}
+
+/// 0x3E00, then zeros; the answer starts with the third byte.
+fn burst_bytes() -> ([u8; 26], [u8; 26]) {
+    let mut sent = [0; 26];
+    sent[0] = 0x3E;
+    let mut answer = [0xA5; 26];
+    for (index, byte) in answer[2..].iter_mut().enumerate() {
+        *byte = 0x80 + index as u8;
+    }
+    (sent, answer)
+}
+
+#[test]
+fn a_burst_is_one_transaction_of_26_bytes() {
+    let (sent, answer) = burst_bytes();
+    let bus = [frame_with(STALL_NS, &sent, &answer)];
+    let burst = both!(Config::default(); bus; NONE; |imu, delay| imu.burst()).unwrap();
+    assert_eq!(burst.words[0].0, 0x8081);
+    assert_eq!(burst.words[11].0, 0x9697);
+
+    let bus = [frame_with(STALL_NS, &sent, &answer)];
+    let sample = both!(config(GyroRange::Dps75, 4, 1); bus; NONE; |imu, delay| imu.sample()).unwrap();
+    assert_eq!((*sample.counts(), sample.range()), (burst.counts(), GyroRange::Dps75));
+}
+
+#[test]
+fn a_burst_can_have_gaps_between_its_words() {
+    let (sent, answer) = burst_bytes();
+    let mut bus = vec![Transaction::transaction_start()];
+    for word in 0..13 {
+        let bytes = 2 * word..2 * word + 2;
+        bus.push(Transaction::transfer(sent[bytes.clone()].to_vec(), answer[bytes].to_vec()));
+        bus.push(Transaction::delay(if word < 12 { 1_000 } else { STALL_NS }));
+    }
+    bus.push(Transaction::transaction_end());
+    let timing = Timing { word_gap_ns: 1_000, ..Timing::DEFAULT };
+    let burst = both!(Config::default(), with [.with_timing(timing)]; [bus]; NONE; |imu, delay| imu.burst()).unwrap();
+    assert_eq!(burst.words[0].0, 0x8081);
+    assert_eq!(burst.words[11].0, 0x9697);
+}
+
+/// The register map of the data sheet: the address of a register's lower byte.
+#[test]
+fn addresses() {
+    let mut expected: Vec<u8> = (0x00..=0x4A).step_by(2).collect();
+    expected.push(0x56);
+    let addresses: Vec<u8> = Register::ALL.iter().map(|register| register.address()).collect();
+    assert_eq!(addresses, expected);
+    for (register, address, bits) in [
+        (Register::ZgyroOff, 0x1E, 13),
+        (Register::XacclOff, 0x20, 12),
+        (Register::XmagnHif, 0x26, 14),
+        (Register::XmagnSif, 0x2C, 12),
+        (Register::GpioCtrl, 0x32, 12),
+        (Register::MscCtrl, 0x34, 12),
+        (Register::SmplPrd, 0x36, 8),
+        (Register::SensAvg, 0x38, 11),
+        (Register::SlpCnt, 0x3A, 9),
+        (Register::DiagStat, 0x3C, 16),
+        (Register::GlobCmd, 0x3E, 8),
+        (Register::AlmMag2, 0x42, 16),
+        (Register::AlmSmpl1, 0x44, 8),
+        (Register::AlmCtrl, 0x48, 16),
+        (Register::AuxDac, 0x4A, 12),
+        (Register::ProdId, 0x56, 16),
+    ] {
+        assert_eq!((register.address(), register.bits()), (address, bits), "{}", register.name());
+    }
+}
