@@ -34,6 +34,7 @@ step "lints and builds for microcontrollers"
 run cargo clippy --locked --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --profile image -- -D warnings
 for target in "$MCU" "$SMALL"; do
     run cargo clippy --locked --package adis16405-driver --package allan-core --target "$target" -- -D warnings
+    run cargo clippy --locked --package adis16405-driver --all-features --target "$target" -- -D warnings
 done
 
 step "lints for the host"
@@ -41,6 +42,10 @@ run cargo clippy --locked --workspace --all-targets --ignore-rust-version -- -D 
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps --package adis16405-driver --package allan-core
+RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps --package adis16405-driver --all-features
+
+step "the driver with all its features"
+run cargo test --locked --package adis16405-driver --all-features
 
 step "tests, the image in the emulator among them"
 run cargo test --locked --workspace --ignore-rust-version

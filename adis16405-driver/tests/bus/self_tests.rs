@@ -97,7 +97,7 @@ fn a_stimulus_is_measured_against_rest_and_taken_away() {
                 (0x04, 0x8000 | k),
                 (0x06, 0xBFFF),
                 (0x08, 0x8000),
-                (0x0A, 0x8000 | k / 2),
+                (0x0A, 0x8000 + k / 2),
                 (0x0C, 0x8000),
                 (0x0E, 0xBED4),
             ])
