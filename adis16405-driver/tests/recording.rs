@@ -29,7 +29,7 @@ fn recording(test: &str, file: &str) -> Option<PathBuf> {
     let path = recordings.join(file);
     if !path.exists() {
         // Not by a macro, which the test harness would hide.
-        writeln!(std::io::stderr(), "skipped {test}: {} is absent", path.display()).unwrap();
+        writeln!(std::io::stderr(), "skipped {test}: {} is absent", path.display()).expect("stderr");
         return None;
     }
     Some(path)
