@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Every check and test of the noise observatory, from a clean checkout.
 #
-# Needs rustup with its default toolchain and a C compiler; installs with rustup what is missing and says so. Fails,
-# and never skips, if something cannot be had. The emulator is the crate rigless, compiled here; it asks for a newer
-# Rust than it needs, hence --ignore-rust-version.
+# Needs rustup with its default toolchain and a C compiler; installs what is missing with rustup, and
+# with apt-get the QEMU that counts instructions, and says so. Fails, and never skips, if something cannot be had. The
+# emulator that the image runs in is the crate rigless, compiled here; it asks for a newer Rust than it needs, hence
+# --ignore-rust-version.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,6 +20,10 @@ SMALL=thumbv6m-none-eabi   # Cortex-M0+: the two libraries
 step "tools"
 command -v rustup >/dev/null || { echo "rustup is missing: install Rust with rustup" >&2; exit 1; }
 command -v cc >/dev/null || { echo "a C compiler is missing: install it with: apt-get install gcc libc6-dev" >&2; exit 1; }
+if ! command -v qemu-system-arm >/dev/null; then
+    run apt-get update -qq
+    run apt-get install -y -qq --no-install-recommends qemu-system-arm
+fi
 for target in "$MCU" "$SMALL"; do
     rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
 done

@@ -67,8 +67,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Between<OCTAVES, OVERLAP> {
     pub fn merge(&mut self, later: &Self) {
         for doubling in 0..OCTAVES {
             for k in 0..FACTORS.len() {
-                let Moments { squares, fourths } = later.moments[doubling][k];
-                self.moments[doubling][k].add_sums(squares, fourths);
+                self.moments[doubling][k].merge(&later.moments[doubling][k]);
                 self.counts[doubling][k] = self.counts[doubling][k].saturating_add(later.counts[doubling][k]);
             }
         }
@@ -81,7 +80,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Between<OCTAVES, OVERLAP> {
     pub fn sum_of_squares(&self, n: u64) -> Option<(u128, u64)> {
         let doubling = (n / 4).checked_ilog2()? as usize;
         let k = FACTORS.into_iter().position(|factor| factor << doubling == n)?;
-        Some((self.moments.get(doubling)?[k].squares, self.counts.get(doubling)?[k]))
+        Some((self.moments.get(doubling)?[k].squares.get(), self.counts.get(doubling)?[k]))
     }
 
     /// The curve of `cascade`, which is the one that was observed, with the in-between factors in their places.

@@ -5,9 +5,11 @@ mod checkpoint;
 mod moments;
 #[cfg(feature = "serde")]
 mod state;
+mod sum;
 
 pub use checkpoint::Learnt;
 pub(crate) use moments::Moments;
+use moments::ROUNDED;
 
 use crate::curve::{Curve, Point};
 use crate::noise_type::Noise;
@@ -24,34 +26,58 @@ use core::mem::replace;
 /// # Range
 /// Running sums wrap, their second differences do not: `|d| ≤ n·2³²` stays below `2⁶³` for `n ≤ 2³⁰`. For samples
 /// within ±2²³, `d² ≤ 2⁴⁸·n²`, and over `2⁴⁰` samples there are at most `2⁴⁴/n` differences with `n ≥ 16`, so with
-/// `n ≤ 2²³` no sum exceeds `2¹¹⁵`: nothing is ever rounded. Should wider samples fill the 128 bits all the same,
-/// the sum stays at its maximum and [`is_saturated`](Self::is_saturated) says so. Fourth powers are summed in 128
+/// `n ≤ 2²³` no sum exceeds `2¹¹⁵`: nothing is ever rounded. Should wider samples fill the 127 bits all the same,
+/// the sum stays at its maximum and [`is_saturated`](Self::is_saturated) says so. Fourth powers are summed in 127
 /// bits too, of differences rounded to `√(n/512)` counts at `n > 2¹⁰`; where they fill up (over
 /// 2⁴⁰ samples: white noise above 2¹⁷ counts, or averages over `n = 2²³` that differ by more than 2¹⁰ counts
 /// throughout) the kurtosis is `None`.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[repr(C)] // what every sample touches lies together, within reach of one base register
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
-    samples: u64,
-    missing: u64,
     /// Samples since the start or the last gap.
     elapsed: u64,
     /// Their running sum, modulo 2⁶⁴.
     sum: i64,
     /// The last `OVERLAP` running sums; the one of sample `k` in slot `k mod OVERLAP`, in the lines below likewise.
     recent: [i64; OVERLAP],
+    octaves: [Octave<OVERLAP>; OCTAVES],
+    /// Samples before the last gap.
+    ended: u64,
+    missing: u64,
+}
+
+/// What was learnt at `n = 2^octave`, and from `n = OVERLAP` on the delay line of its level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+struct Octave<const OVERLAP: usize> {
+    moments: Moments,
+    /// What the line let out last: the sum of `2·OVERLAP` strides ago.
+    oldest: i64,
     /// The `OVERLAP` sums before those that the line above holds, at the level's own stride.
-    lines: [[i64; OVERLAP]; OCTAVES],
-    /// What each line let out last: the sum of `2·OVERLAP` strides ago.
-    oldest: [i64; OCTAVES],
-    moments: [Moments; OCTAVES],
+    line: [i64; OVERLAP],
     /// Differences of the stretches that a gap has ended.
-    differences: [u64; OCTAVES],
+    differences: u64,
+}
+
+impl<const OVERLAP: usize> Octave<OVERLAP> {
+    const NEW: Self = Self { moments: Moments::NONE, oldest: 0, line: [0; OVERLAP], differences: 0 };
+
+    /// Puts the sum of `step` into the line; out comes the one of `OVERLAP` strides before.
+    #[inline]
+    fn exchange(&mut self, step: u64, sum: i64) -> i64 {
+        self.oldest = replace(&mut self.line[step as usize & (OVERLAP - 1)], sum);
+        self.oldest
+    }
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Averaging factors below `OVERLAP`, all of which the first line serves.
     const FINE: usize = OVERLAP.trailing_zeros() as usize;
     const LEVELS: usize = OCTAVES - Self::FINE;
+    /// Levels whose differences are not rounded for the kurtosis.
+    const SHORT: usize = if OCTAVES < ROUNDED { Self::LEVELS } else { ROUNDED - Self::FINE };
+    /// Samples after which all of these have differences: 2048 for eleven octaves or more.
+    const WARM: u64 = (2 * OVERLAP as u64) << (Self::SHORT - 1);
 
     /// An estimator that has seen nothing.
     ///
@@ -76,24 +102,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             assert!(OVERLAP.is_power_of_two() && OVERLAP <= 16, "OVERLAP must be 1, 2, 4, 8 or 16");
             assert!(OCTAVES > Self::FINE && OCTAVES <= 31, "OCTAVES must be in log2(OVERLAP)+1 ..= 31");
         }
-        Self {
-            samples: 0,
-            missing: 0,
-            elapsed: 0,
-            sum: 0,
-            recent: [0; OVERLAP],
-            lines: [[0; OVERLAP]; OCTAVES],
-            oldest: [0; OCTAVES],
-            moments: [Moments::NONE; OCTAVES],
-            differences: [0; OCTAVES],
-        }
+        Self { elapsed: 0, sum: 0, recent: [0; OVERLAP], octaves: [Octave::NEW; OCTAVES], ended: 0, missing: 0 }
     }
 
     /// The estimator that has taken `sample` so many times, at once: to start tests and benchmarks late in a record.
     #[must_use]
     pub fn after_constant(sample: i32, samples: u64) -> Self {
         let sum_at = |step: u64, level: usize| i64::from(sample).wrapping_mul((step << level) as i64);
-        let mut cascade = Self { samples, elapsed: samples, sum: sum_at(samples, 0), ..Self::new() };
+        let mut cascade = Self { elapsed: samples, sum: sum_at(samples, 0), ..Self::new() };
         for back in 0..samples.min(OVERLAP as u64) {
             cascade.recent[Self::slot(samples - back)] = sum_at(samples - back, 0);
         }
@@ -101,9 +117,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         for level in 0..Self::LEVELS {
             let step = samples >> level;
             for back in overlap..step.min(2 * overlap) {
-                cascade.lines[level][Self::slot(step - back)] = sum_at(step - back, level);
+                cascade.octaves[level + Self::FINE].line[Self::slot(step - back)] = sum_at(step - back, level);
             }
-            cascade.oldest[level] = sum_at(step.saturating_sub(2 * overlap), level);
+            cascade.octaves[level + Self::FINE].oldest = sum_at(step.saturating_sub(2 * overlap), level);
         }
         cascade
     }
@@ -115,31 +131,61 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     }
 
     /// Takes the next sample.
+    ///
+    /// The first 2048 samples after a gap take a slower way.
     #[inline]
     pub fn push(&mut self, sample: i32) {
-        self.samples += 1;
+        let previous = self.sum;
         self.elapsed += 1;
-        self.sum = self.sum.wrapping_add(i64::from(sample));
-        let (newest, elapsed) = (self.sum, self.elapsed);
-
-        for octave in 0..Self::FINE {
-            let n = 1 << octave;
-            if elapsed >= 2 * n {
-                let middle = self.recent[Self::slot(elapsed - n)];
-                let oldest = self.recent[Self::slot(elapsed - 2 * n)];
-                self.moments[octave].add(octave, second_difference(newest, middle, oldest));
-            }
+        self.sum = previous.wrapping_add(i64::from(sample));
+        if self.elapsed < Self::WARM {
+            return self.push_early(previous);
         }
-        let mut middle = replace(&mut self.recent[Self::slot(elapsed)], newest);
-        let due = (elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
-        for level in 0..due {
-            let step = elapsed >> level;
-            let oldest = replace(&mut self.lines[level][Self::slot(step)], middle);
-            if step >= 2 * OVERLAP as u64 {
-                let octave = level + Self::FINE;
-                self.moments[octave].add(octave, second_difference(newest, middle, oldest));
+        self.add_fine(Self::FINE, previous);
+        let newest = self.sum;
+        let mut step = self.elapsed as u32;
+        let mut middle = replace(&mut self.recent[Self::slot(self.elapsed)], newest);
+        for octave in &mut self.octaves[Self::FINE..Self::FINE + Self::SHORT] {
+            let oldest = octave.exchange(u64::from(step), middle);
+            octave.moments.add_unrounded(second_difference(newest, middle, oldest));
+            if step & 1 == 1 {
+                return;
             }
-            self.oldest[level] = oldest;
+            (step, middle) = (step >> 1, oldest);
+        }
+        self.advance(Self::SHORT, middle);
+    }
+
+    /// The same while some levels have no differences yet.
+    #[inline(never)]
+    fn push_early(&mut self, previous: i64) {
+        self.add_fine((self.elapsed.ilog2() as usize).min(Self::FINE), previous);
+        let middle = replace(&mut self.recent[Self::slot(self.elapsed)], self.sum);
+        self.advance(0, middle);
+    }
+
+    /// Takes the differences of the first octaves, at `n < OVERLAP`.
+    #[inline(always)]
+    fn add_fine(&mut self, octaves: usize, previous: i64) {
+        let mut middle = previous;
+        for (k, octave) in self.octaves[..Self::FINE].iter_mut().enumerate().take(octaves) {
+            let oldest = self.recent[Self::slot(self.elapsed.wrapping_sub(2 << k))];
+            octave.moments.add_unrounded(second_difference(self.sum, middle, oldest));
+            middle = oldest;
+        }
+    }
+
+    /// Passes on what the line above let out, as far as the newest sample ends strides, from `level` on.
+    #[inline(never)]
+    fn advance(&mut self, level: usize, mut middle: i64) {
+        let due = (self.elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
+        for level in level..due {
+            let step = self.elapsed >> level;
+            let octave = &mut self.octaves[level + Self::FINE];
+            let oldest = octave.exchange(step, middle);
+            if step >= 2 * OVERLAP as u64 {
+                octave.moments.add(level + Self::FINE, second_difference(self.sum, middle, oldest));
+            }
             middle = oldest;
         }
     }
@@ -150,14 +196,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     pub fn gap(&mut self, missing: u32) {
         if missing > 0 {
             self.missing = self.missing.saturating_add(u64::from(missing));
-            for octave in 0..OCTAVES {
-                self.differences[octave] = self.count(octave);
+            for k in 0..OCTAVES {
+                let differences = self.count(k);
+                self.octaves[k] = Octave { moments: self.octaves[k].moments, differences, ..Octave::NEW };
             }
+            self.ended = self.len();
             self.elapsed = 0;
             self.sum = 0;
             self.recent = [0; OVERLAP];
-            self.lines = [[0; OVERLAP]; OCTAVES];
-            self.oldest = [0; OCTAVES];
         }
     }
 
@@ -165,16 +211,16 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     ///
     /// No difference straddles the seam: the result is that of one estimator with a gap there, of no samples.
     pub fn merge(&mut self, later: &Self) {
-        for octave in 0..OCTAVES {
-            self.differences[octave] = self.count(octave).saturating_add(later.differences[octave]);
-            let Moments { squares, fourths } = later.moments[octave];
-            self.moments[octave].add_sums(squares, fourths);
+        for k in 0..OCTAVES {
+            let differences = self.count(k).saturating_add(later.octaves[k].differences);
+            let mut moments = self.octaves[k].moments;
+            moments.merge(&later.octaves[k].moments);
+            self.octaves[k] = Octave { moments, differences, ..later.octaves[k] };
         }
         *self = Self {
-            samples: self.samples.saturating_add(later.samples),
+            ended: self.len().saturating_add(later.ended),
             missing: self.missing.saturating_add(later.missing),
-            moments: self.moments,
-            differences: self.differences,
+            octaves: self.octaves,
             ..*later
         };
     }
@@ -187,13 +233,13 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Samples taken.
     #[must_use]
     pub const fn len(&self) -> u64 {
-        self.samples
+        self.ended.saturating_add(self.elapsed)
     }
 
     /// Whether no sample was taken.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
-        self.samples == 0
+        self.len() == 0
     }
 
     /// Samples reported missing through [`gap`](Self::gap).
@@ -205,7 +251,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Whether samples far beyond 24 bits have filled an accumulator, so that the curve is a lower bound.
     #[must_use]
     pub fn is_saturated(&self) -> bool {
-        self.moments.iter().any(|moments| moments.squares == u128::MAX)
+        self.octaves.iter().any(|octave| octave.moments.squares.is_full())
     }
 
     /// The exact sum of squared second differences of sums of `2^octave` samples, in counts², and their number.
@@ -213,7 +259,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// `None` beyond the last octave.
     #[must_use]
     pub fn sum_of_squares(&self, octave: usize) -> Option<(u128, u64)> {
-        Some((self.moments.get(octave)?.squares, self.count(octave)))
+        Some((self.octaves.get(octave)?.moments.squares.get(), self.count(octave)))
     }
 
     /// The Allan variance, in counts², of every octave that has at least one difference.
@@ -225,13 +271,21 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let points = (0..OCTAVES).filter(|&octave| self.count(octave) > 0).map(|octave| {
             let n = 1_u64 << octave;
             let overlap = n.min(OVERLAP as u64) as u32;
-            Point::new(n, sample_period, &self.moments[octave], octave, self.count(octave), overlap, Noise::White)
+            Point::new(
+                n,
+                sample_period,
+                &self.octaves[octave].moments,
+                octave,
+                self.count(octave),
+                overlap,
+                Noise::White,
+            )
         });
-        Curve::new(sample_period, self.samples, points.collect())
+        Curve::new(sample_period, self.len(), points.collect())
     }
 
     fn count(&self, octave: usize) -> u64 {
-        self.differences[octave].saturating_add(self.open_differences(octave))
+        self.octaves[octave].differences.saturating_add(self.open_differences(octave))
     }
 
     /// Differences since the last gap.
@@ -266,8 +320,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let slot = Self::slot((self.elapsed >> level).wrapping_sub(back));
         match back / OVERLAP as u64 {
             0 => self.recent[slot],
-            1 => self.lines[level][slot],
-            _ => self.oldest[level],
+            1 => self.octaves[level + Self::FINE].line[slot],
+            _ => self.octaves[level + Self::FINE].oldest,
         }
     }
 

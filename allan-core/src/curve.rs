@@ -45,7 +45,7 @@ impl Point {
         Self {
             n,
             tau: n as f64 * sample_period,
-            avar: moments.squares as f64 / (2.0 * count as f64 * n as f64 * n as f64),
+            avar: moments.squares.get() as f64 / (2.0 * count as f64 * n as f64 * n as f64),
             count,
             overlap,
             edf: 0.0,

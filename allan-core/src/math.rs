@@ -2,7 +2,23 @@
 //!
 //! Always by function, never by method: `x.sqrt()` would be `std`'s on the host and another one on the target.
 //! What ends in a reported figure is `libm`'s, the same to the bit on host and target. `micromath`, small and fast
-//! without a double-precision unit, serves where a coarse answer chooses between few cases.
+//! without a double-precision unit, serves where a coarse answer chooses between few cases: the noise type.
+//!
+//! Largest error (relative to the answer where that is above 1) and instructions of a call on a Cortex-M4F and a
+//! Cortex-M0+, for the arguments that the estimator meets; held by the test of `tests/instructions`:
+//!
+//! | | `libm` error | instructions | `micromath` error | instructions |
+//! |---|---|---|---|---|
+//! | `sqrt` | 0 | 182, 1127 | 6e-2 | 21, 61 |
+//! | `ln` | 2e-16 | 2568, 6824 | 1e-1 | 48, 1609 |
+//! | `log2` | 0 | 3276, 8253 | 2e-1 | 50, 1725 |
+//! | `exp` | 2e-16 | 2633, 7093 | 6e-4 | 128, 2603 |
+//! | `expm1` | 0 | 3938, 9996 | — | — |
+//! | `sin` | 1e-16 | 2436, 6369 | 1e-3 | 39, 1633 |
+//! | `cos` | 1e-16 | 2530, 6541 | 1e-3 | 36, 1483 |
+//! | `floor` | 0 | 48, 78 | 0 | 21, 337 |
+//! | `abs` | 0 | 18, 20 | 0 | 13, 20 |
+//! | `ln_gamma` | 8e-15 | 4990, 13796 | — | — |
 
 pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
@@ -16,7 +32,7 @@ pub(crate) fn log2(x: f64) -> f64 {
     libm::log2(x)
 }
 
-/// Base-2 logarithm of a positive ratio of neighbouring variances, within 0.2 over 2⁻⁴ to 2⁴.
+/// Base-2 logarithm of a positive ratio of variances, within 0.2 over 2⁻³⁰ to 2³⁰.
 pub(crate) fn coarse_log2(x: f64) -> f64 {
     f64::from(micromath::F32Ext::log2(x as f32))
 }
@@ -54,7 +70,8 @@ pub(crate) fn abs(x: f64) -> f64 {
 mod tests {
     #[test]
     fn the_coarse_logarithm_keeps_its_bound() {
-        let worst = (-400..=400).map(|k| f64::from(k) / 100.0).map(|log| (super::coarse_log2(log.exp2()) - log).abs());
+        let worst =
+            (-3_000..=3_000).map(|k| f64::from(k) / 100.0).map(|log| (super::coarse_log2(log.exp2()) - log).abs());
         let worst = worst.fold(0.0, f64::max);
         assert!(worst < 0.2, "{worst}");
     }

@@ -169,13 +169,15 @@ fn what_no_samples_lead_to_is_refused_by_name() {
         let found = serde_json::from_value::<Cascade<OCTAVES, 8>>(forged(&words, at, word).into());
         found.expect_err("no samples lead to this").to_string()
     };
-    // Header, samples, missing, elapsed, sum, 8 recent sums, 7·8 in lines, 7 oldest, 7·4 moments, 7 counts, checksum.
-    assert_eq!(words.len(), 5 + 8 + 56 + 7 + 28 + 7 + 1);
-    assert!(flaw(3, 4).contains("more samples since the last gap than in all"));
+    // Header, samples before the last gap, missing, elapsed, sum, 8 recent sums, checksum, and for each octave 4 words
+    // of moments, the oldest sum, 8 in the line and the count.
+    assert_eq!(words.len(), 5 + 8 + OCTAVES * 14 + 1);
+    let octave = |k: usize| 5 + 8 + 14 * k;
+    assert!(flaw(1, u64::MAX).contains("more samples than can be counted"));
     assert!(flaw(4, 1).contains("the newest running sum is not the running sum"));
-    assert!(flaw(5 + 8 + 3, 1).contains("running sums from before the first sample"));
-    assert!(flaw(5 + 8 + 56 + 7 + 28, 4).contains("more differences than samples"));
-    assert!(flaw(5 + 8 + 56 + 7 + 4 * 5, 1).contains("a sum over no differences that is not 0"));
+    assert!(flaw(octave(4) + 5 + 3, 1).contains("running sums from before the first sample"));
+    assert!(flaw(octave(0) + 13, 4).contains("more differences than samples"));
+    assert!(flaw(octave(5), 1).contains("a sum over no differences that is not 0"));
     let short = serde_json::from_value::<Cascade<OCTAVES, 8>>(words[..20].into()).unwrap_err().to_string();
     assert!(short.contains("invalid length"), "{short}");
 }

@@ -2,7 +2,7 @@
 
 use super::{Between, FACTORS};
 use crate::cascade::Moments;
-use crate::state::{State, serde_by_state, wide};
+use crate::state::{State, serde_by_state};
 
 serde_by_state!(OCTAVES, OVERLAP for Between<OCTAVES, OVERLAP>);
 
@@ -15,8 +15,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> State for Between<OCTAVES, OVER
 
     fn walk<E>(&mut self, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
         for Moments { squares, fourths } in self.moments.as_flattened_mut() {
-            wide(squares, &mut visit)?;
-            wide(fourths, &mut visit)?;
+            squares.words().into_iter().try_for_each(&mut visit)?;
+            fourths.words().into_iter().try_for_each(&mut visit)?;
         }
         self.counts.as_flattened_mut().iter_mut().try_for_each(visit)
     }

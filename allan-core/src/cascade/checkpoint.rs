@@ -17,18 +17,18 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// What was learnt at an octave; `None` beyond the last.
     #[must_use]
     pub fn learnt(&self, octave: usize) -> Option<Learnt> {
-        let Moments { squares, fourths } = *self.moments.get(octave)?;
-        Some(Learnt { squares, fourths, count: self.count(octave) })
+        let Moments { squares, fourths } = self.octaves.get(octave)?.moments;
+        Some(Learnt { squares: squares.get(), fourths: fourths.get(), count: self.count(octave) })
     }
 
     /// An estimator that goes on, as after a gap, from what one had [`learnt`](Self::learnt) of `samples` samples with
     /// `missing` missing.
     #[must_use]
     pub fn resumed(samples: u64, missing: u64, learnt: &[Learnt; OCTAVES]) -> Self {
-        let mut resumed = Self { samples, missing, ..Self::new() };
-        for (octave, &Learnt { squares, fourths, count }) in learnt.iter().enumerate() {
-            resumed.moments[octave] = Moments { squares, fourths };
-            resumed.differences[octave] = count;
+        let mut resumed = Self { ended: samples, missing, ..Self::new() };
+        for (octave, &Learnt { squares, fourths, count }) in resumed.octaves.iter_mut().zip(learnt) {
+            octave.moments = Moments { squares: squares.into(), fourths: fourths.into() };
+            octave.differences = count;
         }
         resumed
     }

@@ -1,0 +1,90 @@
+//! The estimator: on average, at its worst, and what reads beside it.
+
+use crate::{instructions, report};
+use allan_core::{Between, Cascade, Coupling, Hadamard};
+use core::hint::black_box;
+use cortex_m_semihosting::{hprint, hprintln};
+
+const OCTAVES: usize = 24;
+const SAMPLES: usize = 4_000;
+/// Estimators that stand right before their longest push.
+const WORST: usize = 100;
+
+/// Noise with a standard deviation of 20 counts, as of a gyro at rest, times a factor.
+fn noise(factor: i32) -> [i32; SAMPLES] {
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state * 16_807 % 2_147_483_647;
+        (state % 41) as i32 - 20
+    };
+    core::array::from_fn(|_| (uniform() + uniform() + uniform()) * factor)
+}
+
+pub(crate) fn count() {
+    let sensor = noise(1);
+    let wide = noise(1 << 16);
+    push::<4>("push_p4", &sensor);
+    push::<8>("push_p8", &sensor);
+    push::<16>("push_p16", &sensor);
+    push::<8>("push_p8_24_bits", &wide);
+    worst::<4>("worst_push_p4");
+    worst::<8>("worst_push_p8");
+    worst::<16>("worst_push_p16");
+    let mut cascade = black_box(Cascade::<OCTAVES, 8>::new());
+    report("push_slice_p8", SAMPLES as u32, || cascade.push_slice(black_box(&sensor)));
+    report("gap_p8", 10, || (0..10).for_each(|_| cascade.gap(black_box(1))));
+    beside(&sensor);
+    let curve = Cascade::<OCTAVES, 8>::after_constant(0, 1 << 24);
+    report("curve_p8", 10, || (0..10).for_each(|_| drop(black_box(black_box(&curve).curve(0.01)))));
+    hprintln!("bytes p4 {}", Cascade::<OCTAVES, 4>::memory());
+    hprintln!("bytes p8 {}", Cascade::<OCTAVES, 8>::memory());
+    hprintln!("bytes p16 {}", Cascade::<OCTAVES, 16>::memory());
+}
+
+/// In a long record, and in the first 2048 samples after a gap.
+fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
+    let mut cascade = black_box(Cascade::<OCTAVES, OVERLAP>::after_constant(0, 1 << 20));
+    samples.iter().for_each(|&sample| cascade.push(sample));
+    report(name, SAMPLES as u32, || samples.iter().for_each(|&sample| cascade.push(sample)));
+    cascade.gap(1);
+    let samples = &samples[..2040];
+    hprint!("early ");
+    report(name, samples.len() as u32, || samples.iter().for_each(|&sample| cascade.push(sample)));
+    black_box(&cascade);
+}
+
+/// The push that completes a difference at every octave, with differences beyond 16 bits.
+fn worst<const OVERLAP: usize>(name: &str) {
+    let mut cascades = black_box([const { Cascade::<OCTAVES, OVERLAP>::new() }; WORST]);
+    cascades.fill_with(|| Cascade::after_constant(0, (1 << 26) - 1));
+    report(name, WORST as u32, || cascades.iter_mut().for_each(|cascade| cascade.push(black_box(1 << 23))));
+    black_box(&cascades);
+}
+
+/// What a sample of one channel, and of two for the coupling, costs more when the sums are read a second time.
+fn beside(samples: &[i32; SAMPLES]) {
+    let mut coupling = black_box(Coupling::<OCTAVES>::new());
+    let mut hadamard = black_box(Hadamard::<OCTAVES, 8>::new());
+    let mut between = black_box(Between::<OCTAVES, 8>::new());
+    let pushes = run(samples, |_, _| ());
+    for (name, total) in [
+        ("coupling_p8", run(samples, |a, b| coupling.observe(a, b))),
+        ("hadamard_p8", run(samples, |a, _| hadamard.observe(a))),
+        ("between_p8", run(samples, |a, _| between.observe(a))),
+    ] {
+        hprintln!("count {} {}", name, (total - pushes) / SAMPLES as u32);
+    }
+}
+
+fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Pushed, &Pushed)) -> u32 {
+    let (mut a, mut b) = (Pushed::new(), Pushed::new());
+    instructions(|| {
+        for &sample in samples {
+            a.push(sample);
+            b.push(-sample);
+            observe(black_box(&a), black_box(&b));
+        }
+    })
+}
+
+type Pushed = Cascade<OCTAVES, 8>;

@@ -1,0 +1,69 @@
+//! Builds the counting image for both cores, runs it in QEMU and holds the counts within bands.
+//!
+//! The board mps2-an386 has a Cortex-M4F. For the Cortex-M0+, whose board QEMU lacks, the image is compiled for
+//! ARMv6-M and runs on the Cortex-M3 of mps2-an385, which executes the same instructions.
+
+mod functions;
+mod image;
+
+use image::{Counts, M0_PLUS, M4F};
+use std::ops::RangeInclusive;
+
+/// A tenth either way, for the compiler's moods.
+fn band(count: f64) -> RangeInclusive<f64> {
+    0.9 * count..=1.1 * count
+}
+
+fn assert_counts(counts: &Counts, expected: &[(&str, f64)]) {
+    for &(name, expected) in expected {
+        let count = counts.of(name);
+        println!("{name}: {count} instructions");
+        assert!(band(expected).contains(&count), "{name} takes {count} instructions, about {expected} before");
+    }
+}
+
+#[test]
+fn a_cortex_m4f() {
+    let counts = M4F.counts();
+    assert!(counts.of("push_p8") <= 200.0, "a sample on average: {}", counts.of("push_p8"));
+    assert_counts(
+        counts,
+        &[
+            ("push_p4", 161.0),
+            ("push_p8", 191.0),
+            ("push_p16", 217.0),
+            ("early_push_p8", 308.0),
+            ("push_p8_24_bits", 679.0),
+            ("worst_push_p8", 3_633.0),
+            ("gap_p8", 1_584.0),
+            ("coupling_p8", 1_240.0),
+            ("hadamard_p8", 896.0),
+            ("between_p8", 528.0),
+        ],
+    );
+}
+
+#[test]
+fn a_cortex_m0_plus() {
+    let counts = M0_PLUS.counts();
+    assert_counts(
+        counts,
+        &[
+            ("push_p4", 462.0),
+            ("push_p8", 509.0),
+            ("push_p16", 612.0),
+            ("early_push_p8", 849.0),
+            ("push_p8_24_bits", 2_312.0),
+            ("worst_push_p8", 12_064.0),
+        ],
+    );
+}
+
+#[test]
+fn memory_on_the_target() {
+    for target in [M4F, M0_PLUS] {
+        let counts = target.counts();
+        println!("P = 4, 8, 16: {}, {}, {} bytes", counts.of("p4"), counts.of("p8"), counts.of("p16"));
+        assert!(counts.of("p4") <= 2_400.0 && counts.of("p8") <= 4_000.0);
+    }
+}
