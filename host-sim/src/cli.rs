@@ -41,6 +41,15 @@ pub enum Command {
     },
     /// Hide effects at random in recordings of the virtual sensor and tell how well the analysis names them.
     Undeclared(Undeclared),
+    /// Repeat the published characterisation on hours whose noise is known: slopes read off beside the fit.
+    Paper {
+        /// Hours to simulate; a scatter needs two.
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
+        seeds: u64,
+        /// Seed of the first.
+        #[arg(long, default_value_t = 1)]
+        first_seed: u64,
+    },
 }
 
 /// Recordings with hidden effects.

@@ -14,6 +14,7 @@ pub mod coefficients;
 pub mod device;
 pub mod grid;
 pub mod page;
+pub mod paper;
 pub mod plot;
 pub mod record;
 pub mod recording;

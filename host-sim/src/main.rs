@@ -4,6 +4,7 @@ use anyhow::{Context, Result, bail};
 use clap::Parser;
 use host_sim::analysis::analyze;
 use host_sim::cli::{Cli, Command, Input, Output};
+use host_sim::paper::Experiment;
 use host_sim::record::Simulation;
 use host_sim::recording::Recording;
 use host_sim::replay::replay;
@@ -51,6 +52,9 @@ fn run(mut cli: Cli) -> Result<()> {
             let recording = csv::read(&input.file, input.range.into())?;
             report_of(input, &recording)?
         }
+        Some(Command::Paper { seeds, first_seed }) => {
+            return paper(Experiment { seeds: *seeds, first_seed: *first_seed }, &cli.output);
+        }
         Some(Command::Undeclared(arguments)) => return benchmark(&arguments.plan(), &cli.output),
         Some(Command::Replay(input)) => {
             let replayed = replay(&input.file, input.range.into())?;
@@ -96,6 +100,22 @@ fn benchmark(plan: &Plan, output: &Output) -> Result<()> {
     }
     let mut out = BufWriter::new(io::stdout().lock());
     table.write(&mut out)?;
+    out.flush()?;
+    Ok(())
+}
+
+fn paper(experiment: Experiment, output: &Output) -> Result<()> {
+    if output.page.is_some() {
+        bail!("paper has no page: leave out --page");
+    }
+    let bar = ProgressBar::new(experiment.seeds);
+    let outcome = experiment.run(|done| bar.set_position(done));
+    bar.finish_and_clear();
+    if let Some(file) = &output.json {
+        write_json(&outcome, file).with_context(|| file.display().to_string())?;
+    }
+    let mut out = BufWriter::new(io::stdout().lock());
+    outcome.write(&mut out)?;
     out.flush()?;
     Ok(())
 }
