@@ -5,10 +5,6 @@ use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
 use crate::recording::Recording;
 use crate::timeline::{Step, Timeline};
 
-/// Fewest changing channels by which a repeated sample is told from equal neighbours.
-const FEWEST_CHANNELS: usize = 3;
-/// A channel that equals its neighbour more often does not change.
-const CHANGING: f64 = 0.5;
 /// By how much equal neighbours by chance may be more frequent than if the channels were independent.
 const DEPENDENCE: f64 = 3.0;
 
@@ -73,17 +69,13 @@ pub fn repeated(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
     }
     let refused = timeline.dropped.get("repeated").copied().unwrap_or(0);
     let (pairs, seen) = (used.len().saturating_sub(1) as f64, positions.len() as f64);
-    // What the repeated ones themselves do not bring about.
-    let chances: Vec<f64> = equal.iter().map(|&equal| (equal as f64 - seen) / (pairs - seen).max(1.0)).collect();
-    if chances.iter().filter(|chance| **chance < CHANGING).count() < FEWEST_CHANNELS {
-        return None;
-    }
-    let expected = DEPENDENCE * pairs * chances.iter().product::<f64>();
+    let shares: Vec<f64> = equal.iter().map(|&equal| equal as f64 / pairs.max(1.0)).collect();
+    let expected = DEPENDENCE * pairs * shares.iter().product::<f64>();
     let p_value = poisson_tail(positions.len() as u64 + refused, expected);
     if p_value > SIGNIFICANCE {
         return None;
     }
-    let count = (seen - expected / DEPENDENCE).max(0.0) + refused as f64;
+    let count = pairs * repeated_share(seen / pairs.max(1.0), &shares) + refused as f64;
     let (low, high) = poisson_bounds(count);
     let all = pairs + 1.0 + refused as f64;
     let evidence = format!(
@@ -98,4 +90,16 @@ pub fn repeated(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
         p_value,
         repair: Repair::LeaveOut(positions),
     })
+}
+
+/// The part f of the samples that are repeated, where the part `all` of them equals the one before in all channels and the
+/// parts `shares` in each: `all = f + (1 − f)·Π (share − f)/(1 − f)`.
+fn repeated_share(all: f64, shares: &[f64]) -> f64 {
+    let (mut low, mut high) = (0.0, all);
+    for _ in 0..50 {
+        let repeated = 0.5 * (low + high);
+        let by_chance: f64 = shares.iter().map(|share| ((share - repeated) / (1.0 - repeated)).max(0.0)).product();
+        if repeated + (1.0 - repeated) * by_chance < all { low = repeated } else { high = repeated }
+    }
+    0.5 * (low + high)
 }

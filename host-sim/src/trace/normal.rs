@@ -38,18 +38,25 @@ pub(crate) fn poisson_tail(count: u64, mean: f64) -> f64 {
     if mean <= 0.0 {
         return 0.0;
     }
-    // The terms from `count` on; beyond the mean each is smaller than the one before.
-    let mut term = (count as f64 * mean.ln() - mean - libm::lgamma(count as f64 + 1.0)).exp();
-    let (mut sum, mut at) = (0.0, count as f64);
-    while term > 1e-17 * sum || at < mean {
-        sum += term;
-        at += 1.0;
-        term *= mean / at;
-        if term == 0.0 && at > mean {
-            break;
+    let term = |at: f64| (at * mean.ln() - mean - libm::lgamma(at + 1.0)).exp();
+    let count = count as f64;
+    // From the end that is nearer to the mean outwards, where each term is smaller than the one before.
+    if count <= mean {
+        let (mut sum, mut at, mut next) = (0.0, count - 1.0, term(count - 1.0));
+        while at >= 0.0 && next > 1e-17 * sum {
+            sum += next;
+            next *= at / mean;
+            at -= 1.0;
         }
+        return (1.0 - sum).max(0.0);
     }
-    sum.min(1.0)
+    let (mut sum, mut at, mut next) = (0.0, count, term(count));
+    while next > 1e-17 * sum {
+        sum += next;
+        at += 1.0;
+        next *= mean / at;
+    }
+    sum
 }
 
 /// 95 % bounds of the mean of a Poisson number that came out as `count` (Byar's approximation of the exact ones).

@@ -148,6 +148,10 @@ fn lost_and_repeated_samples_are_counted() {
     assert_covers(&finding, "fraction", 2e-3);
     assert_eq!(deliveries::repeated(&lossy.recording, &lossy.timeline), None);
 
+    // Neighbours are equal all the time behind a long filter, and none is repeated.
+    let slow = Case::hiding(vec![Effect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
+    assert_eq!(deliveries::repeated(&slow.recording, &slow.timeline), None);
+
     let stale = Case::hiding(vec![Effect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
     let finding = deliveries::repeated(&stale.recording, &stale.timeline).unwrap();
     assert_covers(&finding, "fraction", 2e-3);
@@ -179,7 +183,10 @@ fn tails_are_those_of_the_tables() {
     }
     // 1 − e⁻²(1 + 2 + 2) for three or more of mean 2.
     assert!((poisson_tail(3, 2.0) - 0.323_323_58).abs() < 1e-8);
+    assert!((poisson_tail(2, 2.0) - 0.593_994_15).abs() < 1e-8);
     assert_eq!((poisson_tail(0, 2.0), poisson_tail(1, 0.0)), (1.0, 0.0));
+    // Far from the mean on either side, where terms vanish.
+    assert_eq!((poisson_tail(2_000, 50_000.0), poisson_tail(50_000, 2_000.0)), (1.0, 0.0));
     // Exact (Garwood) bounds of a count of 10.
     let (low, high) = poisson_bounds(10.0);
     assert!((low - 4.795).abs() < 0.02 && (high - 18.390).abs() < 0.02, "{low} {high}");
