@@ -35,6 +35,8 @@ pub struct Cadence {
     /// Rises with every edge that is lost or out of step, falls with every one in step.
     doubt: u32,
     silent: bool,
+    /// The next edge begins a new train: a sensor that was configured does not keep its phase.
+    restarted: bool,
 }
 
 impl Cadence {
@@ -42,7 +44,16 @@ impl Cadence {
     #[must_use]
     pub const fn new(period: SamplePeriod) -> Self {
         let period_q8 = period.ticks() as u64 * TICK_Q8;
-        Self { period_q8, last_us: None, trusted_us: 0, periods: 0, elapsed_us: 0, doubt: 0, silent: false }
+        Self {
+            period_q8,
+            last_us: None,
+            trusted_us: 0,
+            periods: 0,
+            elapsed_us: 0,
+            doubt: 0,
+            silent: false,
+            restarted: false,
+        }
     }
 
     /// Takes the time of an edge, in microseconds; times must not run backwards.
@@ -56,6 +67,10 @@ impl Cadence {
         let (interval, period) = (interval_us << 8, self.mean_period_q8());
         let periods = (interval + period / 2) / period;
         let off = interval.abs_diff(periods * period);
+        if core::mem::take(&mut self.restarted) {
+            self.last_us = Some(at_us);
+            return Step::Periods(u32::try_from(periods.max(1)).unwrap_or(u32::MAX));
+        }
         if periods == 0 || off > period / 4 {
             self.doubt = (self.doubt + 3).min(2 * MOST_DOUBT);
             return Step::Stray;
@@ -86,6 +101,7 @@ impl Cadence {
     /// The sensor was found to be in order, or put in order, at `now_us`.
     pub fn trust(&mut self, now_us: u64) {
         self.trusted_us = now_us;
+        self.restarted = true;
         self.silent = false;
         self.doubt = 0;
     }
@@ -121,7 +137,7 @@ mod tests {
         let mut cadence = cadence();
         follow(&mut cadence, [0.0, 1.0, 2.0], 1.0);
         cadence.trust((10_000.0 * PERIOD_US) as u64);
-        assert_eq!(follow(&mut cadence, [10_001.0, 10_002.0], 1.0), [1, 9_998, 0]);
+        assert_eq!(follow(&mut cadence, [10_001.4, 10_002.4], 1.0), [1, 9_998, 0], "at another phase");
         assert!(!cadence.is_doubtful());
     }
 

@@ -31,7 +31,7 @@ pub struct Estimators<'m> {
     cadence: Cadence,
     health: Health,
     stuck: u32,
-    /// Number of the next sample since sampling began.
+    /// Number of the next sample since sampling began at this rate.
     next: u64,
     raw: Option<Raw>,
     last_raw: (u64, u64),
@@ -95,6 +95,7 @@ impl<'m> Estimators<'m> {
         self.forget();
         self.config = config;
         self.cadence = Cadence::new(config.sample_period());
+        self.next = 0;
         self.raw = self.raw.take().map(|_| empty(config));
     }
 

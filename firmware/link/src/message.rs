@@ -117,7 +117,8 @@ pub struct ModelError {
 /// Bursts in a row, as they came off the bus.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Raw {
-    /// Number of the first burst's sample since sampling began; grows by one a sample period, by more across a gap.
+    /// Number of the first burst's sample since sampling began with these settings; grows by one a sample period, by more
+    /// across a gap.
     pub first: u64,
     /// Time of its data-ready edge, in microseconds since the application started.
     pub at_us: u64,
