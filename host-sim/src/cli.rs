@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+use crate::monitor;
 use crate::record::Simulation;
 use crate::undeclared::{self, Kind, Plan};
 use adis16405_driver::GyroRange;
@@ -31,13 +32,34 @@ pub enum Command {
     Analyze(Input),
     /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
     Replay(Input),
-    /// Write every bus transaction of the virtual sensor to an SPI frame log, then analyse what was read.
+    /// Write every bus transaction of the virtual sensor, or the raw bursts of a device on a serial port, to an SPI frame
+    /// log, then analyse what was read.
     Record {
         /// The log to write; gzip if it ends in .gz.
         out: PathBuf,
+        /// Serial port of a device that runs the firmware, such as /dev/ttyUSB0.
+        #[arg(long, conflicts_with = "seed")]
+        port: Option<String>,
+        /// Baud rate of the port.
+        #[arg(long, default_value_t = monitor::BAUD, requires = "port")]
+        baud: u32,
         /// What to simulate.
         #[command(flatten)]
         simulate: Simulate,
+    },
+    /// Show what a device that runs the firmware sends.
+    Monitor {
+        /// Its serial port, such as /dev/ttyUSB0.
+        port: String,
+        /// Baud rate of the port.
+        #[arg(long, default_value_t = monitor::BAUD)]
+        baud: u32,
+        /// Command to send first, such as "f 819.2"; may be repeated.
+        #[arg(long, value_name = "COMMAND")]
+        send: Vec<String>,
+        /// End after so many seconds [default: when the device hangs up].
+        #[arg(long)]
+        seconds: Option<f64>,
     },
     /// Hide effects at random in recordings of the virtual sensor and tell how well the analysis names them.
     Undeclared(Undeclared),

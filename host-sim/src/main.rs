@@ -1,11 +1,17 @@
 //! The command line: one recording in, one report out.
 
+use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
 use clap::Parser;
 use host_sim::analysis::analyze;
 use host_sim::cli::{Cli, Command, Input, Output};
+<<<<<<< HEAD
 use host_sim::paper::Experiment;
 use host_sim::record::Simulation;
+=======
+use host_sim::monitor::{self, Cable};
+use host_sim::record::{self, Simulation};
+>>>>>>> d4ad7d6 (wip)
 use host_sim::recording::Recording;
 use host_sim::replay::replay;
 use host_sim::report::Report;
@@ -19,6 +25,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 /// Where the page goes when nobody says otherwise.
 const DEFAULT_PAGE: &str = "report";
@@ -44,7 +51,14 @@ fn run(mut cli: Cli) -> Result<()> {
             let simulation = cli.simulate.simulation(3600.0);
             report(&simulate(simulation, None)?, None).context("virtual sensor")?
         }
-        Some(Command::Record { out, simulate: arguments }) => {
+        Some(Command::Record { out, port: Some(port), baud, simulate }) => {
+            let replayed = record_port(out, port, *baud, simulate.seconds.unwrap_or(60.0))?;
+            report(&replayed, None).with_context(|| port.clone())?
+        }
+        Some(Command::Monitor { port, baud, send, seconds }) => {
+            return watch(port, *baud, send, *seconds).with_context(|| port.clone());
+        }
+        Some(Command::Record { out, simulate: arguments, .. }) => {
             let recording = simulate(arguments.simulation(60.0), Some(out))?;
             report(&recording, None).context("virtual sensor")?
         }
@@ -80,6 +94,28 @@ fn simulate(simulation: Simulation, log: Option<&Path>) -> Result<Recording> {
     };
     bar.finish_and_clear();
     Ok(recording?)
+}
+
+fn record_port(out: &Path, port: &str, baud: u32, seconds: f64) -> Result<Recording> {
+    let mut cable = Cable::new(monitor::open(port, baud).with_context(|| port.to_owned())?);
+    let recorded = record::port::record(&mut cable, out, seconds).with_context(|| port.to_owned())?;
+    note(format_args!(
+        "{} bursts, {} missing between them; {}",
+        recorded.bursts,
+        recorded.missing,
+        monitor::summary(&recorded.counters)
+    ));
+    Ok(replay(out, GyroRange::default())?.recording)
+}
+
+fn watch(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Result<()> {
+    let deadline = seconds.map(Duration::try_from_secs_f64).transpose()?.map(|time| Instant::now() + time);
+    let mut cable = Cable::new(monitor::open(port, baud)?);
+    for command in commands {
+        cable.command(command)?;
+    }
+    monitor::show(&mut cable, deadline, &mut io::stdout().lock())?;
+    Ok(())
 }
 
 fn benchmark(plan: &Plan, output: &Output) -> Result<()> {

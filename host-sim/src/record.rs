@@ -2,6 +2,7 @@
 
 mod host;
 mod logged_bus;
+pub mod port;
 
 pub use host::Host;
 pub use logged_bus::{LoggedBus, LoggedBusError};
