@@ -15,6 +15,7 @@ use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::peripherals::{gpio::Pin, spi::Select};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
+use std::collections::VecDeque;
 use std::num::{NonZeroU32, NonZeroU64};
 use std::path::Path;
 
@@ -131,6 +132,21 @@ impl Board for Bench {
     }
 }
 
+/// What happens to the device during a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Event {
+    /// The part resets itself, as after a dip of its supply.
+    PartReset,
+    /// The data line to the processor is held at this byte, or let go.
+    Stuck(Option<u8>),
+    /// So many of the next data-ready edges do not reach the processor.
+    LoseEdges(u32),
+    /// The plug is pulled: no edges, and zeros on the data line; or put back.
+    Unplugged(bool),
+    /// The reset pin is pulsed.
+    ResetPin,
+}
+
 /// Runs the emulator in stretches that end where the sensor's data-ready line changes.
 struct Plant {
     end: u64,
@@ -138,6 +154,18 @@ struct Plant {
     falls: Option<u64>,
     /// Samples that the data-ready line has announced.
     samples: u64,
+    /// Edges still to be swallowed.
+    swallow: u64,
+    events: VecDeque<(u64, Event)>,
+    work: Vec<Work>,
+}
+
+/// How many instructions were executed by a time in ns.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Work {
+    pub(crate) at: u64,
+    pub(crate) instructions: u64,
+    pub(crate) samples: u64,
 }
 
 impl Plant {
@@ -146,13 +174,38 @@ impl Plant {
         let next = ready.min(self.falls.unwrap_or(u64::MAX)).min(now + STRIDE_NS).min(self.end);
         VirtualNanos(next.max(now + 1))
     }
+
+    fn happen(&mut self, event: Event, session: &mut Session<Bench>, stop: Stop, host: &mut dyn Host) {
+        let Some(sensor) = session.board_mut().sensor() else { return };
+        match event {
+            Event::PartReset => {
+                sensor.part.select();
+                sensor.part.transfer(0xBE80); // GLOB_CMD bit 7
+                sensor.part.deselect();
+            }
+            Event::Stuck(byte) => sensor.stuck = byte,
+            Event::LoseEdges(edges) => self.swallow = u64::from(edges),
+            Event::Unplugged(out) => {
+                sensor.stuck = out.then_some(0);
+                self.swallow = if out { u64::MAX } else { 0 };
+            }
+            Event::ResetPin => session.reset_by_pin(stop.at, stop.instruction_count, host),
+        }
+    }
 }
 
 impl Driver<Bench> for Plant {
-    fn on_stop(&mut self, session: &mut Session<Bench>, stop: Stop, _host: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<Bench>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         let now = stop.at.0;
+        let samples = self.samples;
+        if self.work.last().is_none_or(|last| now >= last.at + 1_000_000_000) || now >= self.end {
+            self.work.push(Work { at: now, instructions: stop.instruction_count, samples });
+        }
         if now >= self.end {
             return None;
+        }
+        while let Some((_, event)) = self.events.pop_front_if(|&mut (at, _)| now >= at) {
+            self.happen(event, session, stop, host);
         }
         let bench = session.board_mut();
         if self.falls.is_some_and(|falls| now >= falls) {
@@ -165,11 +218,26 @@ impl Driver<Bench> for Plant {
         });
         if samples > self.samples {
             self.samples = samples;
-            self.falls = Some(now + PULSE_NS);
-            bench.drive_data_ready(stop.at, true);
+            if self.swallow > 0 {
+                self.swallow -= 1;
+            } else {
+                self.falls = Some(now + PULSE_NS);
+                bench.drive_data_ready(stop.at, true);
+            }
         }
         Some(self.next_stop(bench, now))
     }
+}
+
+/// What is done with the image.
+#[derive(Default)]
+pub(crate) struct Scenario {
+    pub(crate) sensor: Option<Sensor>,
+    /// Keys that are pressed, by rising time in s.
+    pub(crate) keys: Vec<(f64, Vec<u8>)>,
+    /// What happens, by rising time in s.
+    pub(crate) events: Vec<(f64, Event)>,
+    pub(crate) seconds: f64,
 }
 
 /// What a run leaves to look at.
@@ -178,22 +246,33 @@ pub(crate) struct Outcome {
     pub(crate) received: Vec<(u64, u8)>,
     /// What the emulator found wrong with the image: accesses to nothing, registers without a model, resets.
     pub(crate) complaints: Vec<String>,
+    /// Once a virtual second, and at the end.
+    pub(crate) work: Vec<Work>,
 }
 
-/// Boots the image and runs it for `seconds`, pressing `keys` at their times in ns.
-pub(crate) fn run(image: &Path, sensor: Option<Sensor>, keys: &[(u64, u8)], seconds: u64) -> Outcome {
-    let terminal = Terminal { keys: keys.iter().copied().collect(), ..Terminal::default() };
-    let bench = Bench::new(sensor, terminal).expect("the emulator knows the part");
-    let plant = Plant { end: seconds * 1_000_000_000, falls: None, samples: 0 };
+/// Boots the image and runs it.
+pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
+    let ns = |seconds: f64| (seconds * 1e9) as u64;
+    let keys = scenario.keys.iter().flat_map(|(at, keys)| keys.iter().map(move |&key| (ns(*at), key)));
+    let terminal = Terminal { keys: keys.collect(), ..Terminal::default() };
+    let bench = Bench::new(scenario.sensor, terminal).expect("the emulator knows the part");
+    let plant = Plant {
+        end: ns(scenario.seconds),
+        falls: None,
+        samples: 0,
+        swallow: 0,
+        events: scenario.events.into_iter().map(|(at, event)| (ns(at), event)).collect(),
+        work: Vec::new(),
+    };
     let session = Session::new(Box::new(bench), 0, VirtualNanos(STRIDE_NS)).expect("the emulator takes the board");
     let images = [Image::read(image, None).expect("the image is an ELF")];
     let finished = emulator::run(session, &Start::new(&images), plant).expect("the emulator runs to the end");
-    let mut session = finished.session;
+    let (mut session, work) = (finished.session, finished.driver.work);
     let complaints = complaints(&session);
     let part = &mut session.board_mut().microcontroller.part;
     let received = part.usart[USART2].chip_mut::<Terminal>().map(|terminal| std::mem::take(&mut terminal.received));
     let sensor = part.spi[SPI1].chip_mut::<Sensor>(0).cloned();
-    Outcome { sensor, received: received.unwrap_or_default(), complaints }
+    Outcome { sensor, received: received.unwrap_or_default(), complaints, work }
 }
 
 fn complaints(session: &Session<Bench>) -> Vec<String> {

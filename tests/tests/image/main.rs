@@ -2,53 +2,35 @@
 
 mod bench;
 mod build;
+mod decoded;
 mod exti;
+mod faults;
+mod full_speed;
+mod restart;
 mod sensor;
 mod terminal;
 
-use adis16405_driver::{BURST_BYTES, Burst};
-use bench::{Outcome, run};
-use firmware::{Arrival, CHANNELS, Estimator, Estimators, FIRST_CONFIG, channel_model, channel_report};
+use bench::{Outcome, Scenario, run};
+use decoded::{Decoded, on_host};
+use firmware::CHANNELS;
 use host_sim::sensor::{NoiseModel, VirtualAdis16405};
-use link::{Boot, BootCause, ChannelReport, Counters, Decoder, Hello, Message, Received};
+use link::{Boot, BootCause, Counters, Hello, Message};
 use sensor::Sensor;
 
 /// The bus clock of the board (84 MHz) over the first power of two that brings it to 1 MHz or less.
 const SCK_HZ: u32 = 84_000_000 / 128;
 
-/// Everything the image said, and what became of the bytes.
-fn decode(received: &[(u64, u8)]) -> (Vec<Message>, Counters) {
-    let mut decoder = Decoder::new();
-    let messages = received.iter().filter_map(|&(_, byte)| decoder.push(byte)).filter_map(Received::message);
-    (messages.collect(), decoder.counters())
-}
-
-/// The same estimators on the host, fed with `bursts` until as many samples were taken as `report` says.
-fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], report: &ChannelReport) -> ChannelReport {
-    let index =
-        CHANNELS.iter().position(|&channel| channel as u8 == report.channel).expect("a channel that is estimated");
-    let mut cascades = CHANNELS.map(|_| Estimator::new());
-    let mut estimators = Estimators::new(&mut cascades, FIRST_CONFIG);
-    for (sample, bytes) in bursts {
-        if estimators.get(index).unwrap().len() == report.samples {
-            break;
-        }
-        let at_us = (*sample as f64 * 1e6 / 204.8) as u64;
-        estimators.take(Arrival { at_us, dropped: 0, burst: Some(Burst::from_bytes(bytes)) }, 0);
-    }
-    let (channel, estimator) = (CHANNELS[index], estimators.get(index).unwrap());
-    let model = (index < 6).then(|| channel_model(channel, estimator, FIRST_CONFIG));
-    channel_report(channel, estimator, FIRST_CONFIG, model.as_ref(), None)
+/// The sensor of the published characterisation.
+fn sensor(seed: u64) -> Sensor {
+    Sensor::new(VirtualAdis16405::new(NoiseModel::paper(), seed), SCK_HZ)
 }
 
 #[test]
 fn the_image_reports_what_the_host_computes_from_the_same_counts() {
-    const SECONDS: u64 = 8;
     const ASKED_AT_S: f64 = 4.5;
-    let part = VirtualAdis16405::new(NoiseModel::paper(), 1);
-    let request = ((ASKED_AT_S * 1e9) as u64, b'r');
-    let Outcome { sensor, received, complaints } =
-        run(build::image(), Some(Sensor::new(part, SCK_HZ)), &[request], SECONDS);
+    let keys = vec![(ASKED_AT_S, b"r".to_vec())];
+    let scenario = Scenario { sensor: Some(sensor(1)), keys, seconds: 6.0, ..Scenario::default() };
+    let Outcome { sensor, received, complaints, .. } = run(build::image(), scenario);
     let sensor = sensor.expect("the sensor hangs on the bus");
     assert_eq!(complaints, [""; 0], "the emulator has nothing to complain about");
 
@@ -63,7 +45,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     assert!(sensor.bursts.iter().map(|&(sample, _)| sample).eq(first..=last));
     assert!(sensor.part.samples() - last <= 1);
 
-    let (messages, counters) = decode(&received);
+    let Decoded { messages, counters, .. } = Decoded::of(&received);
     assert_eq!(counters, Counters { frames: messages.len() as u64, ..Counters::default() });
     let [Message::Log(log), Message::Hello(hello), channels @ .., Message::Health(health)] = messages.as_slice() else {
         panic!("a report goes from hello to health: {messages:?}");
@@ -102,20 +84,24 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
         let factors: Vec<u64> = (0..24).map(|octave| 1 << octave).filter(|n| 2 * n <= report.samples).collect();
         assert!(report.points.iter().map(|point| point.n).eq(factors));
         assert_eq!(report.coefficients.len(), if channel.unit() == "degC" || channel.unit() == "V" { 0 } else { 3 });
-        assert_eq!(*report, on_host(&sensor.bursts, report), "bit for bit");
+        assert_eq!(*report, on_host(&sensor.bursts, 204.8, report), "bit for bit");
     }
     assert_eq!(channels.len(), 8);
 
     assert!(u64::from(health.used) >= least);
     assert_eq!(health.used, health.bursts);
     assert_eq!((health.bus_errors, health.queue_full), (0, 0));
+    let sent = |bytes: &(u64, u8)| bytes.0;
+    let (first, last) =
+        (received.iter().rfind(|bytes| bytes.0 < 4_500_000_000).map_or(0, sent), received.last().map_or(0, sent));
     println!("{health:?}");
+    println!("a report took {:.3} s", (last - first.max(4_500_000_000)) as f64 * 1e-9);
 }
 
 #[test]
 fn a_missing_sensor_is_said_every_second() {
-    let Outcome { received, .. } = run(build::image(), None, &[], 3);
-    let (messages, counters) = decode(&received);
+    let Outcome { received, .. } = run(build::image(), Scenario { seconds: 3.0, ..Scenario::default() });
+    let Decoded { messages, counters, .. } = Decoded::of(&received);
     assert_eq!(counters.bad_frames, 0);
     assert_eq!(messages.len(), 3, "{messages:?}");
     for message in messages {

@@ -12,6 +12,8 @@ pub(crate) struct Sensor {
     pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
     /// Shortest time from one byte to the next within a frame, in ns.
     pub(crate) shortest_byte_ns: u64,
+    /// What the data line is held at.
+    pub(crate) stuck: Option<u8>,
     /// Words that were not of eight bits.
     pub(crate) odd_words: u64,
     byte_ns: u64,
@@ -29,6 +31,7 @@ impl Sensor {
             byte_ns: 8_000_000_000 / u64::from(sck_hz),
             bursts: Vec::new(),
             shortest_byte_ns: u64::MAX,
+            stuck: None,
             odd_words: 0,
             frame: Vec::new(),
             last_byte: None,
@@ -46,7 +49,8 @@ impl Peer for Sensor {
         }
         self.odd_words += u64::from(bits != 8);
         self.part.advance_to(now.saturating_sub(self.byte_ns));
-        let miso = self.part.transfer_byte(mosi as u8);
+        let answer = self.part.transfer_byte(mosi as u8);
+        let miso = self.stuck.unwrap_or(answer);
         self.frame.push((mosi as u8, miso));
         u32::from(miso)
     }

@@ -1,0 +1,103 @@
+//! What the image said, decoded by the host's decoder, and what the host makes of the same bursts.
+
+use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
+use firmware::{Arrival, CHANNELS, Estimator, Estimators, channel_model, channel_report};
+use link::{ChannelReport, Counters, Decoder, Health, Hello, Message, Raw, Received};
+
+pub(crate) struct Decoded {
+    pub(crate) messages: Vec<Message>,
+    pub(crate) lines: Vec<String>,
+    pub(crate) counters: Counters,
+}
+
+impl Decoded {
+    pub(crate) fn of(received: &[(u64, u8)]) -> Self {
+        let mut decoder = Decoder::new();
+        let (mut messages, mut lines) = (Vec::new(), Vec::new());
+        for received in received.iter().filter_map(|&(_, byte)| decoder.push(byte)) {
+            match received {
+                Received::Message { message, .. } => messages.push(message),
+                Received::Line(line) => lines.push(line.as_str().to_owned()),
+            }
+        }
+        Self { messages, lines, counters: decoder.counters() }
+    }
+
+    pub(crate) fn logs(&self) -> Vec<&str> {
+        self.messages
+            .iter()
+            .filter_map(|m| if let Message::Log(line) = m { Some(line.as_str()) } else { None })
+            .collect()
+    }
+
+    pub(crate) fn hellos(&self) -> Vec<&Hello> {
+        self.messages.iter().filter_map(|m| if let Message::Hello(hello) = m { Some(hello) } else { None }).collect()
+    }
+
+    pub(crate) fn healths(&self) -> Vec<&Health> {
+        self.messages.iter().filter_map(|m| if let Message::Health(health) = m { Some(health) } else { None }).collect()
+    }
+
+    pub(crate) fn channels(&self) -> Vec<&ChannelReport> {
+        self.messages
+            .iter()
+            .filter_map(|m| if let Message::Channel(report) = m { Some(report) } else { None })
+            .collect()
+    }
+
+    /// The bursts of the raw stream with their numbers.
+    pub(crate) fn raw(&self) -> Vec<(u64, Burst)> {
+        let mut bursts = Vec::new();
+        for message in &self.messages {
+            let Message::Raw(Raw { first, bursts: stream, .. }) = message else { continue };
+            let mut number = *first;
+            for burst in stream {
+                number += u64::from(burst.periods);
+                let mut bytes = [0; BURST_BYTES];
+                bytes[2..].copy_from_slice(burst.words.as_flattened());
+                bursts.push((number, Burst::from_bytes(&bytes)));
+            }
+        }
+        bursts
+    }
+}
+
+/// The same estimators on the host, fed with `bursts` until as many samples were taken as `report` says.
+pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], rate_hz: f64, report: &ChannelReport) -> ChannelReport {
+    in_stretches(&[bursts], rate_hz, report)
+}
+
+/// The same in several stretches: each starts as after a restart of the image.
+pub(crate) fn in_stretches(
+    stretches: &[&[(u64, [u8; BURST_BYTES])]],
+    rate_hz: f64,
+    report: &ChannelReport,
+) -> ChannelReport {
+    let index = CHANNELS.iter().position(|&channel| channel as u8 == report.channel).expect("a channel");
+    let period = SamplePeriod::nearest(rate_hz).expect("a rate");
+    let config = adis16405_driver::Config::new(GyroRange::Dps300, 0, period).expect("no filter");
+    let mut estimator = Estimator::new();
+    for bursts in stretches {
+        let mut cascades = CHANNELS.map(|_| Estimator::new());
+        cascades[index] = resumed(&estimator);
+        let mut estimators = Estimators::new(&mut cascades, config);
+        let at_us = |sample: u64| (sample as f64 * 1e6 / rate_hz) as u64;
+        estimators.trust(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
+        for &(sample, ref bytes) in *bursts {
+            if estimators.get(index).is_some_and(|estimator| estimator.len() == report.samples) {
+                break;
+            }
+            estimators.take(Arrival { at_us: at_us(sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) }, 0);
+        }
+        estimator = cascades[index].clone();
+    }
+    let channel = CHANNELS[index];
+    let model = (index < 6).then(|| channel_model(channel, &estimator, config));
+    channel_report(channel, &estimator, config, model.as_ref(), None)
+}
+
+/// What a restart leaves of an estimator.
+fn resumed(estimator: &Estimator) -> Estimator {
+    let learnt = core::array::from_fn(|octave| estimator.learnt(octave).expect("an octave"));
+    Estimator::resumed(estimator.len(), estimator.missing(), &learnt)
+}

@@ -1,0 +1,119 @@
+//! Full speed: 819.2 samples a second with everything else going on.
+
+use crate::bench::{Outcome, Scenario, Work, run};
+use crate::decoded::{Decoded, on_host};
+use crate::{build, sensor};
+use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
+use host_sim::analysis::analyze;
+use host_sim::record::port::Tape;
+use host_sim::replay::replay_log;
+use host_sim::source::frame_log::{Frame, FrameLog};
+use host_sim::timeline::Timeline;
+use link::Message;
+use std::path::Path;
+
+const RATE_HZ: f64 = 819.2;
+/// Emulated seconds unless `OBSERVATORY_SECONDS` says otherwise. Ten minutes, 600, take about ten times as long.
+const SECONDS: f64 = 60.0;
+/// The raw stream and the reports are off before, so that sampling and estimating can be weighed alone.
+const QUIET_S: (f64, f64) = (3.0, 8.0);
+
+#[test]
+fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
+    let seconds = std::env::var("OBSERVATORY_SECONDS").map_or(SECONDS, |text| text.parse().expect("seconds"));
+    let mut keys = vec![(1.0, b"i 0\rf 819.2\r".to_vec()), (QUIET_S.1, b"i 10\rw 1\r".to_vec())];
+    let typed = [&b"r"[..], b"t", b"?", b"s", b"k", b"e 0\r", b"x\r"];
+    let times = (0..).map(|k| QUIET_S.1 + 1.3 + 2.7 * f64::from(k)).take_while(|&at| at < seconds - 4.0);
+    keys.extend(times.zip(typed.iter().cycle()).map(|(at, keys)| (at, keys.to_vec())));
+    keys.push((seconds - 2.5, b"w 0\r".to_vec()));
+    keys.push((seconds - 2.0, b"r".to_vec()));
+    let scenario = Scenario { sensor: Some(sensor(2)), keys, seconds, ..Scenario::default() };
+    let Outcome { sensor, received, complaints, work } = run(build::image(), scenario);
+    let sensor = sensor.expect("the sensor hangs on the bus");
+    assert_eq!(complaints, [""; 0]);
+    assert_eq!(sensor.part.violations(), []);
+
+    // Since the rate was set every sample was read once.
+    let set = sensor.bursts.windows(2).rposition(|pair| pair[1].0 != pair[0].0 + 1).expect("the rate was set") + 1;
+    let bursts = &sensor.bursts[set..];
+    assert!(bursts.len() as f64 > (seconds - 1.1) * RATE_HZ - 100.0, "{} bursts", bursts.len());
+    assert!(sensor.part.samples() - bursts[bursts.len() - 1].0 <= 1);
+
+    // The raw stream is what the sensor sent, in order and complete.
+    let decoded = Decoded::of(&received);
+    assert_eq!((decoded.counters.missing, decoded.counters.bad_frames), (0, 0), "{:?}", decoded.counters);
+    let raw = decoded.raw();
+    assert!(raw.len() as f64 > (seconds - QUIET_S.1 - 2.6) * RATE_HZ, "{} bursts in the stream", raw.len());
+    let sent: Vec<Burst> = bursts.iter().map(|(_, bytes)| Burst::from_bytes(bytes)).collect();
+    let first = raw[0].0 as usize;
+    for (k, (number, burst)) in raw.iter().enumerate() {
+        assert_eq!(*number as usize, first + k, "numbers without a gap");
+        assert_eq!(*burst, sent[first + k], "burst {k}");
+    }
+
+    // The last report: nothing lost, equal to the host's bit for bit.
+    let health = **decoded.healths().last().expect("a report");
+    assert_eq!((health.used, health.lost_edges + health.stray_edges + health.queue_full), (health.bursts, 0));
+    assert_eq!((health.recoveries, health.raw_dropped, health.serial_overruns), (0, 0, 0), "{health:?}");
+    let channels = decoded.channels();
+    for report in &channels[channels.len() - 8..] {
+        assert_eq!(report.missing, 0);
+        assert_eq!(**report, on_host(bursts, RATE_HZ, report), "bit for bit");
+    }
+    let measured = decoded.hellos().last().and_then(|hello| hello.measured_rate_hz).expect("a rate");
+    assert!((measured / RATE_HZ - 1.0).abs() < 1e-6, "{measured} Hz");
+    assert!(decoded.lines.iter().any(|line| line.starts_with("Allan deviation")));
+
+    a_recording_off_the_cable_analyses_to_the_identical_report(&decoded, &bursts[first..]);
+
+    let quiet = between(&work, QUIET_S);
+    let busy = between(&work, (QUIET_S.1 + 1.0, seconds - 3.0));
+    println!("{seconds} s at {RATE_HZ} SPS, {} bursts read, {} in the raw stream", bursts.len(), raw.len());
+    println!("sampling and estimating: {} instructions a sample, {:.2} % of 168 MHz", quiet.0, quiet.1);
+    println!("with raw stream, reports and keys: {} instructions a sample, {:.2} %", busy.0, busy.1);
+    println!(
+        "longest sampling interrupt {} instructions, longest turn of the estimators {}",
+        health.sampling_cycles, health.estimator_cycles
+    );
+    println!("stack {} B, at most {} bursts waited", health.stack_bytes, health.queue_peak);
+    assert!(quiet.1 < 5.0, "more than 5 % of the processor");
+    assert!(health.sampling_cycles < 168 * 20, "a sampling interrupt of more than 20 us");
+}
+
+/// Instructions a sample, and the part of 168 million a second in percent, between two times in s.
+fn between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
+    let at = |seconds: f64| work.iter().find(|work| work.at as f64 >= seconds * 1e9).expect("a time of the run");
+    let (from, to) = (at(from), at(to));
+    let instructions = to.instructions - from.instructions;
+    let share = 100.0 * instructions as f64 / (168e6 * (to.at - from.at) as f64 * 1e-9);
+    (instructions / (to.samples - from.samples), share)
+}
+
+/// What `host-sim record` writes of the cable's bytes, against a log of the frames that the sensor handed out at the times
+/// of its own clock.
+fn a_recording_off_the_cable_analyses_to_the_identical_report(decoded: &Decoded, bursts: &[(u64, [u8; BURST_BYTES])]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let report = |file: &Path| {
+        let recording = replay_log(file, GyroRange::Dps300).expect("a log").recording;
+        let timeline = Timeline::of(&recording, Some(RATE_HZ)).expect("a timeline");
+        serde_json::to_string(&analyze(&recording, &timeline)).expect("a report")
+    };
+    let cable = folder.path().join("cable.csv");
+    let mut tape = Tape::create(&cable).expect("a log");
+    for message in &decoded.messages {
+        if let Message::Raw(raw) = message {
+            tape.write(raw).expect("room");
+        }
+    }
+    assert_eq!(tape.missing(), 0);
+    let recorded = decoded.raw().len();
+    tape.finish().expect("room");
+    let sensor = folder.path().join("sensor.csv");
+    let mut log = FrameLog::create(&sensor).expect("a log");
+    for (sample, bytes) in &bursts[..recorded] {
+        let frame = Frame { time_s: *sample as f64 / RATE_HZ, mosi: BURST_REQUEST.to_vec(), miso: bytes.to_vec() };
+        log.write(&frame).expect("room");
+    }
+    log.finish().expect("room");
+    assert_eq!(report(&cable), report(&sensor));
+}
