@@ -12,11 +12,8 @@ pub mod analysis;
 pub mod cli;
 pub mod coefficients;
 pub mod device;
-<<<<<<< HEAD
 pub mod grid;
-=======
 pub mod monitor;
->>>>>>> d4ad7d6 (wip)
 pub mod page;
 pub mod paper;
 pub mod plot;

@@ -5,13 +5,9 @@ use anyhow::{Context, Result, bail};
 use clap::Parser;
 use host_sim::analysis::analyze;
 use host_sim::cli::{Cli, Command, Input, Output};
-<<<<<<< HEAD
-use host_sim::paper::Experiment;
-use host_sim::record::Simulation;
-=======
 use host_sim::monitor::{self, Cable};
+use host_sim::paper::Experiment;
 use host_sim::record::{self, Simulation};
->>>>>>> d4ad7d6 (wip)
 use host_sim::recording::Recording;
 use host_sim::replay::replay;
 use host_sim::report::Report;
