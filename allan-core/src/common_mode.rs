@@ -10,6 +10,8 @@ use heapless::Vec;
 
 /// Standard deviations from which on two channels are believed to share something.
 const DOUBT: f64 = 5.0;
+/// Averaging factors below this are not what is slow: neighbouring channels share noise of their common electronics.
+const SLOW: u64 = 32;
 
 /// What two channels share.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +60,7 @@ pub fn common_mode<const POINTS: usize>(
             shares: model_a.shares(point.n),
         })
     };
-    let octaves: Vec<Octave, POINTS> = shared.iter().filter_map(octave).collect();
+    let octaves: Vec<Octave, POINTS> = shared.iter().filter(|point| point.n >= SLOW).filter_map(octave).collect();
     let (from, sigmas) = clearest(&octaves)?;
     if abs(sigmas) < DOUBT {
         return None;

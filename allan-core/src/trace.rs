@@ -67,19 +67,26 @@ pub enum Lines<'a> {
     Known(&'a [Kind]),
 }
 
+impl Trace {
+    /// N, B and K fitted to `curve`, and nothing sought.
+    #[must_use]
+    pub fn declared<const POINTS: usize>(curve: &Curve<POINTS>) -> Self {
+        let before = fit(curve, &Kind::DECLARED);
+        let before_goodness = goodness(curve, &before);
+        Self { after: before.clone(), after_goodness: before_goodness, before, before_goodness, found: Vec::new() }
+    }
+}
+
 /// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
 #[must_use]
 pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
-    let before = fit(curve, &Kind::DECLARED);
-    let before_goodness = goodness(curve, &before);
     let families = families(curve, lines);
-    let mut after = before.clone();
-    let mut found: Vec<Found, MAX_ADDED> = Vec::new();
+    let Trace { before, before_goodness, mut after, mut found, .. } = Trace::declared(curve);
     while after.terms().len() < MAX_TERMS && !found.is_full() {
         let Some(rival) = most_telling(&Baseline::new(curve, &after), &kinds(&after), &families) else { break };
         let residual = largest_residual(curve, &after);
         let term = rival.kinds.len().min(after.terms().len());
-        // A filter has taken the place of the white noise.
+        // A filter that is read slowly has taken the place of the white noise.
         let term = if rival.kinds.len() == after.terms().len() { 0 } else { term };
         after = fit_shapes(curve, &rival.kinds);
         // There is room: the loop ends when it is full.
@@ -108,7 +115,8 @@ fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family]) -> Opt
 /// The model with one term more; `None` where it has one that would be the same.
 fn with(kinds: &[Kind], candidate: &Kind) -> Option<Vec<Kind, MAX_TERMS>> {
     let mut with: Vec<Kind, MAX_TERMS> = kinds.iter().copied().collect();
-    if let Kind::Filtered(_) = candidate {
+    // Read slowly, what is left of a filter cannot be told from a mixture with white noise: it takes its place.
+    if matches!(candidate, Kind::Filtered(filter) if filter.decimation != 1.0) {
         let white = with.iter_mut().find(|kind| **kind == Kind::AngleRandomWalk)?;
         *white = *candidate;
         return Some(with);

@@ -1,20 +1,40 @@
-//! From a recording to a report: the estimator, the declared model, and its error on data that it has not seen.
+//! From a recording to a report: the estimator, the declared model, what it lacks, and its error on data that it has
+//! not seen.
+//!
+//! Effects are named on the whole record. The errors before and after come from the first half alone: what it shows
+//! to be missing is added, and judged on the second half.
+
+mod lines;
+mod naming;
+mod parts;
+mod repairs;
+mod study;
 
 use crate::recording::Recording;
 use crate::report::{
-    ChannelReport, CurvePoint, ModelError, ModelReport, Parameter, ReadOff, ReadOffValue, Report, SCHEMA, Term,
+    ChannelReport, CurvePoint, Effect, ModelError, ModelReport, ReadOff, ReadOffValue, Report, SCHEMA, Term,
 };
 use crate::timeline::{Step, Timeline};
 use adis16405_driver::Channel;
-use allan_core::term::CoefficientUnit;
-use allan_core::{Cascade, Curve, Kind, Model, check, fit::fit, read_off};
+use allan_core::common_mode::common_mode;
+use allan_core::term::{CoefficientUnit, Kind};
+use allan_core::{Cascade, Curve, Model, check, read_off, telegraph};
 use firmware::{OCTAVES, OVERLAP};
+use lines::Line;
+use parts::{Part, Parts};
+use repairs::{Repairs, in_parallel};
 use std::collections::BTreeMap;
+use study::Study;
+
+/// Allan variance in counts², at the shortest octaves, from which on rounding adds white noise and nothing else.
+const DITHERED: f64 = 0.2;
+/// Behind a filter neighbouring samples are alike, and the noise shows at a few samples only.
+const DITHERED_OCTAVES: usize = 7;
 
 /// The target's own.
 type Estimator = Cascade<OCTAVES, OVERLAP>;
 
-/// Analyses every channel of a recording along its timeline.
+/// Analyses every channel of a recording along its timeline. What a model lacks is traced in the inertial channels.
 #[must_use]
 pub fn analyze(recording: &Recording, timeline: &Timeline) -> Report {
     let used = timeline.steps.iter().filter(|step| matches!(step, Step::Sample(_))).count();
@@ -24,11 +44,7 @@ pub fn analyze(recording: &Recording, timeline: &Timeline) -> Report {
         samples: used as u64,
         dropped: by_cause(&timeline.dropped),
         flagged: by_cause(&timeline.flagged),
-        channels: recording
-            .channels
-            .iter()
-            .map(|&channel| analyze_channel(recording, timeline, used, channel))
-            .collect(),
+        channels: analyze_channels(recording, timeline, used as u64),
     }
 }
 
@@ -36,53 +52,142 @@ fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
     counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
-fn analyze_channel(recording: &Recording, timeline: &Timeline, used: usize, channel: Channel) -> ChannelReport {
-    let estimators = Estimators::run(recording, timeline, used / 2, channel);
-    let curve =
-        |estimator: &Estimator| estimator.curve(1.0 / timeline.sample_rate_hz).scaled(channel.lsb(recording.range));
-    let (whole, first, second) = (curve(&estimators.whole), curve(&estimators.first), curve(&estimators.second));
-    let model = fit(&first, &Kind::DECLARED);
-    let whole = whole.with_confidence(|point| model.shares(point.n));
-    let before = model_report(&model, channel.unit(), [&whole, &first, &second]);
-    ChannelReport {
-        name: channel.name().to_owned(),
-        unit: channel.unit().to_owned(),
-        samples: estimators.whole.len(),
-        curve: curve_points(&whole),
-        read_off: read_off(&whole, channel.unit()),
-        after: before.clone(),
-        before,
-        effects: Vec::new(),
-    }
-}
-
-/// One channel's estimators: over the whole record, over the half that is fitted, over the half that is not.
-struct Estimators {
-    whole: Estimator,
-    first: Estimator,
-    second: Estimator,
-}
-
-impl Estimators {
-    fn run(recording: &Recording, timeline: &Timeline, half: usize, channel: Channel) -> Self {
-        let mut estimators = Self { whole: Cascade::new(), first: Cascade::new(), second: Cascade::new() };
-        let Self { whole, first, second } = &mut estimators;
-        for &step in &timeline.steps {
-            let part = if whole.len() < half as u64 { &mut *first } else { &mut *second };
-            match step {
-                Step::Gap(missing) => {
-                    whole.gap(missing);
-                    part.gap(missing);
-                }
-                Step::Sample(index) => {
-                    let count = i32::from(recording.samples[index].counts.get(channel));
-                    whole.push(count);
-                    part.push(count);
-                }
-            }
+fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) -> Vec<ChannelReport> {
+    let recorded = |channel: &Channel| recording.channels.contains(channel);
+    let traced: Vec<Channel> = Channel::INERTIAL.into_iter().filter(recorded).collect();
+    let surroundings = [Channel::Temp, Channel::Supply].into_iter().filter(recorded);
+    let coupled: Vec<Channel> = traced.iter().copied().chain(surroundings).collect();
+    let repairs = Repairs::find(recording, timeline, &traced);
+    let parts = Parts::of(recording, timeline, &coupled, &repairs);
+    let studies = in_parallel(&recording.channels, |&channel| {
+        let series = traced.contains(&channel).then(|| repairs.series(recording, timeline, channel));
+        Studies::of(&parts, channel, series.as_ref())
+    });
+    let studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
+    let report = |((channel, own), measured): (&(Channel, Studies), &Curve<OCTAVES>)| {
+        let unit = channel.unit();
+        let mut effects: Vec<Effect> = Vec::new();
+        if traced.contains(channel) {
+            effects.extend(repairs.effects(*channel));
+            effects.extend(named(&parts.both, *channel, own, &studies, 1.0 / timeline.sample_rate_hz));
         }
-        estimators
+        let whole = measured.clone().with_confidence(|point| own.first.trace.before.shares(point.n));
+        ChannelReport {
+            name: channel.name().to_owned(),
+            unit: unit.to_owned(),
+            samples,
+            curve: curve_points(&whole),
+            read_off: read_off(&whole, unit),
+            before: own.before(&parts, *channel, unit, &whole),
+            after: own.after(&parts, *channel, unit, &whole),
+            effects,
+        }
+    };
+    studies.iter().zip(&parts.measured).map(report).collect()
+}
+
+/// A channel learnt from the first half, which predicts, and from both, which name.
+struct Studies {
+    first: Study,
+    both: Study,
+    lines: Vec<Line>,
+}
+
+impl Studies {
+    fn of(parts: &Parts, channel: Channel, series: Option<&crate::trace::Series>) -> Self {
+        let position = parts.both.position(channel).unwrap_or_default();
+        let lines = series.map(lines::of).unwrap_or_default();
+        let half_lines = series.map(|series| lines::of(&series.first_half())).unwrap_or_default();
+        Self {
+            first: Study::of(&parts.first, position, series.map(|_| lines::kinds(&half_lines)).as_deref()),
+            both: Study::of(&parts.both, position, series.map(|_| lines::kinds(&lines)).as_deref()),
+            lines,
+        }
     }
+
+    fn before(&self, parts: &Parts, channel: Channel, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
+        let position = parts.first.position(channel).unwrap_or_default();
+        let model = &self.first.trace.before;
+        ModelReport {
+            terms: terms(model, unit),
+            adev: whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
+            fitted: model_error(model, &parts.first.curve(position)),
+            unseen: model_error(model, &parts.second.curve(position)),
+        }
+    }
+
+    fn after(&self, parts: &Parts, channel: Channel, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
+        let position = parts.first.position(channel).unwrap_or_default();
+        let model = &self.first.trace.after;
+        // What the channel follows is in the measured curve, not in the model of the rest.
+        let raw = parts.both.curve(position);
+        let rest = self.first.compensated(&parts.both, position);
+        let followed = |n: u64| {
+            let of = |curve: &Curve<OCTAVES>| curve.points().iter().find(|point| point.n == n).map(|point| point.avar);
+            of(&raw).zip(of(&rest)).map_or(0.0, |(raw, rest)| (raw - rest).max(0.0))
+        };
+        ModelReport {
+            terms: terms(model, unit),
+            adev: whole.points().iter().map(|point| (model.avar(point.n) + followed(point.n)).sqrt()).collect(),
+            fitted: model_error(model, &self.first.curve),
+            unseen: model_error(model, &self.first.compensated(&parts.second, position)),
+        }
+    }
+}
+
+/// Everything that the whole record shows in a channel beyond the declared model.
+fn named(part: &Part, channel: Channel, own: &Studies, all: &[(Channel, Studies)], period_s: f64) -> Vec<Effect> {
+    let (study, unit) = (&own.both, channel.unit());
+    let causes: Vec<_> = study.causes().map(|(cause, followed)| (part.channels[cause], *followed)).collect();
+    let mut effects = naming::followed_effects(&causes, unit);
+    let common = partner(part, channel, own, all)
+        .map(|(partner, common)| naming::common_effect(&common, partner, unit, period_s));
+    // Where the noise does not reach from one count to the next, rounding is no noise, and the curve shows its steps.
+    let count = part.position(channel).map_or(0.0, |position| part.count(position));
+    let shortest = study.curve.points().iter().take(DITHERED_OCTAVES).map(|point| point.avar);
+    let dithered = shortest.fold(0.0, f64::max) > DITHERED * count * count;
+    for found in &study.trace.found {
+        let term = &study.trace.after.terms()[found.term];
+        match term.kind {
+            Kind::Filtered(_) => effects.push(naming::term_effect(term, found, unit, period_s)),
+            _ if !dithered => {}
+            // The spectrum tells them better.
+            Kind::Sinusoid(_) | Kind::Resonance(_) => {}
+            // What is shared needs no second name.
+            Kind::Markov(_) | Kind::RateRamp if common.is_some() => {}
+            Kind::Markov(markov) => match telegraph::judge(&study.curve, &study.trace.after, markov) {
+                Some(verdict) if verdict.is_telegraph() => {
+                    effects.push(naming::telegraph_effect(term, found, &verdict, unit, period_s));
+                }
+                _ => effects.push(naming::term_effect(term, found, unit, period_s)),
+            },
+            _ => effects.push(naming::term_effect(term, found, unit, period_s)),
+        }
+    }
+    effects.extend(common);
+    effects.extend(own.lines.iter().map(|line| naming::line_effect(line, unit)));
+    effects
+}
+
+/// The channel of the same sort that a channel most clearly shares a slow part with.
+fn partner(
+    part: &Part,
+    channel: Channel,
+    own: &Studies,
+    all: &[(Channel, Studies)],
+) -> Option<(Channel, allan_core::common_mode::CommonMode)> {
+    let sort = |channel: Channel| Channel::INERTIAL[..3].contains(&channel);
+    let others =
+        all.iter().filter(|(of, _)| *of != channel && sort(*of) == sort(channel) && Channel::INERTIAL.contains(of));
+    let shared = others.filter_map(|(of, other)| {
+        let (a, b) = (part.position(channel)?, part.position(*of)?);
+        let rest = own.both.shared_rest(part, a, &other.both, b);
+        let side = |study: &Study| (study.curve.clone(), study.trace.after.clone());
+        let ((curve, model), (other_curve, other_model)) = (side(&own.both), side(&other.both));
+        let common = common_mode((&curve, &model), (&other_curve, &other_model), &rest)?;
+        Some((*of, common))
+    });
+    shared.max_by(|(_, a), (_, b)| a.sigmas.abs().total_cmp(&b.sigmas.abs()))
 }
 
 fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {
@@ -98,20 +203,12 @@ fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {
     curve.points().iter().map(point).collect()
 }
 
-fn model_report(model: &Model, unit: &str, [whole, first, second]: [&Curve<OCTAVES>; 3]) -> ModelReport {
+fn terms(model: &Model, unit: &str) -> Vec<Term> {
     let term = |term: &allan_core::model::Term| Term {
         kind: term.kind.name().to_owned(),
-        parameters: BTreeMap::from([(
-            term.kind.coefficient().to_owned(),
-            Parameter { value: term.value, low: term.low, high: term.high, unit: coefficient_unit(term.kind, unit) },
-        )]),
+        parameters: naming::parameters(term, unit),
     };
-    ModelReport {
-        terms: model.terms().iter().map(term).collect(),
-        adev: whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
-        fitted: model_error(model, first),
-        unseen: model_error(model, second),
-    }
+    model.terms().iter().map(term).collect()
 }
 
 fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> ModelError {
@@ -124,10 +221,10 @@ fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> ModelError {
 }
 
 fn read_off(curve: &Curve<OCTAVES>, unit: &str) -> ReadOff {
-    let value = |coefficient: Option<read_off::Coefficient>, kind| {
+    let value = |coefficient: Option<read_off::Coefficient>, kind: Kind| {
         coefficient.map(|coefficient| ReadOffValue {
             value: coefficient.value,
-            unit: coefficient_unit(kind, unit),
+            unit: coefficient_unit(&kind, unit),
             from_s: *coefficient.interval.start(),
             to_s: *coefficient.interval.end(),
         })
@@ -140,7 +237,7 @@ fn read_off(curve: &Curve<OCTAVES>, unit: &str) -> ReadOff {
 }
 
 /// The unit of a coefficient of a channel in `unit`.
-fn coefficient_unit(kind: Kind, unit: &str) -> String {
+fn coefficient_unit(kind: &Kind, unit: &str) -> String {
     match (kind.unit(), unit.strip_suffix("/s")) {
         (CoefficientUnit::TimesSecond, Some(angle)) => angle.to_owned(),
         (CoefficientUnit::TimesSecond, None) => format!("{unit}*s"),

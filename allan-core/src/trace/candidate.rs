@@ -26,9 +26,10 @@ pub(super) fn families<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines)
     };
     add(1, [Kind::Quantization].into_iter().collect());
     add(1, [Kind::RateRamp].into_iter().collect());
-    // A filter takes the place of the white noise: its taps are all that it adds.
-    add(1, (1..=6).map(|log2| Kind::Filtered(Filter::bartlett(1 << log2))).collect());
+    // Behind the filter the converter's rounding adds white noise.
+    add(2, (1..=6).map(|log2| Kind::Filtered(Filter::bartlett(1 << log2))).collect());
     let sampled_slowly = |decimation| Kind::Filtered(Filter { stages: 2, taps: 8, decimation });
+    // It takes the place of the white noise: the rate is all that it adds.
     add(2, [6.1, 8.1, 10.1, 12.1].into_iter().map(sampled_slowly).collect());
     add(2, octaves(2.0 * period, longest, 1.0).map(|time| Kind::Markov(Markov { time_constant: time })).collect());
     match lines {

@@ -20,7 +20,7 @@ pub const FALSE_ALARM: f64 = 1e-3;
 pub const FEWEST_PERIODS: usize = 8;
 
 /// Lines that are sought in a record.
-const MOST: usize = 24;
+const MOST: usize = 6;
 /// A resonance is broader than this many resolutions …
 const NARROWEST: f64 = 1.5;
 /// … and likelier than a sinusoid by this −2 log-likelihood ratio.

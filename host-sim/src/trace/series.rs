@@ -62,6 +62,13 @@ impl Series {
         self.slots.last().map_or(0.0, |&slot| slot as f64 * self.period_s)
     }
 
+    /// The first half of the samples.
+    #[must_use]
+    pub fn first_half(&self) -> Self {
+        let half = self.values.len() / 2;
+        Self { slots: self.slots[..half].to_vec(), values: self.values[..half].to_vec(), ..*self }
+    }
+
     /// The series without the effect.
     #[must_use]
     pub fn repaired(mut self, repair: &Repair) -> Self {

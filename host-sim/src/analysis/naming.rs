@@ -1,0 +1,193 @@
+//! Effects as they are reported: parameters with units and intervals, evidence that a person can check.
+
+use super::coefficient_unit;
+use super::lines::Line;
+use crate::report::{Effect, Parameter};
+use crate::spectrum::line::Estimate;
+use adis16405_driver::Channel;
+use allan_core::common_mode::CommonMode;
+use allan_core::model::Term;
+use allan_core::regression::Sensitivity;
+use allan_core::telegraph::Verdict;
+use allan_core::term::{Filter, Kind};
+use allan_core::trace::Found;
+use std::collections::BTreeMap;
+
+/// Rate of the part's own filter, Hz (data sheet: internal sample clock).
+const INTERNAL_RATE_HZ: f64 = 819.2;
+/// Two-sided 95 % of a normal variable.
+const NORMAL_975: f64 = 1.96;
+
+/// A term's parameters by name.
+pub(super) fn parameters(term: &Term, unit: &str) -> BTreeMap<String, Parameter> {
+    let coefficient =
+        Parameter { value: term.value, low: term.low, high: term.high, unit: coefficient_unit(&term.kind, unit) };
+    let shapes = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
+    let shape = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
+        (name.to_owned(), Parameter { value, low, high, unit: shape_unit(name).to_owned() })
+    };
+    shapes.map(shape).chain([(term.kind.coefficient().to_owned(), coefficient)]).collect()
+}
+
+fn shape_unit(name: &str) -> &'static str {
+    match name {
+        "frequency" | "bandwidth" => "Hz",
+        "time_constant" => "s",
+        _ => "",
+    }
+}
+
+/// A term that the declared model lacks.
+pub(super) fn term_effect(term: &Term, found: &Found, unit: &str, period_s: f64) -> Effect {
+    let residual = found.residual;
+    let evidence = format!(
+        "{:+.1} % at tau = {} s ({:.0} sigma) before it was added, which takes {:.0} sigma off the fit; {}",
+        100.0 * residual.excess,
+        seconds(residual.n as f64 * period_s),
+        residual.sigmas.abs(),
+        found.score.sqrt(),
+        meaning(&term.kind),
+    );
+    Effect { kind: term.kind.name().to_owned(), parameters: parameters(term, unit), evidence }
+}
+
+/// A Markov term whose fourth moments show two levels.
+pub(super) fn telegraph_effect(term: &Term, found: &Found, verdict: &Verdict, unit: &str, period_s: f64) -> Effect {
+    let markov = term_effect(term, found, unit, period_s);
+    let mut parameters = markov.parameters;
+    parameters.remove("deviation");
+    // Two levels, equally often: their distance is twice the standard deviation.
+    let amplitude =
+        Parameter { value: 2.0 * term.value, low: 2.0 * term.low, high: 2.0 * term.high, unit: unit.to_owned() };
+    parameters.insert("amplitude".to_owned(), amplitude);
+    let evidence = format!(
+        "two levels: excess kurtosis {:.2} ± {:.2} of that of a telegraph signal, a Gaussian process has 0; {}",
+        verdict.ratio, verdict.error, markov.evidence,
+    );
+    Effect { kind: "telegraph".to_owned(), parameters, evidence }
+}
+
+/// What a channel follows: temperature, supply, and the specific force on its axes as one effect.
+pub(super) fn followed_effects(followed: &[(Channel, Sensitivity)], unit: &str) -> Vec<Effect> {
+    let parameter = |followed: &Sensitivity, of: &str| Parameter {
+        value: followed.value,
+        low: followed.value - NORMAL_975 * followed.error,
+        high: followed.value + NORMAL_975 * followed.error,
+        unit: format!("{unit}/{of}"),
+    };
+    let single = |cause: Channel, kind: &str, of: &str, meaning: &str| {
+        let (_, followed) = followed.iter().find(|(channel, _)| *channel == cause)?;
+        Some(Effect {
+            kind: kind.to_owned(),
+            parameters: BTreeMap::from([("sensitivity".to_owned(), parameter(followed, of))]),
+            evidence: format!(
+                "follows the measured {kind} in the same differences, {:.0} sigma; {meaning}",
+                followed.sigmas()
+            ),
+        })
+    };
+    let axes: Vec<_> = followed.iter().filter(|(channel, _)| Channel::INERTIAL[3..].contains(channel)).collect();
+    let acceleration = (!axes.is_empty()).then(|| {
+        let axis = |channel: Channel| channel.name().trim_start_matches("accl_").to_owned();
+        let clearest = axes.iter().map(|(_, followed)| followed.sigmas()).fold(0.0, f64::max);
+        Effect {
+            kind: "acceleration".to_owned(),
+            parameters: axes
+                .iter()
+                .map(|(channel, followed)| (format!("sensitivity_{}", axis(*channel)), parameter(followed, "g")))
+                .collect(),
+            evidence: format!("follows the measured specific force, {clearest:.0} sigma; g-sensitivity of the gyro"),
+        }
+    });
+    let temperature = single(Channel::Temp, "temperature", "degC", "a bias that drifts with temperature");
+    let supply = single(Channel::Supply, "supply", "V", "a bias that is not regulated");
+    temperature.into_iter().chain(supply).chain(acceleration).collect()
+}
+
+/// A line that the spectrum shows.
+pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
+    let parameter = |estimate: Estimate, unit: &str| {
+        let half_width = NORMAL_975 * estimate.error;
+        let (low, high) = ((estimate.value - half_width).max(0.0), estimate.value + half_width);
+        Parameter { value: estimate.value, low, high, unit: unit.to_owned() }
+    };
+    let (kind, root) = (line.kind(), 2f64.sqrt());
+    let parameters = match kind {
+        Kind::Resonance(_) => {
+            vec![("deviation", parameter(line.deviation, unit)), ("bandwidth", parameter(line.width, "Hz"))]
+        }
+        _ => {
+            let Estimate { value, error } = line.deviation;
+            vec![("amplitude", parameter(Estimate { value: root * value, error: root * error }, unit))]
+        }
+    };
+    let frequency = ("frequency", parameter(line.frequency, "Hz"));
+    Effect {
+        kind: kind.name().to_owned(),
+        parameters: parameters.into_iter().chain([frequency]).map(|(name, value)| (name.to_owned(), value)).collect(),
+        evidence: format!(
+            "line at {:.4} Hz in the spectrum, {:.4} Hz wide, {:.0} sigma, by chance anywhere {:.0e}; {}",
+            line.frequency.value,
+            line.width.value,
+            line.statistic.sqrt(),
+            line.p_value,
+            meaning(&kind),
+        ),
+    }
+}
+
+/// A slow part that a channel shares with `partner`.
+pub(super) fn common_effect(common: &CommonMode, partner: Channel, unit: &str, period_s: f64) -> Effect {
+    let half_width = NORMAL_975 * common.error;
+    let deviation = Parameter {
+        value: common.deviation,
+        low: (common.deviation - half_width).max(0.0),
+        high: common.deviation + half_width,
+        unit: unit.to_owned(),
+    };
+    let time = common.time_constant;
+    // The times that were tried are a factor of 1.3 apart, and few independent stretches tell them.
+    let time = Parameter { value: time, low: time / 2.0, high: time * 2.0, unit: "s".to_owned() };
+    Effect {
+        kind: "common_mode".to_owned(),
+        parameters: BTreeMap::from([("deviation".to_owned(), deviation), ("time_constant".to_owned(), time)]),
+        evidence: format!(
+            "moves with {} from tau = {} s on, {:+.0} sigma, and no measured cause explains it; \
+             a shared reference, supply or temperature gradient",
+            partner.name(),
+            seconds(common.from_n as f64 * period_s),
+            common.sigmas,
+        ),
+    }
+}
+
+fn seconds(tau: f64) -> String {
+    if tau < 0.1 { format!("{tau:.4}") } else { format!("{tau:.3}") }
+}
+
+/// What a term may physically be.
+fn meaning(kind: &Kind) -> String {
+    match kind {
+        Kind::Quantization => "steps of the angle: a counter or an integrator before the output".to_owned(),
+        Kind::RateRamp => "a steady drift: warming up, or ageing".to_owned(),
+        Kind::Filtered(filter) => filter_meaning(filter),
+        Kind::Markov(_) => "a correlated fluctuation: thermal or electronic".to_owned(),
+        Kind::Resonance(_) => "a narrow band: a mechanical resonance or an unsteady vibration".to_owned(),
+        Kind::Sinusoid(_) => "a steady line: a vibration, or an interference folded into the band".to_owned(),
+        Kind::AngleRandomWalk | Kind::BiasInstability | Kind::RateRandomWalk => "part of the declared model".to_owned(),
+    }
+}
+
+fn filter_meaning(filter: &Filter) -> String {
+    let window = if filter.stages == 2 { "Bartlett window" } else { "moving average" };
+    if filter.decimation == 1.0 {
+        return format!("neighbours correlate as behind a {window} of {} taps a stage", filter.taps);
+    }
+    format!(
+        "neighbours correlate as behind a {window} of {} taps a stage that is read every {:.2} values; \
+         at the part's own {INTERNAL_RATE_HZ} Hz that is a sample rate of {:.1} Hz",
+        filter.taps,
+        filter.decimation,
+        INTERNAL_RATE_HZ / filter.decimation,
+    )
+}

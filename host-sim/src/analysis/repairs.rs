@@ -1,0 +1,110 @@
+//! What was found in the samples themselves, and how the series become whole again without it.
+
+use crate::recording::Recording;
+use crate::report::Effect;
+use crate::timeline::Timeline;
+use crate::trace::{Finding, Repair, Series, bias_step, deliveries, sample_clock, spikes};
+use adis16405_driver::Channel;
+use std::collections::BTreeSet;
+
+/// Effects in the samples, and their repairs.
+#[derive(Default)]
+pub(super) struct Repairs {
+    /// What concerns every channel: how the samples were taken and delivered.
+    everywhere: Vec<Effect>,
+    of_channel: Vec<(Channel, Effect)>,
+    left_out: BTreeSet<usize>,
+    levels: Vec<(Channel, usize, f64)>,
+}
+
+impl Repairs {
+    /// Looks for spikes and steps in `traced`, and for what became of the samples of the whole recording.
+    pub(super) fn find(recording: &Recording, timeline: &Timeline, traced: &[Channel]) -> Self {
+        let mut repairs = Self::default();
+        let deliveries = [
+            deliveries::dropped(timeline),
+            deliveries::repeated(recording, timeline),
+            sample_clock::find(recording, timeline),
+        ];
+        for finding in deliveries.into_iter().flatten() {
+            repairs.left_out.extend(left_out(&finding.repair));
+            repairs.everywhere.push(finding.effect);
+        }
+        let of = |channel: Channel| Series::of(recording, timeline, channel);
+        let causes: Vec<(Channel, Series)> = recording.channels.iter().map(|&channel| (channel, of(channel))).collect();
+        let found = in_parallel(traced, |&channel| {
+            let series = of(channel);
+            let spikes = spikes::find(&series);
+            let left = spikes.as_ref().map(|finding| left_out(&finding.repair)).unwrap_or_default();
+            let cleaned = series.repaired(&Repair::LeaveOut(left.clone()));
+            let others: Vec<&Series> =
+                causes.iter().filter(|(of, _)| may_cause(*of, channel)).map(|(_, series)| series).collect();
+            // A cause must have the same samples.
+            let step =
+                if left.is_empty() { bias_step::find(&cleaned, &others) } else { bias_step::find(&cleaned, &[]) };
+            (spikes, step, left)
+        });
+        for (&channel, (spikes, step, left)) in traced.iter().zip(found) {
+            if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
+                repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
+            }
+            repairs.left_out.extend(left);
+            repairs.of_channel.extend(spikes.into_iter().chain(step).map(|finding| (channel, finding.effect)));
+        }
+        repairs
+    }
+
+    /// Whether the sample at `position` of the timeline is not to be used.
+    pub(super) fn leaves_out(&self, position: usize) -> bool {
+        self.left_out.contains(&position)
+    }
+
+    /// What is to be taken from a sample, in the channel's unit.
+    pub(super) fn level(&self, channel: Channel, position: usize) -> f64 {
+        self.levels.iter().filter(|(of, from, _)| *of == channel && position >= *from).map(|(.., size)| size).sum()
+    }
+
+    /// A channel's series without what was found in it.
+    pub(super) fn series(&self, recording: &Recording, timeline: &Timeline, channel: Channel) -> Series {
+        let mut series = Series::of(recording, timeline, channel);
+        for &(_, from, size) in self.levels.iter().filter(|(of, ..)| *of == channel) {
+            series = series.repaired(&Repair::Level { from, size });
+        }
+        series.repaired(&Repair::LeaveOut(self.left_out.iter().copied().collect()))
+    }
+
+    /// What was found in a channel.
+    pub(super) fn effects(&self, channel: Channel) -> impl Iterator<Item = Effect> + '_ {
+        let own = self.of_channel.iter().filter(move |(of, _)| *of == channel).map(|(_, effect)| effect);
+        self.everywhere.iter().chain(own).cloned()
+    }
+}
+
+/// Runs a task for each of `items`, each on a thread of its own.
+pub(super) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    std::thread::scope(|scope| {
+        let tasks: Vec<_> = items.iter().map(|item| scope.spawn(|| task(item))).collect();
+        // A panic of a task is this thread's too.
+        tasks.into_iter().map(|task| task.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    })
+}
+
+fn left_out(repair: &Repair) -> Vec<usize> {
+    match repair {
+        Repair::LeaveOut(positions) => positions.clone(),
+        _ => Vec::new(),
+    }
+}
+
+/// Surroundings and motion may step and take a channel along.
+fn may_cause(cause: Channel, channel: Channel) -> bool {
+    let surroundings = matches!(cause, Channel::Temp | Channel::Supply);
+    let is_gyro = |of: Channel| Channel::INERTIAL[..3].contains(&of);
+    let motion = Channel::INERTIAL[3..].contains(&cause) && is_gyro(channel);
+    surroundings || motion
+}
+
+/// The position that a sample had before those at `left` were left out.
+fn before_leaving_out(position: usize, left: &[usize]) -> usize {
+    left.iter().fold(position, |position, &left| if left <= position { position + 1 } else { position })
+}

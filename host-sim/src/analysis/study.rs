@@ -1,0 +1,113 @@
+//! One channel of one part: what it follows, and what its model lacks.
+
+use super::parts::Part;
+use adis16405_driver::Channel;
+use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
+use allan_core::trace::{Lines, Trace, trace};
+use allan_core::{Curve, Kind};
+use firmware::OCTAVES;
+
+/// The covariates of a channel in a part, ready for the regression.
+pub(super) struct Surroundings {
+    channel: Curve<OCTAVES>,
+    /// Where the covariates stand in the part.
+    members: Vec<usize>,
+    covariates: Vec<Covariate<OCTAVES>>,
+    with_channel: Vec<Shared<OCTAVES>>,
+    mutual: Vec<Shared<OCTAVES>>,
+}
+
+/// What was learnt of a channel from one part.
+pub(super) struct Study {
+    pub(super) surroundings: Surroundings,
+    /// In the order of [`Surroundings`].
+    pub(super) followed: Vec<Sensitivity>,
+    /// The channel without what it follows.
+    pub(super) curve: Curve<OCTAVES>,
+    pub(super) trace: Trace,
+}
+
+impl Surroundings {
+    fn of(part: &Part, channel: usize, known: Option<&Self>) -> Self {
+        let members: Vec<usize> = causes(part.channels[channel]).filter_map(|cause| part.position(cause)).collect();
+        let covariate = |(index, &member): (usize, &usize)| match known {
+            Some(known) => known.covariates[index].continued(part.curve(member)),
+            None => Covariate::new(part.curve(member), part.count(member)),
+        };
+        let pairs = members.iter().enumerate().flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
+        Self {
+            channel: part.curve(channel),
+            covariates: members.iter().enumerate().map(covariate).collect(),
+            with_channel: members.iter().map(|&member| part.shared(channel, member)).collect(),
+            mutual: pairs.map(|(a, b)| part.shared(a, b)).collect(),
+            members,
+        }
+    }
+
+    fn beside(&self) -> Beside<'_, OCTAVES> {
+        Beside {
+            channel: &self.channel,
+            covariates: &self.covariates,
+            with_channel: &self.with_channel,
+            mutual: &self.mutual,
+        }
+    }
+}
+
+impl Study {
+    /// Learns from `part` what `channel` follows and what it lacks; `lines` are those that a spectrum has shown. `None`
+    /// leaves it at the declared model.
+    pub(super) fn of(part: &Part, channel: usize, lines: Option<&[Kind]>) -> Self {
+        let surroundings = Surroundings::of(part, channel, None);
+        let followed: Vec<Sensitivity> = surroundings.beside().followed().into_iter().collect();
+        let curve = surroundings.beside().compensated(&followed);
+        let trace = match lines {
+            Some(lines) => trace(&curve, Lines::Known(lines)),
+            None => Trace::declared(&curve),
+        };
+        Self { surroundings, followed, curve, trace }
+    }
+
+    /// The curve of the same channel in another part, compensated with what was learnt here.
+    pub(super) fn compensated(&self, part: &Part, channel: usize) -> Curve<OCTAVES> {
+        Surroundings::of(part, channel, Some(&self.surroundings)).beside().compensated(&self.followed)
+    }
+
+    /// What the channel follows: each covariate's place in the part, with the sensitivity.
+    pub(super) fn causes(&self) -> impl Iterator<Item = (usize, &Sensitivity)> {
+        self.followed.iter().map(|followed| (self.surroundings.members[followed.covariate], followed))
+    }
+
+    /// What two channels share beyond what both follow.
+    pub(super) fn shared_rest(&self, part: &Part, own: usize, other: &Self, others: usize) -> Shared<OCTAVES> {
+        let mut rest = part.shared(own, others);
+        let covariance = |shared: &Shared<OCTAVES>, n: u64| {
+            shared.iter().find(|point| point.n == n).map_or(0.0, |point| point.covariance)
+        };
+        for point in &mut rest {
+            let with = |a: usize, b: usize| {
+                if a == b {
+                    part.curve(a).points().iter().find(|of| of.n == point.n).map_or(0.0, |of| of.avar)
+                } else {
+                    covariance(&part.shared(a, b), point.n)
+                }
+            };
+            let mut taken = 0.0;
+            for (cause, followed) in self.causes() {
+                taken += followed.value * with(cause, others);
+                let both = other.causes().map(|(of, known)| followed.value * known.value * with(cause, of));
+                taken -= both.sum::<f64>();
+            }
+            taken += other.causes().map(|(of, known)| known.value * with(own, of)).sum::<f64>();
+            point.covariance -= taken;
+        }
+        rest
+    }
+}
+
+/// What a channel may follow, as far as it is measured.
+fn causes(channel: Channel) -> impl Iterator<Item = Channel> {
+    let motion = if Channel::INERTIAL[..3].contains(&channel) { &Channel::INERTIAL[3..] } else { &[] };
+    let surroundings = Channel::INERTIAL.contains(&channel).then_some([Channel::Temp, Channel::Supply]);
+    surroundings.into_iter().flatten().chain(motion.iter().copied())
+}
