@@ -7,6 +7,9 @@ use allan_core::trace::{Lines, Trace, trace};
 use allan_core::{Curve, Kind};
 use firmware::OCTAVES;
 
+/// Probability of the residual under a model below which another one is tried.
+const UNEXPLAINED: f64 = 1e-3;
+
 /// The covariates of a channel in a part, ready for the regression.
 pub(super) struct Surroundings {
     channel: Curve<OCTAVES>,
@@ -62,7 +65,7 @@ impl Study {
         let followed: Vec<Sensitivity> = surroundings.beside().followed().into_iter().collect();
         let curve = surroundings.beside().compensated(&followed);
         let trace = match lines {
-            Some(lines) => trace(&curve, Lines::Known(lines)),
+            Some(lines) => traced(&curve, lines),
             None => Trace::declared(&curve),
         };
         Self { surroundings, followed, curve, trace }
@@ -103,6 +106,17 @@ impl Study {
         }
         rest
     }
+}
+
+/// With the lines of the spectrum, or, where these do not explain the curve, with what the curve itself shows: a line that
+/// wanders is many in the spectrum of a long record and one in the curve.
+fn traced(curve: &Curve<OCTAVES>, lines: &[Kind]) -> Trace {
+    let known = trace(curve, Lines::Known(lines));
+    if lines.is_empty() || known.after_goodness.p_value > UNEXPLAINED {
+        return known;
+    }
+    let own = trace(curve, Lines::InTheCurve);
+    if own.after_goodness.deviance < known.after_goodness.deviance { own } else { known }
 }
 
 /// What a channel may follow, as far as it is measured.

@@ -30,7 +30,9 @@ const LEAST_EXCESS: f64 = 0.1;
 /// Averages on either side that a hump is compared with.
 const NEIGHBOURS: usize = 16;
 /// Rounds in which resonances and background are fitted again.
-const POLISHING: usize = 3;
+const POLISHING: usize = 1;
+/// Resonances up to which they are fitted again whenever one comes.
+const POLISHED: usize = 2;
 /// Within so many widths of a resonance, a line with less than this share of its statistic belongs to it.
 const SKIRTS: f64 = 20.0;
 const BLEMISH: f64 = 0.02;
@@ -88,7 +90,10 @@ pub fn lines(grid: &Grid) -> Vec<Line> {
             }
             Some(Found::Resonance(resonance)) => {
                 resonances.push(resonance);
-                polish(&rest, &mut resonances);
+                // Every round transforms the whole record for every resonance.
+                if resonances.len() <= POLISHED {
+                    polish(&rest, &mut resonances);
+                }
             }
             None => break,
         }
