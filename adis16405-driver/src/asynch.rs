@@ -95,18 +95,29 @@ async fn run<SPI: SpiDevice<u8>, T>(
 ) -> Result<T, Error<SPI::Error>> {
     let mut procedure = pin!(procedure);
     loop {
-        let mut answer = [0; 2];
         match port.resume(procedure.as_mut()) {
             Ok(result) => return result.map_err(Error::over_bus),
-            Err(Step::Frame { request, stall_ns }) => {
-                spi.transaction(&mut [Operation::Transfer(&mut answer, &request), Operation::DelayNs(stall_ns)])
-                    .await?;
-            }
-            Err(Step::Select { ns }) => spi.transaction(&mut [Operation::DelayNs(ns)]).await?,
-            Err(Step::Pause { us }) => delay.delay_us(us).await,
+            Err(step) => port.answer(perform(spi, delay, step).await?),
         }
-        port.answer(answer);
     }
+}
+
+/// What all procedures share, so that it is in flash once.
+#[inline(never)]
+async fn perform<SPI: SpiDevice<u8>>(
+    spi: &mut SPI,
+    delay: &mut impl DelayNs,
+    step: Step,
+) -> Result<[u8; 2], SPI::Error> {
+    let mut answer = [0; 2];
+    match step {
+        Step::Frame { request, stall_ns } => {
+            spi.transaction(&mut [Operation::Transfer(&mut answer, &request), Operation::DelayNs(stall_ns)]).await?;
+        }
+        Step::Select { ns } => spi.transaction(&mut [Operation::DelayNs(ns)]).await?,
+        Step::Pause { us } => delay.delay_us(us).await,
+    }
+    Ok(answer)
 }
 
 /// For procedures of frames alone.

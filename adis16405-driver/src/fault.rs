@@ -72,14 +72,18 @@ const GREATEST_RATE: i16 = 7000;
 
 pub(crate) fn burst_faults(burst: &Burst) -> Faults {
     let words = &burst.words;
+    let all = words.iter().fold(u16::MAX, |all, word| all & word.0);
+    let any = words.iter().fold(0, |any, word| any | word.0);
+    let possible = |channel| (-GREATEST_RATE..=GREATEST_RATE).contains(&words[channel as usize].counts(channel));
+    let rates_are_possible = possible(Channel::GyroX) && possible(Channel::GyroY) && possible(Channel::GyroZ);
+
     let mut faults = Faults::empty();
-    faults.set(Faults::NO_NEW_DATA, words.iter().any(|word| !word.new_data()));
-    faults.set(Faults::ERROR_ALARM, words.iter().any(|word| word.error_alarm()));
+    faults.set(Faults::NO_NEW_DATA, !OutputWord(all).new_data());
+    faults.set(Faults::ERROR_ALARM, OutputWord(any).error_alarm());
     faults.set(Faults::SUPPLY, !supply_is_right(words[Channel::Supply as usize]));
-    faults.set(Faults::STUCK_LOW, words.iter().all(|word| word.0 == 0x0000));
-    faults.set(Faults::STUCK_HIGH, words.iter().all(|word| word.0 == 0xFFFF));
-    let rates = burst.counts().gyro();
-    faults.set(Faults::IMPOSSIBLE_RATE, rates.iter().any(|rate| !(-GREATEST_RATE..=GREATEST_RATE).contains(rate)));
+    faults.set(Faults::STUCK_LOW, any == 0x0000);
+    faults.set(Faults::STUCK_HIGH, all == 0xFFFF);
+    faults.set(Faults::IMPOSSIBLE_RATE, !rates_are_possible);
     // A shift spoils the supply and, of twelve words, some new-data bit.
     let stuck = faults.intersects(Faults::STUCK_LOW | Faults::STUCK_HIGH);
     if faults.contains(Faults::NO_NEW_DATA | Faults::SUPPLY) && !stuck {

@@ -80,6 +80,17 @@ const fn field_mask(channel: Channel) -> u16 {
     (1 << channel.bits()) - 1
 }
 
+/// How far a field must be moved to have its top bit in bit 15, and whether that is a sign; in burst order.
+const FIELDS: [(u32, bool); 12] = {
+    let mut fields = [(0, false); 12];
+    let mut index = 0;
+    while index < fields.len() {
+        fields[index] = (16 - Channel::ALL[index].bits(), Channel::ALL[index].signed());
+        index += 1;
+    }
+    fields
+};
+
 /// The twelve output words of one burst read, in the order of [`Channel::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -122,8 +133,9 @@ impl Burst {
     /// Sign-extended counts.
     pub fn counts(&self) -> Counts {
         let mut counts = [0; 12];
-        for ((count, word), channel) in counts.iter_mut().zip(self.words).zip(Channel::ALL) {
-            *count = word.counts(channel);
+        for ((count, word), (shift, signed)) in counts.iter_mut().zip(self.words).zip(FIELDS) {
+            let aligned = word.0 << shift;
+            *count = if signed { aligned as i16 >> shift } else { (aligned >> shift) as i16 };
         }
         Counts::new(counts)
     }

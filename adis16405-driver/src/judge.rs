@@ -49,11 +49,20 @@ impl Counters {
     fn add(&mut self, faults: Faults) {
         self.bursts = self.bursts.saturating_add(1);
         self.unusable = self.unusable.saturating_add(u32::from(!usable(faults)));
-        for ((fault, _), count) in Faults::CAUSES.into_iter().zip(&mut self.by_cause) {
-            *count = count.saturating_add(u32::from(faults.contains(fault)));
+        if !faults.is_empty() {
+            for ((fault, _), count) in Faults::CAUSES.into_iter().zip(&mut self.by_cause) {
+                *count = count.saturating_add(u32::from(faults.contains(fault)));
+            }
         }
     }
 }
+
+/// The bits of an output word below its flags.
+const DATA: u16 = 0x3FFF;
+/// Gyros and accelerometers, as bits.
+const INERTIAL: u16 = 0b0000_0111_1110;
+/// All channels, as bits.
+const ALL: u16 = 0b1111_1111_1111;
 
 /// Judges bursts one after the other.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,11 +85,19 @@ impl Judge {
 
     /// Judges the next burst. The first one cannot be a repetition.
     pub fn judge(&mut self, burst: &Burst) -> Verdict {
-        let words = burst.words.map(|word| OutputWord(word.0 & 0x3FFF));
-        let same = |channel: Channel| self.previous.is_some_and(|p| p[channel as usize] == words[channel as usize]);
-        let repeated = Channel::INERTIAL.into_iter().all(same);
-        self.equal = if Channel::ALL.into_iter().all(same) { self.equal.saturating_add(1) } else { 0 };
-        self.previous = Some(words);
+        let (repeated, all_equal) = match &self.previous {
+            None => (false, false),
+            Some(previous) => {
+                // Bit n for channel n.
+                let equal = |mask: u16, (n, (now, before)): (usize, (&OutputWord, &OutputWord))| {
+                    mask | u16::from((now.0 ^ before.0) & DATA == 0) << n
+                };
+                let equal = burst.words.iter().zip(previous).enumerate().fold(0, equal);
+                (equal & INERTIAL == INERTIAL, equal == ALL)
+            }
+        };
+        self.equal = if all_equal { self.equal.saturating_add(1) } else { 0 };
+        self.previous = Some(burst.words);
 
         let mut faults = burst.faults();
         faults.set(Faults::REPEATED, repeated);

@@ -1,0 +1,55 @@
+//! Reads an ADIS16405 on a Linux host, such as a Raspberry Pi, by way of spidev.
+//!
+//! | Raspberry Pi header | signal | at the sensor |
+//! |---|---|---|
+//! | 24, GPIO 8 | CE0 | CS |
+//! | 23, GPIO 11 | SCLK | SCLK |
+//! | 21, GPIO 9 | MISO | DOUT, through a divider or level shifter: the sensor may drive 5 V |
+//! | 19, GPIO 10 | MOSI | DIN |
+//! | 2 (5 V), 6 (ground) | supply | VCC, GND |
+//!
+//! ```console
+//! $ cargo run -p adis16405-driver --example spidev -- /dev/spidev0.0
+//! ```
+
+#[cfg(target_os = "linux")]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    use adis16405_driver::{Adis16405, Config, GyroRange, Judge, SamplePeriod};
+    use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
+    use linux_embedded_hal::{Delay, SpidevDevice};
+    use std::time::Duration;
+
+    let device = std::env::args().nth(1).unwrap_or_else(|| "/dev/spidev0.0".into());
+    let config = Config::new(GyroRange::Dps300, 4, SamplePeriod::nearest(204.8)?)?;
+    let sck_hz = config.sample_period().clock_mode().max_burst_sck_hz();
+    let mut spi = SpidevDevice::open(&device)?;
+    spi.configure(&SpidevOptions::new().max_speed_hz(sck_hz).mode(SpiModeFlags::SPI_MODE_3).build())?;
+
+    let mut imu = Adis16405::new(spi, config);
+    let product = imu.start_up(&mut Delay)?;
+    let test = imu.self_test(&mut Delay)?;
+    println!("{product:?}, self-test {}: {:?}", if test.passed() { "passed" } else { "failed" }, test.diagnosis);
+
+    let mut judge = Judge::default().with_x_sign_at_risk(imu.x_sign_at_risk());
+    for _ in 0..100 {
+        // Without the data-ready line: slower than the sensor samples, so that each sample is new.
+        std::thread::sleep(Duration::from_millis(10));
+        let burst = imu.burst()?;
+        let verdict = judge.judge(&burst);
+        if verdict.usable {
+            let sample = imu.sample_of(burst);
+            println!("{:8.3?} °/s {:7.4?} g {:.1} °C", sample.gyro_dps(), sample.accl_g(), sample.temp_degc());
+        } else {
+            println!("refused: {}", verdict.faults.causes().collect::<Vec<_>>().join(", "));
+        }
+    }
+    for (cause, count) in judge.counters().by_cause().filter(|(_, count)| *count > 0) {
+        println!("{count} × {cause}");
+    }
+    Ok(())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn main() {
+    eprintln!("spidev is a thing of Linux");
+}

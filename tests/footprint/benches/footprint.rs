@@ -1,0 +1,27 @@
+//! Prints what the driver takes of a Cortex-M4F: flash, and instructions for a burst counted by QEMU.
+
+use driver_footprint::{build, driver_bytes};
+use std::process::Command;
+
+fn main() {
+    println!("flash of the driver alone, built as the firmware is:");
+    for (features, what) in [
+        ("burst", "init, burst, verdict, integer values"),
+        ("everything", "every method, blocking (with arithmetic of f64)"),
+        ("asynchronous", "every method, async (with arithmetic of f64)"),
+    ] {
+        println!("{:>8} bytes  {what}", driver_bytes(features));
+    }
+    println!("instructions:");
+    let output = Command::new("qemu-system-arm")
+        .args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=0"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(build("counted"))
+        .output()
+        .expect("qemu-system-arm starts; Debian has it in the package of that name");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for line in String::from_utf8_lossy(&output.stdout).lines() {
+        let (name, count) = line.split_once(' ').expect("a name and a number");
+        println!("{count:>8}        {name}");
+    }
+}

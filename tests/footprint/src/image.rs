@@ -1,0 +1,42 @@
+//! Builds the image with some features and reads what it takes of the flash out of its ELF.
+#![cfg_attr(target_os = "none", no_std)]
+#![cfg(not(target_os = "none"))]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The image with these features, optimised as the firmware is.
+pub fn build(features: &str) -> PathBuf {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate is in tests/");
+    let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
+    // A directory of its own: the tests' own cargo may hold the lock of the other one.
+    let directory = workspace.join(directory).join("footprint");
+    let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(workspace)
+        .args(["build", "--quiet", "--package", "driver-footprint", "--bin", "footprint", "--profile", "image"])
+        .args(["--locked", "--target", TARGET, "--features", &format!("on-target,{features}"), "--target-dir"])
+        .arg(&directory)
+        .status()
+        .expect("cargo starts");
+    assert!(status.success(), "the image does not build; its target comes with `rustup target add {TARGET}`");
+    directory.join(TARGET).join("image").join("footprint")
+}
+
+/// Bytes of flash that the image takes: what its program headers load (ELF for Arm, 32 bits, little-endian).
+pub fn flash_bytes(image: &Path) -> u32 {
+    const LOAD: u32 = 1;
+    let elf = std::fs::read(image).expect("the image is readable");
+    let word = |at: usize| u32::from_le_bytes(elf[at..at + 4].try_into().expect("four bytes"));
+    let half = |at: usize| usize::from(u16::from_le_bytes(elf[at..at + 2].try_into().expect("two bytes")));
+    assert_eq!((&elf[..4], elf[4]), (&b"\x7fELF"[..], 1), "a 32-bit ELF");
+    let (table, entry, entries) = (word(28) as usize, half(42), half(44));
+    let headers = (0..entries).map(|index| table + index * entry);
+    headers.filter(|&header| word(header) == LOAD).map(|header| word(header + 16)).sum()
+}
+
+/// Flash that features add to an image without the driver.
+pub fn driver_bytes(features: &str) -> u32 {
+    flash_bytes(&build(features)) - flash_bytes(&build(""))
+}
