@@ -1,6 +1,6 @@
 //! Many samples at once: the same differences level by level, in loops that a compiler can vectorise.
 
-use super::moments::{fourth_power, unit_bits};
+use super::moments::ROUNDED;
 use super::{Cascade, second_difference};
 
 /// Samples that are taken together.
@@ -11,6 +11,9 @@ const HISTORY: usize = 2 * 16;
 /// Running sums of one level: those of the past in front, then the block's own.
 struct Sums {
     values: [i64; HISTORY + BLOCK],
+    /// The same less a common part, where that leaves 30 bits.
+    narrow: [i32; HISTORY + BLOCK],
+    is_narrow: bool,
     /// Steps that the level had taken before the block.
     past: u64,
     new: usize,
@@ -22,7 +25,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         if cfg!(target_pointer_width = "32") {
             return samples.iter().for_each(|&sample| self.push(sample));
         }
-        let mut sums = Sums { values: [0; HISTORY + BLOCK], past: 0, new: 0 };
+        let mut sums =
+            Sums { values: [0; HISTORY + BLOCK], narrow: [0; HISTORY + BLOCK], is_narrow: false, past: 0, new: 0 };
         for block in samples.chunks(BLOCK) {
             self.push_block(block, &mut sums);
         }
@@ -45,6 +49,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
         for level in 0..Self::LEVELS {
             self.recall(level, sums);
+            sums.narrow(2 * OVERLAP);
             if level == 0 {
                 for octave in 0..Self::FINE {
                     self.accumulate_block(octave, 1 << octave, sums);
@@ -85,15 +90,16 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             return;
         }
         let first = HISTORY + first as usize;
-        let newest = &sums.values[first..HISTORY + sums.new];
-        let middle = &sums.values[first - reach..][..newest.len()];
-        let oldest = &sums.values[first - 2 * reach..][..newest.len()];
-        let differences =
-            || newest.iter().zip(middle).zip(oldest).map(|((&new, &mid), &old)| second_difference(new, mid, old));
-        let (squares, fourths) = sums_of_powers(unit_bits(octave), differences);
         let moments = &mut self.octaves[octave].moments;
-        moments.squares.add(squares);
-        moments.fourths.add(fourths);
+        if let Some((squares, fourths)) = sums.narrow_powers(first, reach).filter(|_| octave < ROUNDED) {
+            moments.squares.add(u128::from(squares));
+            moments.fourths.add(u128::from(fourths));
+            return;
+        }
+        let [newest, middle, oldest] = sums.differing(&sums.values, first, reach);
+        for ((&newest, &middle), &oldest) in newest.iter().zip(middle).zip(oldest) {
+            moments.add(octave, second_difference(newest, middle, oldest));
+        }
     }
 }
 
@@ -116,31 +122,43 @@ impl Sums {
         self.past >>= 1;
         self.new = new;
     }
-}
 
-/// Sums of the second and, of magnitudes rounded by `bits` digits, the fourth powers of at most [`BLOCK`] differences.
-fn sums_of_powers<I: Iterator<Item = i64>>(bits: u32, differences: impl Fn() -> I) -> (u128, u128) {
-    let square_of = |x: i32| u64::from(x.unsigned_abs()) * u64::from(x.unsigned_abs());
-    let widest = differences().fold(0, |digits, difference| digits | difference.unsigned_abs());
-    if widest < 1 << 28 {
-        // Squares below 2⁵⁶, 256 of which fit in 64 bits. Of the fourth power, (a·2²⁸ + b)², the parts fit likewise.
-        const HALF: u64 = (1 << 28) - 1;
-        let half_unit = 1 << bits >> 1;
-        let (mut squares, mut high, mut mixed, mut low) = (0_u64, 0_u64, 0_u64, 0_u64);
-        for difference in differences() {
-            let difference = difference as i32;
-            squares += square_of(difference);
-            let square = square_of((difference + half_unit) >> bits);
-            let (a, b) = (square >> 28, square & HALF);
-            high += a * a;
-            mixed += a * b;
-            low += b * b;
+    /// Takes what all sums have in common off them, if they differ by less than 2³⁰: so do not their differences leave
+    /// 32 bits.
+    fn narrow(&mut self, history: usize) {
+        let steps = HISTORY - history..HISTORY + self.new;
+        let base = self.values[steps.start].wrapping_sub(1 << 29);
+        let mut used = 0;
+        for (narrow, value) in self.narrow[steps.clone()].iter_mut().zip(&self.values[steps]) {
+            let rest = value.wrapping_sub(base);
+            used |= rest;
+            *narrow = rest as i32;
         }
-        (u128::from(squares), (u128::from(high) << 56) + (u128::from(mixed) << 29) + u128::from(low))
-    } else {
-        differences().fold((0, 0), |(squares, fourths): (u128, u128), difference| {
-            let magnitude = u128::from(difference.unsigned_abs());
-            (squares.saturating_add(magnitude * magnitude), fourths.saturating_add(fourth_power(difference, bits)))
-        })
+        self.is_narrow = used as u64 >> 30 == 0;
+    }
+
+    /// The new sums from step `first` on, and those of `reach` and of `2·reach` steps before each.
+    fn differing<'a, T>(&self, values: &'a [T], first: usize, reach: usize) -> [&'a [T]; 3] {
+        let steps = first..HISTORY + self.new;
+        [0, reach, 2 * reach].map(|back| &values[steps.start - back..steps.end - back])
+    }
+
+    /// Sums of squares and of fourth powers in the width of a vector unit; `None` if a difference has 15 bits or more,
+    /// as 256 fourth powers of 14 bits fill the word.
+    fn narrow_powers(&self, first: usize, reach: usize) -> Option<(u64, u64)> {
+        if !self.is_narrow {
+            return None;
+        }
+        let [newest, middle, oldest] = self.differing(&self.narrow, first, reach);
+        let (mut digits, mut squares, mut fourths) = (0, 0_u64, 0_u64);
+        for ((newest, middle), oldest) in newest.iter().zip(middle).zip(oldest) {
+            let difference = newest.wrapping_sub(*middle).wrapping_sub(middle.wrapping_sub(*oldest));
+            digits |= difference ^ (difference >> 31);
+            let small = i32::from(difference as i16);
+            let square = u64::from(small.wrapping_mul(small) as u32);
+            squares = squares.wrapping_add(square);
+            fourths = fourths.wrapping_add(square.wrapping_mul(square));
+        }
+        (digits < 1 << 14).then_some((squares, fourths))
     }
 }
