@@ -39,7 +39,7 @@ step "lints and builds for microcontrollers"
 run cargo clippy --locked --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --profile image -- -D warnings
 run cargo clippy --locked --package firmware --bin observatory-pico --features board-pico --target "$SMALL" --profile image -- -D warnings
 for target in "$MCU" "$SMALL"; do
-    run cargo clippy --locked --package adis16405-driver --package allan-core --target "$target" -- -D warnings
+    run cargo clippy --locked --package adis16405-driver --package allan-core --features allan-core/serde --target "$target" -- -D warnings
     run cargo clippy --locked --package adis16405-driver --all-features --target "$target" -- -D warnings
 done
 

@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# The estimator's speed beside its peers', on the same machine in the same run: nanoseconds a sample and channel.
+#
+# Installs allantools from PyPI into a virtual environment and builds two crates, all below target/peers.
+set -euo pipefail
+cd "$(dirname "$0")/speed"
+
+target=${CARGO_TARGET_DIR:-$PWD/../../../target}/peers
+if [ ! -x "$target/venv/bin/python" ]; then
+    python3 -m venv "$target/venv"
+fi
+"$target/venv/bin/pip" install --quiet --requirement requirements.txt
+cargo build --release --locked --quiet --target-dir "$target"
+
+{
+    "$target/release/speed"
+    "$target/venv/bin/python" peers.py
+} | awk -F '\t' '
+    NR == 1 { push = $2 }
+    NR == 2 { slice = $2 }
+    { printf "%-28s %9.2f ns", $1, $2 }
+    NR > 2 { printf "   %6.1f times push, %6.1f times push_slice", $2 / push, $2 / slice }
+    { print "" }'
