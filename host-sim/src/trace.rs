@@ -7,6 +7,7 @@ pub mod bias_step;
 pub(crate) mod block;
 pub mod deliveries;
 pub(crate) mod normal;
+pub mod rate_ramp;
 pub mod sample_clock;
 pub mod series;
 pub mod spikes;

@@ -4,7 +4,7 @@
 //! stretches of the record by the likelihood ratio under noise whose mixture of white, flicker and random walk is free
 //! with the step and without, and it has to explain more than a ramp or any other cause that is offered.
 
-use super::block::{BLOCKS, Blocks, Whitening, dot, without};
+use super::block::{BLOCKS, Blocks, Whitening, dot, fitted, residual, without};
 use super::normal::{NORMAL_975, upper_tail};
 use super::{Finding, Repair, SIGNIFICANCE, Series, effect, parameter};
 use std::f64::consts::PI;
@@ -86,22 +86,10 @@ pub fn find(series: &Series, causes: &[&Series]) -> Option<Finding> {
     })
 }
 
-/// Sum of squares of the whitened data less their part along `shapes`.
-fn residual(noise: &Whitening, means: &[f64], shapes: &[Vec<f64>]) -> f64 {
-    let mut rest = noise.free(means);
-    for shape in shapes {
-        rest = without(rest, &noise.free(shape));
-    }
-    dot(&rest, &rest)
-}
-
-/// Size of a step and its standard error.
-fn fitted(noise: &Whitening, means: &[f64], step: &[f64]) -> (f64, f64) {
-    let (data, shape) = (noise.free(means), noise.free(step));
-    let norm = dot(&shape, &shape);
-    let size = dot(&data, &shape) / norm;
-    let rest = dot(&data, &data) - size * size * norm;
-    (size, (rest / (data.len() as f64 - 2.0) / norm).sqrt())
+/// By how much the best step explains the data better than none at all, of deviance `plain`, in −2 ln likelihood.
+pub(super) fn gain(blocks: &Blocks, noises: &[Whitening], plain: f64) -> f64 {
+    let best = noises.iter().map(|noise| Scan::of(noise, blocks, &[]).deviance).fold(f64::INFINITY, f64::min);
+    plain - best
 }
 
 /// A step tried at the beginning of every block.

@@ -171,3 +171,21 @@ pub(crate) fn without(mut values: Vec<f64>, direction: &[f64]) -> Vec<f64> {
     }
     values
 }
+
+/// Sum of squares of the whitened data less their part along `shapes`.
+pub(crate) fn residual(noise: &Whitening, means: &[f64], shapes: &[Vec<f64>]) -> f64 {
+    let mut rest = noise.free(means);
+    for shape in shapes {
+        rest = without(rest, &noise.free(shape));
+    }
+    dot(&rest, &rest)
+}
+
+/// Size of `shape` in the data and its standard error.
+pub(crate) fn fitted(noise: &Whitening, means: &[f64], shape: &[f64]) -> (f64, f64) {
+    let (data, shape) = (noise.free(means), noise.free(shape));
+    let norm = dot(&shape, &shape);
+    let size = dot(&data, &shape) / norm;
+    let rest = dot(&data, &data) - size * size * norm;
+    (size, (rest / (data.len() as f64 - 2.0) / norm).sqrt())
+}

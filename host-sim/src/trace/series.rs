@@ -35,6 +35,8 @@ pub enum Repair {
         /// In the unit of the series.
         size: f64,
     },
+    /// This much, times the sample's slot, is to be taken from every sample, in the unit of the series.
+    Slope(f64),
 }
 
 impl Series {
@@ -82,6 +84,9 @@ impl Series {
             }
             &Repair::Level { from, size } => {
                 self.values.iter_mut().skip(from).for_each(|value| *value -= size);
+            }
+            &Repair::Slope(slope) => {
+                self.values.iter_mut().zip(&self.slots).for_each(|(value, &slot)| *value -= slope * slot as f64);
             }
         }
         self

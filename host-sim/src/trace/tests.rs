@@ -1,7 +1,7 @@
 //! Every detector on recordings of the virtual sensor: silent where there is nothing, right where there is something.
 
 use super::normal::{poisson_bounds, poisson_tail, quantile, upper_tail};
-use super::{Finding, Repair, Series, bias_step, deliveries, sample_clock, spikes};
+use super::{Finding, Repair, Series, bias_step, deliveries, rate_ramp, sample_clock, spikes};
 use crate::record::{Host, Simulation};
 use crate::recording::Recording;
 use crate::sensor::effect::surroundings::TemperatureCourse;
@@ -44,7 +44,7 @@ impl Case {
     fn findings(&self) -> Vec<Finding> {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
-            [spikes::find(&series), bias_step::find(&series, &[])]
+            [spikes::find(&series), bias_step::find(&series, &[]), rate_ramp::find(&series, &[])]
         });
         let common = [
             deliveries::dropped(&self.timeline),
@@ -139,6 +139,19 @@ fn a_level_that_moves_otherwise_is_no_step() {
         TemperatureCourse { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureCourse::default() };
     let case = Case::of(simulation);
     assert_eq!(bias_step::find(&case.series(GYRO), &[&case.series(Channel::Temp)]), None);
+}
+
+#[test]
+fn a_ramp_is_measured_and_told_from_a_step() {
+    let case = Case::hiding(vec![Effect::RateRamp { channel: GYRO, slope: -1e-3 }], 600.0, 14);
+    let series = case.series(GYRO);
+    let finding = rate_ramp::find(&series, &[]).unwrap();
+    assert_covers(&finding, "slope", -1e-3);
+    assert!((finding.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
+    assert_eq!(rate_ramp::find(&series.repaired(&finding.repair), &[]), None);
+
+    let step = Effect::BiasStep { channel: GYRO, time_s: 300.0, size: 0.3 };
+    assert_eq!(rate_ramp::find(&Case::hiding(vec![step], 600.0, 15).series(GYRO), &[]), None);
 }
 
 #[test]
