@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Every check and test of the noise observatory, from a clean checkout.
 #
-# Needs rustup with its default toolchain and a C compiler; installs what is missing with rustup, and
+# Needs rustup with its default toolchain, a C compiler, and Node.js 20 with npm; installs what is missing with rustup, and
 # with apt-get the QEMU that counts instructions, and says so. Fails, and never skips, if something cannot be had. The
-# emulator that the image runs in is the crate rigless, compiled here; it asks for a newer Rust than it needs, hence
-# --ignore-rust-version.
+# emulators that the images run in are the crate rigless, compiled here, which asks for a newer Rust than it needs,
+# hence --ignore-rust-version, and rp2040js, which npm brings.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -24,6 +24,9 @@ if ! command -v qemu-system-arm >/dev/null; then
     run apt-get update -qq
     run apt-get install -y -qq --no-install-recommends qemu-system-arm
 fi
+for tool in node npm; do
+    command -v "$tool" >/dev/null || { echo "$tool is missing: install Node.js 20 with npm (the Pico's emulator)" >&2; exit 1; }
+done
 for target in "$MCU" "$SMALL"; do
     rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
 done

@@ -61,6 +61,13 @@ pub enum Command {
         #[arg(long)]
         seconds: Option<f64>,
     },
+    /// Turn an image for the Raspberry Pi Pico into the UF2 file that its boot loader takes.
+    Uf2 {
+        /// The image, an ELF.
+        elf: PathBuf,
+        /// The file to write.
+        out: PathBuf,
+    },
     /// Hide effects at random in recordings of the virtual sensor and tell how well the analysis names them.
     Undeclared(Undeclared),
     /// Repeat the published characterisation on hours whose noise is known: slopes read off beside the fit.

@@ -28,5 +28,6 @@ pub mod terminal;
 pub mod time_course;
 pub mod timeline;
 pub mod trace;
+pub mod uf2;
 pub mod undeclared;
 pub mod wording;

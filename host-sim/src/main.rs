@@ -14,10 +14,10 @@ use host_sim::report::Report;
 use host_sim::source::csv;
 use host_sim::timeline::Timeline;
 use host_sim::undeclared::Plan;
-use host_sim::{page, terminal};
+use host_sim::{page, terminal, uf2};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -50,6 +50,11 @@ fn run(mut cli: Cli) -> Result<()> {
         Some(Command::Record { out, port: Some(port), baud, simulate }) => {
             let replayed = record_port(out, port, *baud, simulate.seconds.unwrap_or(60.0))?;
             report(&replayed, None).with_context(|| port.clone())?
+        }
+        Some(Command::Uf2 { elf, out }) => {
+            let image = fs::read(elf).with_context(|| elf.display().to_string())?;
+            let uf2 = uf2::of_elf(&image).with_context(|| elf.display().to_string())?;
+            return fs::write(out, uf2).with_context(|| out.display().to_string());
         }
         Some(Command::Monitor { port, baud, send, seconds }) => {
             return watch(port, *baud, send, *seconds).with_context(|| port.clone());

@@ -1,0 +1,100 @@
+// Runs an RP2040 image in rp2040js, with the sensor in the parent process: one question over standard output, one answer
+// over standard input. Arguments: the module's folder, the image, seconds, and keys as TIME=TEXT.
+//
+// A question is one byte and a time in ns (f64, little endian): `n` how far the sensor's time is; `s` and `d` chip select
+// falls and rises; `b` a byte goes out, which follows. `u` and a byte: the image said something; `e` and the number of
+// instructions: the end. The answer to `n` is the number of samples and the time of the next (two f64), to `b` a byte.
+import fs from 'node:fs';
+import path from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const [folder, image, seconds, ...keyArguments] = process.argv.slice(2);
+const load = (file) => import(pathToFileURL(path.join(folder, 'node_modules/rp2040js/dist/esm', file)));
+const { RP2040, GPIOPinState } = await load('index.js');
+const { SimulationClock } = await load('clock/simulation-clock.js');
+
+const PIN_SELECT = 17, PIN_DATA_READY = 20, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
+const keys = keyArguments.map((key) => [parseFloat(key) * 1e9, key.slice(key.indexOf('=') + 1)]);
+
+const clock = new SimulationClock();
+const mcu = new RP2040(clock);
+const complaints = new Map();
+const complain = (from, text) => complaints.set(`${from}: ${text}`, true);
+mcu.logger = { debug() {}, info() {}, warn: complain, error: complain };
+
+// The image, from its ELF program headers (32 bits, little endian) into flash.
+const elf = fs.readFileSync(image);
+for (let i = 0; i < elf.readUInt16LE(44); i++) {
+  const header = elf.readUInt32LE(28) + i * 32;
+  const [kind, offset, , address, size] = [0, 4, 8, 12, 16].map((field) => elf.readUInt32LE(header + field));
+  if (kind === 1 && size > 0 && address >= 0x10000000 && address < 0x11000000) {
+    mcu.flash.set(elf.subarray(offset, offset + size), address - 0x10000000);
+  }
+}
+// The boot ROM copies the second stage to the top of memory and calls it; rp2040js has no boot ROM.
+mcu.sram.set(mcu.flash.subarray(0, 252), 0x41f00);
+Object.assign(mcu.core, { SP: 0x20041f00, LR: 0, PC: 0x20041f00 });
+// The block that tells why the chip was reset, which rp2040js lacks: after power-on.
+mcu.peripherals[0x40064] = {
+  readUint32: (offset) => (offset === 8 ? 1 << 8 : 0),
+  writeUint32() {},
+  writeUint32Atomic() {},
+};
+
+const ask = (kind, value, byte, answerLength) => {
+  const question = Buffer.alloc(byte === undefined ? 9 : 10);
+  question.write(kind);
+  question.writeDoubleLE(value, 1);
+  if (byte !== undefined) question[9] = byte;
+  for (let done = 0; done < question.length; ) done += fs.writeSync(1, question, done);
+  const answer = Buffer.alloc(answerLength);
+  for (let done = 0; done < answerLength; ) {
+    const count = fs.readSync(0, answer, done, answerLength - done, null);
+    if (count === 0) process.exit(1);
+    done += count;
+  }
+  return answer;
+};
+
+const spi = mcu.spi[0];
+spi.onTransmit = (value) => {
+  const answer = ask('b', clock.nanos, value & 0xff, 1)[0];
+  clock.createAlarm(() => spi.completeTransmit(answer)).schedule((spi.dataBits * 1e9) / spi.clockFrequency);
+};
+mcu.gpio[PIN_SELECT].addListener((state) => {
+  if (state === GPIOPinState.Low) ask('s', clock.nanos, undefined, 0);
+  else if (state === GPIOPinState.High) ask('d', clock.nanos, undefined, 0);
+});
+mcu.uart[0].onByte = (byte) => ask('u', clock.nanos, byte, 0);
+
+// Data ready: a pulse at every sample; the next one is asked for again and again, as settings may change it.
+let samples = 0;
+const edge = clock.createAlarm(() => {
+  const answer = ask('n', clock.nanos, undefined, 16);
+  const [taken, next] = [answer.readDoubleLE(0), answer.readDoubleLE(8)];
+  if (taken > samples) {
+    samples = taken;
+    mcu.gpio[PIN_DATA_READY].setInputValue(true);
+    clock.createAlarm(() => mcu.gpio[PIN_DATA_READY].setInputValue(false)).schedule(PULSE_NS);
+  }
+  edge.schedule(Math.max(1, Math.min(next - clock.nanos, STRIDE_NS)));
+});
+edge.schedule(1);
+for (const [at, text] of keys) {
+  clock.createAlarm(() => [...text].forEach((key) => mcu.uart[0].feedByte(key.charCodeAt(0)))).schedule(at);
+}
+
+const end = seconds * 1e9;
+let instructions = 0;
+while (clock.nanos < end) {
+  if (mcu.core.waiting) {
+    clock.tick(clock.nanosToNextAlarm || STRIDE_NS);
+  } else {
+    const cycles = mcu.core.executeInstruction();
+    instructions++;
+    clock.tick((cycles * 1e9) / mcu.clkSys);
+  }
+}
+for (const complaint of complaints.keys()) console.error(complaint);
+ask('e', instructions, undefined, 0);
+process.exit(0);
