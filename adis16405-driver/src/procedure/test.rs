@@ -64,9 +64,9 @@ impl Session<'_> {
             Stimulus::Negative => 1 << 9,
         };
         self.update_register(Register::MscCtrl, STIMULI, 0).await?;
-        let rest = self.mean().await;
+        let rest = self.sums().await;
         self.update_register(Register::MscCtrl, STIMULI, bits).await?;
-        let stimulated = self.mean().await;
+        let stimulated = self.sums().await;
         self.update_register(Register::MscCtrl, STIMULI, 0).await?;
         let mut response = [0; 6];
         for (response, (with, without)) in response.iter_mut().zip(stimulated.into_iter().zip(rest)) {
@@ -76,7 +76,7 @@ impl Session<'_> {
     }
 
     /// Sums of several samples of the six inertial outputs, read singly and after the filter has settled.
-    async fn mean(&self) -> [i32; 6] {
+    async fn sums(&self) -> [i32; 6] {
         let taps = 2u32 << self.state.config.filter_taps_log2();
         self.pause(self.state.timing.self_test_us.saturating_add(taps * self.sample_us())).await;
         let mut sums = [0; 6];
