@@ -20,6 +20,10 @@
 //! assert!((n / (100.0 / 12.0_f64.sqrt() * 0.1) - 1.0).abs() < 0.02);
 //! ```
 //!
+//! [`Coupling`], [`Hadamard`] and [`Between`] read the running sums that a [`Cascade`] holds anyway: the Allan
+//! covariance of two channels, a variance blind to drift, and averaging factors between the octaves. With the feature
+//! `serde` all four can be kept, sent and resumed to the bit.
+//!
 //! Everything up to the curve is integer arithmetic without rounding, so a microcontroller and a server agree to
 //! the bit. Everything from the curve on is `f64` through `libm`, so they agree there too.
 #![no_std]
