@@ -90,7 +90,7 @@ pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace 
         let term = if rival.kinds.len() == after.terms().len() { 0 } else { term };
         after = fit_shapes(curve, &rival.kinds);
         // There is room: the loop ends when it is full.
-        let _ = found.push(Found { term, score: rival.score, residual });
+        let _ = found.push(Found { term, score: rival.score(), residual });
     }
     let after_goodness = goodness(curve, &after);
     Trace { before, before_goodness, after, after_goodness, found }
@@ -104,10 +104,10 @@ fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
 fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family]) -> Option<Rival> {
     let of_family = |family: &Family| {
         let rivals = family.shapes.iter().filter_map(|shape| with(kinds, shape)).map(|kinds| baseline.rival(&kinds));
-        let best = rivals.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let best = rivals.max_by(|a, b| a.fall.total_cmp(&b.fall))?;
         let best = baseline.shaped_rival(&best.kinds);
         let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
-        (best.score > cost).then_some((best.score - cost, best))
+        (best.gain(cost) > 0.0).then_some((best.gain(cost), best))
     };
     families.iter().filter_map(of_family).max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, rival)| rival)
 }

@@ -1,13 +1,12 @@
 //! Every term three ways: against the integral of its spectrum, against its autocovariance, against simulation.
 
+mod simulation;
+
 use allan_core::term::{Filter, Kind, Markov, Resonance, Sinusoid};
-use allan_core::{Cascade, Model, model::Term};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use allan_core::{Model, model::Term};
+use simulation::{Noise, PERIOD, autocovariance, curve};
 use std::f64::consts::PI;
 
-const PERIOD: f64 = 0.01;
 const FACTORS: [u64; 8] = [1, 2, 3, 4, 8, 33, 128, 1024];
 
 const MARKOV: [Markov; 3] =
@@ -58,39 +57,6 @@ fn the_closed_form_is_the_integral_of_the_spectrum() {
             assert!((closed / integral - 1.0).abs() < 2e-5, "{kind:?}, n = {n}: {closed} and {integral}");
         }
     }
-}
-
-/// Autocovariance at a lag of `j` samples, written down from the definition of the process.
-fn autocovariance(kind: &Kind, j: usize) -> f64 {
-    let t = j as f64 * PERIOD;
-    match kind {
-        Kind::AngleRandomWalk => f64::from(u8::from(j == 0)) / PERIOD,
-        Kind::Quantization => [2.0, -1.0].get(j).copied().unwrap_or(0.0) / (PERIOD * PERIOD),
-        Kind::Markov(markov) => (-t / markov.time_constant).exp(),
-        Kind::Resonance(line) => (-PI * line.bandwidth * t).exp() * (2.0 * PI * line.frequency * t).cos(),
-        Kind::Sinusoid(line) => 0.5 * (2.0 * PI * line.frequency * t).cos(),
-        Kind::Filtered(filter) => {
-            let response = impulse_response(filter);
-            let at = |values: usize| response.iter().zip(response.iter().skip(values)).map(|(a, b)| a * b).sum::<f64>();
-            let step = filter.decimation as usize;
-            let sum = at(0) + 2.0 * (1..=response.len()).map(|j| at(j * step)).sum::<f64>();
-            at(j * step) / (sum * PERIOD)
-        }
-        other => panic!("{other:?} is not stationary"),
-    }
-}
-
-fn impulse_response(filter: &Filter) -> Vec<f64> {
-    let average = vec![1.0 / f64::from(filter.taps); usize::from(filter.taps)];
-    if filter.stages == 1 { average } else { convolve(&average, &average) }
-}
-
-fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut product = vec![0.0; a.len() + b.len() - 1];
-    for (i, a) in a.iter().enumerate() {
-        b.iter().enumerate().for_each(|(j, b)| product[i + j] += a * b);
-    }
-    product
 }
 
 fn stationary() -> Vec<Kind> {
@@ -150,85 +116,12 @@ fn the_memory_of_a_resonance_is_summed_to_its_end() {
     }
 }
 
-/// One sample after the other of a process with a coefficient of 1, each from its own recursion.
-fn simulate(kind: &Kind, samples: usize, seed: u64) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = move || -> f64 { StandardNormal.sample(&mut rng) };
-    match kind {
-        Kind::AngleRandomWalk => (0..samples).map(|_| normal() / PERIOD.sqrt()).collect(),
-        Kind::Quantization => {
-            let angles: Vec<f64> = (0..=samples).map(|_| normal()).collect();
-            angles.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD).collect()
-        }
-        Kind::RateRandomWalk => {
-            let mut rate = 0.0;
-            (0..samples)
-                .map(|_| {
-                    rate += normal() * PERIOD.sqrt();
-                    rate
-                })
-                .collect()
-        }
-        Kind::RateRamp => (0..samples).map(|k| k as f64 * PERIOD).collect(),
-        Kind::Sinusoid(line) => (0..samples).map(|k| (2.0 * PI * line.frequency * k as f64 * PERIOD).sin()).collect(),
-        Kind::Markov(markov) => {
-            let keep = (-PERIOD / markov.time_constant).exp();
-            let mut state = normal();
-            (0..samples)
-                .map(|_| {
-                    state = keep * state + (1.0 - keep * keep).sqrt() * normal();
-                    state
-                })
-                .collect()
-        }
-        Kind::Resonance(line) => {
-            // A complex Markov process turns with the frequency; its real part is the oscillation.
-            let keep = (-PI * line.bandwidth * PERIOD).exp();
-            let (sin, cos) = (2.0 * PI * line.frequency * PERIOD).sin_cos();
-            let drive = (1.0 - keep * keep).sqrt();
-            let mut state = (normal(), normal());
-            (0..samples)
-                .map(|_| {
-                    let (re, im) = state;
-                    state = (
-                        keep * (re * cos - im * sin) + drive * normal(),
-                        keep * (re * sin + im * cos) + drive * normal(),
-                    );
-                    state.0
-                })
-                .collect()
-        }
-        Kind::Filtered(filter) => {
-            let response = impulse_response(filter);
-            let step = filter.decimation as usize;
-            let gain = (autocovariance(kind, 0) / response.iter().map(|a| a * a).sum::<f64>()).sqrt();
-            let white: Vec<f64> = (0..samples * step + response.len()).map(|_| gain * normal()).collect();
-            let filtered = white.windows(response.len()).map(|w| w.iter().zip(&response).map(|(a, b)| a * b).sum());
-            filtered.step_by(step).take(samples).collect()
-        }
-        // By its definition as white noise integrated half a time: J. Hosking, Biometrika 68 (1981).
-        Kind::BiasInstability => {
-            let mut response = vec![1.0];
-            (1..4096).for_each(|k| response.push(response[k - 1] * (k as f64 - 0.5) / k as f64));
-            let white: Vec<f64> = (0..samples + response.len()).map(|_| normal()).collect();
-            white
-                .windows(response.len())
-                .take(samples)
-                .map(|w| w.iter().rev().zip(&response).map(|(a, b)| a * b).sum())
-                .collect()
-        }
-    }
-}
-
 #[test]
 fn the_closed_form_is_what_simulation_shows() {
     const SAMPLES: usize = 1 << 16;
-    const LSB: f64 = 2e-6;
     let others = [Kind::RateRamp, Kind::Sinusoid(Sinusoid { frequency: 21.7 })];
     for (seed, kind) in noises().into_iter().chain(others).enumerate() {
-        let mut cascade = Cascade::<16, 8>::new();
-        simulate(&kind, SAMPLES, seed as u64).iter().for_each(|value| cascade.push((value / LSB).round() as i32));
-        let curve = cascade.curve(PERIOD).scaled(LSB);
+        let curve = curve(&Noise::new(seed as u64).series(&kind, SAMPLES));
         let model = Model::new(PERIOD, [Term::exact(kind, 1.0)]);
         for point in curve.points().iter().filter(|point| point.n <= 1024) {
             let (modelled, edf) = (model.avar(point.n), model.edf(point));
@@ -261,14 +154,8 @@ fn degrees_of_freedom_tell_the_scatter_of_estimates() {
         let model = Model::new(PERIOD, terms.iter().copied());
         let curves: Vec<_> = (0..RECORDS)
             .map(|seed| {
-                let mut sum = vec![0.0; SAMPLES];
-                for (index, term) in terms.iter().enumerate() {
-                    let series = simulate(&term.kind, SAMPLES, 31 * seed + index as u64);
-                    sum.iter_mut().zip(series).for_each(|(sum, value)| *sum += term.value * value);
-                }
-                let mut cascade = Cascade::<16, 8>::new();
-                sum.iter().for_each(|value| cascade.push((value * 1e4).round() as i32));
-                cascade.curve(PERIOD).scaled(1e-4)
+                let sum: Vec<(Kind, f64)> = terms.iter().map(|term| (term.kind, term.value)).collect();
+                curve(&Noise::new(seed).sum(SAMPLES, &sum))
             })
             .collect();
         for octave in 0..9 {

@@ -22,8 +22,23 @@ pub(crate) struct Baseline {
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
     pub(crate) kinds: Vec<Kind, MAX_TERMS>,
+    /// How much lower its deviance is.
+    pub(crate) fall: f64,
+    /// What the deviance falls by without a cause, on average for each parameter: points that are correlated move
+    /// together.
+    pub(crate) scatter: f64,
+}
+
+impl Rival {
     /// Fall of the deviance in units of its scatter: without a cause it is χ² with one degree of freedom.
-    pub(crate) score: f64,
+    pub(crate) fn score(&self) -> f64 {
+        self.fall / self.scatter
+    }
+
+    /// What is left of the fall when everything that is to be earned, in units of the scatter, is paid.
+    pub(crate) fn gain(&self, cost: f64) -> f64 {
+        self.fall - cost * self.scatter
+    }
 }
 
 impl Baseline {
@@ -37,7 +52,7 @@ impl Baseline {
     /// Fits the coefficients of `kinds`.
     pub(crate) fn rival(&self, kinds: &[Kind]) -> Rival {
         let (problem, deviance) = self.fitted(kinds);
-        Rival { kinds: problem.kinds.clone(), score: self.score(&problem, deviance) }
+        self.compared(&problem, deviance)
     }
 
     /// Fits the coefficients of `kinds` and their shapes.
@@ -46,7 +61,7 @@ impl Baseline {
         let mut kinds = problem.kinds.clone();
         shape::search(&mut problem, &mut kinds);
         let deviance = problem.minimise();
-        Rival { kinds, score: self.score(&problem, deviance) }
+        self.compared(&problem, deviance)
     }
 
     fn fitted(&self, kinds: &[Kind]) -> (Problem, f64) {
@@ -55,13 +70,8 @@ impl Baseline {
         (problem, deviance)
     }
 
-    /// Chance moves correlated points together: the fall of the deviance is divided by the variance of the residual
-    /// along the change of the model.
-    fn score(&self, rival: &Problem, deviance: f64) -> f64 {
-        let fall = self.deviance - deviance;
-        if fall <= 0.0 {
-            return 0.0;
-        }
+    /// The variance of the residual along the change of the model says what chance would gain.
+    fn compared(&self, rival: &Problem, deviance: f64) -> Rival {
         let mut change = [0.0; MAX_POINTS];
         for ((entry, old), new) in change.iter_mut().zip(&self.problem.points).zip(&rival.points) {
             let ratio = dot(&new.basis, &rival.squares) / dot(&old.basis, &self.problem.squares);
@@ -72,8 +82,9 @@ impl Baseline {
             change.iter_mut().zip(known).for_each(|(entry, known)| *entry -= along * known);
         }
         let length = dot(&change, &change);
-        let scatter: f64 = pairs(&self.problem.points, &change).sum::<f64>() / length;
-        if length > 0.0 && scatter > 0.0 { fall / scatter.max(1.0) } else { 0.0 }
+        let scatter = pairs(&self.problem.points, &change).sum::<f64>() / length;
+        let fall = if length > 0.0 { self.deviance - deviance } else { 0.0 };
+        Rival { kinds: rival.kinds.clone(), fall, scatter: scatter.max(1.0) }
     }
 }
 

@@ -1,0 +1,133 @@
+//! Regression on covariates and the common mode, on channels whose relation is known.
+
+mod simulation;
+
+use allan_core::common_mode::common_mode;
+use allan_core::fit::fit;
+use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
+use allan_core::term::{Kind, Markov};
+use allan_core::{Cascade, Coupling, Curve};
+use simulation::{Noise, PERIOD};
+
+const OCTAVES: usize = 18;
+const SAMPLES: usize = 1 << 16;
+/// Unit to a count of every channel.
+const LSB: f64 = 1e-4;
+
+type Estimator = Cascade<OCTAVES, 8>;
+
+/// Curves of channels that are sampled in step, and what each has in common with those before it.
+fn measured(channels: &[Vec<f64>]) -> (Vec<Curve<OCTAVES>>, Vec<Shared<OCTAVES>>) {
+    let mut cascades = vec![Estimator::new(); channels.len()];
+    let mut couplings = vec![Coupling::<OCTAVES>::new(); channels.len() * (channels.len() - 1) / 2];
+    for k in 0..SAMPLES {
+        for (cascade, channel) in cascades.iter_mut().zip(channels) {
+            cascade.push((channel[k] / LSB).round() as i32);
+        }
+        for i in 1..channels.len() {
+            for j in 0..i {
+                couplings[i * (i - 1) / 2 + j].observe(&cascades[i], &cascades[j]);
+            }
+        }
+    }
+    let curves = cascades.iter().map(|cascade| cascade.curve(PERIOD).scaled(LSB)).collect();
+    let in_units = |coupling: &Coupling<OCTAVES>| {
+        let mut points = coupling.points();
+        points.iter_mut().for_each(|point| point.covariance *= LSB * LSB);
+        points
+    };
+    (curves, couplings.iter().map(in_units).collect())
+}
+
+/// What the first channel follows of the others.
+fn followed(channels: &[Vec<f64>]) -> Vec<Sensitivity> {
+    let (curves, shared) = measured(channels);
+    let covariates: Vec<Covariate<OCTAVES>> =
+        curves[1..].iter().map(|curve| Covariate::new(curve.clone(), LSB)).collect();
+    let pair = |i: usize, j: usize| shared[i * (i - 1) / 2 + j].clone();
+    let with_channel: Vec<_> = (1..channels.len()).map(|i| pair(i, 0)).collect();
+    let mutual: Vec<_> =
+        (2..channels.len()).flat_map(|i| (1..i).map(move |j| (i, j))).map(|(i, j)| pair(i, j)).collect();
+    let beside = Beside { channel: &curves[0], covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
+    beside.followed().into_iter().collect()
+}
+
+fn rest(noise: &mut Noise) -> Vec<f64> {
+    noise.sum(SAMPLES, &[(Kind::AngleRandomWalk, 0.05), (Kind::RateRandomWalk, 0.002)])
+}
+
+/// A slow course, as of a temperature, and what a converter with white noise shows of it.
+fn course(noise: &mut Noise, deviation: f64) -> (Vec<f64>, Vec<f64>) {
+    let slow = noise.sum(SAMPLES, &[(Kind::Markov(Markov { time_constant: 40.0 }), deviation)]);
+    let seen = slow.iter().map(|value| value + 0.2 * noise.normal()).collect();
+    (slow, seen)
+}
+
+#[test]
+fn sensitivities_to_noisy_covariates_are_unbiased() {
+    const RECORDS: u64 = 40;
+    let truth = [0.05, -0.03];
+    let mut standardised = Vec::new();
+    for seed in 0..RECORDS {
+        let mut noise = Noise::new(seed);
+        let (first, first_seen) = course(&mut noise, 3.0);
+        let (second, second_seen) = course(&mut noise, 3.0);
+        let mut channel = rest(&mut noise);
+        let causes = first.iter().zip(&second);
+        channel.iter_mut().zip(causes).for_each(|(y, (a, b))| *y += truth[0] * a + truth[1] * b);
+        let mut found = followed(&[channel, first_seen, second_seen]);
+        found.sort_by_key(|of| of.covariate);
+        assert_eq!(found.iter().map(|of| of.covariate).collect::<Vec<_>>(), [0, 1], "seed {seed}");
+        for (of, truth) in found.iter().zip(truth) {
+            standardised.push((of.value - truth) / of.error);
+            assert!((of.value / truth - 1.0).abs() < 0.15, "seed {seed}: {of:?}");
+        }
+    }
+    let count = standardised.len() as f64;
+    let mean = standardised.iter().sum::<f64>() / count;
+    let deviation = (standardised.iter().map(|z| z * z).sum::<f64>() / count).sqrt();
+    // Four standard deviations of a mean of 80; the stated errors may be off by a third, as the octaves'
+    // correlations are those of pure noises.
+    assert!(mean.abs() < 4.0 / count.sqrt(), "{mean}");
+    assert!((0.5..1.5).contains(&deviation), "{deviation}");
+}
+
+#[test]
+fn channels_that_walk_by_themselves_do_not_follow_each_other() {
+    // Beyond 5 standard deviations by chance in fewer than 2 % of the records: of 60, three or fewer.
+    let alarms = (0..60)
+        .filter(|&seed| {
+            let mut noise = Noise::new(900 + seed);
+            let walk = [(Kind::RateRandomWalk, 0.1), (Kind::AngleRandomWalk, 0.01)];
+            let (own, other) = (noise.sum(SAMPLES, &walk), noise.sum(SAMPLES, &walk));
+            !followed(&[own, other]).is_empty()
+        })
+        .count();
+    assert!(alarms <= 3, "{alarms} of 60");
+}
+
+#[test]
+fn what_two_channels_share_is_found_with_its_size() {
+    let time_constant = 5.0;
+    let (mut found, mut alarms) = (0, 0);
+    for seed in 0..20 {
+        let mut noise = Noise::new(300 + seed);
+        let shared = noise.sum(SAMPLES, &[(Kind::Markov(Markov { time_constant }), 0.1)]);
+        let [alone, other] = [rest(&mut noise), rest(&mut noise)];
+        let with = |channel: &[f64]| channel.iter().zip(&shared).map(|(own, shared)| own + shared).collect::<Vec<_>>();
+        let common = |channels: &[Vec<f64>]| {
+            let (curves, shared) = measured(channels);
+            let models: Vec<_> = curves.iter().map(|curve| fit(curve, &Kind::DECLARED)).collect();
+            common_mode((&curves[0], &models[0]), (&curves[1], &models[1]), &shared[0])
+        };
+        alarms += usize::from(common(&[alone.clone(), other.clone()]).is_some());
+        if let Some(common) = common(&[with(&alone), with(&other)]) {
+            found += 1;
+            // 655 s hold 65 independent stretches of twice the correlation time: 12 % of the deviation at 1 σ.
+            assert!((common.deviation / 0.1 - 1.0).abs() < 0.5, "{common:?}");
+            assert!(common.sigmas > 0.0);
+            assert!((1.0 / 3.0..3.0).contains(&(common.time_constant / time_constant)), "{common:?}");
+        }
+    }
+    assert!(found == 20 && alarms == 0, "{found} of 20 found, {alarms} false");
+}

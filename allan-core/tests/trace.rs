@@ -1,0 +1,163 @@
+//! The loop on simulated noise whose composition is known: nothing found where nothing is missing, and what is
+//! missing found by name and size.
+
+mod simulation;
+
+use allan_core::model::Term;
+use allan_core::term::{Filter, Kind, Markov, Resonance, Sinusoid};
+use allan_core::trace::{Lines, Trace, trace};
+use allan_core::{Model, telegraph};
+use simulation::{Noise, curve, telegraph_signal};
+
+const SAMPLES: usize = 1 << 17;
+/// White noise of 0.05 unit·√s and a random walk of 0.004 unit/√s, which meet at about 20 s.
+const DECLARED: [(Kind, f64); 2] = [(Kind::AngleRandomWalk, 0.05), (Kind::RateRandomWalk, 0.004)];
+
+fn traced(hidden: &[(Kind, f64)], seed: u64) -> Trace {
+    let mut noise = Noise::new(seed);
+    let sum = noise.sum(SAMPLES, DECLARED.iter().chain(hidden));
+    trace(&curve(&sum), Lines::InTheCurve)
+}
+
+fn added(trace: &Trace) -> Vec<Term> {
+    trace.found.iter().map(|found| trace.after.terms()[found.term]).collect()
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_missing() {
+    // A false alarm in 2 % of the records at most: of 60, three or fewer with a probability of 0.97.
+    let alarms = (0..60).filter(|&seed| !traced(&[], seed).found.is_empty()).count();
+    assert!(alarms <= 3, "{alarms} of 60");
+}
+
+#[test]
+fn the_p_value_of_a_true_model_is_uniform() {
+    const RECORDS: usize = 100;
+    let mut p_values: Vec<f64> =
+        (0..RECORDS as u64).map(|seed| traced(&[], 1_000 + seed).before_goodness.p_value).collect();
+    p_values.sort_by(f64::total_cmp);
+    let expected = |rank: usize| (rank as f64 + 0.5) / RECORDS as f64;
+    let distance = p_values.iter().enumerate().map(|(rank, p)| (p - expected(rank)).abs()).fold(0.0, f64::max);
+    // Kolmogorov and Smirnov: 1.63/√n is exceeded once in a hundred; 0.05 for a χ² in the place of the exact law.
+    assert!(distance < 1.63 / (RECORDS as f64).sqrt() + 0.05, "{distance}");
+}
+
+/// What is hidden, and how far its parameters may be off: the amount, and the shape's, each as a share.
+fn hidden() -> Vec<(Kind, f64, f64, f64)> {
+    vec![
+        (Kind::Quantization, 1e-3, 0.1, 0.0),
+        (Kind::RateRamp, 2e-3, 0.1, 0.0),
+        (Kind::Markov(Markov { time_constant: 1.3 }), 0.06, 0.1, 0.3),
+        (Kind::Sinusoid(Sinusoid { frequency: 3.1 }), 0.1, 0.1, 0.06),
+        (Kind::Resonance(Resonance { frequency: 7.0, bandwidth: 1.5 }), 0.2, 0.1, 0.5),
+    ]
+}
+
+#[test]
+fn each_effect_is_named_with_its_size() {
+    for (kind, value, amount, share) in hidden() {
+        let trace = traced(&[(kind, value)], 7);
+        let added = added(&trace);
+        let [term] = added[..] else { panic!("{kind:?}: {added:?}") };
+        assert_eq!(term.kind.name(), kind.name());
+        assert!((term.value / value - 1.0).abs() < amount, "{kind:?}: {term:?}");
+        for ((name, truth), (_, found)) in kind.shape().into_iter().zip(term.kind.shape()) {
+            assert!(name.is_empty() || (found / truth - 1.0).abs() < share, "{name} of {kind:?}: {found}");
+        }
+        assert!(trace.before_goodness.p_value < 1e-3, "{kind:?}: {:?}", trace.before_goodness);
+        assert!(trace.after_goodness.p_value > 1e-3, "{kind:?}: {:?}", trace.after_goodness);
+        assert!(trace.after_goodness.deviance < trace.before_goodness.deviance);
+    }
+}
+
+#[test]
+fn a_filter_is_recognised_by_its_taps() {
+    for taps in [2, 4, 16, 64] {
+        let mut noise = Noise::new(u64::from(taps));
+        let terms = [(Kind::Filtered(Filter::bartlett(taps)), 0.05), (Kind::RateRandomWalk, 0.004)];
+        let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), Lines::InTheCurve);
+        let added = added(&trace);
+        let [term] = added[..] else { panic!("{taps}: {added:?}") };
+        assert_eq!(term.kind, Kind::Filtered(Filter::bartlett(taps)));
+        assert!((term.value / 0.05 - 1.0).abs() < 0.03, "{term:?}");
+    }
+}
+
+#[test]
+fn a_filter_that_is_read_slowly_tells_the_sample_rate() {
+    let decimation = 9.0;
+    let mut noise = Noise::new(5);
+    let terms = [(Kind::Filtered(Filter { stages: 2, taps: 8, decimation }), 0.05), (Kind::RateRandomWalk, 0.004)];
+    let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), Lines::InTheCurve);
+    let added = added(&trace);
+    let [term] = added[..] else { panic!("{added:?}") };
+    let (low, high) = term.shape[1];
+    assert!(low < decimation && decimation < high && high - low < 1.0, "{term:?}");
+}
+
+#[test]
+fn two_effects_are_found_one_after_the_other() {
+    let pair =
+        [(Kind::Sinusoid(Sinusoid { frequency: 3.1 }), 0.1), (Kind::Markov(Markov { time_constant: 4.0 }), 0.06)];
+    let mut names: Vec<&str> = added(&traced(&pair, 3)).iter().map(|term| term.kind.name()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["markov", "sinusoid"]);
+}
+
+#[test]
+fn a_larger_model_never_fits_worse() {
+    for seed in 0..5 {
+        let mut noise = Noise::new(40 + seed);
+        let curve = curve(&noise.sum(1 << 14, &DECLARED));
+        let all =
+            [Kind::Quantization, Kind::AngleRandomWalk, Kind::BiasInstability, Kind::RateRandomWalk, Kind::RateRamp];
+        // At the same weights; those of the largest model are given to all.
+        let largest = allan_core::fit::fit(&curve, &all);
+        let deviance = |kinds: &[Kind]| {
+            let model = allan_core::fit::fit(&curve, kinds);
+            let of = |point: &allan_core::Point| {
+                let ratio = point.avar / model.avar(point.n);
+                largest.edf(point) * (ratio - 1.0 - ratio.ln())
+            };
+            curve.points().iter().map(of).sum::<f64>()
+        };
+        let of: Vec<f64> = (1..=all.len()).map(|terms| deviance(&all[..terms])).collect();
+        // The weights of the smaller model are its own, so its fit is a little off the minimum at these.
+        assert!(of.windows(2).all(|pair| pair[1] < pair[0] * 1.02 + 0.05), "{of:?}");
+    }
+}
+
+#[test]
+fn two_levels_are_told_from_a_gaussian_process() {
+    let shape = Markov { time_constant: 1.3 };
+    for seed in 0..10 {
+        let mut noise = Noise::new(500 + seed);
+        let rest = noise.sum(SAMPLES, &DECLARED);
+        let gaussian = noise.series(&Kind::Markov(shape), SAMPLES);
+        // Levels 0.4 apart have a standard deviation of 0.2.
+        let levels = telegraph_signal(&mut noise, SAMPLES, shape.time_constant, 0.4);
+        let verdict = |signal: &dyn Fn(usize) -> f64| {
+            let sum: Vec<f64> = rest.iter().enumerate().map(|(k, rest)| rest + signal(k)).collect();
+            let curve = curve(&sum);
+            let trace = trace(&curve, Lines::InTheCurve);
+            let found = added(&trace).into_iter().find_map(|term| match term.kind {
+                Kind::Markov(markov) => Some(markov),
+                _ => None,
+            });
+            let markov = found.unwrap_or_else(|| panic!("no correlated term in {:?}", trace.found));
+            telegraph::judge(&curve, &trace.after, markov).expect("fourth moments")
+        };
+        let (smooth, two) = (verdict(&|k| 0.2 * gaussian[k]), verdict(&|k| levels[k]));
+        assert!(two.is_telegraph() && !smooth.is_telegraph(), "{two:?}, {smooth:?}");
+    }
+}
+
+#[test]
+fn a_declared_model_is_left_alone_when_nothing_is_sought() {
+    let mut noise = Noise::new(1);
+    let curve = curve(&noise.sum(1 << 14, &[(Kind::AngleRandomWalk, 0.05), (Kind::RateRamp, 0.1)]));
+    let trace = Trace::declared(&curve);
+    assert!(trace.found.is_empty() && trace.before == trace.after);
+    let names = |model: &Model| model.terms().iter().map(|term| term.kind).collect::<Vec<_>>();
+    assert_eq!(names(&trace.after), Kind::DECLARED);
+}
