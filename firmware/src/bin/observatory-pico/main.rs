@@ -75,7 +75,7 @@ mod app {
         let boot = boot::report(&device.VREG_AND_CHIP_RESET, &device.WATCHDOG);
         let retained = boot::retained(boot.cause);
         let mut watchdog = Watchdog::new(device.WATCHDOG);
-        let clocks = init_clocks_and_plls(
+        let Ok(clocks) = init_clocks_and_plls(
             CRYSTAL_HZ,
             device.XOSC,
             device.CLOCKS,
@@ -83,9 +83,9 @@ mod app {
             device.PLL_USB,
             &mut resets,
             &mut watchdog,
-        )
-        .ok()
-        .expect("clocks within reach");
+        ) else {
+            panic!("clocks out of reach");
+        };
         let sio = Sio::new(device.SIO);
         let pins = gpio::Pins::new(device.IO_BANK0, device.PADS_BANK0, sio.gpio_bank0, &mut resets);
 
