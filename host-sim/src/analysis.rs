@@ -69,7 +69,9 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
         let mut effects: Vec<Effect> = Vec::new();
         if traced.contains(channel) {
             effects.extend(repairs.effects(*channel));
-            effects.extend(named(&parts.both, *channel, own, &studies, 1.0 / timeline.sample_rate_hz));
+            let ramps = effects.iter().any(|effect| effect.kind == Kind::RateRamp.name());
+            let named = named(&parts.both, *channel, own, &studies, 1.0 / timeline.sample_rate_hz);
+            effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != Kind::RateRamp.name()));
         }
         let whole = measured.clone().with_confidence(|point| own.first.trace.before.shares(point.n));
         ChannelReport {

@@ -1,9 +1,11 @@
 //! What was found in the samples themselves, and how the series become whole again without it.
+//!
+//! A ramp is named here, where it is clearest, and left in the samples: the model has a term for it.
 
 use crate::recording::Recording;
 use crate::report::Effect;
 use crate::timeline::Timeline;
-use crate::trace::{Finding, Repair, Series, bias_step, deliveries, sample_clock, spikes};
+use crate::trace::{Finding, Repair, Series, bias_step, deliveries, rate_ramp, sample_clock, spikes};
 use adis16405_driver::Channel;
 use std::collections::BTreeSet;
 
@@ -18,7 +20,7 @@ pub(super) struct Repairs {
 }
 
 impl Repairs {
-    /// Looks for spikes and steps in `traced`, and for what became of the samples of the whole recording.
+    /// Looks for spikes, steps and ramps in `traced`, and for what became of the samples of the whole recording.
     pub(super) fn find(recording: &Recording, timeline: &Timeline, traced: &[Channel]) -> Self {
         let mut repairs = Self::default();
         let deliveries = [
@@ -40,16 +42,20 @@ impl Repairs {
             let others: Vec<&Series> =
                 causes.iter().filter(|(of, _)| may_cause(*of, channel)).map(|(_, series)| series).collect();
             // A cause must have the same samples.
-            let step =
-                if left.is_empty() { bias_step::find(&cleaned, &others) } else { bias_step::find(&cleaned, &[]) };
-            (spikes, step, left)
+            let others = if left.is_empty() { others } else { Vec::new() };
+            let step = bias_step::find(&cleaned, &others);
+            // A step is a ramp too, if a bad one.
+            let ramp = if step.is_none() { rate_ramp::find(&cleaned, &others) } else { None };
+            (spikes, step, ramp, left)
         });
-        for (&channel, (spikes, step, left)) in traced.iter().zip(found) {
+        for (&channel, (spikes, step, ramp, left)) in traced.iter().zip(found) {
             if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
                 repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
             }
             repairs.left_out.extend(left);
-            repairs.of_channel.extend(spikes.into_iter().chain(step).map(|finding| (channel, finding.effect)));
+            repairs
+                .of_channel
+                .extend(spikes.into_iter().chain(step).chain(ramp).map(|finding| (channel, finding.effect)));
         }
         repairs
     }
