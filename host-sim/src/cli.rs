@@ -32,6 +32,8 @@ pub enum Command {
     Analyze(Input),
     /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
     Replay(Input),
+    /// Say what is in recordings of hours: effects, what moves, what channels share, and what knowing it is worth.
+    Explain(Explain),
     /// Write every bus transaction of the virtual sensor, or the raw bursts of a device on a serial port, to an SPI frame
     /// log, then analyse what was read.
     Record {
@@ -136,6 +138,23 @@ pub struct Input {
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Gyro range in which the recording was taken, deg/s.
+    #[arg(long, value_enum, default_value = "300")]
+    pub range: Range,
+}
+
+/// Recordings to explain.
+#[derive(Debug, Args)]
+pub struct Explain {
+    /// Tables of register counts (CSV, plain or gzip), or folders of them.
+    #[arg(required = true)]
+    pub recordings: Vec<PathBuf>,
+    /// Sample rate in Hz; overrides what the time stamps say.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub rate: Option<f64>,
+    /// Write a picture of each channel into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
+    /// Gyro range in which the recordings were taken, deg/s.
     #[arg(long, value_enum, default_value = "300")]
     pub range: Range,
 }

@@ -12,6 +12,7 @@ pub mod analysis;
 pub mod cli;
 pub mod coefficients;
 pub mod device;
+pub mod explain;
 pub mod grid;
 pub mod monitor;
 pub mod page;

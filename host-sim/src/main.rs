@@ -4,14 +4,15 @@ use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
 use clap::Parser;
 use host_sim::analysis::analyze;
-use host_sim::cli::{Cli, Command, Input, Output};
+use host_sim::cli::{Cli, Command, Explain, Input, Output};
+use host_sim::explain::{self, Explanation};
 use host_sim::monitor::{self, Cable};
 use host_sim::paper::Experiment;
 use host_sim::record::{self, Simulation};
 use host_sim::recording::Recording;
 use host_sim::replay::replay;
 use host_sim::report::Report;
-use host_sim::source::csv;
+use host_sim::source::{csv, folder};
 use host_sim::timeline::Timeline;
 use host_sim::undeclared::Plan;
 use host_sim::{page, terminal, uf2};
@@ -70,6 +71,7 @@ fn run(mut cli: Cli) -> Result<()> {
         Some(Command::Paper { seeds, first_seed }) => {
             return paper(Experiment { seeds: *seeds, first_seed: *first_seed }, &cli.output);
         }
+        Some(Command::Explain(arguments)) => return explain_all(arguments, &cli.output),
         Some(Command::Undeclared(arguments)) => return benchmark(&arguments.plan(), &cli.output),
         Some(Command::Replay(input)) => {
             let replayed = replay(&input.file, input.range.into())?;
@@ -116,6 +118,39 @@ fn watch(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Re
         cable.command(command)?;
     }
     monitor::show(&mut cable, deadline, &mut io::stdout().lock())?;
+    Ok(())
+}
+
+fn explain_all(arguments: &Explain, output: &Output) -> Result<()> {
+    if output.page.is_some() || output.json.is_some() {
+        bail!("explain writes tables only: leave out --page and --json");
+    }
+    for path in &arguments.recordings {
+        for file in folder::tables(path)? {
+            let recording = csv::read(&file, arguments.range.into())?;
+            let timeline = Timeline::of(&recording, arguments.rate).with_context(|| file.display().to_string())?;
+            let mut out = BufWriter::new(io::stdout().lock());
+            writeln!(out, "\n══ {}", file.display())?;
+            let explanation = explain::explain(&recording, &timeline);
+            explain::text::write(&explanation, &mut out)?;
+            out.flush()?;
+            if let Some(folder) = &arguments.pictures {
+                draw(&explanation, &file, folder)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A picture for each channel, named after the recording and the channel.
+fn draw(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()> {
+    let name = recording.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.split('.').next().unwrap_or_default();
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    for channel in &explanation.channels {
+        let file = folder.join(format!("{stem}-{}.svg", channel.channel.name()));
+        std::fs::write(&file, explain::picture(channel)?).with_context(|| file.display().to_string())?;
+    }
     Ok(())
 }
 

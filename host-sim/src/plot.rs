@@ -4,7 +4,7 @@ mod panel;
 mod read_off;
 mod residual;
 
-use crate::report::{ChannelReport, CurvePoint, ModelReport};
+use crate::report::{ChannelReport, CurvePoint, ModelReport, ReadOff};
 use crate::wording;
 use panel::{Frame, Panel, ink};
 use plotters::coord::Shift;
@@ -204,7 +204,11 @@ fn legend(canvas: &Canvas<'_>, channel: &ChannelReport) -> Drawn {
     if effects_added(channel) {
         entry("with traced effects", AFTER, Shape::Line)?;
     }
-    entry("slopes read off", READ_OFF, Shape::Dashes)
+    let ReadOff { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
+    if [angle_random_walk, bias_instability, rate_random_walk].iter().any(|slope| slope.is_some()) {
+        entry("slopes read off", READ_OFF, Shape::Dashes)?;
+    }
+    Ok(())
 }
 
 enum Shape {

@@ -4,6 +4,7 @@
 //! clocks that do not run backwards; everything else is an [`InputError`] that names the place.
 
 pub mod csv;
+pub mod folder;
 pub mod frame_log;
 mod input_error;
 mod open;

@@ -2,13 +2,18 @@
 //!
 //! ```text
 //! Series ─► Parts ─► Stationarity ─► which part of the fitted half predicts best
-//!             │                       │
+//!             │
 //!             └─► epochs ─► Moving: level and line, epoch by epoch ─► Tracked: each epoch foretold from those before
+//!                                                                   ├► Companion: the line as another channel shows it
+//!                                                                   └► Controls: the same without knowing any effect
 //! ```
 //!
-//! The record is cut in the middle. Verdicts, shapes and gains come from the fitted half alone; only [`tracking`] looks at
-//! the unseen half, at each epoch after it was foretold, and its results are kept apart.
+//! The record is cut in the middle. Verdicts, shapes and gains come from the fitted half alone. [`tracking`] looks at the
+//! unseen half too, at each epoch after it was foretold, and [`companion`] at that of another channel: their results are
+//! kept apart from those of models that have seen nothing of it.
 
+pub mod companion;
+pub mod control;
 pub mod moving;
 pub mod parts;
 pub mod stationarity;
@@ -28,16 +33,13 @@ pub const SIGNIFICANCE: f64 = 0.01;
 
 /// `mean edf·(ln(m/v) + v/m − 1)` over the octaves with `n ≤ M/8`, of variances that no single model gives.
 ///
-/// The same figure as that of [`ModelError`](allan_core::check::ModelError).
-pub fn deviance_per_point<const POINTS: usize>(
-    curve: &Curve<POINTS>,
-    modelled: impl Fn(u64) -> f64,
-    edf: impl Fn(&Point) -> f64,
-) -> f64 {
+/// The figure of [`ModelError`](allan_core::check::ModelError), but with the degrees of freedom of the kind of noise that
+/// the curve itself shows: the same for all that is compared, so that a model which claims to be uncertain gains nothing.
+pub fn deviance_per_point<const POINTS: usize>(curve: &Curve<POINTS>, modelled: impl Fn(u64) -> f64) -> f64 {
     let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8);
     let of = |point: &Point| {
         let ratio = point.avar / modelled(point.n);
-        edf(point) * (ratio - 1.0 - ratio.ln())
+        point.edf * (ratio - 1.0 - ratio.ln())
     };
     points().map(of).sum::<f64>() / points().count() as f64
 }

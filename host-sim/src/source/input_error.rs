@@ -27,6 +27,9 @@ pub enum Reason {
     /// A folder where a file is expected.
     #[error("is a directory, not a file")]
     Directory,
+    /// A folder without a table in it.
+    #[error("no file in it ends in .csv or .csv.gz")]
+    NoTables,
     /// Not a single byte, or only blank lines.
     #[error("the file is empty")]
     Empty,

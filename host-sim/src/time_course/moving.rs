@@ -10,6 +10,12 @@ use allan_core::{Curve, Kind, Model, Point};
 pub const STATES: usize = 2;
 /// Farthest that a line is looked for from where it is on average, in ln f.
 const FARTHEST: f64 = 0.3;
+/// Farthest that a level is looked for, in ln s²: a factor of about 20.
+const FARTHEST_LEVEL: f64 = 3.0;
+/// Widest line, as a part of its frequency; what is wider is a colour of the noise.
+const WIDEST: f64 = 0.25;
+/// Largest standard deviation of ln f in an epoch of a line that can be followed.
+const LEAST_CERTAIN: f64 = 0.02;
 /// Distance of the first guesses.
 const GUESSES: f64 = 0.02;
 
@@ -58,12 +64,29 @@ pub struct Evidence {
 }
 
 impl Moving {
+    /// A model none of whose lines moves.
+    #[must_use]
+    pub fn still(model: Model) -> Self {
+        Self { model, line: None }
+    }
+
     /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the evidence.
     #[must_use]
     pub fn of<const POINTS: usize>(model: Model, epochs: &[Curve<POINTS>]) -> (Self, Option<Evidence>) {
-        let is_line = |term: &Term| matches!(term.kind, Kind::Sinusoid(_) | Kind::Resonance(_)) && term.value > 0.0;
+        let is_line = |term: &Term| match term.kind {
+            Kind::Sinusoid(_) => term.value > 0.0,
+            Kind::Resonance(line) => term.value > 0.0 && line.bandwidth < WIDEST * line.frequency,
+            _ => false,
+        };
         let lines: Vec<usize> = (0..model.terms().len()).filter(|&at| is_line(&model.terms()[at])).collect();
-        let tried = lines.iter().map(|&line| {
+        let followable = |line: &usize| {
+            let moving = Self { model: model.clone(), line: Some(*line) };
+            let mut errors: Vec<f64> =
+                epochs.iter().map(|epoch| moving.estimate(epoch, Free::LevelAndLine).error[1]).collect();
+            errors.sort_by(f64::total_cmp);
+            errors.get(errors.len() / 2).is_some_and(|&median| median < LEAST_CERTAIN)
+        };
+        let tried = lines.iter().copied().filter(followable).map(|line| {
             let moving = Self { model: model.clone(), line: Some(line) };
             let evidence = moving.evidence(epochs, Free::Level, Free::LevelAndLine);
             (moving, Evidence { p_value: (evidence.p_value * lines.len() as f64).min(1.0), ..evidence })
@@ -71,7 +94,7 @@ impl Moving {
         let clearest = tried.min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value).then(b.1.gain.total_cmp(&a.1.gain)));
         match clearest {
             Some((moving, evidence)) if evidence.p_value < SIGNIFICANCE => (moving, Some(evidence)),
-            clearest => (Self { model, line: None }, clearest.map(|(_, evidence)| evidence)),
+            clearest => (Self::still(model), clearest.map(|(_, evidence)| evidence)),
         }
     }
 
@@ -107,6 +130,22 @@ impl Moving {
             term
         };
         Model::new(self.model.sample_period(), self.model.terms().iter().enumerate().map(moved))
+    }
+
+    /// The model in a state, with a line of another width and amplitude, whose logarithms change by so much.
+    pub(super) fn along(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
+        let moved = self.at([level, line]);
+        let changed = |(at, term): (usize, &Term)| {
+            let mut term = *term;
+            if self.line == Some(at) {
+                term.value *= amplitude.exp();
+                if let Kind::Resonance(line) = term.kind {
+                    term.kind = Kind::Resonance(Resonance { bandwidth: line.bandwidth * width.exp(), ..line });
+                }
+            }
+            term
+        };
+        Model::new(moved.sample_period(), moved.terms().iter().enumerate().map(changed))
     }
 
     /// Whether `more` describes the epochs better than `fewer` by more than chance.
@@ -148,7 +187,7 @@ impl Moving {
             };
             points.iter().zip(modelled).map(of).sum::<f64>()
         };
-        let best_level = |avars: &[f64]| least(|level| deviance(level, avars), 0.0, 0.05);
+        let best_level = |avars: &[f64]| least(|level| deviance(level, avars), 0.0, 0.05, FARTHEST_LEVEL);
         let at_line = |line: f64| {
             let avars = avars([0.0, line]);
             let level = best_level(&avars);
@@ -161,7 +200,7 @@ impl Moving {
                 let most = (FARTHEST / GUESSES) as i32;
                 let guesses = (-most..=most).map(|k| f64::from(k) * GUESSES).map(|line| (line, at_line(line).1));
                 let guess = guesses.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(line, _)| line);
-                let line = least(|line| at_line(line).1, guess, GUESSES / 2.0);
+                let line = least(|line| at_line(line).1, guess, GUESSES / 2.0, FARTHEST);
                 [at_line(line).0, line]
             }
         };
@@ -225,14 +264,14 @@ fn shifted(kind: Kind, factor: f64) -> Kind {
     }
 }
 
-/// Where `of` is least near `start`: downhill in growing steps, then by the golden section.
-fn least(of: impl Fn(f64) -> f64, start: f64, step: f64) -> f64 {
+/// Where `of` is least near `start`, at most `farthest` from 0: downhill in growing steps, then by the golden section.
+pub(super) fn least(of: impl Fn(f64) -> f64, start: f64, step: f64, farthest: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut step = if of(start + step) < of(start - step) { step } else { -step };
     let (mut behind, mut here, mut value) = (start - step, start, of(start));
     for _ in 0..40 {
         let next = of(here + step);
-        if next >= value {
+        if next >= value || (here + step).abs() > farthest {
             break;
         }
         (behind, here, value) = (here, here + step, next);

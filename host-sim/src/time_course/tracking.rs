@@ -51,14 +51,12 @@ pub fn track<const POINTS: usize>(
         }
     }
     let models: Vec<Model> = states.iter().map(|state: &State| moving.at(*state)).collect();
-    let mean = |of: &dyn Fn(&Model) -> f64| models.iter().map(of).sum::<f64>() / models.len() as f64;
-    let of_epoch = |(epoch, model): (&Curve<POINTS>, &Model)| {
-        deviance_per_point(epoch, |n| model.avar(n), |point| model.edf(point))
-    };
+    let mean = |n: u64| models.iter().map(|model| model.avar(n)).sum::<f64>() / models.len() as f64;
+    let of_epoch = |(epoch, model): (&Curve<POINTS>, &Model)| deviance_per_point(epoch, |n| model.avar(n));
     let count = unseen.len() as f64;
     Tracked {
         free,
-        pooled: deviance_per_point(half, |n| mean(&|model| model.avar(n)), |point| mean(&|model| model.edf(point))),
+        pooled: deviance_per_point(half, mean),
         one_step: unseen.iter().zip(&models).map(of_epoch).sum::<f64>() / count,
         one_step_static: unseen.iter().map(|epoch| of_epoch((epoch, moving.model()))).sum::<f64>() / count,
     }

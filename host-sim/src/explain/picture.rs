@@ -1,0 +1,41 @@
+//! The picture of an explained channel: what the first half taught, against the curve of the second.
+
+use super::ChannelExplanation;
+use crate::plot::{PlotError, allan};
+use crate::report::{ChannelReport, CurvePoint, ModelError, ModelReport, ReadOff};
+use allan_core::read_off::percentage_accuracy;
+use allan_core::{Model, Point};
+
+/// The curve of the second half, the declared and the predictive model of the first, and the residual, as an SVG document.
+///
+/// # Errors
+/// The drawing library refuses.
+pub fn picture(of: &ChannelExplanation) -> Result<String, PlotError> {
+    let unseen = &of.parts.unseen;
+    // The same degrees of freedom as in the tables.
+    let point = |point: &Point| CurvePoint {
+        n: point.n,
+        tau_s: point.tau,
+        adev: point.avar.sqrt(),
+        low: point.low.sqrt(),
+        high: point.high.sqrt(),
+        edf: point.edf,
+        accuracy_percent: percentage_accuracy(unseen.samples(), point.n),
+    };
+    let model = |model: &Model, [fitted, error]: [f64; 2]| ModelReport {
+        terms: Vec::new(),
+        adev: unseen.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
+        fitted: ModelError { deviance_per_point: Some(fitted), rms_percent: None },
+        unseen: ModelError { deviance_per_point: Some(error), rms_percent: None },
+    };
+    allan(&ChannelReport {
+        name: format!("{}, second half; models of the first", of.channel.name()),
+        unit: of.channel.unit().to_owned(),
+        samples: unseen.samples(),
+        curve: unseen.points().iter().map(point).collect(),
+        read_off: ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
+        before: model(&of.trace.before, of.errors.declared),
+        effects: Vec::new(),
+        after: model(&of.predictive, of.errors.predictive),
+    })
+}
