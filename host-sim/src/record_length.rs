@@ -1,0 +1,91 @@
+//! How long to record: the information that a longer record would hold.
+
+use allan_core::Model;
+use allan_core::model::Term;
+use nalgebra::{DMatrix, DVector};
+
+/// Relative half-width of the 95 % bounds that is asked for.
+pub const WANTED: f64 = 0.2;
+/// Longest record that is advised, s.
+const LONGEST_S: f64 = 30.0 * 86_400.0;
+const NORMAL_975: f64 = 1.96;
+
+/// Record length in s at which the 95 % bounds of a coefficient are [`WANTED`] wide, for a model that is true.
+///
+/// By Whittle's information: each frequency tells each term's share of the density. The fit reaches it within a tenth; by
+/// how much its own bounds of today's `duration` are wider, those of the longer record are taken to be. `None` for a term
+/// that the data does not show, or where a month would not do.
+#[must_use]
+pub fn wanted(model: &Model, term: usize, duration: f64) -> Option<f64> {
+    let present = model.terms().get(term).filter(|term| term.value > 0.0 && term.low > 0.0)?;
+    let today = (present.high - present.low) / 2.0 / present.value;
+    let inefficiency = (today / (NORMAL_975 * relative_error(model, term, duration)?)).max(1.0);
+    let width = |length: f64| relative_error(model, term, length).map(|error| NORMAL_975 * inefficiency * error);
+    let mut length = duration;
+    while width(length)? > WANTED {
+        length *= 1.05;
+        if length > LONGEST_S {
+            return None;
+        }
+    }
+    Some(length)
+}
+
+/// Relative standard deviation of a coefficient among the others, after `duration` s.
+fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> {
+    let present: Vec<&Term> = model.terms().iter().filter(|term| term.value > 0.0).collect();
+    let position = present.iter().position(|of| std::ptr::eq(*of, &model.terms()[term]))?;
+    let period = model.sample_period();
+    let mut information = DMatrix::zeros(present.len(), present.len());
+    // One ordinate in every half resolution, each with a single degree of freedom; in ever wider bands.
+    let ordinates = (duration / period) as usize;
+    let mut first = 1;
+    while first < ordinates {
+        let count = (first / 16).clamp(1, ordinates - first);
+        let frequency = (first as f64 + (count - 1) as f64 / 2.0) / (2.0 * duration);
+        let density = |term: &&Term| term.value * term.value * term.kind.process().density(frequency, period);
+        let densities = DVector::from_iterator(present.len(), present.iter().map(density));
+        let total = densities.sum();
+        if total > 0.0 {
+            let shares = densities / total;
+            information += count as f64 / 2.0 * &shares * shares.transpose();
+        }
+        first += count;
+    }
+    // Of the square of the coefficient, hence the half.
+    Some(information.cholesky()?.inverse()[(position, position)].sqrt() / 2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use allan_core::Kind;
+
+    fn model(n: f64, k: f64) -> Model {
+        let terms = [Term::exact(Kind::AngleRandomWalk, n), Term::exact(Kind::RateRandomWalk, k)];
+        Model::new(0.01, terms.map(|term| Term { low: 0.9 * term.value, high: 1.1 * term.value, ..term }))
+    }
+
+    #[test]
+    fn white_noise_and_a_walk_have_their_known_information() {
+        // N alone: 1/√(2M) of M samples.
+        let error = relative_error(&model(2e-3, 0.0), 0, 1e4).expect("an error");
+        assert!((error / (1.0 / 2e6f64.sqrt()) - 1.0).abs() < 1e-3, "{error}");
+        // N and K: the walk passes the white noise at K/(2πN), 27.6 resolutions; ½·Σ 1/(1 + (j/55.1)²)² over half
+        // resolutions is 55.1·π/8 − ¼ = 21.4, of K², and N costs little.
+        let error = relative_error(&model(2e-3, 3.464e-5), 1, 1e4).expect("an error");
+        assert!((error / (0.5 / 21.4f64.sqrt()) - 1.0).abs() < 0.02, "{error}");
+    }
+
+    #[test]
+    fn four_times_as_long_halves_the_error_of_a_walk() {
+        let model = model(2e-3, 3.464e-5);
+        // 1.96·10.8 % at 1e4 s is 21.2 %: 12.5 % longer will do.
+        let length = wanted(&model, 1, 1e4).expect("a length");
+        assert!((1.0e4..1.25e4).contains(&length), "{length}");
+        // The white noise is known at once; what is not there can never be.
+        assert_eq!(wanted(&model, 0, 1e4), Some(1e4));
+        assert_eq!(wanted(&self::model(2e-3, 0.0), 1, 1e4), None);
+        assert_eq!(wanted(&self::model(2e-3, 1e-9), 1, 1e4), None);
+    }
+}
