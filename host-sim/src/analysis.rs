@@ -10,11 +10,13 @@ mod parts;
 mod repairs;
 mod study;
 
+use crate::practice::Practice;
 use crate::recording::Recording;
 use crate::report::{
     ChannelReport, CurvePoint, Effect, ModelError, ModelReport, ReadOff, ReadOffValue, Report, SCHEMA, Term,
 };
 use crate::timeline::{Step, Timeline};
+use crate::trace::Series;
 use adis16405_driver::Channel;
 use allan_core::common_mode::common_mode;
 use allan_core::term::{CoefficientUnit, Kind};
@@ -61,10 +63,17 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     let parts = Parts::of(recording, timeline, &coupled, &repairs);
     let studies = in_parallel(&recording.channels, |&channel| {
         let series = traced.contains(&channel).then(|| repairs.series(recording, timeline, channel));
-        Studies::of(&parts, channel, series.as_ref())
+        let studies = Studies::of(&parts, channel, series.as_ref());
+        let series = series.unwrap_or_else(|| Series::of(recording, timeline, channel));
+        // What the channel follows is no noise, and is in the series: there the declared model has to do.
+        let trace = &studies.first.trace;
+        let model = if studies.first.followed.is_empty() { &trace.after } else { &trace.before };
+        let practice = Practice::of(&series, model);
+        (studies, practice)
     });
+    let (studies, practices): (Vec<Studies>, Vec<Practice>) = studies.into_iter().unzip();
     let studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
-    let report = |((channel, own), measured): (&(Channel, Studies), &Curve<OCTAVES>)| {
+    let report = |(((channel, own), measured), practice): ((&(Channel, Studies), &Curve<OCTAVES>), Practice)| {
         let unit = channel.unit();
         let mut effects: Vec<Effect> = Vec::new();
         if traced.contains(channel) {
@@ -83,9 +92,10 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
             before: own.before(&parts, *channel, unit, &whole),
             after: own.after(&parts, *channel, unit, &whole),
             effects,
+            practice,
         }
     };
-    studies.iter().zip(&parts.measured).map(report).collect()
+    studies.iter().zip(&parts.measured).zip(practices).map(report).collect()
 }
 
 /// A channel learnt from the first half, which predicts, and from both, which name.
@@ -96,7 +106,7 @@ struct Studies {
 }
 
 impl Studies {
-    fn of(parts: &Parts, channel: Channel, series: Option<&crate::trace::Series>) -> Self {
+    fn of(parts: &Parts, channel: Channel, series: Option<&Series>) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
         let lines = series.map(lines::of).unwrap_or_default();
         let half_lines = series.map(|series| lines::of(&series.first_half())).unwrap_or_default();

@@ -1,6 +1,7 @@
 //! The report as one HTML file that needs nothing else: styles and pictures are inside. The same report gives the
 //! same bytes.
 
+mod practice;
 mod sections;
 
 use crate::plot::{self, PlotError};

@@ -6,7 +6,7 @@ use crate::innovation;
 use crate::navigation::{self, CALIBRATION_S};
 use crate::record_length;
 use crate::report::Parameter;
-use crate::spectrum::{Welch, lines};
+use crate::spectrum::Welch;
 use crate::trace::Series;
 use crate::units::{GRAVITY, conversions};
 use allan_core::{Kind, Model};
@@ -18,7 +18,7 @@ const WELCH_SAMPLES: usize = 1 << 13;
 const LINE_WIDTHS: f64 = 4.0;
 
 /// What a channel's model is good for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Practice {
     /// The coefficients in the units that people ask for.
     pub coefficients: Vec<Coefficient>,
@@ -105,7 +105,7 @@ impl Practice {
                 correlation: found.correlation,
                 whiteness_p: found.whiteness,
             }),
-            angle_random_walk_by_spectrum: angle_random_walk(&whole, series.unit),
+            angle_random_walk_by_spectrum: angle_random_walk(&whole, model, series.unit),
             record: records(model, whole.duration() / 2.0),
         }
     }
@@ -159,14 +159,17 @@ fn drift(model: &Model, unit: &str, unseen: &Grid) -> Vec<Drift> {
     navigation::drifts(model, unseen).into_iter().map(of).collect()
 }
 
-fn angle_random_walk(whole: &Grid, unit: &str) -> Option<Parameter> {
+/// N by the spectrum without the lines of the model.
+fn angle_random_walk(whole: &Grid, model: &Model, unit: &str) -> Option<Parameter> {
     let welch = Welch::of(whole, WELCH_SAMPLES)?;
     let reach = LINE_WIDTHS / (WELCH_SAMPLES as f64 * whole.sample_period());
-    let lines = lines(whole);
     let near = |frequency: f64| {
-        lines.iter().any(|line| {
-            let width = line.width.map_or(0.0, |width| width.value);
-            (frequency - line.frequency.value).abs() < reach + LINE_WIDTHS * width
+        model.terms().iter().any(|term| match term.kind {
+            Kind::Sinusoid(sinusoid) => (frequency - sinusoid.frequency).abs() < reach,
+            Kind::Resonance(resonance) => {
+                (frequency - resonance.frequency).abs() < reach + LINE_WIDTHS * resonance.bandwidth
+            }
+            _ => false,
         })
     };
     let (shape, bands) = welch.shape(near);

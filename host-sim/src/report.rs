@@ -3,6 +3,7 @@
 //! A report says nothing of where its samples came from, so that a recording read from a file and the same
 //! recording replayed over the bus give the same bytes.
 
+use crate::practice::Practice;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -45,6 +46,8 @@ pub struct ChannelReport {
     pub effects: Vec<Effect>,
     /// The declared model with the effects.
     pub after: ModelReport,
+    /// What that model is good for.
+    pub practice: Practice,
 }
 
 /// One octave of the measured Allan deviation.

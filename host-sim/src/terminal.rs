@@ -1,6 +1,11 @@
 //! The report as text: at most 100 columns, the same in a terminal and in a file.
 
+mod practice;
+
+pub(crate) use practice::advice;
+
 use crate::coefficients::{self, Row};
+use crate::navigation::CALIBRATION_S;
 use crate::report::{ChannelReport, Parameter, Report, Term};
 use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
@@ -25,7 +30,11 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(out)?;
     writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
     writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
-    writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")
+    writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")?;
+    writeln!(
+        out,
+        "error after t: rms of the integral over t when the bias is the mean of the {CALIBRATION_S} s before."
+    )
 }
 
 /// By cause, on one line unless there are very many.
@@ -57,6 +66,7 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     if same && channel.effects.is_empty() {
         writeln!(out, "No effect was added to the declared model: after equals before.")?;
     }
+    practice::write(&channel.practice, out)?;
     if channel.curve.is_empty() {
         return writeln!(out, "The record is too short for a point of the curve.");
     }

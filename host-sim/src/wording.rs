@@ -1,5 +1,7 @@
 //! How numbers, units and names read in the terminal, in the picture and on the page.
 
+use crate::practice::Innovations;
+
 /// What stands where there is no number.
 pub const NONE: &str = "–";
 
@@ -94,8 +96,31 @@ pub fn parameter_name(name: &str) -> String {
 
 /// A unit of the JSON schema as it is printed: `deg/sqrt(s)` becomes `°/√s`.
 pub fn unit(name: &str) -> String {
-    name.replace("degC", "°C").replace("deg", "°").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
+    let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
+    let powers = [("^2", "²"), ("^3", "³")];
+    let spelled = symbols.iter().chain(&powers).fold(name.to_owned(), |name, (plain, sign)| name.replace(plain, sign));
+    if spelled.starts_with("ug") { spelled.replacen("ug", "µg", 1) } else { spelled }
 }
+
+/// What the innovations say of a model, in a sentence.
+pub fn verdict(innovations: &Innovations) -> &'static str {
+    let size = if innovations.normalised > innovations.high {
+        -1
+    } else {
+        i32::from(innovations.normalised >= innovations.low)
+    };
+    match (size, innovations.whiteness_p >= WHITE) {
+        (1, true) => "white and as large as the model says: enough for a filter",
+        (1, false) => "as large as the model says, but not white: something with a memory is missing",
+        (0, true) => "white, but smaller than the model says: a filter would be too cautious",
+        (0, false) => "smaller than the model says, and not white",
+        (_, true) => "white, but larger than the model says: a filter would be too sure",
+        (_, false) => "larger than the model says, and not white: the model is not enough for a filter",
+    }
+}
+
+/// Innovations whose correlation has a smaller chance are not called white.
+const WHITE: f64 = 0.01;
 
 #[cfg(test)]
 mod tests {
@@ -172,5 +197,8 @@ mod tests {
         assert_eq!(unit("deg/s/sqrt(s)"), "°/s/√s");
         assert_eq!(unit("degC"), "°C");
         assert_eq!(unit("gauss"), "gauss");
+        assert_eq!(unit("ug/sqrt(Hz)"), "µg/√Hz");
+        assert_eq!(unit("deg/h/sqrt(h)"), "°/h/√h");
+        assert_eq!(unit("m/s^3/sqrt(Hz)"), "m/s³/√Hz");
     }
 }

@@ -1,5 +1,6 @@
 //! The parts of the page.
 
+use super::practice::practice;
 use crate::coefficients::{self, Row};
 use crate::report::{ChannelReport, ModelError, ModelReport, Parameter, Report};
 use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
@@ -133,6 +134,10 @@ pub(super) fn channel(channel: &ChannelReport, picture: &str) -> Markup {
                         }
                     }
                 }
+            }
+            details {
+                summary { "What the model is good for: other units, drift, a filter's innovations, longer records" }
+                (practice(&channel.practice))
             }
             details {
                 summary { "The curve in numbers (" (count(channel.curve.len() as u64)) " points)" }
@@ -302,6 +307,14 @@ pub(super) fn definitions() -> Markup {
                      "octaves with " i { "n" } " ≤ " i { "M" } "/8: rms is 100·√(mean (½ ln(" i { "v/m" }
                      "))²) %, deviance a point is mean edf·(ln(" i { "m/v" } ") + " i { "v/m" }
                      " − 1), which is about 1 for a true model." }
+                dt { "Error after a time" }
+                dd { "is the root mean square of the integral over that time, of a vehicle that took the mean of the 60 s "
+                     "before as its bias: an angle of a gyro, a velocity of an accelerometer." }
+                dt { "Innovations" }
+                dd { "are what a Kalman filter of the model does not predict of quarter seconds of the unseen half. Of a true "
+                     "model they are white and of the expected variance." }
+                dt { "Continuous and discrete" }
+                dd { "coefficients belong to the process and to its samples at this rate: they are different numbers." }
                 dt { "Read off" }
                 dd { i { "N" } " is the −½ slope at 1 s, " i { "B" } " the flat minimum divided by √(2 ln 2/π) = "
                      "0.664, " i { "K" } " the +½ slope at 3 s. Accuracy is 100/√(2(" i { "N/n" } " − 1)) %, with "

@@ -1,5 +1,6 @@
 //! A report made by hand: the curve of known N, B and K, without an estimator or a fit.
 
+use host_sim::practice::{Coefficient, Drift, Innovations, Practice, Record};
 use host_sim::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -55,6 +56,7 @@ pub(crate) fn empty() -> Report {
     let error = ModelError { deviance_per_point: None, rms_percent: None };
     channel.before = ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error };
     channel.after = channel.before.clone();
+    channel.practice = Practice::default();
     report
 }
 
@@ -89,6 +91,45 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         before: declared.clone(),
         effects: vec![],
         after: declared,
+        practice: practice(scale),
+    }
+}
+
+/// Numbers that occur nowhere else.
+fn practice(scale: f64) -> Practice {
+    let parameter = |value: f64, unit: &str| Parameter {
+        value: scale * value,
+        low: scale * value * 0.9,
+        high: scale * value * 1.1,
+        unit: unit.to_owned(),
+    };
+    let coefficient = |discrete, value| Coefficient { kind: "angle_random_walk".to_owned(), discrete, value };
+    Practice {
+        coefficients: vec![
+            coefficient(false, parameter(2.208, "deg/sqrt(h)")),
+            coefficient(true, parameter(0.3681, "deg/s")),
+        ],
+        drift: [10.0, 600.0]
+            .map(|seconds| Drift {
+                seconds,
+                calibration_s: 60.0,
+                predicted: scale * 0.017 * seconds,
+                observed: (seconds < 100.0).then(|| parameter(0.0181 * seconds, "deg")),
+                unit: "deg".to_owned(),
+            })
+            .into(),
+        innovations: Some(Innovations {
+            count: 14_321,
+            normalised: 1.007,
+            low: 0.977,
+            high: 1.023,
+            correlation: 0.002,
+            whiteness_p: 0.4321,
+        }),
+        angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
+        record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
+            .map(|(kind, more_hours)| Record { kind: kind.to_owned(), half_s: None, more_hours })
+            .into(),
     }
 }
 

@@ -187,7 +187,7 @@ fn the_terminal_stays_within_a_hundred_columns() {
 }
 
 /// What both the terminal and the page must hold of [`report`], in the format of [`host_sim::wording`].
-const TOLD: [&str; 22] = [
+const TOLD: [&str; 32] = [
     "gyro_x",
     "gyro_y",
     "gyro_z",
@@ -210,6 +210,16 @@ const TOLD: [&str; 22] = [
     "3.946 %",
     "°/√s",
     "no such slope",
+    "°/√h",
+    "2.208",
+    "0.3681",
+    "0.1700",
+    "0.1810",
+    "10 min",
+    "0.4321",
+    "enough for a filter",
+    "0.03677",
+    "bias instability to ±20 %: record 7 h 30 min more",
 ];
 
 #[test]
