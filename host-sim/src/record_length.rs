@@ -31,8 +31,10 @@ pub fn wanted(model: &Model, term: usize, duration: f64) -> Option<f64> {
     Some(length)
 }
 
-/// Relative standard deviation of a coefficient among the others, after `duration` s.
-fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> {
+/// Relative standard deviation of a coefficient among the others that `duration` s of samples allow, by Whittle's
+/// information; `None` for a term of 0.
+#[must_use]
+pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> {
     let present: Vec<&Term> = model.terms().iter().filter(|term| term.value > 0.0).collect();
     let position = present.iter().position(|of| std::ptr::eq(*of, &model.terms()[term]))?;
     let period = model.sample_period();

@@ -163,6 +163,7 @@ fn report(found: &[Found<'_>]) -> Report {
         curve: Vec::new(),
         read_off: ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(),
+        practice: Default::default(),
         effects: found.iter().filter(|(of, ..)| *of == channel).map(effect).collect(),
         after: model(),
     };

@@ -63,6 +63,8 @@ fn main() -> Result<()> {
                 }
             }
         }
+        let [n, b, k] = ours::limit(case).map(|limit| limit.map_or("–".to_owned(), score::percent));
+        table.add_row([case.name.to_owned(), "information in the series".to_owned(), n, b, k]);
         for (method, Scores([n, b, k])) in methods {
             table.add_row([case.name.to_owned(), method, n.cell(), b.cell(), k.cell()]);
         }

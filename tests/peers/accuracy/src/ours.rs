@@ -1,7 +1,9 @@
 //! This project's own estimator and fit.
 
-use crate::case::{Case, Coefficients, SAMPLE_PERIOD};
+use crate::case::{Case, Coefficients, SAMPLE_PERIOD, SAMPLES};
+use allan_core::model::Term;
 use allan_core::{Cascade, Kind, Model, fit::fit};
+use host_sim::record_length::relative_error;
 
 /// Counts in the standard deviation of the white noise: rounding adds 1/12 count², a part in 10⁷.
 const COUNTS: f64 = 1000.0;
@@ -19,6 +21,17 @@ pub(crate) fn fitted(case: &Case, series: &[f64], kinds: &[Kind]) -> Model {
 /// The terms that the case is made of.
 pub(crate) fn true_kinds(case: &Case) -> Vec<Kind> {
     Kind::DECLARED.into_iter().zip(case.truth).filter(|(_, value)| *value > 0.0).map(|(kind, _)| kind).collect()
+}
+
+/// Relative error of N, B, K that no unbiased method can go below, on average.
+pub(crate) fn limit(case: &Case) -> [Option<f64>; 3] {
+    let truth = Model::new(
+        SAMPLE_PERIOD,
+        Kind::DECLARED.into_iter().zip(case.truth).map(|(kind, value)| Term::exact(kind, value)),
+    );
+    std::array::from_fn(|term| {
+        (case.truth[term] > 0.0).then(|| relative_error(&truth, term, SAMPLES as f64 * SAMPLE_PERIOD))?
+    })
 }
 
 /// N, B, K of a model.

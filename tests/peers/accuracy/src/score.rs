@@ -80,7 +80,8 @@ impl Scores {
     }
 }
 
-fn percent(value: f64) -> String {
+/// A share in percent.
+pub(crate) fn percent(value: f64) -> String {
     let value = 100.0 * value;
     if value < 1.0 { format!("{value:.3} %") } else { format!("{value:.1} %") }
 }
