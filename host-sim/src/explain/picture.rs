@@ -35,6 +35,7 @@ pub fn picture(of: &ChannelExplanation) -> Result<String, PlotError> {
         curve: unseen.points().iter().map(point).collect(),
         read_off: ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(&of.trace.before, of.errors.declared),
+        practice: Default::default(),
         effects: Vec::new(),
         after: model(&of.predictive, of.errors.predictive),
     })
