@@ -192,12 +192,20 @@ pub struct Simulate {
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Nothing but the declared noise: without it the sensor hides a line and an effect of temperature.
+    #[arg(long)]
+    pub plain: bool,
 }
 
 impl Simulate {
     /// With `default_s` seconds unless told otherwise.
     pub fn simulation(&self, default_s: f64) -> Simulation {
-        Simulation::of_paper(self.seconds.unwrap_or(default_s), self.seed)
+        let seconds = self.seconds.unwrap_or(default_s);
+        if self.plain {
+            Simulation::of_paper(seconds, self.seed)
+        } else {
+            Simulation::of_demonstration(seconds, self.seed)
+        }
     }
 }
 

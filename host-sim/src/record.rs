@@ -1,5 +1,6 @@
 //! The virtual sensor, read by the real driver over the emulated bus.
 
+mod demonstration;
 mod host;
 mod logged_bus;
 pub mod port;
@@ -77,6 +78,11 @@ impl Simulation {
     /// The part of [`NoiseModel::paper`], hiding nothing, read by a perfect host.
     pub fn of_paper(seconds: f64, seed: u64) -> Self {
         Self { seconds, seed, noise: NoiseModel::paper(), hidden: Hidden::default(), host: Host::default() }
+    }
+
+    /// The same part with a line on gyro z and a gyro x that follows the temperature.
+    pub fn of_demonstration(seconds: f64, seed: u64) -> Self {
+        Self { hidden: demonstration::hidden(), ..Self::of_paper(seconds, seed) }
     }
 
     /// Samples that the part takes.
