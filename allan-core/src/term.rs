@@ -75,6 +75,9 @@ pub enum Kind {
     Sinusoid(Sinusoid),
 }
 
+/// Frequency over bandwidth from which on a curve cannot tell a resonance from a sinusoid.
+const SHARPEST: f64 = 200.0;
+
 const NONE: (&str, f64) = ("", 0.0);
 
 /// What a coefficient is measured in, the channel's unit being that of a rate.
@@ -152,7 +155,10 @@ impl Kind {
     pub(crate) fn with_shape(self, shape: [f64; MAX_SHAPE]) -> Self {
         match self {
             Self::Markov(_) => Self::Markov(Markov { time_constant: shape[0] }),
-            Self::Resonance(_) => Self::Resonance(Resonance { frequency: shape[0], bandwidth: shape[1] }),
+            Self::Resonance(_) => {
+                let [frequency, bandwidth] = shape;
+                Self::Resonance(Resonance { frequency, bandwidth: bandwidth.max(frequency / SHARPEST) })
+            }
             Self::Sinusoid(_) => Self::Sinusoid(Sinusoid { frequency: shape[0] }),
             Self::Filtered(filter) => Self::Filtered(Filter { decimation: shape[1], ..filter }),
             other => other,

@@ -85,15 +85,48 @@ pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace 
     while after.terms().len() < MAX_TERMS && !found.is_full() {
         let Some(rival) = most_telling(&Baseline::new(curve, &after), &kinds(&after), &families) else { break };
         let residual = largest_residual(curve, &after);
-        let term = rival.kinds.len().min(after.terms().len());
         // A filter that is read slowly has taken the place of the white noise.
-        let term = if rival.kinds.len() == after.terms().len() { 0 } else { term };
+        let term = if rival.kinds.len() == after.terms().len() { 0 } else { after.terms().len() };
         after = fit_shapes(curve, &rival.kinds);
         // There is room: the loop ends when it is full.
         let _ = found.push(Found { term, score: rival.score(), residual });
+        if found.len() > 1 {
+            after = reconsidered(curve, after, &found, &families);
+        }
     }
     let after_goodness = goodness(curve, &after);
     Trace { before, before_goodness, after, after_goodness, found }
+}
+
+/// Terms that were found before others were known, put to the test again: each gives way to another that explains more.
+fn reconsidered<const POINTS: usize>(
+    curve: &Curve<POINTS>,
+    mut model: Model,
+    found: &[Found],
+    families: &[Family],
+) -> Model {
+    for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
+        let without: Vec<Kind, MAX_TERMS> =
+            model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
+        let baseline = Baseline::new(curve, &fit(curve, &without));
+        // A slowly read filter would change the order of the terms.
+        let Some(rival) = most_telling(&baseline, &without, families).filter(|rival| rival.kinds.len() > without.len())
+        else {
+            continue;
+        };
+        let mut kinds = rival.kinds;
+        let Some(other) = kinds.pop() else { continue };
+        if other.name() == model.terms()[known.term].kind.name() {
+            continue;
+        }
+        // In the place of the old one.
+        let _ = kinds.insert(known.term.min(kinds.len()), other);
+        let candidate = fit_shapes(curve, &kinds);
+        if goodness(curve, &candidate).deviance < goodness(curve, &model).deviance - CONVINCING {
+            model = candidate;
+        }
+    }
+    model
 }
 
 fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
@@ -121,7 +154,8 @@ fn with(kinds: &[Kind], candidate: &Kind) -> Option<Vec<Kind, MAX_TERMS>> {
         *white = *candidate;
         return Some(with);
     }
-    if kinds.contains(candidate) {
+    let is_filter = |kind: &Kind| matches!(kind, Kind::Filtered(_));
+    if kinds.contains(candidate) || (is_filter(candidate) && kinds.iter().any(is_filter)) {
         return None;
     }
     with.push(*candidate).ok()?;
