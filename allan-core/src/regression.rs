@@ -107,16 +107,16 @@ impl<const POINTS: usize> Beside<'_, POINTS> {
             let tried = others.filter_map(|next| {
                 let chosen: Vec<usize, MAX_COVARIATES> =
                     followed.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
-                self.sensitivities(&chosen, &rest)
+                let first = self.sensitivities(&chosen, &rest)?;
+                // What is left is smaller now: weigh the octaves by that.
+                self.sensitivities(&chosen, &self.rest(&first))
             });
             let clarity = |tried: &Vec<Sensitivity, MAX_COVARIATES>| tried.last().map_or(0.0, Sensitivity::sigmas);
             let Some(best) = tried.max_by(|a, b| clarity(a).total_cmp(&clarity(b))) else { break };
             if clarity(&best) < DOUBT {
                 break;
             }
-            // What is left is smaller now: weigh the octaves by that.
-            let chosen: Vec<usize, MAX_COVARIATES> = best.iter().map(|known| known.covariate).collect();
-            followed = self.sensitivities(&chosen, &self.rest(&best)).unwrap_or(best);
+            followed = best;
         }
         followed
     }
