@@ -77,6 +77,8 @@ pub enum Kind {
 
 /// Frequency over bandwidth from which on a curve cannot tell a resonance from a sinusoid.
 const SHARPEST: f64 = 200.0;
+/// The same below which it is a Markov process rather than an oscillation.
+const BROADEST: f64 = 1.5;
 
 const NONE: (&str, f64) = ("", 0.0);
 
@@ -157,7 +159,10 @@ impl Kind {
             Self::Markov(_) => Self::Markov(Markov { time_constant: shape[0] }),
             Self::Resonance(_) => {
                 let [frequency, bandwidth] = shape;
-                Self::Resonance(Resonance { frequency, bandwidth: bandwidth.max(frequency / SHARPEST) })
+                Self::Resonance(Resonance {
+                    frequency,
+                    bandwidth: bandwidth.clamp(frequency / SHARPEST, frequency / BROADEST),
+                })
             }
             Self::Sinusoid(_) => Self::Sinusoid(Sinusoid { frequency: shape[0] }),
             Self::Filtered(filter) => Self::Filtered(Filter { decimation: shape[1], ..filter }),

@@ -9,6 +9,8 @@ const ROUNDS: usize = 12;
 /// First step: a factor of about 1.2 each way.
 const FIRST_STEP: f64 = 0.18;
 const LAST_STEP: f64 = 2e-4;
+/// Samples: neighbours that correlate more briefly do so behind a filter.
+const SHORTEST: f64 = 1.5;
 
 /// Moves the shapes of all `kinds` that have one to where the deviance is least, at the present weights.
 pub(super) fn search(problem: &mut Problem, kinds: &mut [Kind]) {
@@ -34,7 +36,7 @@ fn walk(problem: &mut Problem, kinds: &mut [Kind], at: (usize, usize), step: &mu
         let after = trial(problem, kinds[term], at, *step);
         let (shift, least) = if before < after { (-*step, before) } else { (*step, after) };
         if least < deviance {
-            kinds[term] = shifted(kinds[term], index, shift);
+            kinds[term] = shifted(problem, kinds[term], index, shift);
             deviance = least;
             continue;
         }
@@ -43,7 +45,7 @@ fn walk(problem: &mut Problem, kinds: &mut [Kind], at: (usize, usize), step: &mu
         let vertex = if curvature > 0.0 { 0.5 * *step * (before - after) / curvature } else { 0.0 };
         let there = trial(problem, kinds[term], at, vertex);
         if there < deviance {
-            kinds[term] = shifted(kinds[term], index, vertex);
+            kinds[term] = shifted(problem, kinds[term], index, vertex);
             deviance = there;
         }
         *step /= 4.0;
@@ -54,12 +56,16 @@ fn walk(problem: &mut Problem, kinds: &mut [Kind], at: (usize, usize), step: &mu
 }
 
 fn trial(problem: &mut Problem, kind: Kind, (term, index): (usize, usize), shift: f64) -> f64 {
-    problem.set_kind(term, shifted(kind, index, shift));
+    let kind = shifted(problem, kind, index, shift);
+    problem.set_kind(term, kind);
     problem.minimise()
 }
 
-fn shifted(kind: Kind, index: usize, shift: f64) -> Kind {
+fn shifted(problem: &Problem, kind: Kind, index: usize, shift: f64) -> Kind {
     let mut shape = kind.shape().map(|(_, value)| value);
     shape[index] *= exp(shift);
+    if let Kind::Markov(_) = kind {
+        shape[index] = shape[index].max(SHORTEST * problem.sample_period);
+    }
     kind.with_shape(shape)
 }
