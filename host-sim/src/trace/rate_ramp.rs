@@ -10,7 +10,7 @@ use super::normal::{NORMAL_975, upper_tail};
 use super::{Finding, Repair, SIGNIFICANCE, Series, effect, parameter};
 
 /// What the free mixture of the noise may gain from a ramp that is none, in −2 ln likelihood.
-const NOISE_GAIN: f64 = 4.0;
+const NOISE_GAIN: f64 = 8.0;
 
 /// Looks for a ramp in one channel. `causes` are other channels, of the same samples, that may move this one.
 #[must_use]
