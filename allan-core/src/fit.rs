@@ -43,12 +43,17 @@ pub fn goodness<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Go
 /// Fits the coefficients of `kinds` and also the shapes of those that have one, from the given ones on.
 #[must_use]
 pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
+    fit_free_shapes(curve, kinds, &[])
+}
+
+/// As [`fit_shapes`], leaving those of `kinds` that are `fixed` as they are.
+pub(crate) fn fit_free_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind], fixed: &[Kind]) -> Model {
     let mut kinds: Vec<Kind, MAX_TERMS> = kinds.iter().copied().take(MAX_TERMS).collect();
     let mut problem = Problem::new(curve, &kinds);
     let mut model = problem.settle(curve, 2);
     if kinds.iter().any(|kind| !kind.freedom().is_empty()) {
         for _ in 0..2 {
-            shape::search(&mut problem, &mut kinds);
+            shape::search(&mut problem, &mut kinds, fixed);
             model = problem.settle(curve, 2);
         }
     }

@@ -5,10 +5,10 @@
 
 mod candidate;
 
-use crate::fit::{Baseline, Goodness, Rival, fit, fit_shapes, goodness};
+use crate::fit::{Baseline, Goodness, Rival, fit, fit_free_shapes, goodness};
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind, math};
-use candidate::{Family, families};
+use candidate::{Family, MAX_SHAPES, families};
 use heapless::Vec;
 
 /// Terms beyond the declared ones that a trace can add.
@@ -77,21 +77,33 @@ impl Trace {
     }
 }
 
+impl Lines<'_> {
+    /// The sinusoids of a spectrum, which tells their frequency far better than a curve could.
+    fn steady(&self) -> Vec<Kind, MAX_SHAPES> {
+        let known = match self {
+            Self::InTheCurve => &[],
+            Self::Known(lines) => *lines,
+        };
+        known.iter().filter(|kind| matches!(kind, Kind::Sinusoid(_))).copied().take(MAX_SHAPES).collect()
+    }
+}
+
 /// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
 #[must_use]
 pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
     let families = families(curve, lines);
+    let fixed = lines.steady();
     let Trace { before, before_goodness, mut after, mut found, .. } = Trace::declared(curve);
     while after.terms().len() < MAX_TERMS && !found.is_full() {
-        let Some(rival) = most_telling(&Baseline::new(curve, &after), &kinds(&after), &families) else { break };
+        let Some(rival) = most_telling(&Baseline::new(curve, &after), &kinds(&after), &families, &fixed) else { break };
         let residual = largest_residual(curve, &after);
         // A filter that is read slowly has taken the place of the white noise.
         let term = if rival.kinds.len() == after.terms().len() { 0 } else { after.terms().len() };
-        after = fit_shapes(curve, &rival.kinds);
+        after = fit_free_shapes(curve, &rival.kinds, &fixed);
         // There is room: the loop ends when it is full.
         let _ = found.push(Found { term, score: rival.score(), residual });
         if found.len() > 1 {
-            after = reconsidered(curve, after, &found, &families);
+            after = reconsidered(curve, after, &found, &families, &fixed);
         }
     }
     let after_goodness = goodness(curve, &after);
@@ -104,13 +116,15 @@ fn reconsidered<const POINTS: usize>(
     mut model: Model,
     found: &[Found],
     families: &[Family],
+    fixed: &[Kind],
 ) -> Model {
     for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
         let without: Vec<Kind, MAX_TERMS> =
             model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
         let baseline = Baseline::new(curve, &fit(curve, &without));
         // A slowly read filter would change the order of the terms.
-        let Some(rival) = most_telling(&baseline, &without, families).filter(|rival| rival.kinds.len() > without.len())
+        let Some(rival) =
+            most_telling(&baseline, &without, families, fixed).filter(|rival| rival.kinds.len() > without.len())
         else {
             continue;
         };
@@ -121,7 +135,7 @@ fn reconsidered<const POINTS: usize>(
         }
         // In the place of the old one.
         let _ = kinds.insert(known.term.min(kinds.len()), other);
-        let candidate = fit_shapes(curve, &kinds);
+        let candidate = fit_free_shapes(curve, &kinds, fixed);
         if goodness(curve, &candidate).deviance < goodness(curve, &model).deviance - CONVINCING {
             model = candidate;
         }
@@ -134,11 +148,11 @@ fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
 }
 
 /// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
-fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family]) -> Option<Rival> {
+fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family], fixed: &[Kind]) -> Option<Rival> {
     let of_family = |family: &Family| {
         let rivals = family.shapes.iter().filter_map(|shape| with(kinds, shape)).map(|kinds| baseline.rival(&kinds));
         let best = rivals.max_by(|a, b| a.fall.total_cmp(&b.fall))?;
-        let best = baseline.shaped_rival(&best.kinds);
+        let best = baseline.shaped_rival(&best.kinds, fixed);
         let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
         (best.gain(cost) > 0.0).then_some((best.gain(cost), best))
     };

@@ -55,11 +55,11 @@ impl Baseline {
         self.compared(&problem, deviance)
     }
 
-    /// Fits the coefficients of `kinds` and their shapes.
-    pub(crate) fn shaped_rival(&self, kinds: &[Kind]) -> Rival {
+    /// Fits the coefficients of `kinds` and the shapes of those that are not `fixed`.
+    pub(crate) fn shaped_rival(&self, kinds: &[Kind], fixed: &[Kind]) -> Rival {
         let (mut problem, _) = self.fitted(kinds);
         let mut kinds = problem.kinds.clone();
-        shape::search(&mut problem, &mut kinds);
+        shape::search(&mut problem, &mut kinds, fixed);
         let deviance = problem.minimise();
         self.compared(&problem, deviance)
     }

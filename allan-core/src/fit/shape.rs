@@ -12,17 +12,21 @@ const LAST_STEP: f64 = 2e-4;
 /// Samples: neighbours that correlate more briefly do so behind a filter.
 const SHORTEST: f64 = 1.5;
 
-/// Moves the shapes of all `kinds` that have one to where the deviance is least, at the present weights.
-pub(super) fn search(problem: &mut Problem, kinds: &mut [Kind]) {
+/// Moves the shapes of all `kinds` that have one and are not `fixed` to where the deviance is least, at the present weights.
+pub(super) fn search(problem: &mut Problem, kinds: &mut [Kind], fixed: &[Kind]) {
     let mut deviance = problem.minimise();
+    let mut free = [false; crate::model::MAX_TERMS];
+    free.iter_mut().zip(kinds.iter()).for_each(|(free, kind)| *free = !fixed.contains(kind));
     let mut steps = [[FIRST_STEP; MAX_SHAPE]; crate::model::MAX_TERMS];
     for _ in 0..ROUNDS {
-        for term in 0..kinds.len() {
+        for term in (0..kinds.len()).filter(|&term| free[term]) {
             for index in kinds[term].freedom() {
                 deviance = walk(problem, kinds, (term, index), &mut steps[term][index], deviance);
             }
         }
-        if steps.iter().zip(kinds.iter()).all(|(steps, kind)| steps[kind.freedom()].iter().all(|&s| s < LAST_STEP)) {
+        let settled = |(steps, kind): (&[f64; MAX_SHAPE], &Kind)| steps[kind.freedom()].iter().all(|&s| s < LAST_STEP);
+        let moving = steps.iter().zip(kinds.iter()).zip(free).filter(|(_, free)| *free);
+        if moving.map(|(term, _)| term).all(settled) {
             break;
         }
     }

@@ -17,6 +17,9 @@ const CHANGES: f64 = 30.0;
 /// … and one that does so more seldom than this does not tell a model how its amplitude scatters.
 const TELLING_CHANGES: f64 = 150.0;
 
+/// Relative standard deviation of the clock that the sample rate was measured with: a crystal to ±100 ppm.
+const CLOCK: f64 = 5e-5;
+
 /// A line, or several that are one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
@@ -77,7 +80,10 @@ impl Line {
         let width_error = mean(&|line| line.width.map_or(0.0, |width| width.error));
         let strongest = lines[0];
         Self {
-            frequency: Estimate { value: frequency, error: strongest.frequency.error.max(spread) },
+            frequency: Estimate {
+                value: frequency,
+                error: strongest.frequency.error.max(spread).hypot(CLOCK * frequency),
+            },
             deviation: Estimate {
                 value: total.sqrt(),
                 error: strongest.deviation.error * total.sqrt() / strongest.deviation.value,

@@ -122,13 +122,16 @@ pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
         }
     };
     let frequency = ("frequency", parameter(line.frequency, "Hz"));
+    let width = match line.width.value {
+        width if width > 0.0 => format!("{width:.4} Hz wide"),
+        _ => "no wider than the record resolves".to_owned(),
+    };
     Effect {
         kind: kind.name().to_owned(),
         parameters: parameters.into_iter().chain([frequency]).map(|(name, value)| (name.to_owned(), value)).collect(),
         evidence: format!(
-            "line at {:.4} Hz in the spectrum, {:.4} Hz wide, {:.0} sigma, by chance anywhere {:.0e}; {}",
+            "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {:.0e}; {}",
             line.frequency.value,
-            line.width.value,
             line.statistic.sqrt(),
             line.p_value,
             meaning(&kind),
