@@ -1,12 +1,12 @@
 //! Nanoseconds a sample and channel, of this crate and of two others, on the same white noise.
 //!
-//! Processor time, the least of several runs: another load of the machine does not enter it much.
+//! The least of several runs: another load of the machine does not enter it much.
 
 use allan::{Allan, DataType, Mode, Style};
 use allan_core::Cascade;
 use imu_calib::allan::{AllanConfig, AllanEstimator};
 use std::hint::black_box;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const SAMPLES: usize = 1_000_000;
 const RATE_HZ: f64 = 100.0;
@@ -51,18 +51,11 @@ fn calibrate(values: &[f64]) -> AllanEstimator {
 
 fn least(runs: usize, mut work: impl FnMut()) -> Duration {
     let timed = |_| {
-        let start = processor_time();
+        let start = Instant::now();
         work();
-        processor_time() - start
+        start.elapsed()
     };
     (0..runs).map(timed).min().expect("at least one run")
-}
-
-/// Of this process, from the kernel's table of it, in the nanoseconds that the scheduler counts.
-fn processor_time() -> Duration {
-    let table = std::fs::read_to_string("/proc/self/schedstat").expect("Linux counts processor time");
-    let nanoseconds = table.split(' ').next().and_then(|word| word.parse().ok());
-    Duration::from_nanos(nanoseconds.expect("nanoseconds on the processor"))
 }
 
 fn print(name: &str, time: Duration, channels: u32) {
