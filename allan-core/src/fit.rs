@@ -40,6 +40,12 @@ pub fn goodness<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Go
     goodness::judge(&Problem::of(curve, model))
 }
 
+/// `Σ edf·(v/m − 1 − ln(v/m))` of `model`, which was fitted to `curve`.
+pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> f64 {
+    let problem = Problem::of(curve, model);
+    problem.deviance(&problem.squares)
+}
+
 /// Fits the coefficients of `kinds` and also the shapes of those that have one, from the given ones on.
 #[must_use]
 pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {

@@ -5,7 +5,7 @@
 
 mod candidate;
 
-use crate::fit::{Baseline, Goodness, Rival, fit, fit_free_shapes, goodness};
+use crate::fit::{Baseline, Goodness, Rival, deviance, fit, fit_free_shapes, goodness};
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind, math};
 use candidate::{Family, MAX_SHAPES, families};
@@ -136,7 +136,7 @@ fn reconsidered<const POINTS: usize>(
         // In the place of the old one.
         let _ = kinds.insert(known.term.min(kinds.len()), other);
         let candidate = fit_free_shapes(curve, &kinds, fixed);
-        if goodness(curve, &candidate).deviance < goodness(curve, &model).deviance - CONVINCING {
+        if deviance(curve, &candidate) < deviance(curve, &model) - CONVINCING {
             model = candidate;
         }
     }
@@ -150,9 +150,10 @@ fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
 /// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
 fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family], fixed: &[Kind]) -> Option<Rival> {
     let of_family = |family: &Family| {
-        let rivals = family.shapes.iter().filter_map(|shape| with(kinds, shape)).map(|kinds| baseline.rival(&kinds));
-        let best = rivals.max_by(|a, b| a.fall.total_cmp(&b.fall))?;
-        let best = baseline.shaped_rival(&best.kinds, fixed);
+        let rivals = family.shapes.iter().filter_map(|shape| with(kinds, shape));
+        let judged = rivals.map(|kinds| (baseline.fall(&kinds), kinds));
+        let (_, best) = judged.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let best = baseline.shaped_rival(&best, fixed);
         let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
         (best.gain(cost) > 0.0).then_some((best.gain(cost), best))
     };

@@ -49,25 +49,19 @@ impl Baseline {
         Self { problem, deviance, explained }
     }
 
-    /// Fits the coefficients of `kinds`.
-    pub(crate) fn rival(&self, kinds: &[Kind]) -> Rival {
-        let (problem, deviance) = self.fitted(kinds);
-        self.compared(&problem, deviance)
+    /// How much lower the deviance of `kinds` is with the best coefficients.
+    pub(crate) fn fall(&self, kinds: &[Kind]) -> f64 {
+        self.deviance - self.problem.with_kinds(kinds).minimise()
     }
 
     /// Fits the coefficients of `kinds` and the shapes of those that are not `fixed`.
     pub(crate) fn shaped_rival(&self, kinds: &[Kind], fixed: &[Kind]) -> Rival {
-        let (mut problem, _) = self.fitted(kinds);
+        let mut problem = self.problem.with_kinds(kinds);
+        problem.minimise();
         let mut kinds = problem.kinds.clone();
         shape::search(&mut problem, &mut kinds, fixed);
         let deviance = problem.minimise();
         self.compared(&problem, deviance)
-    }
-
-    fn fitted(&self, kinds: &[Kind]) -> (Problem, f64) {
-        let mut problem = self.problem.with_kinds(kinds);
-        let deviance = problem.minimise();
-        (problem, deviance)
     }
 
     /// The variance of the residual along the change of the model says what chance would gain.
