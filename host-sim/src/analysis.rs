@@ -194,25 +194,14 @@ fn partner(
     let shared = others.filter_map(|(of, other)| {
         let (a, b) = (part.position(channel)?, part.position(*of)?);
         let rest = own.both.shared_rest(part, a, &other.both, b);
-        let side = |study: &Study| (study.curve.clone(), study.trace.after.clone());
-        let ((curve, model), (other_curve, other_model)) = (side(&own.both), side(&other.both));
-        let common = common_mode((&curve, &model), (&other_curve, &other_model), &rest)?;
+        let common = common_mode(own.both.rest(), other.both.rest(), &rest)?;
         Some((*of, common))
     });
     shared.max_by(|(_, a), (_, b)| a.sigmas.abs().total_cmp(&b.sigmas.abs()))
 }
 
 fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {
-    let point = |point: &allan_core::Point| CurvePoint {
-        n: point.n,
-        tau_s: point.tau,
-        adev: point.avar.sqrt(),
-        low: point.low.sqrt(),
-        high: point.high.sqrt(),
-        edf: point.edf,
-        accuracy_percent: read_off::percentage_accuracy(curve.samples(), point.n),
-    };
-    curve.points().iter().map(point).collect()
+    curve.points().iter().map(|point| CurvePoint::of(point, curve.samples())).collect()
 }
 
 fn terms(model: &Model, unit: &str) -> Vec<Term> {

@@ -4,6 +4,8 @@
 //! recording replayed over the bus give the same bytes.
 
 use crate::practice::Practice;
+use allan_core::Point;
+use allan_core::read_off::percentage_accuracy;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -67,6 +69,22 @@ pub struct CurvePoint {
     pub edf: f64,
     /// `100/sqrt(2(N/n−1))`, the percentage accuracy by which the classical method judges a point.
     pub accuracy_percent: f64,
+}
+
+impl CurvePoint {
+    /// A point of a curve of `samples` samples, in the curve's unit.
+    #[must_use]
+    pub fn of(point: &Point, samples: u64) -> Self {
+        Self {
+            n: point.n,
+            tau_s: point.tau,
+            adev: point.avar.sqrt(),
+            low: point.low.sqrt(),
+            high: point.high.sqrt(),
+            edf: point.edf,
+            accuracy_percent: percentage_accuracy(samples, point.n),
+        }
+    }
 }
 
 /// Coefficients read off the slopes of the curve; absent where the slope does not occur.

@@ -4,7 +4,7 @@ use super::parts::Part;
 use adis16405_driver::Channel;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
 use allan_core::trace::{Lines, Trace, trace};
-use allan_core::{Curve, Kind};
+use allan_core::{Curve, Kind, Model};
 use firmware::OCTAVES;
 
 /// Probability of the residual under a model below which another one is tried.
@@ -84,27 +84,28 @@ impl Study {
     /// What two channels share beyond what both follow.
     pub(super) fn shared_rest(&self, part: &Part, own: usize, other: &Self, others: usize) -> Shared<OCTAVES> {
         let mut rest = part.shared(own, others);
-        let covariance = |shared: &Shared<OCTAVES>, n: u64| {
-            shared.iter().find(|point| point.n == n).map_or(0.0, |point| point.covariance)
-        };
-        for point in &mut rest {
-            let with = |a: usize, b: usize| {
-                if a == b {
-                    part.curve(a).points().iter().find(|of| of.n == point.n).map_or(0.0, |of| of.avar)
-                } else {
-                    covariance(&part.shared(a, b), point.n)
-                }
-            };
-            let mut taken = 0.0;
-            for (cause, followed) in self.causes() {
-                taken += followed.value * with(cause, others);
-                let both = other.causes().map(|(of, known)| followed.value * known.value * with(cause, of));
-                taken -= both.sum::<f64>();
+        let mut add = |weight: f64, a: usize, b: usize| {
+            let common = part.common(a, b);
+            for point in &mut rest {
+                let of = common.iter().find(|(n, _)| *n == point.n);
+                point.covariance += weight * of.map_or(0.0, |(_, covariance)| *covariance);
             }
-            taken += other.causes().map(|(of, known)| known.value * with(own, of)).sum::<f64>();
-            point.covariance -= taken;
+        };
+        for (cause, followed) in self.causes() {
+            add(-followed.value, cause, others);
+            for (of, known) in other.causes() {
+                add(followed.value * known.value, cause, of);
+            }
+        }
+        for (of, known) in other.causes() {
+            add(-known.value, own, of);
         }
         rest
+    }
+
+    /// The channel without what it follows, and the model of that.
+    pub(super) fn rest(&self) -> (&Curve<OCTAVES>, &Model) {
+        (&self.curve, &self.trace.after)
     }
 }
 

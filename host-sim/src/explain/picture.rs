@@ -3,8 +3,7 @@
 use super::ChannelExplanation;
 use crate::plot::{PlotError, allan};
 use crate::report::{ChannelReport, CurvePoint, ModelError, ModelReport, ReadOff};
-use allan_core::read_off::percentage_accuracy;
-use allan_core::{Model, Point};
+use allan_core::Model;
 
 /// The curve of the second half, the declared and the predictive model of the first, and the residual, as an SVG document.
 ///
@@ -12,16 +11,6 @@ use allan_core::{Model, Point};
 /// The drawing library refuses.
 pub fn picture(of: &ChannelExplanation) -> Result<String, PlotError> {
     let unseen = &of.parts.unseen;
-    // The same degrees of freedom as in the tables.
-    let point = |point: &Point| CurvePoint {
-        n: point.n,
-        tau_s: point.tau,
-        adev: point.avar.sqrt(),
-        low: point.low.sqrt(),
-        high: point.high.sqrt(),
-        edf: point.edf,
-        accuracy_percent: percentage_accuracy(unseen.samples(), point.n),
-    };
     let model = |model: &Model, [fitted, error]: [f64; 2]| ModelReport {
         terms: Vec::new(),
         adev: unseen.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
@@ -32,7 +21,8 @@ pub fn picture(of: &ChannelExplanation) -> Result<String, PlotError> {
         name: format!("{}, second half; models of the first", of.channel.name()),
         unit: of.channel.unit().to_owned(),
         samples: unseen.samples(),
-        curve: unseen.points().iter().map(point).collect(),
+        // The same degrees of freedom as in the tables.
+        curve: unseen.points().iter().map(|point| CurvePoint::of(point, unseen.samples())).collect(),
         read_off: ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(&of.trace.before, of.errors.declared),
         practice: Default::default(),
