@@ -5,11 +5,11 @@
 //!  (interrupts)      bursts              (below them)  (main loop)
 //! ```
 //!
-//! A board brings pins, clocks and interrupts: it calls the [`Sampler`] at data-ready edges and at the ends of bursts,
-//! [`estimate`] at a lower priority, and [`run`] from its main program, with itself as a [`Chip`]. Nothing of a higher
-//! priority ever waits for anything of a lower one.
+//! A board brings pins, clocks and interrupts; what all images share beside the application is in `microcontroller`: it
+//! calls the [`Sampler`] at data-ready edges and at the ends of bursts, [`estimate`] at a lower priority, and [`run`] from
+//! the main program. Nothing of a higher priority ever waits for anything of a lower one.
 #![no_std]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 #![deny(missing_docs)]
 
 pub mod acquisition;
@@ -20,6 +20,9 @@ pub mod command;
 mod desk;
 mod estimators;
 mod last_words;
+#[cfg(all(target_os = "none", feature = "microcontroller"))]
+#[allow(unsafe_code, reason = "registers, and memory that outlives a reset")]
+pub mod microcontroller;
 pub mod outbox;
 pub mod retained;
 pub mod sensor;

@@ -1,41 +1,33 @@
 //! The sensor's bus: registers byte by byte, bursts by DMA so that the processor is free meanwhile.
 
-use crate::chip::Microcontroller;
+use super::Rp2040;
+use crate::microcontroller::{Bus, transfer};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use core::convert::Infallible;
 use core::sync::atomic::{Ordering, compiler_fence};
 use embedded_hal::digital::OutputPin;
-use embedded_hal::spi::{ErrorType, Operation, SpiBus, SpiDevice};
-use rp2040_hal::gpio::bank0::{Gpio16, Gpio17, Gpio18, Gpio19};
-use rp2040_hal::gpio::{FunctionSio, FunctionSpi, Pin, PullDown, SioOutput};
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use rp2040_hal::pac::{self, DMA, RESETS, SPI0};
-use rp2040_hal::spi::{Enabled, Spi};
+use rp2040_hal::spi::{Enabled, Spi, ValidSpiPinout};
 
 /// DMA channels.
 const RX: usize = 0;
 const TX: usize = 1;
 
-type Wire<I> = Pin<I, FunctionSpi, PullDown>;
-type Wires = (Wire<Gpio19>, Wire<Gpio16>, Wire<Gpio18>);
-
 /// SPI0, its chip select and two DMA channels.
-pub struct Bus {
-    spi: Spi<Enabled, SPI0, Wires, 8>,
-    select: Pin<Gpio17, FunctionSio<SioOutput>, PullDown>,
+pub struct SensorBus<W: ValidSpiPinout<SPI0>, S> {
+    spi: Spi<Enabled, SPI0, W, 8>,
+    select: S,
     dma: DMA,
     answer: &'static mut [u8; BURST_BYTES],
 }
 
-impl Bus {
-    pub(crate) fn new(
-        spi: Spi<Enabled, SPI0, Wires, 8>,
-        select: Pin<Gpio17, FunctionSio<SioOutput>, PullDown>,
-        dma: DMA,
-        resets: &mut RESETS,
-    ) -> Self {
+impl<W: ValidSpiPinout<SPI0>, S> SensorBus<W, S> {
+    /// A bus whose chip select is high.
+    pub fn new(spi: Spi<Enabled, SPI0, W, 8>, select: S, dma: DMA, resets: &mut RESETS) -> Self {
         resets.reset().modify(|_, w| w.dma().clear_bit());
         while resets.reset_done().read().dma().bit_is_clear() {}
-        // SAFETY: an interrupt enable of a channel that only `Bus` uses.
+        // SAFETY: an interrupt enable of a channel that only this bus uses.
         dma.inte0().write(|w| unsafe { w.bits(1 << RX) });
         registers().sspdmacr().write(|w| w.rxdmae().set_bit().txdmae().set_bit());
         let answer = cortex_m::singleton!(: [u8; BURST_BYTES] = [0; BURST_BYTES]).expect("the bus is made once");
@@ -43,14 +35,16 @@ impl Bus {
     }
 
     /// The serial clock that the two dividers make of the peripheral clock, rounded up (data sheet, section 4.4.3.4).
-    pub(crate) fn clock_hz(&self, peripheral_hz: u32) -> u32 {
+    pub fn clock_hz(&self, peripheral_hz: u32) -> u32 {
         let prescale = u32::from(registers().sspcpsr().read().cpsdvsr().bits());
         let rate = u32::from(registers().sspcr0().read().scr().bits());
         peripheral_hz.div_ceil(prescale.max(1) * (rate + 1))
     }
+}
 
-    /// Selects the sensor and lets a burst run; its end raises DMA_IRQ_0.
-    pub(crate) fn start_burst(&mut self) {
+impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> Bus for SensorBus<W, S> {
+    /// Its end raises DMA_IRQ_0.
+    fn start_burst(&mut self) {
         let Ok(()) = self.select.set_low();
         let data = registers().sspdr().as_ptr() as u32;
         compiler_fence(Ordering::SeqCst);
@@ -74,9 +68,8 @@ impl Bus {
         }
     }
 
-    /// Ends the burst: what came in, or `None` if the transfer failed.
-    pub(crate) fn end_burst(&mut self) -> Option<&[u8; BURST_BYTES]> {
-        // SAFETY: clears the request of a channel that only `Bus` uses.
+    fn end_burst(&mut self) -> Option<&[u8; BURST_BYTES]> {
+        // SAFETY: clears the request of a channel that only this bus uses.
         self.dma.ints0().write(|w| unsafe { w.bits(1 << RX) });
         let failed = [RX, TX].map(|channel| self.dma.ch(channel).ch_ctrl_trig().read().ahb_error().bit_is_set());
         let Ok(()) = self.select.set_high();
@@ -87,30 +80,18 @@ impl Bus {
 
 /// The registers of SPI0, for what its HAL does not do.
 fn registers() -> &'static pac::spi0::RegisterBlock {
-    // SAFETY: `Bus` owns the HAL's driver of SPI0, and only `Bus` calls this.
+    // SAFETY: `SensorBus` owns the HAL's driver of SPI0, and only it calls this.
     unsafe { &*SPI0::ptr() }
 }
 
-impl ErrorType for Bus {
+impl<W: ValidSpiPinout<SPI0>, S> ErrorType for SensorBus<W, S> {
     type Error = Infallible;
 }
 
-impl SpiDevice<u8> for Bus {
+impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> SpiDevice<u8> for SensorBus<W, S> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
         self.select.set_low()?;
-        for operation in operations {
-            match operation {
-                Operation::Read(words) => self.spi.read(words)?,
-                Operation::Write(words) => self.spi.write(words)?,
-                Operation::Transfer(read, write) => self.spi.transfer(read, write)?,
-                Operation::TransferInPlace(words) => self.spi.transfer_in_place(words)?,
-                Operation::DelayNs(ns) => {
-                    self.spi.flush()?;
-                    Microcontroller::wait_us(ns.div_ceil(1000));
-                }
-            }
-        }
-        self.spi.flush()?;
+        transfer::<Rp2040, _>(&mut self.spi, operations)?;
         self.select.set_high()
     }
 }
