@@ -1,19 +1,20 @@
 //! Many samples at once: the same differences level by level, in loops that a compiler can vectorise.
 
-use super::moments::ROUNDED;
-use super::{Cascade, second_difference};
+mod powers;
+
+use super::Cascade;
+use super::moments::unit_bits;
+use powers::{Word, differences};
 
 /// Samples that are taken together.
-const BLOCK: usize = 256;
+const BLOCK: usize = 1024;
 /// Running sums of earlier samples that a block's differences reach back to.
 const HISTORY: usize = 2 * 16;
 
-/// Running sums of one level: those of the past in front, then the block's own.
-struct Sums {
-    values: [i64; HISTORY + BLOCK],
-    /// The same less a common part, where that leaves 30 bits.
-    narrow: [i32; HISTORY + BLOCK],
-    is_narrow: bool,
+/// Running sums of one level, less a common base: those of the past in front, then the block's own.
+struct Sums<W> {
+    values: [W; HISTORY + BLOCK],
+    base: i64,
     /// Steps that the level had taken before the block.
     past: u64,
     new: usize,
@@ -25,88 +26,122 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         if cfg!(target_pointer_width = "32") {
             return samples.iter().for_each(|&sample| self.push(sample));
         }
-        let mut sums =
-            Sums { values: [0; HISTORY + BLOCK], narrow: [0; HISTORY + BLOCK], is_narrow: false, past: 0, new: 0 };
+        let mut narrow = Sums::<i32>::new();
         for block in samples.chunks(BLOCK) {
-            self.push_block(block, &mut sums);
+            if let Some((level, mut wide)) = self.push_narrow(block, &mut narrow) {
+                self.descend(level, &mut wide);
+            }
         }
     }
 
-    fn push_block(&mut self, block: &[i32], sums: &mut Sums) {
+    /// Takes a block down to the level whose sums do not fit in narrow words; returns that level and its sums.
+    fn push_narrow(&mut self, block: &[i32], narrow: &mut Sums<i32>) -> Option<(usize, Sums<i64>)> {
+        if self.begin(block, narrow) {
+            return self.descend(0, narrow).map(|level| (level, narrow.widened()));
+        }
+        let mut wide = Sums::new();
+        self.begin(block, &mut wide);
+        Some((0, wide))
+    }
+
+    /// Adds the samples up, behind the recent sums. Nothing has happened if a sum does not fit.
+    fn begin<W: Word>(&mut self, block: &[i32], sums: &mut Sums<W>) -> bool {
+        sums.base = W::base(self.sum);
         sums.past = self.elapsed;
         sums.new = block.len();
-        for back in 0..OVERLAP {
-            sums.values[HISTORY - 1 - back] = self.recent[Self::slot(sums.past.wrapping_sub(back as u64))];
-        }
+        let mut used = sums.put_past(0, &self.recent);
+        let mut sum = self.sum.wrapping_sub(sums.base);
         for (slot, &sample) in sums.values[HISTORY..].iter_mut().zip(block) {
-            self.sum = self.sum.wrapping_add(i64::from(sample));
-            *slot = self.sum;
+            sum = sum.wrapping_add(i64::from(sample));
+            used |= sum as u64;
+            *slot = W::truncated(sum);
         }
-        self.elapsed += block.len() as u64;
-        for back in 0..OVERLAP {
-            self.recent[Self::slot(self.elapsed.wrapping_sub(back as u64))] = sums.before(back);
+        let fits = used <= W::MAX;
+        if fits {
+            self.sum = sum.wrapping_add(sums.base);
+            self.elapsed += block.len() as u64;
+            sums.keep_past(0, &mut self.recent);
         }
+        fits
+    }
 
-        for level in 0..Self::LEVELS {
-            self.recall(level, sums);
-            sums.narrow(2 * OVERLAP);
+    /// Takes the differences from `level` on; returns the level whose past does not fit.
+    fn descend<W: Word>(&mut self, level: usize, sums: &mut Sums<W>) -> Option<usize> {
+        for level in level..Self::LEVELS {
+            let line = &mut self.octaves[level + Self::FINE].line;
+            if sums.put_past(OVERLAP, line) > W::MAX {
+                return Some(level);
+            }
+            sums.keep_past(OVERLAP, line);
+            self.octaves[level + Self::FINE].oldest = sums.before(2 * OVERLAP);
             if level == 0 {
                 for octave in 0..Self::FINE {
                     self.accumulate_block(octave, 1 << octave, sums);
                 }
             }
             self.accumulate_block(level + Self::FINE, OVERLAP, sums);
-            self.keep(level, sums);
             sums.halve(OVERLAP);
             if sums.new == 0 {
                 break;
             }
         }
-    }
-
-    /// Brings what the level's line holds in front of the sums that the level above left.
-    fn recall(&self, level: usize, sums: &mut Sums) {
-        for back in OVERLAP..2 * OVERLAP {
-            let slot = Self::slot(sums.past.wrapping_sub(back as u64));
-            sums.values[HISTORY - 1 - back] = self.octaves[level + Self::FINE].line[slot];
-        }
-    }
-
-    /// Fills the level's line anew.
-    fn keep(&mut self, level: usize, sums: &Sums) {
-        let last = sums.past + sums.new as u64;
-        let octave = &mut self.octaves[level + Self::FINE];
-        for back in OVERLAP..2 * OVERLAP {
-            octave.line[Self::slot(last.wrapping_sub(back as u64))] = sums.before(back);
-        }
-        octave.oldest = sums.before(2 * OVERLAP);
+        None
     }
 
     /// The differences over `reach` steps of a level that end in the block.
-    fn accumulate_block(&mut self, octave: usize, reach: usize, sums: &Sums) {
+    fn accumulate_block<W: Word>(&mut self, octave: usize, reach: usize, sums: &Sums<W>) {
         // The first difference ends at step 2·reach.
         let first = (2 * reach as u64).saturating_sub(sums.past + 1);
         if first >= sums.new as u64 {
             return;
         }
-        let first = HISTORY + first as usize;
+        let steps = HISTORY + first as usize..HISTORY + sums.new;
+        let sums = [0, reach, 2 * reach].map(|back| &sums.values[steps.start - back..steps.end - back]);
         let moments = &mut self.octaves[octave].moments;
-        if let Some((squares, fourths)) = sums.narrow_powers(first, reach).filter(|_| octave < ROUNDED) {
-            moments.squares.add(u128::from(squares));
-            moments.fourths.add(u128::from(fourths));
-            return;
-        }
-        let [newest, middle, oldest] = sums.differing(&sums.values, first, reach);
-        for ((&newest, &middle), &oldest) in newest.iter().zip(middle).zip(oldest) {
-            moments.add(octave, second_difference(newest, middle, oldest));
+        if let Some((squares, fourths)) = W::powers(sums, unit_bits(octave)) {
+            moments.squares.add(squares);
+            moments.fourths.add(fourths);
+        } else {
+            differences(sums).for_each(|difference| moments.add(octave, difference));
         }
     }
 }
 
-impl Sums {
+impl<W: Word> Sums<W> {
+    fn new() -> Self {
+        Self { values: [W::default(); HISTORY + BLOCK], base: 0, past: 0, new: 0 }
+    }
+
+    /// The same in words that hold any sum.
+    fn widened(&self) -> Sums<i64> {
+        let values = self.values.map(|value| self.base.wrapping_add(value.into()));
+        Sums { values, base: 0, past: self.past, new: self.new }
+    }
+
     /// The sum of `back` steps before the newest.
     fn before(&self, back: usize) -> i64 {
-        self.values[HISTORY + self.new - 1 - back]
+        self.base.wrapping_add(self.values[HISTORY + self.new - 1 - back].into())
+    }
+
+    /// Puts a line of sums, of `nearest` steps ago and before, in front of the block; returns the bits that they use.
+    #[inline]
+    fn put_past<const OVERLAP: usize>(&mut self, nearest: usize, line: &[i64; OVERLAP]) -> u64 {
+        let mut used = 0;
+        for back in nearest..nearest + OVERLAP {
+            let sum = line[self.past.wrapping_sub(back as u64) as usize & (OVERLAP - 1)].wrapping_sub(self.base);
+            used |= sum as u64;
+            self.values[HISTORY - 1 - back] = W::truncated(sum);
+        }
+        used
+    }
+
+    /// Fills a line anew, with the sums of `nearest` steps ago and before.
+    #[inline]
+    fn keep_past<const OVERLAP: usize>(&self, nearest: usize, line: &mut [i64; OVERLAP]) {
+        let last = self.past + self.new as u64;
+        for back in nearest..nearest + OVERLAP {
+            line[last.wrapping_sub(back as u64) as usize & (OVERLAP - 1)] = self.before(back);
+        }
     }
 
     /// Leaves every second running sum: those of the next level, the last `history` of the past among them.
@@ -121,44 +156,5 @@ impl Sums {
         }
         self.past >>= 1;
         self.new = new;
-    }
-
-    /// Takes what all sums have in common off them, if they differ by less than 2³⁰: so do not their differences leave
-    /// 32 bits.
-    fn narrow(&mut self, history: usize) {
-        let steps = HISTORY - history..HISTORY + self.new;
-        let base = self.values[steps.start].wrapping_sub(1 << 29);
-        let mut used = 0;
-        for (narrow, value) in self.narrow[steps.clone()].iter_mut().zip(&self.values[steps]) {
-            let rest = value.wrapping_sub(base);
-            used |= rest;
-            *narrow = rest as i32;
-        }
-        self.is_narrow = used as u64 >> 30 == 0;
-    }
-
-    /// The new sums from step `first` on, and those of `reach` and of `2·reach` steps before each.
-    fn differing<'a, T>(&self, values: &'a [T], first: usize, reach: usize) -> [&'a [T]; 3] {
-        let steps = first..HISTORY + self.new;
-        [0, reach, 2 * reach].map(|back| &values[steps.start - back..steps.end - back])
-    }
-
-    /// Sums of squares and of fourth powers in the width of a vector unit; `None` if a difference has 15 bits or more,
-    /// as 256 fourth powers of 14 bits fill the word.
-    fn narrow_powers(&self, first: usize, reach: usize) -> Option<(u64, u64)> {
-        if !self.is_narrow {
-            return None;
-        }
-        let [newest, middle, oldest] = self.differing(&self.narrow, first, reach);
-        let (mut digits, mut squares, mut fourths) = (0, 0_u64, 0_u64);
-        for ((newest, middle), oldest) in newest.iter().zip(middle).zip(oldest) {
-            let difference = newest.wrapping_sub(*middle).wrapping_sub(middle.wrapping_sub(*oldest));
-            digits |= difference ^ (difference >> 31);
-            let small = i32::from(difference as i16);
-            let square = u64::from(small.wrapping_mul(small) as u32);
-            squares = squares.wrapping_add(square);
-            fourths = fourths.wrapping_add(square.wrapping_mul(square));
-        }
-        (digits < 1 << 14).then_some((squares, fourths))
     }
 }

@@ -93,6 +93,12 @@ pub(crate) const fn unit_bits(octave: usize) -> u32 {
     (octave.saturating_sub(ROUNDED - 2) / 2) as u32
 }
 
+/// The difference in units of `2^bits`.
+#[inline]
+pub(crate) const fn rounded(difference: i64, bits: u32) -> i64 {
+    (difference + (1 << bits >> 1)) >> bits
+}
+
 /// Whether the fourth power fits in 60 bits.
 #[inline]
 const fn is_small(difference: i64) -> bool {
@@ -102,8 +108,7 @@ const fn is_small(difference: i64) -> bool {
 /// Fourth power of a difference rounded by `bits` digits, saturating.
 #[inline]
 pub(crate) fn fourth_power(difference: i64, bits: u32) -> u128 {
-    let rounded = (difference + (1 << bits >> 1)) >> bits;
-    match u32::try_from(rounded.unsigned_abs()) {
+    match u32::try_from(rounded(difference, bits).unsigned_abs()) {
         Ok(magnitude) => {
             let square = u128::from(u64::from(magnitude) * u64::from(magnitude));
             square * square
