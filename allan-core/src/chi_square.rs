@@ -1,6 +1,6 @@
 //! Quantiles of the χ² distribution for any real number of degrees of freedom.
 
-use crate::math::{abs, exp, ln, ln_gamma, sqrt};
+use crate::math::{abs, clamp, exp, ln, ln_gamma, sqrt};
 
 /// Above this the Wilson–Hilferty cube is within 2·10⁻⁶ in probability.
 const LARGE: f64 = 2_000.0;
@@ -22,7 +22,7 @@ pub(crate) fn quantile(p: f64, dof: f64) -> f64 {
     for _ in 0..60 {
         let density = exp((shape - 1.0) * ln(x / 2.0) - x / 2.0 - ln_gamma(shape)) / 2.0;
         let step = (gamma_p(shape, x / 2.0) - p) / density;
-        let next = (x - step).clamp(x / 2.0, 2.0 * x);
+        let next = clamp(x - step, x / 2.0, 2.0 * x);
         if abs(next - x) <= 1e-13 * x {
             return next;
         }
@@ -33,7 +33,7 @@ pub(crate) fn quantile(p: f64, dof: f64) -> f64 {
 
 /// Probability that a χ² variable with `dof > 0` degrees of freedom exceeds `x`.
 pub(crate) fn upper_tail(x: f64, dof: f64) -> f64 {
-    (1.0 - gamma_p(dof / 2.0, x / 2.0)).clamp(0.0, 1.0)
+    clamp(1.0 - gamma_p(dof / 2.0, x / 2.0), 0.0, 1.0)
 }
 
 /// The regularised lower incomplete gamma function `P(a, x)` (NIST Handbook 6.5.29 and 6.5.31).

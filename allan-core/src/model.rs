@@ -2,6 +2,7 @@
 
 use crate::Point;
 use crate::confidence::Shares;
+use crate::math::clamp;
 use crate::term::Kind;
 use heapless::Vec;
 
@@ -115,7 +116,7 @@ impl Model {
     fn edf_of(&self, point: &Point, blur: f64) -> f64 {
         let avar = self.avar(point.n);
         // As many as there are differences where nothing random is modelled at all.
-        (point.count as f64 * avar * avar / blur).clamp(1.0_f64.min(point.count as f64), 1e18)
+        clamp(point.count as f64 * avar * avar / blur, 1.0_f64.min(point.count as f64), 1e18)
     }
 
     /// Sums of the squared covariances: up to two averaging times (four with flicker noise), and beyond.

@@ -15,6 +15,7 @@ pub use power_law::{AngleRandomWalk, BiasInstability, Quantization, RateRamp, Ra
 pub use sinusoid::Sinusoid;
 
 use crate::confidence::Shares;
+use crate::math::clamp;
 use crate::model::MAX_SHAPE;
 
 /// A process with a coefficient of 1, sampled every `sample_period` seconds.
@@ -161,7 +162,7 @@ impl Kind {
                 let [frequency, bandwidth] = shape;
                 Self::Resonance(Resonance {
                     frequency,
-                    bandwidth: bandwidth.clamp(frequency / SHARPEST, frequency / BROADEST),
+                    bandwidth: clamp(bandwidth, frequency / SHARPEST, frequency / BROADEST),
                 })
             }
             Self::Sinusoid(_) => Self::Sinusoid(Sinusoid { frequency: shape[0] }),
