@@ -158,6 +158,10 @@ impl<'m> Estimators<'m> {
             supply: counters.get(Faults::SUPPLY),
             stuck_low: counters.get(Faults::STUCK_LOW),
             stuck_high: counters.get(Faults::STUCK_HIGH),
+            shifted: counters.get(Faults::SHIFTED),
+            frozen: counters.get(Faults::FROZEN),
+            impossible_rate: counters.get(Faults::IMPOSSIBLE_RATE),
+            x_sign: counters.get(Faults::X_SIGN),
             repeated: counters.get(Faults::REPEATED),
             ..self.health
         }

@@ -40,7 +40,8 @@ impl<E: fmt::Debug> fmt::Display for Trouble<E> {
     }
 }
 
-/// Identifies the sensor, tests it, and configures it: range, filter, sample period, data ready on DIO1, active high.
+/// Identifies the sensor, tests it, and configures it: range, filter, sample period, data ready on DIO1, active high, and
+/// no negative bias of gyro x.
 ///
 /// # Errors
 /// The bus failed, something else answers, the self-test failed, or a register did not take its value.
@@ -53,6 +54,10 @@ pub fn bring_up<SPI: SpiDevice<u8>>(
     let test = sensor.self_test(&mut pause)?;
     if test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES) {
         return Err(Trouble::SelfTest(test.diagnosis));
+    }
+    // Otherwise bursts would lose the sign of negative x rates; a constant is nothing to the Allan variance.
+    if sensor.x_sign_at_risk() {
+        sensor.keep_negative_x_bias_on_host()?;
     }
     sensor.set_data_ready(Some(Signal::default()))?;
     Ok(Identity { product, tested: test.ran, diagnosis: test.diagnosis })

@@ -27,7 +27,7 @@ pub use message::{
 pub use text::{Line, line_bytes};
 
 /// Version of the format. Messages and their fields are only ever appended to within a version.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 /// Longest frame in bytes, both zero bytes included.
 ///

@@ -194,6 +194,14 @@ pub struct Health {
     pub stuck_low: u32,
     /// Bursts of nothing but ones.
     pub stuck_high: u32,
+    /// Bursts that were good but for a clock that was lost or counted twice.
+    pub shifted: u32,
+    /// Bursts whose twelve words had not changed for hundreds of samples.
+    pub frozen: u32,
+    /// Bursts with a rate beyond what the sensor can measure.
+    pub impossible_rate: u32,
+    /// Bursts whose x rate may have lost its sign.
+    pub x_sign: u32,
     /// Bursts whose inertial words equal those of the burst before.
     pub repeated: u32,
     /// Bursts that the bus refused.
