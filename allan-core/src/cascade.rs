@@ -295,9 +295,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         ((self.elapsed >> level) + 1).saturating_sub(reach)
     }
 
-    /// The difference that the newest sample completed, if it completed one.
+    /// The second difference of sums of `2^octave` samples that the newest sample completed, if it completed one.
+    ///
+    /// For products of channels in step, as [`Coupling`](crate::Coupling) makes them; `octave` below `OCTAVES`.
     #[inline]
-    pub(crate) fn newest_difference(&self, octave: usize) -> Option<i64> {
+    #[must_use]
+    pub fn newest_difference(&self, octave: usize) -> Option<i64> {
         let level = octave.saturating_sub(Self::FINE);
         let n = 1 << (octave - level);
         (self.has(level, 2 * n))

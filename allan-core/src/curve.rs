@@ -113,6 +113,13 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self
     }
 
+    /// The same curve without the points below averaging factor `n`.
+    #[must_use]
+    pub fn from_factor(mut self, n: u64) -> Self {
+        self.points.retain(|point| point.n >= n);
+        self
+    }
+
     /// The same points with another variance.
     pub(crate) fn with_avar(mut self, avar: impl Fn(&Point) -> f64) -> Self {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {

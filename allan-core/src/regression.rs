@@ -46,6 +46,13 @@ impl<const POINTS: usize> Covariate<POINTS> {
         Self { curve, noise, step: if dithered { 0.0 } else { lsb * lsb / 12.0 } }
     }
 
+    /// A covariate that is to be subtracted as it is measured, noise and all.
+    #[must_use]
+    pub fn as_measured(curve: Curve<POINTS>) -> Self {
+        let noise = Model::new(curve.sample_period(), core::iter::empty());
+        Self { curve, noise, step: 0.0 }
+    }
+
     /// Another stretch of the same covariate, whose noise is known from this one.
     #[must_use]
     pub fn continued(&self, curve: Curve<POINTS>) -> Self {
@@ -174,6 +181,29 @@ impl<const POINTS: usize> Beside<'_, POINTS> {
         })
     }
 
+    /// The channel's curve when the covariates, as they are measured, are subtracted from its samples.
+    ///
+    /// Exact where all the covariances are known, the noise that the covariates bring included; elsewhere it is that
+    /// of the channel.
+    #[must_use]
+    pub fn subtracted(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
+        self.channel.clone().with_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar))
+    }
+
+    fn subtracted_at(&self, point: &Point, sensitivities: &[Sensitivity]) -> Option<f64> {
+        let known =
+            |shared: &[Covariance]| shared.iter().find(|other| other.n == point.n).map(|other| other.covariance);
+        let mut avar = point.avar;
+        for (i, a) in sensitivities.iter().enumerate() {
+            let own = self.covariates[a.covariate].curve.points().iter().find(|own| own.n == point.n)?.avar;
+            avar += a.value * (a.value * own - 2.0 * known(&self.with_channel[a.covariate])?);
+            for b in &sensitivities[..i] {
+                avar += 2.0 * a.value * b.value * known(&self.mutual[pair(a.covariate, b.covariate)])?;
+            }
+        }
+        Some(avar.max(0.0))
+    }
+
     fn told(&self, point: &Point, chosen: &[usize], rest: &Model) -> Option<Told> {
         // What the model lacks is noise to the regression too.
         let variance = rest.avar(point.n).max(point.avar);
@@ -205,10 +235,7 @@ impl<const POINTS: usize> Beside<'_, POINTS> {
         let signal = |covariate: usize| self.covariates[covariate].signal(n);
         match (signal(a), signal(b)) {
             (Some((signal, _)), Some(_)) if a == b => signal,
-            (Some(_), Some(_)) => {
-                let (high, low) = (a.max(b), a.min(b));
-                covariance(&self.mutual[high * (high - 1) / 2 + low], n)
-            }
+            (Some(_), Some(_)) => covariance(&self.mutual[pair(a, b)], n),
             _ => 0.0,
         }
     }
@@ -248,6 +275,12 @@ fn scatter(told: &[Told], count: usize) -> Matrix<MAX_COVARIATES> {
         }
     }
     scatter
+}
+
+/// Where a pair of covariates stands among the mutual ones.
+fn pair(a: usize, b: usize) -> usize {
+    let (high, low) = (a.max(b), a.min(b));
+    high * (high - 1) / 2 + low
 }
 
 fn covariance(shared: &[Covariance], n: u64) -> f64 {

@@ -91,11 +91,27 @@ impl Lines<'_> {
 /// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
 #[must_use]
 pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
+    match trace_while(curve, lines, &mut || true) {
+        Some(trace) => trace,
+        None => Trace::declared(curve), // nobody said no
+    }
+}
+
+/// The same, asking before every fit of a candidate whether to keep on; `None` if the answer was no.
+///
+/// For a microcontroller that has other things to do as well: `keep_on` can do them.
+#[must_use]
+pub fn trace_while<const POINTS: usize>(
+    curve: &Curve<POINTS>,
+    lines: Lines,
+    keep_on: &mut dyn FnMut() -> bool,
+) -> Option<Trace> {
     let families = families(curve, lines);
     let fixed = lines.steady();
+    let mut search = Search { families: &families, fixed: &fixed, keep_on };
     let Trace { before, before_goodness, mut after, mut found, .. } = Trace::declared(curve);
     while after.terms().len() < MAX_TERMS && !found.is_full() {
-        let Some(rival) = most_telling(&Baseline::new(curve, &after), &kinds(&after), &families, &fixed) else { break };
+        let Some(rival) = search.most_telling(&Baseline::new(curve, &after), &kinds(&after)).ok()? else { break };
         let residual = largest_residual(curve, &after);
         // A filter that is read slowly has taken the place of the white noise.
         let term = if rival.kinds.len() == after.terms().len() { 0 } else { after.terms().len() };
@@ -103,61 +119,88 @@ pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace 
         // There is room: the loop ends when it is full.
         let _ = found.push(Found { term, score: rival.score(), residual });
         if found.len() > 1 {
-            after = reconsidered(curve, after, &found, &families, &fixed);
+            after = search.reconsidered(curve, after, &found).ok()?;
         }
     }
     let after_goodness = goodness(curve, &after);
-    Trace { before, before_goodness, after, after_goodness, found }
+    Some(Trace { before, before_goodness, after, after_goodness, found })
 }
 
-/// Terms that were found before others were known, put to the test again: each gives way to another that explains more.
-fn reconsidered<const POINTS: usize>(
-    curve: &Curve<POINTS>,
-    mut model: Model,
-    found: &[Found],
-    families: &[Family],
-    fixed: &[Kind],
-) -> Model {
-    for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
-        let without: Vec<Kind, MAX_TERMS> =
-            model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
-        let baseline = Baseline::new(curve, &fit(curve, &without));
-        // A slowly read filter would change the order of the terms.
-        let Some(rival) =
-            most_telling(&baseline, &without, families, fixed).filter(|rival| rival.kinds.len() > without.len())
-        else {
-            continue;
-        };
-        let mut kinds = rival.kinds;
-        let Some(other) = kinds.pop() else { continue };
-        if other.name() == model.terms()[known.term].kind.name() {
-            continue;
+/// The candidates, and whether to go on.
+struct Search<'a> {
+    families: &'a [Family],
+    /// Shapes that are known better than the curve tells them.
+    fixed: &'a [Kind],
+    keep_on: &'a mut dyn FnMut() -> bool,
+}
+
+/// Somebody said no.
+struct Stopped;
+
+impl Search<'_> {
+    /// Terms that were found before others were known, put to the test again: each gives way to another that explains
+    /// more.
+    fn reconsidered<const POINTS: usize>(
+        &mut self,
+        curve: &Curve<POINTS>,
+        mut model: Model,
+        found: &[Found],
+    ) -> Result<Model, Stopped> {
+        for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
+            let without: Vec<Kind, MAX_TERMS> =
+                model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
+            let baseline = Baseline::new(curve, &fit(curve, &without));
+            // A slowly read filter would change the order of the terms.
+            let Some(rival) = self.most_telling(&baseline, &without)?.filter(|rival| rival.kinds.len() > without.len())
+            else {
+                continue;
+            };
+            let mut kinds = rival.kinds;
+            let Some(other) = kinds.pop() else { continue };
+            if other.name() == model.terms()[known.term].kind.name() {
+                continue;
+            }
+            // In the place of the old one.
+            let _ = kinds.insert(known.term.min(kinds.len()), other);
+            let candidate = fit_free_shapes(curve, &kinds, self.fixed);
+            if deviance(curve, &candidate) < deviance(curve, &model) - CONVINCING {
+                model = candidate;
+            }
         }
-        // In the place of the old one.
-        let _ = kinds.insert(known.term.min(kinds.len()), other);
-        let candidate = fit_free_shapes(curve, &kinds, fixed);
-        if deviance(curve, &candidate) < deviance(curve, &model) - CONVINCING {
-            model = candidate;
-        }
+        Ok(model)
     }
-    model
+
+    /// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
+    fn most_telling(&mut self, baseline: &Baseline, kinds: &[Kind]) -> Result<Option<Rival>, Stopped> {
+        let mut most: Option<(f64, Rival)> = None;
+        for family in self.families {
+            let mut best: Option<(f64, Vec<Kind, MAX_TERMS>)> = None;
+            for kinds in family.shapes.iter().filter_map(|shape| with(kinds, shape)) {
+                self.go_on()?;
+                let fall = baseline.fall(&kinds);
+                if best.as_ref().is_none_or(|(other, _)| fall.total_cmp(other).is_ge()) {
+                    best = Some((fall, kinds));
+                }
+            }
+            let Some((_, best)) = best else { continue };
+            self.go_on()?;
+            let rival = baseline.shaped_rival(&best, self.fixed);
+            let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
+            let gain = rival.gain(cost);
+            if gain > 0.0 && most.as_ref().is_none_or(|(other, _)| gain.total_cmp(other).is_ge()) {
+                most = Some((gain, rival));
+            }
+        }
+        Ok(most.map(|(_, rival)| rival))
+    }
+
+    fn go_on(&mut self) -> Result<(), Stopped> {
+        if (self.keep_on)() { Ok(()) } else { Err(Stopped) }
+    }
 }
 
 fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
     model.terms().iter().map(|term| term.kind).collect()
-}
-
-/// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
-fn most_telling(baseline: &Baseline, kinds: &[Kind], families: &[Family], fixed: &[Kind]) -> Option<Rival> {
-    let of_family = |family: &Family| {
-        let rivals = family.shapes.iter().filter_map(|shape| with(kinds, shape));
-        let judged = rivals.map(|kinds| (baseline.fall(&kinds), kinds));
-        let (_, best) = judged.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
-        let best = baseline.shaped_rival(&best, fixed);
-        let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
-        (best.gain(cost) > 0.0).then_some((best.gain(cost), best))
-    };
-    families.iter().filter_map(of_family).max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, rival)| rival)
 }
 
 /// The model with one term more; `None` where it has one that would be the same.

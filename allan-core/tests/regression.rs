@@ -52,6 +52,37 @@ fn followed(channels: &[Vec<f64>]) -> Vec<Sensitivity> {
     beside.followed().into_iter().collect()
 }
 
+/// A stream from which multiples of others are subtracted, sample by sample, against the curve that is worked out.
+#[test]
+fn subtracting_is_exact_without_a_second_pass() {
+    let mut noise = Noise::new(7);
+    let channels = [rest(&mut noise), course(&mut noise, 0.3).1, course(&mut noise, 0.2).1];
+    let count = |channel: &[f64], k: usize| (channel[k] / LSB).round();
+    let less: Vec<f64> = (0..SAMPLES)
+        .map(|k| LSB * (count(&channels[0], k) - 3.0 * count(&channels[1], k) + 2.0 * count(&channels[2], k)))
+        .collect();
+    let (curves, shared) = measured(&channels);
+    let (expected, _) = measured(&[less, channels[0].clone()]);
+    let covariates: Vec<_> = curves[1..].iter().cloned().map(Covariate::as_measured).collect();
+    let with_channel = [shared[0].clone(), shared[1].clone()];
+    let beside =
+        Beside { channel: &curves[0], covariates: &covariates, with_channel: &with_channel, mutual: &shared[2..] };
+    let sensitivity = |covariate, value| Sensitivity { covariate, value, error: 0.0 };
+    let subtracted = beside.subtracted(&[sensitivity(0, 3.0), sensitivity(1, -2.0)]);
+    for (found, expected) in subtracted.points().iter().zip(expected[0].points()) {
+        // Differences of sums 10⁴ times as large.
+        assert!((found.avar / expected.avar - 1.0).abs() < 1e-9, "{found:?}, {expected:?}");
+    }
+    // Where a covariance is not known nothing is subtracted.
+    let from = |n| Covariate::as_measured(curves[1].clone().from_factor(n));
+    let (short, known) = ([from(256)], [shared[0].clone()]);
+    let beside = Beside { channel: &curves[0], covariates: &short, with_channel: &known, mutual: &[] };
+    let subtracted = beside.subtracted(&[sensitivity(0, 3.0)]);
+    for (found, raw) in subtracted.points().iter().zip(curves[0].points()) {
+        assert_eq!(found.avar == raw.avar, found.n < 256, "{found:?}");
+    }
+}
+
 fn rest(noise: &mut Noise) -> Vec<f64> {
     noise.sum(SAMPLES, &[(Kind::AngleRandomWalk, 0.05), (Kind::RateRandomWalk, 0.002)])
 }

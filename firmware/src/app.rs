@@ -1,18 +1,20 @@
 //! The application's main loop: commands, care for the sensor, epochs, and what is kept over a restart.
 
 mod answer;
+mod epoch;
 mod report;
 
 use crate::board::Board;
 use crate::command::{Command, Mistake, Parser};
+use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::last_words::line;
 use crate::retained::{Retained, Settings};
 use crate::sensor::{Identity, auto_null, bring_up};
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase};
-use allan_core::Model;
 use answer::Answer;
 use core::fmt::Arguments;
+use epoch::School;
 use heapless::Deque;
 use link::{Boot, Line, Message};
 use report::Report;
@@ -25,6 +27,8 @@ pub struct Start {
     pub boot: Boot,
     /// What survived the start.
     pub retained: Retained,
+    /// Memory for what an epoch leaves.
+    pub finished: &'static mut Epoch,
 }
 
 /// Configuration of a first start: 204.8 samples a second, ±300 °/s, no filter.
@@ -57,7 +61,9 @@ const LINES: usize = 4;
 
 /// The state of the main loop.
 pub struct App {
-    start: Start,
+    spi_clock_hz: u32,
+    boot: Boot,
+    retained: Retained,
     settings: Settings,
     config: Config,
     product_id: u16,
@@ -66,8 +72,7 @@ pub struct App {
     lines: Deque<Line, LINES>,
     answer: Option<Answer>,
     report: Report,
-    /// What the epoch before has learnt of each inertial channel.
-    learnt: [Option<Model>; 6],
+    school: School,
     epoch_began_us: u64,
     next_report_us: u64,
     next_keep_us: u64,
@@ -98,23 +103,26 @@ fn config(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
 
 impl App {
     /// Goes on with what survived, if anything did: the settings, and the statistics of each channel.
-    pub fn new(mut start: Start, board: &mut impl Board) -> Self {
-        let kept = start.retained.settings().and_then(|kept| Some((kept, config(kept.smpl_prd, kept.sens_avg)?)));
+    pub fn new(start: Start, board: &mut impl Board) -> Self {
+        let Start { spi_clock_hz, mut boot, mut retained, finished } = start;
+        let kept = retained.settings().and_then(|kept| Some((kept, config(kept.smpl_prd, kept.sens_avg)?)));
         let fresh = kept.is_none();
         let (mut settings, config) = kept.unwrap_or((FIRST, FIRST_CONFIG));
         settings.starts = settings.starts.saturating_add(1);
-        start.boot.starts = settings.starts;
+        boot.starts = settings.starts;
         board.estimators(|estimators| estimators.begin(config));
         for index in 0..CHANNELS.len() {
-            if let Some(estimator) = start.retained.estimator(index).filter(|_| !fresh) {
+            if let Some(estimator) = retained.estimator(index).filter(|_| !fresh) {
                 board.estimators(|estimators| estimators.resume(index, estimator));
-                start.boot.kept_channels += 1;
+                boot.kept_channels += 1;
             }
         }
-        start.retained.keep_settings(settings, fresh);
+        retained.keep_settings(settings, fresh);
         let now_us = board.now_us();
         Self {
-            start,
+            spi_clock_hz,
+            boot,
+            retained,
             settings,
             config,
             product_id: 0,
@@ -123,7 +131,7 @@ impl App {
             lines: Deque::new(),
             answer: None,
             report: Report::default(),
-            learnt: [const { None }; 6],
+            school: School::new(finished),
             epoch_began_us: now_us,
             next_report_us: now_us + interval_us(settings),
             next_keep_us: now_us + KEEP_US,
@@ -137,6 +145,12 @@ impl App {
     /// One turn: every command that has come, and at most one message. False if there is nothing more to do before the
     /// next interrupt.
     pub fn turn(&mut self, board: &mut impl Board) -> bool {
+        self.attend(board);
+        self.speak(board)
+    }
+
+    /// Everything that must not wait.
+    fn attend(&mut self, board: &mut impl Board) {
         board.alive();
         while let Some(byte) = board.received() {
             match self.parser.push(byte) {
@@ -148,7 +162,6 @@ impl App {
         self.watch(board);
         self.keep(board);
         self.look_at_clock(board);
-        self.speak(board)
     }
 
     #[inline(never)] // so that its stack is not everybody's
@@ -160,9 +173,9 @@ impl App {
             Command::Faults => self.answer = Some(Answer::faults()),
             Command::Status => self.answer = Some(Answer::status()),
             Command::Version => self.say(board, format_args!("{}", answer::VERSION_LINE)),
-            Command::Report => self.report.start(false),
+            Command::Report => self.report.start(),
             Command::ResetStatistics => {
-                self.begin_epoch(board, 0);
+                self.forget(board);
                 self.recoveries = 0;
                 self.bad_commands = 0;
                 self.say(board, format_args!("statistics forgotten"));
@@ -182,7 +195,7 @@ impl App {
             }
             Command::Epoch(seconds) => {
                 self.settings.epoch_s = seconds;
-                self.start.retained.keep_settings(self.settings, false);
+                self.retained.keep_settings(self.settings, false);
                 self.say(
                     board,
                     format_args!("epoch of {seconds} s; this one began {} s ago", self.epoch_age_s(now_us)),
@@ -191,7 +204,7 @@ impl App {
             Command::Interval(seconds) => {
                 self.settings.interval_s = seconds;
                 self.next_report_us = now_us + interval_us(self.settings);
-                self.start.retained.keep_settings(self.settings, false);
+                self.retained.keep_settings(self.settings, false);
                 self.say(board, format_args!("reports every {seconds} s"));
             }
             Command::Raw(on) => {
@@ -233,8 +246,8 @@ impl App {
             Err(error) => return self.say(board, format_args!("{error}")),
         };
         let low_power = config.sample_period().clock_mode() == ClockMode::LowPower;
-        if low_power && self.start.spi_clock_hz > LOW_POWER_HZ {
-            let clock_hz = self.start.spi_clock_hz;
+        if low_power && self.spi_clock_hz > LOW_POWER_HZ {
+            let clock_hz = self.spi_clock_hz;
             return self.say(
                 board,
                 format_args!("below 182 SPS the sensor takes a serial clock of {LOW_POWER_HZ} Hz, not {clock_hz} Hz"),
@@ -244,7 +257,7 @@ impl App {
         self.config = config;
         self.settings.smpl_prd = config.sample_period().register();
         self.settings.sens_avg = config.sens_avg();
-        self.begin_epoch(board, 0);
+        self.forget(board);
         board.estimators(|estimators| estimators.begin(config));
         self.sensor = Sensor::Sought { at_us: board.now_us() };
         self.say(board, format_args!("statistics forgotten: the sensor is configured anew"));
@@ -259,7 +272,7 @@ impl App {
         let done = auto_null(board.bus(), self.config).map_err(|error| line(format_args!("{error}")));
         match done {
             Ok(()) => {
-                self.begin_epoch(board, 0);
+                self.forget(board);
                 self.say(board, format_args!("bias nulled, statistics forgotten"));
             }
             Err(error) => self.say(board, format_args!("bias not nulled: {error}")),
@@ -319,7 +332,7 @@ impl App {
 
     fn keep_channel(&mut self, board: &mut impl Board, index: usize) {
         if let Some(estimator) = board.estimators(|estimators| estimators.get(index).cloned()) {
-            self.start.retained.keep_estimator(index, &estimator);
+            self.retained.keep_estimator(index, &estimator);
         }
     }
 
@@ -327,43 +340,35 @@ impl App {
         let now_us = board.now_us();
         let epoch_us = u64::from(self.settings.epoch_s) * 1_000_000;
         if epoch_us > 0 && now_us >= self.epoch_began_us + epoch_us {
-            self.epoch_began_us = now_us;
-            self.report.start(true);
+            self.finish_epoch(board);
         }
         let interval_us = interval_us(self.settings);
         if interval_us > 0 && now_us >= self.next_report_us {
             // However late: one report makes up for those that were missed.
             self.next_report_us += ((now_us - self.next_report_us) / interval_us + 1) * interval_us;
-            self.report.start(false);
+            self.report.start();
         }
-    }
-
-    /// The statistics begin again, as epoch number `epoch`.
-    fn begin_epoch(&mut self, board: &mut impl Board, epoch: u32) {
-        board.estimators(|estimators| if epoch == 0 { estimators.forget() } else { estimators.begin_epoch() });
-        self.settings.epoch = epoch;
-        self.epoch_began_us = board.now_us();
-        if epoch == 0 {
-            self.learnt = [const { None }; 6];
-            self.report = Report::default();
-        }
-        self.start.retained.keep_settings(self.settings, true);
     }
 
     /// Sends what there is room for. False if nothing is left or no room.
     fn speak(&mut self, board: &mut impl Board) -> bool {
+        if !self.speak_up(board) {
+            return false;
+        }
+        self.answer(board);
+        self.report(board);
+        self.answer.is_some() || self.report.is_under_way()
+    }
+
+    /// Sends the lines that wait. False if there is no room for more.
+    fn speak_up(&mut self, board: &mut impl Board) -> bool {
         while let Some(line) = self.lines.front() {
             if !board.outbox(|outbox| outbox.line(line)) {
                 return false;
             }
             self.lines.pop_front();
         }
-        if !board.outbox(|outbox| outbox.has_room()) {
-            return false;
-        }
-        self.answer(board);
-        self.report(board);
-        self.answer.is_some() || self.report.is_under_way()
+        board.outbox(|outbox| outbox.has_room())
     }
 
     /// A line of text, behind those that wait. The oldest gives way when there are too many.

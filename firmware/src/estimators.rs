@@ -2,6 +2,8 @@
 
 use crate::acquisition::Arrival;
 use crate::cadence::{Cadence, Step};
+use crate::couplings::Couplings;
+use crate::epoch::Epoch;
 use crate::outbox::Outbox;
 use crate::summary::{OCTAVES, OVERLAP};
 use adis16405_driver::{Burst, Channel, Config, Faults, Judge};
@@ -21,12 +23,33 @@ pub type Estimator = Cascade<OCTAVES, OVERLAP>;
 /// Bursts of nothing but zeros or ones in a row from which on the sensor is to be checked.
 const STUCK_BURSTS: u32 = 16;
 
+/// The memory of the estimators.
+#[derive(Debug)]
+pub struct Statistics {
+    cascades: [Estimator; CHANNELS.len()],
+    couplings: Couplings,
+}
+
+impl Statistics {
+    /// Of no sample.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { cascades: [const { Estimator::new() }; CHANNELS.len()], couplings: Couplings::new() }
+    }
+}
+
+impl Default for Statistics {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// The estimators of all channels, in lockstep, and the account of what they were not given.
 ///
-/// The estimators themselves are lent, so that a board can keep them where memory starts at zero.
+/// Their [`Statistics`] are lent, so that a board can keep them where memory starts at zero.
 pub struct Estimators<'m> {
     config: Config,
-    cascades: &'m mut [Estimator; CHANNELS.len()],
+    statistics: &'m mut Statistics,
     judge: Judge,
     cadence: Cadence,
     health: Health,
@@ -38,11 +61,11 @@ pub struct Estimators<'m> {
 }
 
 impl<'m> Estimators<'m> {
-    /// Estimators for a sensor so configured; they go on from what `cascades` has.
-    pub fn new(cascades: &'m mut [Estimator; CHANNELS.len()], config: Config) -> Self {
+    /// Estimators for a sensor so configured; they go on from what `statistics` has.
+    pub fn new(statistics: &'m mut Statistics, config: Config) -> Self {
         Self {
             config,
-            cascades,
+            statistics,
             judge: Judge::default(),
             cadence: Cadence::new(config.sample_period()),
             health: Health::default(),
@@ -99,9 +122,15 @@ impl<'m> Estimators<'m> {
         self.raw = self.raw.take().map(|_| empty(config));
     }
 
-    /// The statistics begin again; the counters go on.
-    pub fn begin_epoch(&mut self) {
-        self.cascades.iter_mut().for_each(Cascade::reset);
+    /// Hands over the statistics and begins again without losing a sample; the counters go on.
+    pub fn finish_epoch(&mut self, finished: &mut Epoch) {
+        finished.take(&self.statistics.cascades, &self.statistics.couplings);
+        self.begin_epoch();
+    }
+
+    fn begin_epoch(&mut self) {
+        self.statistics.cascades.iter_mut().for_each(Cascade::reset);
+        self.statistics.couplings = Couplings::new();
     }
 
     /// Forgets the statistics and the counters, and keeps step with the sensor.
@@ -124,12 +153,12 @@ impl<'m> Estimators<'m> {
     /// The estimator of [`CHANNELS`]`[index]`.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<&Estimator> {
-        self.cascades.get(index)
+        self.statistics.cascades.get(index)
     }
 
     /// Puts what was learnt before a restart in place of the estimator of [`CHANNELS`]`[index]`.
     pub fn resume(&mut self, index: usize, estimator: Estimator) {
-        if let Some(cascade) = self.cascades.get_mut(index) {
+        if let Some(cascade) = self.statistics.cascades.get_mut(index) {
             *cascade = estimator;
         }
     }
@@ -185,14 +214,16 @@ impl<'m> Estimators<'m> {
             self.gap(1);
             return;
         }
-        let counts = burst.counts();
-        for (cascade, channel) in self.cascades.iter_mut().zip(CHANNELS) {
-            cascade.push(i32::from(counts.get(channel)));
+        let counts = CHANNELS.map(|channel| i32::from(burst.counts().get(channel)));
+        let Statistics { cascades, couplings } = &mut *self.statistics;
+        for (cascade, count) in cascades.iter_mut().zip(counts) {
+            cascade.push(count);
         }
+        couplings.observe(cascades, counts);
     }
 
     fn gap(&mut self, missing: u32) {
-        for cascade in self.cascades.iter_mut() {
+        for cascade in &mut self.statistics.cascades {
             cascade.gap(missing);
         }
     }

@@ -17,9 +17,13 @@ mod app;
 mod board;
 pub mod cadence;
 pub mod command;
+pub mod compensation;
+pub mod couplings;
 mod desk;
+mod epoch;
 mod estimators;
 mod last_words;
+pub mod lesson;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 #[allow(unsafe_code, reason = "registers, and memory that outlives a reset")]
 pub mod microcontroller;
@@ -35,7 +39,8 @@ pub use acquisition::{Arrival, Arrivals, Sampler};
 pub use app::{App, FIRST_CONFIG, Start};
 pub use board::{Board, Meters};
 pub use desk::{Chip, Desk, Locks, run};
-pub use estimators::{CHANNELS, Estimator, Estimators, estimate};
+pub use epoch::Epoch;
+pub use estimators::{CHANNELS, Estimator, Estimators, Statistics, estimate};
 pub use last_words::LastWords;
 pub use outbox::{Outbox, Outgoing};
 pub use retained::Retained;

@@ -31,17 +31,15 @@ pub fn channel_report(
     model: Option<&Model>,
     previous: Option<&Model>,
 ) -> ChannelReport {
-    let coefficients = model.into_iter().flat_map(Model::terms).filter_map(|term| {
+    let coefficients = model.into_iter().flat_map(Model::terms).map(|term| {
         let (value, low, high) = (term.value, term.low, term.high);
-        Some(Coefficient { term: term_of(term.kind)?, value, low, high })
+        Coefficient { term: term_of(term.kind), value, low, high }
     });
     let points = (0..OCTAVES).filter_map(|octave| {
         let (sum, count) = estimator.sum_of_squares(octave)?;
         (count > 0).then_some(Point { n: 1 << octave, sum, count })
     });
-    let unseen = previous
-        .and_then(|previous| check::ModelError::between(previous, &curve(channel, estimator, config)))
-        .map(|error| ModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent });
+    let unseen = previous.and_then(|previous| model_error(previous, &curve(channel, estimator, config)));
     ChannelReport {
         channel: channel as u8,
         samples: estimator.len(),
@@ -52,11 +50,22 @@ pub fn channel_report(
     }
 }
 
-fn term_of(kind: Kind) -> Option<Term> {
-    Some(match kind {
+/// How wrong a model is on a curve; `None` if no octave can be compared.
+pub(crate) fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> Option<ModelError> {
+    let error = check::ModelError::between(model, curve)?;
+    Some(ModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent })
+}
+
+pub(crate) fn term_of(kind: Kind) -> Term {
+    match kind {
+        Kind::Quantization => Term::Quantization,
         Kind::AngleRandomWalk => Term::AngleRandomWalk,
         Kind::BiasInstability => Term::BiasInstability,
         Kind::RateRandomWalk => Term::RateRandomWalk,
-        _ => return None,
-    })
+        Kind::RateRamp => Term::RateRamp,
+        Kind::Filtered(_) => Term::Filtered,
+        Kind::Markov(_) => Term::Markov,
+        Kind::Resonance(_) => Term::Resonance,
+        Kind::Sinusoid(_) => Term::Sinusoid,
+    }
 }

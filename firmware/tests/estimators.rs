@@ -1,7 +1,7 @@
 //! Sampling and estimating without a board: order, gaps by cause, the raw stream.
 
 use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts};
-use firmware::{Arrival, Arrivals, CHANNELS, Estimator, Estimators, Outbox, Outgoing, Sampler, estimate};
+use firmware::{Arrival, Arrivals, CHANNELS, Estimators, Outbox, Outgoing, Sampler, Statistics, estimate};
 use link::{Decoder, Message, Raw, Received};
 
 /// The default configuration samples at 819.2 Hz.
@@ -23,15 +23,11 @@ fn arrival(period: u32, burst: Option<Burst>) -> Arrival {
     Arrival { at_us: at_us(period), dropped: 0, burst }
 }
 
-fn cascades() -> [Estimator; CHANNELS.len()] {
-    CHANNELS.map(|_| Estimator::new())
-}
-
 /// Allan's sum worked out by hand: counts 0, 1, 3 have first differences 1, 2, whose squares sum to 5.
 #[test]
 fn counts_reach_the_estimators() {
-    let mut cascades = cascades();
-    let mut estimators = Estimators::new(&mut cascades, Config::default());
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
     for (period, k) in (0..).zip([0, 1, 3]) {
         assert_eq!(estimators.take(arrival(period, Some(burst(k))), 0), None);
     }
@@ -54,8 +50,8 @@ fn losses_are_gaps_and_are_counted_by_cause() {
     let ones = Some(Burst::from_bytes(&[0xFF; BURST_BYTES]));
     let cases = [(None, 1, 0), (zeros, 1, 0), (ones, 1, 0), (None, 4, 0), (None, 4, 2), (None, 4, 3)];
     for (lost, periods, dropped) in cases {
-        let mut cascades = cascades();
-        let mut estimators = Estimators::new(&mut cascades, Config::default());
+        let mut statistics = Statistics::new();
+        let mut estimators = Estimators::new(&mut statistics, Config::default());
         estimators.take(arrival(0, Some(burst(1))), 0);
         estimators.take(Arrival { dropped, ..arrival(periods, lost) }, 4);
         estimators.take(arrival(periods + 1, Some(burst(5))), 0);
@@ -76,8 +72,8 @@ fn losses_are_gaps_and_are_counted_by_cause() {
 /// An edge between two samples is noise on the line: its burst is no sample, and no sample is missing.
 #[test]
 fn a_stray_edge_is_no_sample() {
-    let mut cascades = cascades();
-    let mut estimators = Estimators::new(&mut cascades, Config::default());
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
     estimators.take(arrival(0, Some(burst(1))), 0);
     estimators.take(Arrival { at_us: 500, ..arrival(0, Some(burst(1))) }, 0);
     estimators.take(arrival(1, Some(burst(2))), 0);
@@ -89,8 +85,8 @@ fn a_stray_edge_is_no_sample() {
 /// After a silence in which the sensor may have been reset its samples are not used until it was checked.
 #[test]
 fn after_a_silence_samples_wait_for_the_check() {
-    let mut cascades = cascades();
-    let mut estimators = Estimators::new(&mut cascades, Config::default());
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
     estimators.trust(0);
     estimators.take(arrival(0, Some(burst(1))), 0);
     for (period, k) in [(100, 2), (101, 3)] {
@@ -108,8 +104,8 @@ fn after_a_silence_samples_wait_for_the_check() {
 #[test]
 fn a_stuck_data_line_raises_doubt() {
     for bytes in [[0; BURST_BYTES], [0xFF; BURST_BYTES]] {
-        let mut cascades = cascades();
-        let mut estimators = Estimators::new(&mut cascades, Config::default());
+        let mut statistics = Statistics::new();
+        let mut estimators = Estimators::new(&mut statistics, Config::default());
         let mut doubtful = |period| {
             estimators.take(arrival(period, Some(Burst::from_bytes(&bytes))), 0);
             estimators.is_doubtful()
@@ -144,11 +140,11 @@ fn a_full_queue_is_counted_with_the_next_burst_that_fits() {
 /// The raw stream holds every burst, usable or not, each with its place: those that are lost leave a gap in the numbers.
 #[test]
 fn the_raw_stream_is_what_came_off_the_bus() {
-    let (mut arrivals, mut outgoing, mut cascades) = (Arrivals::new(), Outgoing::new(), cascades());
+    let (mut arrivals, mut outgoing, mut statistics) = (Arrivals::new(), Outgoing::new(), Statistics::new());
     let (mut producer, mut consumer) = arrivals.split();
     let (to_port, mut port) = outgoing.split();
     let mut outbox = Outbox::new(to_port);
-    let mut estimators = Estimators::new(&mut cascades, Config::default());
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
     estimators.set_raw(true);
     let mut expected = Vec::new();
     for period in (0..40).chain(50..58) {
@@ -178,11 +174,11 @@ fn the_raw_stream_is_what_came_off_the_bus() {
 /// A line that nobody empties: messages of the raw stream are dropped whole, counted, and missed by their numbers.
 #[test]
 fn what_the_line_cannot_take_is_counted() {
-    let (mut arrivals, mut outgoing, mut cascades) = (Arrivals::new(), Outgoing::new(), cascades());
+    let (mut arrivals, mut outgoing, mut statistics) = (Arrivals::new(), Outgoing::new(), Statistics::new());
     let (mut producer, mut consumer) = arrivals.split();
     let (to_port, mut port) = outgoing.split();
     let mut outbox = Outbox::new(to_port);
-    let mut estimators = Estimators::new(&mut cascades, Config::default());
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
     estimators.set_raw(true);
     let mut decoder = Decoder::new();
     for period in 0..320 {

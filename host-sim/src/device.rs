@@ -6,8 +6,8 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{Memory, blank};
 use firmware::{
-    App, Arrival, Arrivals, Board, CHANNELS, Estimator, Estimators, FIRST_CONFIG, Meters, Outbox, Outgoing, Retained,
-    Sampler, Start, estimate,
+    App, Arrival, Arrivals, Board, Epoch, Estimators, FIRST_CONFIG, Meters, Outbox, Outgoing, Retained, Sampler, Start,
+    Statistics, estimate,
 };
 use heapless::spsc::Consumer;
 use link::Boot;
@@ -42,16 +42,16 @@ struct Desk {
 impl Device {
     /// Starts the application with a sensor, and with what `memory` retains.
     ///
-    /// The queues and estimators, 30 kB, are never given back: on the target they are statics.
+    /// The queues and statistics, 50 kB, are never given back: on the target they are statics.
     pub fn new(part: VirtualAdis16405, memory: &'static Memory) -> Self {
         let (to_estimators, arrivals) = Box::leak(Box::new(Arrivals::new())).split();
         let (to_port, outgoing) = Box::leak(Box::new(Outgoing::new())).split();
-        let cascades = Box::leak(Box::new(CHANNELS.map(|_| Estimator::new())));
+        let statistics = Box::leak(Box::new(Statistics::new()));
         let mut desk = Desk {
             now_us: part.now() / 1000,
             bus: EmulatedBus::with_sck_hz(part, SCK_HZ),
             sampler: Sampler::new(to_estimators),
-            estimators: Estimators::new(cascades, FIRST_CONFIG),
+            estimators: Estimators::new(statistics, FIRST_CONFIG),
             arrivals,
             outbox: Outbox::new(to_port),
             outgoing,
@@ -59,7 +59,12 @@ impl Device {
             received: VecDeque::new(),
             restarts: 0,
         };
-        let start = Start { spi_clock_hz: SCK_HZ, boot: Boot::default(), retained: Retained::open(memory) };
+        let start = Start {
+            spi_clock_hz: SCK_HZ,
+            boot: Boot::default(),
+            retained: Retained::open(memory),
+            finished: Box::leak(Box::new(Epoch::EMPTY)),
+        };
         Self { app: App::new(start, &mut desk), desk }
     }
 

@@ -1,8 +1,11 @@
 //! The host's end of the serial cable.
 
+mod compensation;
+mod lesson;
 mod wording;
 
-pub use wording::lines;
+pub use compensation::{Compensated, Compensation};
+pub use wording::Narrator;
 
 use link::{Counters, Decoder, Received};
 use std::collections::VecDeque;
@@ -83,8 +86,9 @@ fn is_hangup(error: &io::Error) -> bool {
 /// # Errors
 /// The port fails, or `out`.
 pub fn show<P: Read + Write>(cable: &mut Cable<P>, deadline: Option<Instant>, out: &mut impl Write) -> io::Result<()> {
+    let mut narrator = Narrator::default();
     while let Some(received) = cable.next(deadline)? {
-        for line in lines(&received) {
+        for line in narrator.lines(&received) {
             writeln!(out, "{line}")?;
         }
         out.flush()?;

@@ -56,10 +56,12 @@ impl Heard {
             .expect("a report")
     }
 
-    /// Splits reports: hello, eight channels, health.
+    /// Splits reports: hello, eight channels, health; what an epoch adds is left out.
     fn reports(&self) -> usize {
-        let frames: Vec<&Message> =
-            self.messages.iter().filter(|m| !matches!(m, Message::Log(_) | Message::Raw(_))).collect();
+        let extra = |message: &&Message| {
+            matches!(message, Message::Log(_) | Message::Raw(_) | Message::Checked(_) | Message::Learnt(_))
+        };
+        let frames: Vec<&Message> = self.messages.iter().filter(|message| !extra(message)).collect();
         for report in frames.chunks(10) {
             let [Message::Hello(_), channels @ .., Message::Health(_)] = report else { panic!("{report:?}") };
             let numbers = channels.iter().map(|message| match message {

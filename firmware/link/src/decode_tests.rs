@@ -1,7 +1,8 @@
 use super::*;
 use crate::{
-    ChannelReport, Coefficient, Encoder, Frame, Health, MAX_COEFFICIENTS, MAX_POINTS, MAX_RAW, ModelError, Point, Raw,
-    RawBurst, Term, line_bytes,
+    Bounded, Cause, ChannelReport, Checked, Coefficient, Drift, Effect, Encoder, Frame, Health, Learnt, MAX_CAUSES,
+    MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, ModelError, Point, Raw, RawBurst, Shift, Term,
+    line_bytes,
 };
 
 extern crate std;
@@ -47,6 +48,41 @@ fn raw() -> Message {
     Message::Raw(Raw { first: u64::MAX, at_us: u64::MAX, sens_avg: u16::MAX, bursts })
 }
 
+/// The longest messages of an epoch.
+fn checked() -> Message {
+    let error = Some(ModelError { deviance_per_point: f64::MAX, rms_percent: f64::MAX });
+    let drift = Drift { n: u64::MAX, raw: f64::MAX, compensated: f64::MIN_POSITIVE };
+    Message::Checked(Checked {
+        channel: u8::MAX,
+        epoch: u32::MAX,
+        before: error,
+        after: error,
+        shift: Some(Shift { raw: f64::MIN, compensated: f64::MAX }),
+        drift: core::iter::repeat_n(drift, MAX_DRIFTS).collect(),
+    })
+}
+
+fn learnt() -> Message {
+    let cause = Cause { covariate: 10, value: f64::MAX, low: f64::MIN, high: f64::MAX, reference: 25.0 };
+    let bounded = Bounded { value: f64::MAX, low: f64::MIN, high: f64::MAX };
+    let effect = Effect {
+        coefficient: Coefficient { term: Term::Resonance, value: f64::MAX, low: f64::MIN, high: f64::MAX },
+        shape: [bounded; 2].into_iter().collect(),
+        score: f64::MAX,
+        n: u64::MAX,
+        excess: f64::MAX,
+        sigmas: f64::MAX,
+    };
+    Message::Learnt(Learnt {
+        channel: u8::MAX,
+        epoch: u32::MAX,
+        causes: core::iter::repeat_n(cause, MAX_CAUSES).collect(),
+        effects: core::iter::repeat_n(effect, MAX_EFFECTS).collect(),
+        p_before: f64::MIN_POSITIVE,
+        p_after: f64::MAX,
+    })
+}
+
 /// Numbers from a linear congruential generator (Knuth's MMIX constants), seeded, upper bits only.
 struct Noise(u64);
 
@@ -59,14 +95,14 @@ impl Noise {
 
 #[test]
 fn every_message_comes_back_in_order() {
-    let messages =
-        [log("start"), largest(), Message::Health(Health { bursts: 7, ..Health::default() }), raw(), log("")];
+    let health = Message::Health(Health { bursts: 7, ..Health::default() });
+    let messages = [log("start"), largest(), health, raw(), checked(), learnt(), log("")];
     let mut encoder = Encoder::new();
     let stream: StdVec<u8> = messages.iter().flat_map(|message| encoder.encode(message).unwrap()).collect();
     let (found, counters) = decode(&stream);
-    assert_eq!(sequences(&found), [0, 1, 2, 3, 4]);
+    assert_eq!(sequences(&found), [0, 1, 2, 3, 4, 5, 6]);
     assert!(found.into_iter().filter_map(Received::message).eq(messages));
-    assert_eq!(counters, Counters { frames: 5, ..Counters::default() });
+    assert_eq!(counters, Counters { frames: 7, ..Counters::default() });
 }
 
 /// The bytes of one short frame worked out by hand: version 3, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is

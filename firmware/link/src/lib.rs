@@ -21,8 +21,9 @@ mod text;
 pub use decode::{Counters, Decoder, Received};
 pub use encode::{Encoder, Frame};
 pub use message::{
-    Boot, BootCause, ChannelReport, Coefficient, Health, Hello, MAX_COEFFICIENTS, MAX_POINTS, MAX_RAW, MAX_TEXT,
-    Message, ModelError, Point, Raw, RawBurst, Term,
+    Boot, BootCause, Bounded, Cause, ChannelReport, Checked, Coefficient, Drift, Effect, Health, Hello, Learnt,
+    MAX_CAUSES, MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, MAX_TEXT, Message, ModelError, Point,
+    Raw, RawBurst, Shift, Term,
 };
 pub use text::{Line, line_bytes};
 

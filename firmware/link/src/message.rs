@@ -7,6 +7,12 @@ use serde::{Deserialize, Serialize};
 pub const MAX_POINTS: usize = 28;
 /// Most coefficients of a model.
 pub const MAX_COEFFICIENTS: usize = 8;
+/// Most terms beyond the declared ones that are traced in a channel.
+pub const MAX_EFFECTS: usize = 5;
+/// Most covariates that a channel can follow.
+pub const MAX_CAUSES: usize = 5;
+/// Most octaves at which the drift before and after compensation is told.
+pub const MAX_DRIFTS: usize = 12;
 /// Longest log line in bytes.
 pub const MAX_TEXT: usize = 120;
 /// Most bursts in one message of the raw stream.
@@ -26,6 +32,10 @@ pub enum Message {
     Log(String<MAX_TEXT>),
     /// Bursts as they came off the bus, while a recording is asked for.
     Raw(Raw),
+    /// What an epoch says to what was learnt of a channel in the epoch before.
+    Checked(Checked),
+    /// What an epoch has taught of a channel, for the one after it.
+    Learnt(Learnt),
 }
 
 /// Who speaks and with which settings.
@@ -114,6 +124,107 @@ pub struct ModelError {
     pub rms_percent: f64,
 }
 
+/// Errors and bias drift over an epoch, before and after what the epoch before had taught of the channel.
+///
+/// The compensated stream is `y − Σ value·(covariate − reference)` over the causes that were [`Learnt`] one epoch earlier; it
+/// is the stream itself if there were none.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Checked {
+    /// Position of the channel in the burst.
+    pub channel: u8,
+    /// The epoch that was not seen before: so many were finished before it.
+    pub epoch: u32,
+    /// N, B and K on the stream itself.
+    pub before: Option<ModelError>,
+    /// The traced model on the compensated stream.
+    pub after: Option<ModelError>,
+    /// By how much the means moved since the epoch before; `None` if they are not known of all samples, as after a restart.
+    pub shift: Option<Shift>,
+    /// Allan deviations of both streams, by rising averaging factor.
+    pub drift: Vec<Drift, MAX_DRIFTS>,
+}
+
+/// By how much the mean of a stream moved from one epoch to the next, in the channel's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Shift {
+    /// Of the stream.
+    pub raw: f64,
+    /// Of the compensated stream.
+    pub compensated: f64,
+}
+
+/// Allan deviation of a stream and of the same stream compensated, over the same samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Drift {
+    /// Averaging factor in samples.
+    pub n: u64,
+    /// Of the stream, in the channel's unit.
+    pub raw: f64,
+    /// Of the compensated stream.
+    pub compensated: f64,
+}
+
+/// What an epoch has taught of a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Learnt {
+    /// Position of the channel in the burst.
+    pub channel: u8,
+    /// The epoch that taught it: so many were finished before it.
+    pub epoch: u32,
+    /// What the channel follows beyond doubt, to be subtracted from now on; empty: nothing is.
+    pub causes: Vec<Cause, MAX_CAUSES>,
+    /// The terms that N, B and K lack in the compensated stream, in the order in which they were found; empty: nothing is
+    /// missing.
+    pub effects: Vec<Effect, MAX_EFFECTS>,
+    /// Probability of a residual as large under N, B and K if they were all there is in the compensated stream.
+    pub p_before: f64,
+    /// The same with the effects.
+    pub p_after: f64,
+}
+
+/// A covariate that a channel follows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// Position of the covariate in the burst.
+    pub covariate: u8,
+    /// Sensitivity in the channel's unit over the covariate's.
+    pub value: f64,
+    /// Lower 95 % bound.
+    pub low: f64,
+    /// Upper 95 % bound.
+    pub high: f64,
+    /// Value of the covariate at which nothing is subtracted, in its unit.
+    pub reference: f64,
+}
+
+/// A term that the declared model lacks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    /// Its coefficient.
+    pub coefficient: Coefficient,
+    /// Its shape, as the [`Term`] says; empty for those that have none.
+    pub shape: Vec<Bounded, 2>,
+    /// How much it explains: the square of a number of standard deviations.
+    pub score: f64,
+    /// Averaging factor at which the model without it was furthest off.
+    pub n: u64,
+    /// Measured over modelled deviation there, less 1.
+    pub excess: f64,
+    /// The same in standard deviations.
+    pub sigmas: f64,
+}
+
+/// A parameter of a shape with its 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Bounded {
+    /// Best value.
+    pub value: f64,
+    /// Lower 95 % bound.
+    pub low: f64,
+    /// Upper 95 % bound.
+    pub high: f64,
+}
+
 /// Bursts in a row, as they came off the bus.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Raw {
@@ -161,6 +272,18 @@ pub enum Term {
     BiasInstability,
     /// K, in channel units per square root of a second.
     RateRandomWalk,
+    /// Q, in channel units times a second.
+    Quantization,
+    /// R, in channel units per second.
+    RateRamp,
+    /// N behind a filter; shape: taps of each of its two averages, and how many of its steps a sample is.
+    Filtered,
+    /// Standard deviation of correlated noise; shape: time constant in s.
+    Markov,
+    /// Standard deviation of noise in a narrow band; shape: frequency and bandwidth in Hz.
+    Resonance,
+    /// Amplitude of a line; shape: frequency in Hz.
+    Sinusoid,
 }
 
 /// One fitted coefficient with its 95 % bounds, in physical units.

@@ -1,5 +1,6 @@
 //! Answers for a person: lines of text, made one at a time.
 
+use super::epoch::{INERTIAL, Verdict};
 use super::{App, Sensor};
 use crate::board::Board;
 use crate::command::HELP;
@@ -7,11 +8,13 @@ use crate::estimators::CHANNELS;
 use crate::last_words::line;
 use crate::summary::{OCTAVES, channel_model};
 use crate::table::{HEAD, Short, row};
-use adis16405_driver::Channel;
-use link::{Health, Line};
+use link::{Health, Line, MAX_CAUSES};
 
 /// What `v` answers.
 pub(super) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
+
+/// Lines of a channel in the table: coefficients, covariates, and this one.
+const CHECKED: usize = 1 + MAX_CAUSES;
 
 /// An answer and how many of its lines were sent.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +64,13 @@ impl From<Option<Line>> for Next {
 }
 
 impl App {
+    /// The same, unless the answer takes a fit: that must wait.
+    pub(super) fn answer_briefly(&mut self, board: &mut impl Board) {
+        if self.answer.is_some_and(|answer| !matches!(answer.kind, Kind::Table)) {
+            self.answer(board);
+        }
+    }
+
     /// Makes and sends the next line of the answer under way.
     #[inline(never)] // so that its stack is not everybody's
     pub(super) fn answer(&mut self, board: &mut impl Board) {
@@ -81,7 +91,8 @@ impl App {
         };
     }
 
-    /// Head, a row for every octave, a line of coefficients for every inertial channel.
+    /// Head, a row for every octave, a line of coefficients for every inertial channel; what the last epoch taught, and what
+    /// it said to what was learnt before.
     fn table_line(&self, board: &mut impl Board, index: usize) -> Next {
         if let Some(head) = HEAD.get(index) {
             return Next::Line(line(format_args!("{head}")));
@@ -90,9 +101,18 @@ impl App {
         if index < OCTAVES {
             return board.estimators(|estimators| row(estimators, index)).into();
         }
-        let index = index - OCTAVES;
-        let Some(&channel) = Channel::INERTIAL.get(index) else { return Next::End };
-        let Some(estimator) = board.estimators(|estimators| estimators.get(index).cloned()) else { return Next::End };
+        let (line, index) = ((index - OCTAVES) / INERTIAL, (index - OCTAVES) % INERTIAL);
+        match line {
+            0 => self.coefficients_line(board, index).map_or(Next::End, Next::Line),
+            1..=MAX_CAUSES => self.cause_line(index, line - 1).into(),
+            CHECKED => self.checked_line(index).into(),
+            _ => Next::End,
+        }
+    }
+
+    fn coefficients_line(&self, board: &mut impl Board, index: usize) -> Option<Line> {
+        let channel = CHANNELS[index];
+        let estimator = board.estimators(|estimators| estimators.get(index).cloned())?;
         let model = channel_model(channel, &estimator, self.config);
         let mut text = line(format_args!("{}", channel.name()));
         for term in model.terms() {
@@ -100,16 +120,36 @@ impl App {
             let (value, low, high) = (Short(term.value), Short(term.low), Short(term.high));
             let _ = text.push_str(&line(format_args!("  {} ({low}..{high})", value)));
         }
-        Next::Line(text)
+        Some(text)
+    }
+
+    /// A covariate that is subtracted since the last epoch.
+    fn cause_line(&self, index: usize, cause: usize) -> Option<Line> {
+        let followed = self.school.lessons[index].causes.get(cause)?;
+        let (value, error) = (Short(followed.value), Short(followed.error));
+        let (channel, cause) = (CHANNELS[index], CHANNELS[followed.cause]);
+        let (unit, of) = (channel.unit(), cause.unit());
+        Some(line(format_args!("{} follows {}: {value} +- {error} {unit}/{of}", channel.name(), cause.name())))
+    }
+
+    /// What the last epoch said to what was learnt before it.
+    fn checked_line(&self, index: usize) -> Option<Line> {
+        let Verdict { errors, drift } = self.school.verdicts[index]?;
+        let (before, after) = (Short(errors.0), Short(errors.1));
+        let (raw, compensated) = (Short(drift.raw), Short(drift.compensated));
+        let tau = Short(drift.n as f64 / self.config.sample_period().hz());
+        let name = CHANNELS[index].name();
+        let text = format_args!("{name} unseen: drift at {tau} s {raw} -> {compensated}, error {before} -> {after}");
+        Some(line(text))
     }
 
     fn status_line(&self, board: &mut impl Board, index: usize) -> Next {
         let now_us = board.now_us();
-        let boot = &self.start.boot;
+        let boot = &self.boot;
         let text = match index {
             0 => {
                 let state = if matches!(self.sensor, Sensor::Sampled { .. }) { "sampled" } else { "sought" };
-                line(format_args!("up {} s, sensor {state}, SCK {} Hz", now_us / 1_000_000, self.start.spi_clock_hz))
+                line(format_args!("up {} s, sensor {state}, SCK {} Hz", now_us / 1_000_000, self.spi_clock_hz))
             }
             1 => {
                 let measured = board.estimators(|estimators| estimators.measured_hz());
@@ -166,5 +206,3 @@ fn faults_line(health: &Health, index: usize) -> Next {
         None => Next::End,
     }
 }
-
-const _: () = assert!(CHANNELS.len() >= Channel::INERTIAL.len());

@@ -1,15 +1,12 @@
 //! A report in frames: who speaks, every channel, health. Made one message at a time.
 
+use super::epoch::INERTIAL;
 use super::{App, Sensor};
 use crate::board::Board;
 use crate::estimators::CHANNELS;
 use crate::summary::{channel_model, channel_report};
-use adis16405_driver::{Channel, GyroRange};
-use core::ops::Range;
+use adis16405_driver::GyroRange;
 use link::{Health, Hello, Message};
-
-/// Messages of a report.
-const MESSAGES: usize = CHANNELS.len() + 2;
 
 /// Version of the firmware, from the manifest.
 const VERSION: (u8, u8, u8) = (
@@ -26,25 +23,60 @@ const fn decimal(digits: &str) -> u8 {
     }
 }
 
+/// A message of a report.
+#[derive(Clone, Copy)]
+enum Part {
+    Hello,
+    /// A channel.
+    Channel(usize),
+    /// What the epoch says to what was learnt of an inertial channel.
+    Checked(usize),
+    /// What the epoch teaches of an inertial channel.
+    Learnt(usize),
+    Health,
+}
+
+impl Part {
+    /// The part that is in this place. That of a report that ends an epoch is longer.
+    fn at(index: usize, closing: bool) -> Option<Self> {
+        let pupils = if closing { INERTIAL } else { 0 };
+        let channels = 1 + CHANNELS.len();
+        Some(match index {
+            0 => Self::Hello,
+            _ if index < channels => Self::Channel(index - 1),
+            _ if index < channels + pupils => Self::Checked(index - channels),
+            _ if index < channels + 2 * pupils => Self::Learnt(index - channels - pupils),
+            _ if index == channels + 2 * pupils => Self::Health,
+            _ => return None,
+        })
+    }
+}
+
 /// How far the report under way has come.
 #[derive(Default)]
 pub(super) struct Report {
-    left: Range<usize>,
-    /// Whether it ends an epoch: what it fits is what the epoch has learnt.
+    next: Option<usize>,
+    /// Whether it ends an epoch: then it is of that epoch, whose statistics have made room for the next one's.
     closing: bool,
 }
 
 impl Report {
-    /// Starts a report; `closing` if it ends an epoch. One that is under way is finished first and counts as this one.
-    pub(super) fn start(&mut self, closing: bool) {
-        if self.left.is_empty() || closing && !self.closing {
-            self.left = 0..MESSAGES;
-        }
-        self.closing |= closing;
+    /// Starts a report. One that is under way is finished first and counts as this one.
+    pub(super) fn start(&mut self) {
+        self.next.get_or_insert(0);
+    }
+
+    /// Starts the report that ends an epoch, in the place of one that is under way.
+    pub(super) fn close(&mut self) {
+        *self = Self { next: Some(0), closing: true };
     }
 
     pub(super) fn is_under_way(&self) -> bool {
-        !self.left.is_empty()
+        self.next.is_some()
+    }
+
+    pub(super) fn is_closing(&self) -> bool {
+        self.closing
     }
 }
 
@@ -52,21 +84,24 @@ impl App {
     /// Makes and sends the next message of the report under way; there must be room for it.
     #[inline(never)] // so that its stack is not everybody's
     pub(super) fn report(&mut self, board: &mut impl Board) {
-        let Some(index) = self.report.left.next() else { return };
-        let message = match index.checked_sub(1) {
-            None => Message::Hello(self.hello(board)),
-            Some(k) => match CHANNELS.get(k) {
-                Some(&channel) => match self.channel(board, k, channel) {
-                    Some(message) => message,
-                    None => return,
-                },
-                None => Message::Health(self.health(board)),
-            },
+        let Report { next: Some(index), closing } = self.report else { return };
+        let Some(part) = Part::at(index, closing) else {
+            self.report = Report::default();
+            return;
         };
-        board.outbox(|outbox| outbox.send(&message));
-        if !self.report.is_under_way() && core::mem::take(&mut self.report.closing) {
-            // What has arrived since each channel was reported belongs to no epoch.
-            self.begin_epoch(board, self.settings.epoch.saturating_add(1));
+        let message = match part {
+            Part::Hello => Some(Message::Hello(self.hello(board))),
+            Part::Channel(k) => self.channel(board, k),
+            Part::Checked(k) => self.check(k),
+            Part::Learnt(k) => self.study(board, k),
+            Part::Health => Some(Message::Health(self.health(board))),
+        };
+        if self.report.closing == closing {
+            // Otherwise the statistics were forgotten meanwhile.
+            self.report.next = Some(index + 1);
+        }
+        if let Some(message) = message {
+            board.outbox(|outbox| outbox.send(&message));
         }
     }
 
@@ -87,15 +122,16 @@ impl App {
     }
 
     #[inline(never)]
-    fn channel(&mut self, board: &mut impl Board, k: usize, channel: Channel) -> Option<Message> {
-        let estimator = board.estimators(|estimators| estimators.get(k).cloned())?;
-        let inertial = k < Channel::INERTIAL.len();
-        let model = inertial.then(|| channel_model(channel, &estimator, self.config));
-        let previous = self.learnt.get(k).and_then(Option::as_ref);
-        let report = channel_report(channel, &estimator, self.config, model.as_ref(), previous);
-        if let Some(learnt) = self.learnt.get_mut(k).filter(|_| self.report.closing) {
-            *learnt = model;
-        }
+    fn channel(&mut self, board: &mut impl Board, k: usize) -> Option<Message> {
+        let channel = CHANNELS[k];
+        let estimator = match self.school.finished().filter(|_| self.report.closing) {
+            Some(epoch) => epoch.estimator(k),
+            None => board.estimators(|estimators| estimators.get(k).cloned())?,
+        };
+        let lesson = self.school.lessons.get(k);
+        let model = lesson.map(|_| channel_model(channel, &estimator, self.config));
+        let previous = lesson.and_then(|lesson| lesson.declared(self.config));
+        let report = channel_report(channel, &estimator, self.config, model.as_ref(), previous.as_ref());
         Some(Message::Channel(report))
     }
 
@@ -111,12 +147,16 @@ impl App {
             filter_taps_log2: self.config.filter_taps_log2(),
             sample_rate_hz: self.config.sample_period().hz(),
             measured_rate_hz: board.estimators(|estimators| estimators.measured_hz()),
-            spi_clock_hz: self.start.spi_clock_hz,
+            spi_clock_hz: self.spi_clock_hz,
             uptime_us: board.now_us(),
             sampling: matches!(self.sensor, Sensor::Sampled { .. }),
-            epoch: self.settings.epoch,
+            epoch: self
+                .school
+                .finished()
+                .filter(|_| self.report.closing)
+                .map_or(self.settings.epoch, |epoch| epoch.number),
             epoch_s: self.settings.epoch_s,
-            boot: self.start.boot.clone(),
+            boot: self.boot.clone(),
         }
     }
 }

@@ -35,7 +35,7 @@ macro_rules! observatory {
                 SAMPLING_CYCLES, measure, survivors,
             };
             use $crate::{
-                Arrival, Arrivals, CHANNELS, Estimator, Estimators, FIRST_CONFIG, Locks, Outbox, Outgoing, Sampler, Start,
+                Arrival, Arrivals, Epoch, Estimators, FIRST_CONFIG, Locks, Outbox, Outgoing, Sampler, Start, Statistics,
                 Uptime, estimate, run,
             };
 
@@ -60,7 +60,8 @@ macro_rules! observatory {
 
             #[init(local = [
                 queue: Arrivals = Arrivals::new(),
-                cascades: [Estimator; CHANNELS.len()] = [const { Estimator::new() }; CHANNELS.len()],
+                statistics: Statistics = Statistics::new(),
+                finished: Epoch = Epoch::EMPTY,
                 outgoing: Outgoing = Outgoing::new(),
                 incoming: Incoming = Incoming::new(),
             ])]
@@ -79,10 +80,10 @@ macro_rules! observatory {
                     uptime: Uptime::new(<$microcontroller>::counter()),
                     bus,
                     sampler: Sampler::new(to_estimators),
-                    estimators: Estimators::new(context.local.cascades, FIRST_CONFIG),
+                    estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
                     outbox: Outbox::new(to_port),
                 };
-                let start = Some(Start { spi_clock_hz, boot, retained });
+                let start = Some(Start { spi_clock_hz, boot, retained, finished: context.local.finished });
                 (shared, Local { data_ready, arrivals, port, processor, received, start })
             }
 

@@ -1,20 +1,53 @@
 //! Messages in words.
 
+use super::compensation::{Compensated, Compensation};
+use super::lesson;
 use adis16405_driver::Channel;
-use link::{BootCause, ChannelReport, Health, Hello, Message, Received, Term};
+use link::{BootCause, ChannelReport, Health, Hello, Message, Raw, Received};
 
-/// What a message or line says to a person.
-pub fn lines(received: &Received) -> Vec<String> {
-    let message = match received {
-        Received::Line(line) => return vec![line.as_str().to_owned()],
-        Received::Message { message, .. } => message,
-    };
-    match message {
-        Message::Hello(report) => hello(report),
-        Message::Channel(report) => channel(report),
-        Message::Health(report) => vec![health(report)],
-        Message::Log(line) => vec![line.as_str().to_owned()],
-        Message::Raw(raw) => vec![format!("raw: {} bursts from number {}", raw.bursts.len(), raw.first)],
+/// Says in words what is received, and remembers what later messages need to be understood.
+#[derive(Default)]
+pub struct Narrator {
+    sample_rate_hz: Option<f64>,
+    epoch: u32,
+    compensation: Compensation,
+}
+
+impl Narrator {
+    /// What a message or line says to a person.
+    pub fn lines(&mut self, received: &Received) -> Vec<String> {
+        let message = match received {
+            Received::Line(line) => return vec![line.as_str().to_owned()],
+            Received::Message { message, .. } => message,
+        };
+        match message {
+            Message::Hello(report) => {
+                if report.epoch < self.epoch {
+                    self.compensation = Compensation::default(); // it has forgotten what it had learnt
+                }
+                (self.sample_rate_hz, self.epoch) = (Some(report.sample_rate_hz), report.epoch);
+                hello(report)
+            }
+            Message::Channel(report) => channel(report),
+            Message::Health(report) => vec![health(report)],
+            Message::Log(line) => vec![line.as_str().to_owned()],
+            Message::Raw(raw) => vec![self.raw(raw)],
+            Message::Checked(checked) => vec![lesson::checked(checked, self.sample_rate_hz)],
+            Message::Learnt(learnt) => {
+                self.compensation.learn(learnt);
+                lesson::learnt(learnt)
+            }
+        }
+    }
+
+    /// The last burst is shown as it is and compensated, where anything is.
+    fn raw(&self, raw: &Raw) -> String {
+        let mut text = format!("raw: {} bursts from number {}", raw.bursts.len(), raw.first);
+        let values = raw.bursts.last().map(|burst| self.compensation.of(burst, raw.sens_avg));
+        for Compensated { channel, raw, compensated } in values.into_iter().flatten() {
+            text += &format!(", {} {raw:.4} -> {compensated:.4} {}", channel.name(), channel.unit());
+        }
+        text
     }
 }
 
@@ -55,21 +88,21 @@ fn hello(report: &Hello) -> Vec<String> {
 }
 
 fn channel(report: &ChannelReport) -> Vec<String> {
-    let name = Channel::ALL.get(usize::from(report.channel)).map_or("unknown channel", |channel| channel.name());
+    let name = name(report.channel);
     let mut text = format!("   {name}: {} samples, {} missing", report.samples, report.missing);
     for coefficient in &report.coefficients {
-        let symbol = match coefficient.term {
-            Term::AngleRandomWalk => "N",
-            Term::BiasInstability => "B",
-            Term::RateRandomWalk => "K",
-        };
         let (value, low, high) = (coefficient.value, coefficient.low, coefficient.high);
-        text += &format!(", {symbol} {value:.3e} ({low:.3e} to {high:.3e})");
+        text += &format!(", {} {value:.3e} ({low:.3e} to {high:.3e})", lesson::symbol(coefficient.term));
     }
     if let Some(error) = &report.unseen {
         text += &format!(", model of the epoch before {:.1} % off", error.rms_percent);
     }
     vec![text]
+}
+
+/// Name of the channel in this place of a burst.
+pub(super) fn name(channel: u8) -> &'static str {
+    Channel::ALL.get(usize::from(channel)).map_or("unknown channel", |channel| channel.name())
 }
 
 fn health(health: &Health) -> String {

@@ -1,7 +1,7 @@
 //! What the image said, decoded by the host's decoder, and what the host makes of the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
-use firmware::{Arrival, CHANNELS, Estimator, Estimators, channel_model, channel_report};
+use firmware::{Arrival, CHANNELS, Estimator, Estimators, Statistics, channel_model, channel_report};
 use link::{ChannelReport, Counters, Decoder, Health, Hello, Message, Raw, Received};
 
 pub(crate) struct Decoded {
@@ -78,9 +78,9 @@ pub(crate) fn in_stretches(
     let config = adis16405_driver::Config::new(GyroRange::Dps300, 0, period).expect("no filter");
     let mut estimator = Estimator::new();
     for bursts in stretches {
-        let mut cascades = CHANNELS.map(|_| Estimator::new());
-        cascades[index] = resumed(&estimator);
-        let mut estimators = Estimators::new(&mut cascades, config);
+        let mut statistics = Statistics::new();
+        let mut estimators = Estimators::new(&mut statistics, config);
+        estimators.resume(index, resumed(&estimator));
         let at_us = |sample: u64| (sample as f64 * 1e6 / rate_hz) as u64;
         estimators.trust(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
         for &(sample, ref bytes) in *bursts {
@@ -89,7 +89,7 @@ pub(crate) fn in_stretches(
             }
             estimators.take(Arrival { at_us: at_us(sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) }, 0);
         }
-        estimator = cascades[index].clone();
+        estimator.clone_from(estimators.get(index).expect("a channel"));
     }
     let channel = CHANNELS[index];
     let model = (index < 6).then(|| channel_model(channel, &estimator, config));

@@ -1,0 +1,155 @@
+//! What an epoch teaches of an inertial channel, and what the next epoch, which was not seen, says to it.
+
+use crate::compensation::{Causes, Means, compensated, learn, shift};
+use crate::couplings::FIRST;
+use crate::epoch::Epoch;
+use crate::estimators::CHANNELS;
+use crate::summary::{OCTAVES, model_error, term_of};
+use adis16405_driver::Config;
+use allan_core::fit::fit;
+use allan_core::model::{MAX_TERMS, Term};
+use allan_core::trace::{Found, Lines, MAX_ADDED, Trace, trace_while};
+use allan_core::{Curve, Kind, Model};
+use heapless::Vec;
+use link::{Bounded, Cause, Checked, Coefficient, Drift, Effect, Learnt};
+
+/// Half the width of a 95 % interval in standard deviations.
+const NORMAL_975: f64 = 1.959_963_984_540_054;
+
+const _: () = assert!(MAX_ADDED == link::MAX_EFFECTS);
+
+/// What was learnt of one channel: the coefficients alone, so that six of them take little room.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lesson {
+    /// N, B and K of the stream itself.
+    declared: Coefficients,
+    /// The traced model of the compensated stream.
+    traced: Coefficients,
+    /// What is subtracted.
+    pub causes: Causes,
+}
+
+type Coefficients = Vec<(Kind, f64), MAX_TERMS>;
+
+impl Lesson {
+    /// Before anything was learnt.
+    pub const NOTHING: Self = Self { declared: Vec::new(), traced: Vec::new(), causes: Vec::new() };
+
+    /// N, B and K of the stream itself; `None` before anything was learnt.
+    #[must_use]
+    pub fn declared(&self, config: Config) -> Option<Model> {
+        model(&self.declared, config)
+    }
+
+    /// Every term of the compensated stream.
+    #[must_use]
+    pub fn traced(&self, config: Config) -> Option<Model> {
+        model(&self.traced, config)
+    }
+
+    /// The terms beyond N, B and K.
+    pub fn effects(&self) -> impl Iterator<Item = (Kind, f64)> {
+        self.traced.iter().copied().filter(|(kind, _)| !Kind::DECLARED.contains(kind))
+    }
+}
+
+fn coefficients(model: &Model) -> Coefficients {
+    model.terms().iter().map(|term| (term.kind, term.value)).collect()
+}
+
+fn model(coefficients: &Coefficients, config: Config) -> Option<Model> {
+    let terms = coefficients.iter().map(|&(kind, value)| Term::exact(kind, value));
+    (!coefficients.is_empty()).then(|| Model::new(1.0 / config.sample_period().hz(), terms))
+}
+
+/// Learns from an epoch what the inertial channel [`CHANNELS`]`[index]` follows, and what N, B and K lack in the rest.
+///
+/// It takes seconds on a microcontroller. `keep_on` is asked again and again, and may do something else meanwhile; `None`
+/// if it said no.
+#[must_use]
+#[inline(never)] // so that its stack is not everybody's
+pub fn study(
+    epoch: &Epoch,
+    index: usize,
+    config: Config,
+    keep_on: &mut dyn FnMut() -> bool,
+) -> Option<(Lesson, Learnt)> {
+    let causes = learn(epoch, index, config);
+    keep_on().then_some(())?;
+    let trace = traced(epoch, index, config, &causes, keep_on)?;
+    let declared = if causes.is_empty() { coefficients(&trace.before) } else { declared(&epoch.curve(index, config)) };
+    let learnt = Learnt {
+        channel: CHANNELS[index] as u8,
+        epoch: epoch.number,
+        causes: causes.iter().map(cause).collect(),
+        effects: trace.found.iter().map(|found| effect(found, &trace.after)).collect(),
+        p_before: trace.before_goodness.p_value,
+        p_after: trace.after_goodness.p_value,
+    };
+    Some((Lesson { declared, traced: coefficients(&trace.after), causes }, learnt))
+}
+
+#[inline(never)]
+fn traced(
+    epoch: &Epoch,
+    index: usize,
+    config: Config,
+    causes: &Causes,
+    keep_on: &mut dyn FnMut() -> bool,
+) -> Option<Trace> {
+    let curve = compensated(epoch, index, config, causes).unwrap_or_else(|| epoch.curve(index, config));
+    trace_while(&curve, Lines::InTheCurve, keep_on)
+}
+
+#[inline(never)]
+fn declared(curve: &Curve<OCTAVES>) -> Coefficients {
+    coefficients(&fit(curve, &Kind::DECLARED))
+}
+
+/// What an epoch says to a lesson of the one before; `means` are that one's. `None` if there was no lesson, or if the epoch
+/// does not know what it would take to compensate.
+#[must_use]
+#[inline(never)]
+pub fn check(lesson: &Lesson, means: Option<&Means>, epoch: &Epoch, index: usize, config: Config) -> Option<Checked> {
+    let (declared, traced) = (lesson.declared(config)?, lesson.traced(config)?);
+    let raw = epoch.curve(index, config);
+    let compensated = compensated(epoch, index, config, &lesson.causes)?;
+    let pairs = raw.points().iter().zip(compensated.points()).filter(|(point, _)| point.n >= 1 << FIRST);
+    let drift = pairs.map(|(raw, compensated)| Drift {
+        n: raw.n,
+        raw: libm::sqrt(raw.avar),
+        compensated: libm::sqrt(compensated.avar),
+    });
+    Some(Checked {
+        channel: CHANNELS[index] as u8,
+        epoch: epoch.number,
+        before: model_error(&declared, &raw),
+        after: model_error(&traced, &compensated),
+        shift: means.and_then(|means| shift(epoch, index, config, &lesson.causes, means)),
+        drift: drift.take(link::MAX_DRIFTS).collect(),
+    })
+}
+
+fn cause(followed: &crate::compensation::Followed) -> Cause {
+    let half_width = NORMAL_975 * followed.error;
+    Cause {
+        covariate: CHANNELS[followed.cause] as u8,
+        value: followed.value,
+        low: followed.value - half_width,
+        high: followed.value + half_width,
+        reference: followed.reference,
+    }
+}
+
+fn effect(found: &Found, model: &Model) -> Effect {
+    let Term { kind, value, low, high, shape } = model.terms()[found.term];
+    let named = kind.shape().into_iter().zip(shape).filter(|((name, _), _)| !name.is_empty());
+    Effect {
+        coefficient: Coefficient { term: term_of(kind), value, low, high },
+        shape: named.map(|((_, value), (low, high))| Bounded { value, low, high }).collect(),
+        score: found.score,
+        n: found.residual.n,
+        excess: found.residual.excess,
+        sigmas: found.residual.sigmas,
+    }
+}
