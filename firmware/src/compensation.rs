@@ -37,7 +37,7 @@ pub type Causes = Vec<Followed, MAX_CAUSES>;
 #[must_use]
 #[inline(never)] // so that its stack is not everybody's
 pub fn learn(epoch: &Epoch, index: usize, config: Config) -> Causes {
-    let Some(surroundings) = Surroundings::of(epoch, index, config, |curve, lsb| Covariate::new(curve, lsb)) else {
+    let Some(surroundings) = Surroundings::of(epoch, index, config, Covariate::new) else {
         return Causes::new();
     };
     let followed = surroundings.beside().followed();

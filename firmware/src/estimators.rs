@@ -214,7 +214,8 @@ impl<'m> Estimators<'m> {
             self.gap(1);
             return;
         }
-        let counts = CHANNELS.map(|channel| i32::from(burst.counts().get(channel)));
+        let counts = burst.counts();
+        let counts = CHANNELS.map(|channel| i32::from(counts.get(channel)));
         let Statistics { cascades, couplings } = &mut *self.statistics;
         for (cascade, count) in cascades.iter_mut().zip(counts) {
             cascade.push(count);
