@@ -172,7 +172,8 @@ impl Plant {
     fn next_stop(&self, bench: &mut Bench, now: u64) -> VirtualNanos {
         let ready = bench.sensor().map_or(u64::MAX, |sensor| sensor.part.next_data_ready());
         let next = ready.min(self.falls.unwrap_or(u64::MAX)).min(now + STRIDE_NS).min(self.end);
-        VirtualNanos(next.max(now + 1))
+        // Within a frame the part is a byte behind.
+        VirtualNanos(next.max(now + 1_000))
     }
 
     fn happen(&mut self, event: Event, session: &mut Session<Bench>, stop: Stop, host: &mut dyn Host) {
@@ -213,7 +214,7 @@ impl Driver<Bench> for Plant {
             bench.drive_data_ready(stop.at, false);
         }
         let samples = bench.sensor().map_or(0, |sensor| {
-            sensor.part.advance_to(now);
+            sensor.advance_to(now);
             sensor.part.samples()
         });
         if samples > self.samples {

@@ -19,6 +19,7 @@ pub(crate) struct Sensor {
     byte_ns: u64,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
+    selected: bool,
 }
 
 impl Sensor {
@@ -35,7 +36,16 @@ impl Sensor {
             odd_words: 0,
             frame: Vec::new(),
             last_byte: None,
+            selected: false,
         }
+    }
+}
+
+impl Sensor {
+    /// Lets the part's time pass; within a frame no further than to where a byte under way has begun, which is heard of
+    /// when it has crossed.
+    pub(crate) fn advance_to(&mut self, now: u64) {
+        self.part.advance_to(if self.selected { now.saturating_sub(self.byte_ns) } else { now });
     }
 }
 
@@ -58,6 +68,7 @@ impl Peer for Sensor {
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
         self.part.advance_to(context.now().0);
         self.part.select();
+        self.selected = true;
         self.frame.clear();
         self.last_byte = None;
     }
@@ -65,6 +76,7 @@ impl Peer for Sensor {
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
         self.part.advance_to(context.now().0);
         self.part.deselect();
+        self.selected = false;
         let asked_for_burst = self.frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
         let answers: Vec<u8> = self.frame.iter().map(|&(_, miso)| miso).collect();
         if asked_for_burst && let Ok(burst) = answers.try_into() {
