@@ -1,7 +1,7 @@
 //! Why the driver refused a burst is counted in what the device reports.
 
 use adis16405_driver::{Burst, Config, Counts, OutputWord};
-use firmware::{Arrival, CHANNELS, Estimator, Estimators};
+use firmware::{Arrival, Estimators, Statistics};
 use link::Health;
 
 /// 5.00 V in counts of 2.418 mV, and a sensor at rest.
@@ -20,8 +20,8 @@ fn shifted(burst: &Burst) -> Burst {
 }
 
 fn health_after(bursts: impl IntoIterator<Item = Burst>) -> Health {
-    let mut cascades = CHANNELS.map(|_| Estimator::new());
-    let mut estimators = Estimators::new(&mut cascades, Config::default());
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
     for (period, burst) in (0..).zip(bursts) {
         let at_us = (f64::from(period) * 1e6 / 819.2) as u64;
         estimators.take(Arrival { at_us, dropped: 0, burst: Some(burst) }, 0);
