@@ -1,6 +1,7 @@
 //! The image on an emulated STM32F427 with a crystal, a sensor and a terminal.
 
 use crate::exti::Exti;
+use crate::memory;
 use crate::sensor::Sensor;
 use crate::terminal::Terminal;
 use rigless::cpu::armv7m as cpu;
@@ -12,6 +13,7 @@ use rigless::mcu::{Mcu, Operate};
 use rigless::session::Session;
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::rcc;
 use rigless::soc::stm32f427::peripherals::{gpio::Pin, spi::Select};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
@@ -27,6 +29,11 @@ const DATA_READY: u8 = 0; // PB0
 const PORT_B: usize = 1;
 const SPI1: usize = 0;
 const USART2: usize = 1;
+const TIM2: std::ops::Range<u64> = 0x4000_0000..0x4000_0400;
+/// Control register of the stream that receives bursts, and its bit that has the end raise an interrupt (RM0090 section
+/// 10.5.5).
+const DMA2_S0CR: u64 = 0x4002_6410;
+const TCIE: u64 = 1 << 4;
 /// Longest stretch that the emulator runs without looking at the sensor's clock and the keys.
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
@@ -38,6 +45,9 @@ struct Microcontroller {
     part: Stm32f427,
     exti: Exti,
     exti_slot: usize,
+    rcc_slot: usize,
+    /// The next reset is one by the supply, which the emulator does not model.
+    browning_out: bool,
 }
 
 impl Mcu for Microcontroller {
@@ -52,6 +62,11 @@ impl Mcu for Microcontroller {
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.part.reset(at, cause);
         self.exti = Exti::default();
+        if std::mem::take(&mut self.browning_out) {
+            let (registers, _) = self.part.bus_mut().drive(at, self.rcc_slot);
+            let flags = registers.get(rcc::Register::Csr);
+            registers.set(rcc::Register::Csr, rcc::csr::BORRSTF.set(flags, 1));
+        }
     }
 
     fn poll(&mut self, now: VirtualNanos) {
@@ -84,7 +99,9 @@ impl Bench {
         }
         part.usart[USART2].attach(terminal);
         let exti_slot = part.bus().slot("EXTI")?;
-        Ok(Self { microcontroller: Microcontroller { part, exti: Exti::default(), exti_slot } })
+        let rcc_slot = part.bus().slot("RCC")?;
+        let microcontroller = Microcontroller { part, exti: Exti::default(), exti_slot, rcc_slot, browning_out: false };
+        Ok(Self { microcontroller })
     }
 
     fn sensor(&mut self) -> Option<&mut Sensor> {
@@ -92,7 +109,7 @@ impl Bench {
     }
 
     fn drive_data_ready(&mut self, at: VirtualNanos, high: bool) {
-        let Microcontroller { part, exti, exti_slot } = &mut self.microcontroller;
+        let Microcontroller { part, exti, exti_slot, .. } = &mut self.microcontroller;
         let level = if high { Level::High } else { Level::Low };
         part.drive_port(at, PORT_B, |port, registers, context| {
             port.drive(Pin::new(DATA_READY).unwrap(), Some(level), registers, context);
@@ -145,6 +162,14 @@ pub(crate) enum Event {
     Unplugged(bool),
     /// The reset pin is pulsed.
     ResetPin,
+    /// The supply dips: memory loses what it held, and the part restarts.
+    BrownOut,
+    /// The end of the next burst raises no interrupt, as if a bit of the DMA's control register had flipped.
+    LoseBurstEnd,
+    /// The next access to the timer is answered with a bus error.
+    BusError,
+    /// Every word pair of memory that holds this value becomes 0.
+    Lose(u64),
 }
 
 /// Runs the emulator in stretches that end where the sensor's data-ready line changes.
@@ -156,6 +181,7 @@ struct Plant {
     samples: u64,
     /// Edges still to be swallowed.
     swallow: u64,
+    lose_burst_end: bool,
     events: VecDeque<(u64, Event)>,
     work: Vec<Work>,
 }
@@ -191,6 +217,14 @@ impl Plant {
                 self.swallow = if out { u64::MAX } else { 0 };
             }
             Event::ResetPin => session.reset_by_pin(stop.at, stop.instruction_count, host),
+            Event::BrownOut => {
+                memory::fill_with_noise(host);
+                session.board_mut().microcontroller.browning_out = true;
+                session.reset_by_pin(stop.at, stop.instruction_count, host);
+            }
+            Event::LoseBurstEnd => self.lose_burst_end = true,
+            Event::BusError => session.fail_next(TIM2.start, TIM2.end),
+            Event::Lose(value) => memory::lose(host, value),
         }
     }
 }
@@ -208,9 +242,13 @@ impl Driver<Bench> for Plant {
         while let Some((_, event)) = self.events.pop_front_if(|&mut (at, _)| now >= at) {
             self.happen(event, session, stop, host);
         }
+        let fallen = self.falls.take_if(|falls| now >= *falls).is_some();
+        if fallen && std::mem::take(&mut self.lose_burst_end) {
+            // The pulse is shorter than a burst.
+            memory::clear_bits(session, host, DMA2_S0CR, TCIE);
+        }
         let bench = session.board_mut();
-        if self.falls.is_some_and(|falls| now >= falls) {
-            self.falls = None;
+        if fallen {
             bench.drive_data_ready(stop.at, false);
         }
         let samples = bench.sensor().map_or(0, |sensor| {
@@ -262,6 +300,7 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
         falls: None,
         samples: 0,
         swallow: 0,
+        lose_burst_end: false,
         events: scenario.events.into_iter().map(|(at, event)| (ns(at), event)).collect(),
         work: Vec::new(),
     };

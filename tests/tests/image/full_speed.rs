@@ -2,7 +2,7 @@
 
 use crate::bench::{Outcome, Scenario, Work, run};
 use crate::decoded::{Decoded, on_host};
-use crate::{build, sensor};
+use crate::{image, sensor};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
 use host_sim::analysis::analyze;
 use host_sim::record::port::Tape;
@@ -28,7 +28,7 @@ fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
     keys.push((seconds - 2.5, b"w 0\r".to_vec()));
     keys.push((seconds - 2.0, b"r".to_vec()));
     let scenario = Scenario { sensor: Some(sensor(2)), keys, seconds, ..Scenario::default() };
-    let Outcome { sensor, received, complaints, work } = run(build::image(), scenario);
+    let Outcome { sensor, received, complaints, work } = run(image(), scenario);
     let sensor = sensor.expect("the sensor hangs on the bus");
     assert_eq!(complaints, [""; 0]);
     assert_eq!(sensor.part.violations(), []);

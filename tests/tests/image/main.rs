@@ -2,10 +2,12 @@
 
 mod bench;
 mod build;
+mod crash;
 mod decoded;
 mod exti;
 mod faults;
 mod full_speed;
+mod memory;
 mod restart;
 mod sensor;
 mod terminal;
@@ -16,9 +18,18 @@ use firmware::CHANNELS;
 use host_sim::sensor::{NoiseModel, VirtualAdis16405};
 use link::{Boot, BootCause, Counters, Hello, Message};
 use sensor::Sensor;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// The bus clock of the board (84 MHz) over the first power of two that brings it to 1 MHz or less.
 const SCK_HZ: u32 = 84_000_000 / 128;
+
+/// The image, built at most once a run; `OBSERVATORY_IMAGE` names another.
+fn image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    let build = || build::image("f405", "thumbv7em-none-eabihf");
+    IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
+}
 
 /// The sensor of the published characterisation.
 fn sensor(seed: u64) -> Sensor {
@@ -30,7 +41,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     const ASKED_AT_S: f64 = 4.5;
     let keys = vec![(ASKED_AT_S, b"r".to_vec())];
     let scenario = Scenario { sensor: Some(sensor(1)), keys, seconds: 6.0, ..Scenario::default() };
-    let Outcome { sensor, received, complaints, .. } = run(build::image(), scenario);
+    let Outcome { sensor, received, complaints, .. } = run(image(), scenario);
     let sensor = sensor.expect("the sensor hangs on the bus");
     assert_eq!(complaints, [""; 0], "the emulator has nothing to complain about");
 
@@ -100,7 +111,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
 
 #[test]
 fn a_missing_sensor_is_said_every_second() {
-    let Outcome { received, .. } = run(build::image(), Scenario { seconds: 3.0, ..Scenario::default() });
+    let Outcome { received, .. } = run(image(), Scenario { seconds: 3.0, ..Scenario::default() });
     let Decoded { messages, counters, .. } = Decoded::of(&received);
     assert_eq!(counters.bad_frames, 0);
     assert_eq!(messages.len(), 3, "{messages:?}");

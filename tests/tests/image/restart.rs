@@ -2,7 +2,7 @@
 
 use crate::bench::{Event, Outcome, Scenario, run};
 use crate::decoded::{Decoded, in_stretches};
-use crate::{build, sensor};
+use crate::{image, sensor};
 use link::BootCause;
 
 const RESET_S: f64 = 4.0;
@@ -12,7 +12,7 @@ fn a_reset_costs_a_second_of_statistics_and_no_more() {
     let keys = vec![(0.5, b"i 0\re 3600\r".to_vec()), (3.9, b"r".to_vec()), (6.0, b"r".to_vec())];
     let events = vec![(RESET_S, Event::ResetPin)];
     let scenario = Scenario { sensor: Some(sensor(4)), keys, events, seconds: 8.0 };
-    let Outcome { sensor, received, complaints, .. } = run(build::image(), scenario);
+    let Outcome { sensor, received, complaints, .. } = run(image(), scenario);
     assert!(complaints.iter().all(|complaint| complaint.starts_with("reset")), "{complaints:?}");
     let sensor = sensor.expect("a sensor");
     let decoded = Decoded::of(&received);

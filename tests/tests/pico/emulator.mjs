@@ -1,5 +1,6 @@
 // Runs an RP2040 image in rp2040js, with the sensor in the parent process: one question over standard output, one answer
-// over standard input. Arguments: the module's folder, the image, seconds, and keys as TIME=TEXT.
+// over standard input. Arguments: the module's folder, the image as UF2 and as ELF, which must agree, seconds, and keys as
+// TIME=TEXT.
 //
 // A question is one byte and a time in ns (f64, little endian): `n` how far the sensor's time is; `s` and `d` chip select
 // falls and rises; `b` a byte goes out, which follows. `u` and a byte: the image said something; `e` and the number of
@@ -8,7 +9,7 @@ import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const [folder, image, seconds, ...keyArguments] = process.argv.slice(2);
+const [folder, uf2File, elfFile, seconds, ...keyArguments] = process.argv.slice(2);
 const load = (file) => import(pathToFileURL(path.join(folder, 'node_modules/rp2040js/dist/esm', file)));
 const { RP2040, GPIOPinState } = await load('index.js');
 const { SimulationClock } = await load('clock/simulation-clock.js');
@@ -22,13 +23,24 @@ const complaints = new Map();
 const complain = (from, text) => complaints.set(`${from}: ${text}`, true);
 mcu.logger = { debug() {}, info() {}, warn: complain, error: complain };
 
-// The image, from its ELF program headers (32 bits, little endian) into flash.
-const elf = fs.readFileSync(image);
+const FLASH = 0x10000000;
+
+// What the boot loader writes: of every block (https://github.com/microsoft/uf2), the payload to its address.
+const uf2 = fs.readFileSync(uf2File);
+for (let block = 0; block < uf2.length; block += 512) {
+  const [magic0, magic1, , address, size] = [0, 4, 8, 12, 16].map((field) => uf2.readUInt32LE(block + field));
+  if (magic0 !== 0x0a324655 || magic1 !== 0x9e5d5157) throw new Error(`no UF2 block at ${block}`);
+  mcu.flash.set(uf2.subarray(block + 32, block + 32 + size), address - FLASH);
+}
+// What a debug probe writes: the loadable segments of the ELF (32 bits, little endian).
+const elf = fs.readFileSync(elfFile);
 for (let i = 0; i < elf.readUInt16LE(44); i++) {
   const header = elf.readUInt32LE(28) + i * 32;
   const [kind, offset, , address, size] = [0, 4, 8, 12, 16].map((field) => elf.readUInt32LE(header + field));
-  if (kind === 1 && size > 0 && address >= 0x10000000 && address < 0x11000000) {
-    mcu.flash.set(elf.subarray(offset, offset + size), address - 0x10000000);
+  if (kind !== 1 || size === 0 || address < FLASH || address >= FLASH + mcu.flash.length) continue;
+  const segment = elf.subarray(offset, offset + size);
+  if (!segment.equals(mcu.flash.subarray(address - FLASH, address - FLASH + size))) {
+    throw new Error(`UF2 and ELF differ in the segment at 0x${address.toString(16)}`);
   }
 }
 // The boot ROM copies the second stage to the top of memory and calls it; rp2040js has no boot ROM.
