@@ -3,8 +3,8 @@
 use adis16405_driver::{BURST_BYTES, Burst};
 use heapless::spsc;
 
-/// Bursts that may wait for the estimators, and the one slot that the queue needs: 77 ms at 819.2 samples a second.
-pub const QUEUE_SLOTS: usize = 64;
+/// Bursts that may wait for the estimators, and the one slot that the queue needs: 38 ms at 819.2 samples a second.
+pub const QUEUE_SLOTS: usize = 32;
 
 /// The queue from sampling to the estimators.
 pub type Arrivals = spsc::Queue<Arrival, QUEUE_SLOTS>;

@@ -3,14 +3,17 @@
 use heapless::spsc;
 use link::{Encoder, Line, MAX_FRAME, Message, line_bytes};
 
-/// Bytes that may wait for the serial port, and the one slot that the queue needs.
-pub const OUTGOING_SLOTS: usize = 4096;
+/// Bytes that may wait for the serial port, and the one slot that the queue needs: the longest message, the reserve, and a
+/// line of text.
+pub const OUTGOING_SLOTS: usize = 2560;
 
 /// The queue from the application to the serial port.
 pub type Outgoing = spsc::Queue<u8, OUTGOING_SLOTS>;
 
 /// Room that a report leaves for the raw stream, in bytes: two of its messages.
 const RESERVE: usize = 1024;
+
+const _: () = assert!(OUTGOING_SLOTS > MAX_FRAME + RESERVE + link::MAX_TEXT);
 
 /// Numbers messages, frames them, and queues them whole or not at all.
 pub struct Outbox<'q> {

@@ -355,4 +355,6 @@ pub struct Health {
     pub estimator_cycles: u32,
     /// Most bytes of stack ever used.
     pub stack_bytes: u32,
+    /// Bytes of stack that there are.
+    pub stack_size: u32,
 }

@@ -200,6 +200,7 @@ fn faults_line(health: &Health, index: usize) -> Next {
         ("sampling_cycles", health.sampling_cycles),
         ("estimator_cycles", health.estimator_cycles),
         ("stack_bytes", health.stack_bytes),
+        ("stack_size", health.stack_size),
     ];
     match counters.get(index) {
         Some((name, count)) => (*count > 0).then(|| line(format_args!("{name} {count}"))).into(),

@@ -117,6 +117,7 @@ impl App {
             sampling_cycles: meters.sampling_cycles,
             estimator_cycles: meters.estimator_cycles,
             stack_bytes: meters.stack_bytes,
+            stack_size: meters.stack_size,
             ..board.estimators(|estimators| estimators.health())
         }
     }

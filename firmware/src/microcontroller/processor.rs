@@ -78,19 +78,21 @@ impl<M: Microcontroller> Chip for &mut Processor<M> {
     }
 
     fn meters(&mut self) -> Meters {
+        let (stack_bytes, stack_size) = stack();
         Meters {
             asleep_us: 0,
             serial_overruns: SERIAL_OVERRUNS.load(Relaxed),
             sampling_cycles: SAMPLING_CYCLES.load(Relaxed),
             estimator_cycles: ESTIMATOR_CYCLES.load(Relaxed),
-            stack_bytes: stack_bytes(),
+            stack_bytes,
+            stack_size,
         }
     }
 }
 
-/// How much of the stack was ever used: from its start down to the first word that the paint of the start-up code is
-/// gone from.
-fn stack_bytes() -> u32 {
+/// How much of the stack was ever used, from its start down to the first word that the paint of the start-up code is gone
+/// from, and how much there is.
+fn stack() -> (u32, u32) {
     unsafe extern "C" {
         static _stack_start: u32;
         static _stack_end: u32;
@@ -99,5 +101,6 @@ fn stack_bytes() -> u32 {
     let (start, end) = (&raw const _stack_start as usize, &raw const _stack_end as usize);
     // SAFETY: between these symbols of the linker lies the stack, all of it readable RAM.
     let is_painted = |&address: &usize| unsafe { (address as *const u32).read_volatile() } == PAINT;
-    (start - (end..start).step_by(4).take_while(is_painted).count() * 4 - end) as u32
+    let size = start - end;
+    ((size - (end..start).step_by(4).take_while(is_painted).count() * 4) as u32, size as u32)
 }

@@ -75,7 +75,8 @@ fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
         "longest sampling interrupt {} instructions, longest turn of the estimators {}",
         health.sampling_cycles, health.estimator_cycles
     );
-    println!("stack {} B, at most {} bursts waited", health.stack_bytes, health.queue_peak);
+    println!("stack {} of {} B, at most {} bursts waited", health.stack_bytes, health.stack_size, health.queue_peak);
+    assert!(health.stack_bytes + crate::INTERRUPTS_STACK < health.stack_size, "{health:?}");
     assert!(quiet.1 < 5.0, "more than 5 % of the processor");
     assert!(health.sampling_cycles < 168 * 20, "a sampling interrupt of more than 20 us");
 }

@@ -10,6 +10,7 @@ mod full_speed;
 mod memory;
 mod restart;
 mod sensor;
+mod size;
 mod terminal;
 
 use bench::{Outcome, Scenario, run};
@@ -23,6 +24,11 @@ use std::sync::OnceLock;
 
 /// The bus clock of the board (84 MHz) over the first power of two that brings it to 1 MHz or less.
 const SCK_HZ: u32 = 84_000_000 / 128;
+
+/// What interrupts may add to the deepest stack that was seen, if none came then: four, one above the other, each with the
+/// 104 bytes that the processor stacks (with floating point) and the frames of its functions, which disassembled are
+/// 5.3 kB of the estimators (a full message of the raw stream is framed there) and 160 bytes of the others together.
+const INTERRUPTS_STACK: u32 = 4 * 104 + 6 * 1024 + 256;
 
 /// The image, built at most once a run; `OBSERVATORY_IMAGE` names another.
 fn image() -> &'static Path {
@@ -107,6 +113,13 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
         (received.iter().rfind(|bytes| bytes.0 < 4_500_000_000).map_or(0, sent), received.last().map_or(0, sent));
     println!("{health:?}");
     println!("a report took {:.3} s", (last - first.max(4_500_000_000)) as f64 * 1e-9);
+}
+
+#[test]
+fn the_image_fits_its_flash() {
+    let size = size::size(image());
+    println!("{size:?}");
+    assert!(size.flash <= 128 * 1024, "{size:?}");
 }
 
 #[test]
