@@ -113,11 +113,11 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self
     }
 
-    /// The same curve without the points below averaging factor `n`.
+    /// The same curve from averaging factor `n` on, as far as there is room.
     #[must_use]
-    pub fn from_factor(mut self, n: u64) -> Self {
-        self.points.retain(|point| point.n >= n);
-        self
+    pub fn from_factor<const ROOM: usize>(&self, n: u64) -> Curve<ROOM> {
+        let points = self.points.iter().filter(|point| point.n >= n).copied().take(ROOM).collect();
+        Curve { sample_period: self.sample_period, samples: self.samples, points }
     }
 
     /// The same points with another variance.

@@ -59,6 +59,12 @@ impl<const POINTS: usize> Covariate<POINTS> {
         Self { curve, noise: self.noise.clone(), step: self.step }
     }
 
+    /// The same from averaging factor `n` on, as far as there is room.
+    #[must_use]
+    pub fn from_factor<const ROOM: usize>(self, n: u64) -> Covariate<ROOM> {
+        Covariate { curve: self.curve.from_factor(n), noise: self.noise, step: self.step }
+    }
+
     /// Allan variance of what was really there to be followed, and of all that was measured.
     fn signal(&self, n: u64) -> Option<(f64, f64)> {
         let measured = self.curve.points().iter().find(|point| point.n == n)?.avar;
@@ -71,17 +77,17 @@ impl<const POINTS: usize> Covariate<POINTS> {
 /// The coupling of two channels in the product of their physical units.
 pub type Shared<const POINTS: usize> = Vec<Covariance, POINTS>;
 
-/// A channel, the covariates that it may follow, and what they share.
+/// A channel, the covariates that it may follow, and what they share, at `COUPLED` octaves or fewer.
 #[derive(Debug)]
-pub struct Beside<'a, const POINTS: usize> {
+pub struct Beside<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
     /// The channel.
     pub channel: &'a Curve<POINTS>,
     /// At most [`MAX_COVARIATES`].
-    pub covariates: &'a [Covariate<POINTS>],
+    pub covariates: &'a [Covariate<COUPLED>],
     /// The channel with each covariate.
-    pub with_channel: &'a [Shared<POINTS>],
+    pub with_channel: &'a [Shared<COUPLED>],
     /// The covariates with each other: `i` with `j < i` at `i·(i−1)/2 + j`.
-    pub mutual: &'a [Shared<POINTS>],
+    pub mutual: &'a [Shared<COUPLED>],
 }
 
 /// How a channel follows a covariate.
@@ -103,29 +109,42 @@ impl Sensitivity {
     }
 }
 
-impl<const POINTS: usize> Beside<'_, POINTS> {
+impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     /// The covariates that the channel follows beyond doubt, the clearest chosen first.
     #[must_use]
     pub fn followed(&self) -> Vec<Sensitivity, MAX_COVARIATES> {
+        self.followed_while(&mut || true).unwrap_or_default()
+    }
+
+    /// The same, asking before every fit whether to keep on; `None` if the answer was no.
+    #[must_use]
+    pub fn followed_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
         let mut followed: Vec<Sensitivity, MAX_COVARIATES> = Vec::new();
         while followed.len() < self.covariates.len() {
             let rest = self.rest(&followed);
-            let others = (0..self.covariates.len()).filter(|i| followed.iter().all(|known| known.covariate != *i));
-            let tried = others.filter_map(|next| {
+            let mut best: Vec<Sensitivity, MAX_COVARIATES> = Vec::new();
+            let clarity = |tried: &Vec<Sensitivity, MAX_COVARIATES>| tried.last().map_or(0.0, Sensitivity::sigmas);
+            for next in (0..self.covariates.len()).filter(|i| followed.iter().all(|known| known.covariate != *i)) {
+                if !keep_on() {
+                    return None;
+                }
                 let chosen: Vec<usize, MAX_COVARIATES> =
                     followed.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
-                let first = self.sensitivities(&chosen, &rest)?;
-                // What is left is smaller now: weigh the octaves by that.
-                self.sensitivities(&chosen, &self.rest(&first))
-            });
-            let clarity = |tried: &Vec<Sensitivity, MAX_COVARIATES>| tried.last().map_or(0.0, Sensitivity::sigmas);
-            let Some(best) = tried.max_by(|a, b| clarity(a).total_cmp(&clarity(b))) else { break };
+                // What is left is smaller when it is subtracted: weigh the octaves by that.
+                let tried = self
+                    .sensitivities(&chosen, &rest)
+                    .and_then(|first| self.sensitivities(&chosen, &self.rest(&first)))
+                    .unwrap_or_default();
+                if clarity(&tried).total_cmp(&clarity(&best)).is_ge() {
+                    best = tried;
+                }
+            }
             if clarity(&best) < DOUBT {
                 break;
             }
             followed = best;
         }
-        followed
+        Some(followed)
     }
 
     /// What the channel would be without the covariates, as far as N, B and K describe it.

@@ -74,7 +74,7 @@ fn subtracting_is_exact_without_a_second_pass() {
         assert!((found.avar / expected.avar - 1.0).abs() < 1e-9, "{found:?}, {expected:?}");
     }
     // Where a covariance is not known nothing is subtracted.
-    let from = |n| Covariate::as_measured(curves[1].clone().from_factor(n));
+    let from = |n| Covariate::as_measured(curves[1].from_factor::<OCTAVES>(n));
     let (short, known) = ([from(256)], [shared[0].clone()]);
     let beside = Beside { channel: &curves[0], covariates: &short, with_channel: &known, mutual: &[] };
     let subtracted = beside.subtracted(&[sensitivity(0, 3.0)]);

@@ -3,13 +3,13 @@
 //! The compensated stream is `y − Σ βᵢ·(cᵢ − rᵢ)`, sample by sample, with sensitivities `β` and references `r` of the epoch
 //! before. Its Allan variance follows from the curves and couplings of the epoch: no second estimator is needed.
 
-use crate::couplings::{FIRST, GYROS};
+use crate::couplings::{COUPLED, Couplings, FIRST, GYROS};
 use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::summary::OCTAVES;
 use adis16405_driver::{Channel, Config};
-use allan_core::Curve;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
+use allan_core::{Curve, Point};
 use heapless::Vec;
 use link::Shift;
 
@@ -34,20 +34,39 @@ pub type Causes = Vec<Followed, MAX_CAUSES>;
 
 /// What the inertial channel [`CHANNELS`]`[index]` followed in an epoch, beyond doubt. Empty also where the epoch does not
 /// know what its channels have in common.
+///
+/// Asks before every fit whether to keep on; `None` if the answer was no.
 #[must_use]
 #[inline(never)] // so that its stack is not everybody's
-pub fn learn(epoch: &Epoch, index: usize, config: Config) -> Causes {
-    let Some(surroundings) = Surroundings::of(epoch, index, config, Covariate::new) else {
-        return Causes::new();
+pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMut() -> bool) -> Option<Causes> {
+    let Some(couplings) = epoch.couplings() else { return Some(Causes::new()) };
+    let mut members: Members = causes(index).collect();
+    let channel = coupled(epoch, index, config);
+    let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
+    for &member in &members {
+        if !keep_on() {
+            return None;
+        }
+        // There is room for as many as there are members.
+        let _ = covariates.push(covariate(epoch, member, config));
+    }
+    let followed = loop {
+        let (with_channel, mutual) = shared(couplings, index, &members, config);
+        let beside =
+            Beside { channel: &channel, covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
+        let followed = beside.followed_while(keep_on)?;
+        let harm = || harms(epoch, (index, &channel), &members, config, &followed, &beside.subtracted(&followed));
+        // The least clear of them is told last.
+        let Some(worst) = followed.last().filter(|_| harm()) else { break followed };
+        members.remove(worst.covariate);
+        covariates.remove(worst.covariate);
     };
-    let followed = surroundings.beside().followed();
     let with_reference = |sensitivity: &Sensitivity| {
-        let cause = surroundings.members[sensitivity.covariate];
-        let mean = epoch.couplings().map_or(0.0, |couplings| couplings.mean(cause));
-        let reference = mean * CHANNELS[cause].lsb(config.range()) + CHANNELS[cause].zero();
+        let cause = members[sensitivity.covariate];
+        let reference = couplings.mean(cause) * lsb(cause, config) + CHANNELS[cause].zero();
         Followed { cause, value: sensitivity.value, error: sensitivity.error, reference }
     };
-    followed.iter().map(with_reference).take(MAX_CAUSES).collect()
+    Some(followed.iter().map(with_reference).take(MAX_CAUSES).collect())
 }
 
 /// The curve of the compensated stream of [`CHANNELS`]`[index]` over an epoch, exact from 2⁸ samples on; below, that of the
@@ -60,13 +79,21 @@ pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Follow
     if causes.is_empty() {
         return Some(epoch.curve(index, config));
     }
-    let surroundings = Surroundings::of(epoch, index, config, |curve, _| Covariate::as_measured(curve))?;
-    let sensitivity = |followed: &Followed| {
-        let covariate = surroundings.members.iter().position(|&member| member == followed.cause)?;
-        Some(Sensitivity { covariate, value: followed.value, error: followed.error })
+    let members: Members = causes.iter().map(|followed| followed.cause).collect();
+    let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
+    for &member in &members {
+        let _ = covariates.push(Covariate::as_measured(coupled(epoch, member, config)));
+    }
+    let (with_channel, mutual) = shared(epoch.couplings()?, index, &members, config);
+    let sensitivity = |(covariate, followed): (usize, &Followed)| Sensitivity {
+        covariate,
+        value: followed.value,
+        error: followed.error,
     };
-    let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().filter_map(sensitivity).collect();
-    Some(surroundings.beside().subtracted(&sensitivities))
+    let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(sensitivity).collect();
+    let channel = &epoch.curve(index, config);
+    let beside = Beside { channel, covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
+    Some(beside.subtracted(&sensitivities))
 }
 
 /// How far the mean of the stream moved from one epoch to the next, and how far that of the compensated stream, in the
@@ -91,52 +118,55 @@ fn causes(index: usize) -> impl Iterator<Item = usize> {
     surroundings.chain(motion).filter_map(position)
 }
 
-/// A channel with what it may follow, ready for the regression.
-struct Surroundings {
-    channel: Curve<OCTAVES>,
-    members: Vec<usize, MAX_CAUSES>,
-    covariates: Vec<Covariate<OCTAVES>, MAX_CAUSES>,
-    with_channel: Vec<Shared<OCTAVES>, MAX_CAUSES>,
-    mutual: Vec<Shared<OCTAVES>, { MAX_CAUSES * (MAX_CAUSES - 1) / 2 }>,
+/// Channels that may be causes.
+type Members = Vec<usize, MAX_CAUSES>;
+
+/// What a channel has in common with each of its causes, and what they have with each other.
+type AllShared = (Vec<Shared<COUPLED>, MAX_CAUSES>, Vec<Shared<COUPLED>, { MAX_CAUSES * (MAX_CAUSES - 1) / 2 }>);
+
+fn shared(couplings: &Couplings, index: usize, members: &Members, config: Config) -> AllShared {
+    let shared = |a: usize, b: usize| couplings.shared(a, b, (lsb(a, config), lsb(b, config)));
+    let pairs = members.iter().enumerate().flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
+    (members.iter().map(|&member| shared(index, member)).collect(), pairs.map(|(a, b)| shared(a, b)).collect())
 }
 
-impl Surroundings {
-    fn of(
-        epoch: &Epoch,
-        index: usize,
-        config: Config,
-        covariate: impl Fn(Curve<OCTAVES>, f64) -> Covariate<OCTAVES>,
-    ) -> Option<Self> {
-        let couplings = epoch.couplings()?;
-        let lsb = |index: usize| CHANNELS[index].lsb(config.range());
-        let shared = |a: usize, b: usize| couplings.shared(a, b, (lsb(a), lsb(b)));
-        let members: Vec<usize, MAX_CAUSES> = causes(index).collect();
-        let mut surroundings = Self {
-            channel: epoch.curve(index, config),
-            covariates: Vec::new(),
-            with_channel: members.iter().map(|&member| shared(index, member)).collect(),
-            mutual: Vec::new(),
-            members: Vec::new(),
-        };
-        for (i, &member) in members.iter().enumerate() {
-            let curve = epoch.curve(member, config);
-            let coupled = curve.clone().from_factor(1 << FIRST);
-            // There is room for as many as there are members, and for their pairs.
-            let _ = surroundings.covariates.push(covariate(curve, lsb(member)).continued(coupled));
-            for &other in &members[..i] {
-                let _ = surroundings.mutual.push(shared(member, other));
-            }
-        }
-        surroundings.members = members;
-        Some(surroundings)
-    }
+/// The curve of [`CHANNELS`]`[index]` where it is coupled.
+#[inline(never)]
+fn coupled(epoch: &Epoch, index: usize, config: Config) -> Curve<COUPLED> {
+    epoch.curve(index, config).from_factor(1 << FIRST)
+}
 
-    fn beside(&self) -> Beside<'_, OCTAVES> {
-        Beside {
-            channel: &self.channel,
-            covariates: &self.covariates,
-            with_channel: &self.with_channel,
-            mutual: &self.mutual,
+#[inline(never)]
+fn covariate(epoch: &Epoch, index: usize, config: Config) -> Covariate<COUPLED> {
+    Covariate::new(epoch.curve(index, config), lsb(index, config)).from_factor(1 << FIRST)
+}
+
+fn lsb(index: usize, config: Config) -> f64 {
+    CHANNELS[index].lsb(config.range())
+}
+
+/// Whether subtracting makes the stream worse at any octave, beyond what its uncertainty could hide.
+///
+/// A slow likeness by chance of what is hardly there costs a large sensitivity, and with it all the noise of the covariate.
+/// Where the coupling is not known that noise is all that is expected of it.
+#[inline(never)]
+fn harms(
+    epoch: &Epoch,
+    (index, channel): (usize, &Curve<COUPLED>),
+    members: &Members,
+    config: Config,
+    followed: &[Sensitivity],
+    subtracted: &Curve<COUPLED>,
+) -> bool {
+    let worse = |raw: &Point, other: f64| other > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf));
+    let mut added = [0.0; FIRST];
+    for sensitivity in followed {
+        let covariate = epoch.curve(members[sensitivity.covariate], config);
+        for (added, point) in added.iter_mut().zip(covariate.points()) {
+            *added += sensitivity.value * sensitivity.value * point.avar;
         }
     }
+    let whole = epoch.curve(index, config);
+    whole.points().iter().zip(added).any(|(raw, added)| worse(raw, raw.avar + added))
+        || channel.points().iter().zip(subtracted.points()).any(|(raw, subtracted)| worse(raw, subtracted.avar))
 }

@@ -16,6 +16,12 @@ use link::{Bounded, Cause, Checked, Coefficient, Drift, Effect, Learnt};
 /// Half the width of a 95 % interval in standard deviations.
 const NORMAL_975: f64 = 1.959_963_984_540_054;
 
+/// Probability of the residual under N, B and K above which nothing is sought.
+///
+/// A term that is believed lowers the deviance by 14 of its scatter or more. A deviance that is met in one of five true models
+/// has no room for that: it is below 14 for up to 10 degrees of freedom, as curves of a dozen octaves have them.
+const ENOUGH: f64 = 0.2;
+
 const _: () = assert!(MAX_ADDED == link::MAX_EFFECTS);
 
 /// What was learnt of one channel: the coefficients alone, so that six of them take little room.
@@ -74,9 +80,9 @@ pub fn study(
     config: Config,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> Option<(Lesson, Learnt)> {
-    let causes = learn(epoch, index, config);
-    keep_on().then_some(())?;
-    let trace = traced(epoch, index, config, &causes, keep_on)?;
+    let causes = learn(epoch, index, config, keep_on)?;
+    let curve = compensated(epoch, index, config, &causes).unwrap_or_else(|| epoch.curve(index, config));
+    let trace = traced(&curve, keep_on)?;
     let declared = if causes.is_empty() { coefficients(&trace.before) } else { declared(&epoch.curve(index, config)) };
     let learnt = Learnt {
         channel: CHANNELS[index] as u8,
@@ -90,15 +96,12 @@ pub fn study(
 }
 
 #[inline(never)]
-fn traced(
-    epoch: &Epoch,
-    index: usize,
-    config: Config,
-    causes: &Causes,
-    keep_on: &mut dyn FnMut() -> bool,
-) -> Option<Trace> {
-    let curve = compensated(epoch, index, config, causes).unwrap_or_else(|| epoch.curve(index, config));
-    trace_while(&curve, Lines::InTheCurve, keep_on)
+fn traced(curve: &Curve<OCTAVES>, keep_on: &mut dyn FnMut() -> bool) -> Option<Trace> {
+    let declared = Trace::declared(curve);
+    if declared.before_goodness.p_value > ENOUGH {
+        return Some(declared);
+    }
+    trace_while(curve, Lines::InTheCurve, keep_on)
 }
 
 #[inline(never)]
