@@ -9,60 +9,71 @@ mod bounds;
 mod goodness;
 mod improvement;
 pub(crate) mod least_squares;
+mod parameter;
+mod points;
 mod problem;
 mod shape;
 
 pub use goodness::Goodness;
 pub(crate) use improvement::{Baseline, Rival};
+pub(crate) use shape::Free;
 
-use crate::model::{MAX_TERMS, Model};
+use crate::model::Model;
 use crate::{Curve, Kind};
-use heapless::Vec;
+use points::Points;
 use problem::Problem;
 
 const EDF_ROUNDS: usize = 4;
 
-/// Fits the coefficients of `kinds` (the first [`MAX_TERMS`] of them, each once) to all points of a curve; their
+/// Fits the coefficients of `kinds` (the first [`MAX_TERMS`](crate::model::MAX_TERMS) of them, each once) to all points of a curve; their
 /// shapes stay as they are given.
 ///
 /// A curve without points, or of a channel that never changed, gives coefficients of 0.
 #[must_use]
 pub fn fit<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
-    let mut problem = Problem::new(curve, kinds);
-    let mut model = problem.settle(curve, EDF_ROUNDS);
-    bounds::set(&problem, &mut model);
-    model
+    fit_free_shapes(curve, kinds, Free::Nothing)
 }
 
 /// Whether `model`, which was fitted to `curve`, is enough to describe it.
 #[must_use]
+#[inline(never)] // so that its stack is not everybody's
 pub fn goodness<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Goodness {
-    goodness::judge(&Problem::of(curve, model))
+    let (mut points, mut problem) = (Points::empty(), Problem::empty());
+    points.take(curve);
+    problem.take_model(&mut points, curve, model);
+    goodness::judge(&points, &mut problem)
 }
 
 /// `Σ edf·(v/m − 1 − ln(v/m))` of `model`, which was fitted to `curve`.
+#[inline(never)]
 pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> f64 {
-    let problem = Problem::of(curve, model);
-    problem.deviance(&problem.squares)
+    let (mut points, mut problem) = (Points::empty(), Problem::empty());
+    points.take(curve);
+    problem.take_model(&mut points, curve, model);
+    problem.deviance(&points)
 }
 
 /// Fits the coefficients of `kinds` and also the shapes of those that have one, from the given ones on.
 #[must_use]
 pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
-    fit_free_shapes(curve, kinds, &[])
+    fit_free_shapes(curve, kinds, Free::AllBut(&[]))
 }
 
-/// As [`fit_shapes`], leaving those of `kinds` that are `fixed` as they are.
-pub(crate) fn fit_free_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind], fixed: &[Kind]) -> Model {
-    let mut kinds: Vec<Kind, MAX_TERMS> = kinds.iter().copied().take(MAX_TERMS).collect();
-    let mut problem = Problem::new(curve, &kinds);
-    let mut model = problem.settle(curve, 2);
-    if kinds.iter().any(|kind| !kind.freedom().is_empty()) {
+/// As [`fit_shapes`], of those that are `free`.
+#[inline(never)] // so that its stack is not everybody's
+pub(crate) fn fit_free_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind], free: Free) -> Model {
+    let (mut points, mut problem) = (Points::empty(), Problem::empty());
+    points.take(curve);
+    problem.take(&points, kinds);
+    let searched = problem.kinds.iter().any(|kind| free.has(kind));
+    problem.settle(&mut points, curve, if searched { 2 } else { EDF_ROUNDS });
+    if searched {
         for _ in 0..2 {
-            shape::search(&mut problem, &mut kinds, fixed);
-            model = problem.settle(curve, 2);
+            shape::search(&points, &mut problem, free);
+            problem.settle(&mut points, curve, 2);
         }
     }
-    bounds::set(&problem, &mut model);
+    let mut model = problem.model(points.sample_period);
+    bounds::set(&mut points, curve, &mut problem, &mut model);
     model
 }

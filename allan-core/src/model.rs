@@ -3,7 +3,7 @@
 use crate::Point;
 use crate::confidence::Shares;
 use crate::math::clamp;
-use crate::term::Kind;
+use crate::term::{BiasInstability, Kind, Process};
 use heapless::Vec;
 
 /// Terms that a model can hold.
@@ -61,6 +61,11 @@ impl Model {
         &self.terms
     }
 
+    /// What the terms are.
+    pub(crate) fn kinds(&self) -> Vec<Kind, MAX_TERMS> {
+        self.terms.iter().map(|term| term.kind).collect()
+    }
+
     pub(crate) fn terms_mut(&mut self) -> &mut [Term] {
         &mut self.terms
     }
@@ -104,32 +109,32 @@ impl Model {
     /// amplitude, so it blurs it more than its share says.
     #[must_use]
     pub fn edf(&self, point: &Point) -> f64 {
-        let (near, far) = self.blur(point);
-        self.edf_of(point, near + far)
+        self.degrees_of_freedom(point, &FlickerCovariances::NONE).0
     }
 
-    /// The same without the memory of narrow terms beyond two averaging times.
-    pub(crate) fn near_edf(&self, point: &Point) -> f64 {
-        self.edf_of(point, self.blur(point).0)
-    }
-
-    fn edf_of(&self, point: &Point, blur: f64) -> f64 {
+    /// The same, and without the memory of narrow terms beyond two averaging times.
+    pub(crate) fn degrees_of_freedom(&self, point: &Point, flicker: &FlickerCovariances) -> (f64, f64) {
         let avar = self.avar(point.n);
+        let (near, far) = self.blur(point, flicker);
         // As many as there are differences where nothing random is modelled at all.
-        clamp(point.count as f64 * avar * avar / blur, 1.0_f64.min(point.count as f64), 1e18)
+        let of = |blur: f64| clamp(point.count as f64 * avar * avar / blur, 1.0_f64.min(point.count as f64), 1e18);
+        (of(near + far), of(near))
     }
 
     /// Sums of the squared covariances: up to two averaging times (four with flicker noise), and beyond.
-    fn blur(&self, point: &Point) -> (f64, f64) {
+    fn blur(&self, point: &Point, flicker: &FlickerCovariances) -> (f64, f64) {
         let stride = point.n as f64 / f64::from(point.overlap);
-        let flicker = self.present().any(|term| term.kind == Kind::BiasInstability);
-        let reach = if flicker { 4 } else { 2 } * u64::from(point.overlap);
+        let has_flicker = self.present().any(|term| term.kind == Kind::BiasInstability);
+        let reach = if has_flicker { 4 } else { 2 } * u64::from(point.overlap);
         let count = point.count as f64;
         let mut near = 0.0;
         for lag in 0..=reach.min(point.count.saturating_sub(1)) {
             let (mut noise, mut certain) = (0.0, 0.0);
             for term in self.present() {
-                let covariance = term.kind.process().covariance(lag as f64 * stride, point.n, self.sample_period);
+                let covariance = match term.kind {
+                    Kind::BiasInstability => flicker.at(lag as u32, point.overlap),
+                    kind => kind.process().covariance(lag as f64 * stride, point.n, self.sample_period),
+                };
                 *if term.kind.is_deterministic() { &mut certain } else { &mut noise } +=
                     term.value * term.value * covariance;
             }
@@ -161,5 +166,32 @@ impl Model {
 
     fn contributions(&self, n: u64) -> impl Iterator<Item = (Kind, f64)> + '_ {
         self.present().map(move |term| (term.kind, term.value * term.value * term.kind.avar(n, self.sample_period)))
+    }
+}
+
+/// Covariances of flicker noise, worked out once for all points: they depend on the distance in averaging times alone.
+pub(crate) struct FlickerCovariances {
+    overlap: u32,
+    /// Every `1/overlap` averaging times, up to 4 of them at 8-fold overlap.
+    table: Vec<f64, 33>,
+}
+
+impl FlickerCovariances {
+    /// Each worked out when it is asked for.
+    const NONE: Self = Self { overlap: 1, table: Vec::new() };
+
+    /// For points of this overlap and of those that divide it.
+    pub(crate) fn new(overlap: u32) -> Self {
+        Self { overlap, table: (0..33).map(|lag| Self::of(lag, overlap)).collect() }
+    }
+
+    fn of(lag: u32, overlap: u32) -> f64 {
+        BiasInstability.covariance(f64::from(lag), u64::from(overlap), 1.0)
+    }
+
+    fn at(&self, lag: u32, overlap: u32) -> f64 {
+        let known = (lag * self.overlap).is_multiple_of(overlap).then(|| lag * self.overlap / overlap);
+        let known = known.and_then(|lag| self.table.get(lag as usize)).copied();
+        known.unwrap_or_else(|| Self::of(lag, overlap))
     }
 }

@@ -5,10 +5,10 @@
 
 mod candidate;
 
-use crate::fit::{Baseline, Goodness, Rival, deviance, fit, fit_free_shapes, goodness};
+use crate::fit::{Baseline, Free, Goodness, Rival, deviance, fit, fit_free_shapes, goodness};
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind, math};
-use candidate::{Family, MAX_SHAPES, families};
+use candidate::Families;
 use heapless::Vec;
 
 /// Terms beyond the declared ones that a trace can add.
@@ -77,14 +77,13 @@ impl Trace {
     }
 }
 
-impl Lines<'_> {
-    /// The sinusoids of a spectrum, which tells their frequency far better than a curve could.
-    fn steady(&self) -> Vec<Kind, MAX_SHAPES> {
-        let known = match self {
+impl<'a> Lines<'a> {
+    /// A spectrum tells the frequency of a sinusoid far better than a curve could.
+    fn free(self) -> Free<'a> {
+        Free::AllBut(match self {
             Self::InTheCurve => &[],
-            Self::Known(lines) => *lines,
-        };
-        known.iter().filter(|kind| matches!(kind, Kind::Sinusoid(_))).copied().take(MAX_SHAPES).collect()
+            Self::Known(lines) => lines,
+        })
     }
 }
 
@@ -106,16 +105,14 @@ pub fn trace_while<const POINTS: usize>(
     lines: Lines,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> Option<Trace> {
-    let families = families(curve, lines);
-    let fixed = lines.steady();
-    let mut search = Search { families: &families, fixed: &fixed, keep_on };
+    let mut search = Search { families: Families::new(curve, lines), free: lines.free(), keep_on };
     let Trace { before, before_goodness, mut after, mut found, .. } = Trace::declared(curve);
     while after.terms().len() < MAX_TERMS && !found.is_full() {
-        let Some(rival) = search.most_telling(&Baseline::new(curve, &after), &kinds(&after)).ok()? else { break };
+        let Some(rival) = search.most_telling(curve, &after).ok()? else { break };
         let residual = largest_residual(curve, &after);
         // A filter that is read slowly has taken the place of the white noise.
         let term = if rival.kinds.len() == after.terms().len() { 0 } else { after.terms().len() };
-        after = fit_free_shapes(curve, &rival.kinds, &fixed);
+        after = fit_free_shapes(curve, &rival.kinds, search.free);
         // There is room: the loop ends when it is full.
         let _ = found.push(Found { term, score: rival.score(), residual });
         if found.len() > 1 {
@@ -128,9 +125,8 @@ pub fn trace_while<const POINTS: usize>(
 
 /// The candidates, and whether to go on.
 struct Search<'a> {
-    families: &'a [Family],
-    /// Shapes that are known better than the curve tells them.
-    fixed: &'a [Kind],
+    families: Families<'a>,
+    free: Free<'a>,
     keep_on: &'a mut dyn FnMut() -> bool,
 }
 
@@ -140,6 +136,7 @@ struct Stopped;
 impl Search<'_> {
     /// Terms that were found before others were known, put to the test again: each gives way to another that explains
     /// more.
+    #[inline(never)] // here and below: so that stack frames do not add up
     fn reconsidered<const POINTS: usize>(
         &mut self,
         curve: &Curve<POINTS>,
@@ -149,10 +146,9 @@ impl Search<'_> {
         for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
             let without: Vec<Kind, MAX_TERMS> =
                 model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
-            let baseline = Baseline::new(curve, &fit(curve, &without));
             // A slowly read filter would change the order of the terms.
-            let Some(rival) = self.most_telling(&baseline, &without)?.filter(|rival| rival.kinds.len() > without.len())
-            else {
+            let rival = self.most_telling(curve, &fit(curve, &without))?;
+            let Some(rival) = rival.filter(|rival| rival.kinds.len() > without.len()) else {
                 continue;
             };
             let mut kinds = rival.kinds;
@@ -162,7 +158,7 @@ impl Search<'_> {
             }
             // In the place of the old one.
             let _ = kinds.insert(known.term.min(kinds.len()), other);
-            let candidate = fit_free_shapes(curve, &kinds, self.fixed);
+            let candidate = fit_free_shapes(curve, &kinds, self.free);
             if deviance(curve, &candidate) < deviance(curve, &model) - CONVINCING {
                 model = candidate;
             }
@@ -171,11 +167,19 @@ impl Search<'_> {
     }
 
     /// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
-    fn most_telling(&mut self, baseline: &Baseline, kinds: &[Kind]) -> Result<Option<Rival>, Stopped> {
+    #[inline(never)]
+    fn most_telling<const POINTS: usize>(
+        &mut self,
+        curve: &Curve<POINTS>,
+        model: &Model,
+    ) -> Result<Option<Rival>, Stopped> {
+        let mut baseline = Baseline::empty();
+        baseline.take(curve, model);
+        let (families, kinds) = (self.families, model.kinds());
         let mut most: Option<(f64, Rival)> = None;
-        for family in self.families {
+        for family in families.all() {
             let mut best: Option<(f64, Vec<Kind, MAX_TERMS>)> = None;
-            for kinds in family.shapes.iter().filter_map(|shape| with(kinds, shape)) {
+            for kinds in families.shapes(family).filter_map(|shape| with(&kinds, &shape)) {
                 self.go_on()?;
                 let fall = baseline.fall(&kinds);
                 if best.as_ref().is_none_or(|(other, _)| fall.total_cmp(other).is_ge()) {
@@ -184,8 +188,8 @@ impl Search<'_> {
             }
             let Some((_, best)) = best else { continue };
             self.go_on()?;
-            let rival = baseline.shaped_rival(&best, self.fixed);
-            let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters - 1);
+            let rival = baseline.shaped_rival(&best, self.free);
+            let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters() - 1);
             let gain = rival.gain(cost);
             if gain > 0.0 && most.as_ref().is_none_or(|(other, _)| gain.total_cmp(other).is_ge()) {
                 most = Some((gain, rival));
@@ -197,10 +201,6 @@ impl Search<'_> {
     fn go_on(&mut self) -> Result<(), Stopped> {
         if (self.keep_on)() { Ok(()) } else { Err(Stopped) }
     }
-}
-
-fn kinds(model: &Model) -> Vec<Kind, MAX_TERMS> {
-    model.terms().iter().map(|term| term.kind).collect()
 }
 
 /// The model with one term more; `None` where it has one that would be the same.

@@ -1,11 +1,8 @@
 //! Whether a model is enough: the probability of a residual as large as the one that was seen.
 
-use super::bounds::{MAX_PARAMETERS, correlation, tangents};
-use super::least_squares::dot;
-use super::problem::{MAX_POINTS, Problem};
+use super::points::{Measured, Points, correlation};
+use super::problem::{MAX_PARAMETERS, Problem};
 use crate::chi_square;
-use crate::math::sqrt;
-use heapless::Vec;
 
 /// How well a model describes the curve that it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,59 +13,41 @@ pub struct Goodness {
     pub p_value: f64,
 }
 
-/// Judges the fitted `problem`.
+/// Judges the fitted `problem`, whose columns it uses up.
 ///
 /// The deviance is a sum of squares of correlated normal residuals from which the fit has taken the directions of its
 /// parameters. Its law is that of a scaled χ² with the same mean and variance (F. Satterthwaite, Biometrics 2, 1946).
-pub(super) fn judge(problem: &Problem) -> Goodness {
-    let deviance = problem.deviance(&problem.squares);
-    let count = problem.points.len();
-    let mut residual = [[0.0; MAX_POINTS]; MAX_POINTS];
-    for (row, a) in residual.iter_mut().zip(&problem.points) {
-        for (entry, b) in row.iter_mut().zip(&problem.points) {
-            *entry = correlation(a, b);
-        }
-    }
-    for direction in orthonormal(problem) {
-        let mut along = [0.0; MAX_POINTS];
-        for (row, weight) in residual.iter().zip(&direction) {
-            for (sum, entry) in along.iter_mut().zip(row) {
-                *sum += weight * entry;
-            }
-        }
-        for (row, weight) in residual.iter_mut().zip(&direction) {
-            for (entry, taken) in row.iter_mut().zip(&along) {
-                *entry -= weight * taken;
-            }
-        }
-    }
-    // The traces of the matrix and of its square.
-    let (mut mean, mut square) = (0.0, 0.0);
-    for (i, row) in residual.iter().enumerate().take(count) {
-        mean += row[i];
-        square += row.iter().zip(&residual).take(count).map(|(entry, other)| entry * other[i]).sum::<f64>();
-    }
+pub(super) fn judge<const POINTS: usize>(points: &Points<POINTS>, problem: &mut Problem<POINTS>) -> Goodness {
+    let deviance = problem.deviance(points);
+    let count = problem.orthonormal(points);
+    let (mean, square) = traces(&points.measured, &problem.columns[..count]);
     let dof = mean * mean / square;
     let p_value = if mean > 1e-9 { chi_square::upper_tail(deviance * mean / square, dof) } else { 1.0 };
     Goodness { deviance, p_value }
 }
 
-/// The directions in the space of standardised residuals that the fit can follow, made orthonormal.
-pub(super) fn orthonormal(problem: &Problem) -> Vec<[f64; MAX_POINTS], MAX_PARAMETERS> {
-    let mut directions: Vec<[f64; MAX_POINTS], MAX_PARAMETERS> = Vec::new();
-    for mut direction in tangents(problem) {
-        for known in &directions {
-            let along = dot(&direction, known);
-            for (entry, known) in direction.iter_mut().zip(known) {
-                *entry -= along * known;
-            }
+/// The traces of `PR` and of its square, with the correlations `R` and the projection `P = 1 − Σ ddᵀ` that leaves the
+/// directions `d` out: `tr R − Σ dᵀRd` and `tr R² − 2 Σ |Rd|² + Σ (dᵀRe)²`.
+#[inline(never)]
+fn traces<const POINTS: usize>(measured: &[Measured], directions: &[[f64; POINTS]]) -> (f64, f64) {
+    let (mut mean, mut square) = (0.0, 0.0);
+    let mut between = [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS];
+    for (i, a) in measured.iter().enumerate() {
+        let mut turned = [0.0; MAX_PARAMETERS];
+        for (j, b) in measured.iter().enumerate() {
+            let entry = correlation(a, b);
+            mean += if i == j { entry } else { 0.0 };
+            square += entry * entry;
+            turned.iter_mut().zip(directions).for_each(|(turned, direction)| *turned += entry * direction[j]);
         }
-        let length = sqrt(dot(&direction, &direction));
-        if length > 1e-9 {
-            direction.iter_mut().for_each(|entry| *entry /= length);
-            // Room for as many as there are parameters.
-            let _ = directions.push(direction);
+        for (row, direction) in between.iter_mut().zip(directions) {
+            row.iter_mut().zip(turned).for_each(|(entry, turned)| *entry += direction[i] * turned);
         }
+        square -= 2.0 * turned.iter().map(|entry| entry * entry).sum::<f64>();
     }
-    directions
+    for (i, row) in between.iter().enumerate() {
+        mean -= row[i];
+        square += row.iter().map(|entry| entry * entry).sum::<f64>();
+    }
+    (mean, square)
 }

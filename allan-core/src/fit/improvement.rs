@@ -1,21 +1,22 @@
 //! What another set of terms gains over a fitted model, measured against what chance would gain.
 
-use super::bounds::correlation;
-use super::goodness::orthonormal;
-use super::least_squares::dot;
-use super::problem::{MAX_POINTS, Measured, Problem};
-use super::shape;
+use super::parameter::take_away;
+use super::points::Points;
+use super::problem::Problem;
+use super::shape::{self, Free};
 use crate::math::{ln, sqrt};
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind};
 use heapless::Vec;
 
 /// A fitted model, ready to be compared with others at the weights that it gives to the points.
-pub(crate) struct Baseline {
-    problem: Problem,
+pub(crate) struct Baseline<const POINTS: usize> {
+    points: Points<POINTS>,
     deviance: f64,
-    /// What its own parameters can explain.
-    explained: Vec<[f64; MAX_POINTS], { super::bounds::MAX_PARAMETERS }>,
+    modelled: [f64; POINTS],
+    /// What its own parameters can explain: this many orthonormal columns.
+    directions: usize,
+    explained: Problem<POINTS>,
 }
 
 /// Another set of terms beside a baseline.
@@ -41,51 +42,61 @@ impl Rival {
     }
 }
 
-impl Baseline {
-    pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
-        let mut problem = Problem::of(curve, model);
-        let deviance = problem.minimise();
-        let explained = orthonormal(&problem);
-        Self { problem, deviance, explained }
+impl<const POINTS: usize> Baseline<POINTS> {
+    /// Of nothing yet: filled where it stands, being too large to be handed about on a small stack.
+    #[inline(always)]
+    pub(crate) const fn empty() -> Self {
+        Self {
+            points: Points::empty(),
+            deviance: 0.0,
+            modelled: [0.0; POINTS],
+            directions: 0,
+            explained: Problem::empty(),
+        }
+    }
+
+    #[inline(never)]
+    pub(crate) fn take(&mut self, curve: &Curve<POINTS>, model: &Model) {
+        let Self { points, deviance, modelled, directions, explained } = self;
+        points.take(curve);
+        explained.take_model(points, curve, model);
+        *deviance = explained.minimise(points);
+        modelled.iter_mut().enumerate().for_each(|(at, entry)| *entry = explained.modelled(at, &explained.squares));
+        *directions = explained.orthonormal(points);
     }
 
     /// How much lower the deviance of `kinds` is with the best coefficients.
+    #[inline(never)]
     pub(crate) fn fall(&self, kinds: &[Kind]) -> f64 {
-        self.deviance - self.problem.with_kinds(kinds).minimise()
+        let mut problem = Problem::empty();
+        problem.take(&self.points, kinds);
+        self.deviance - problem.minimise(&self.points)
     }
 
-    /// Fits the coefficients of `kinds` and the shapes of those that are not `fixed`.
-    pub(crate) fn shaped_rival(&self, kinds: &[Kind], fixed: &[Kind]) -> Rival {
-        let mut problem = self.problem.with_kinds(kinds);
-        problem.minimise();
-        let mut kinds = problem.kinds.clone();
-        shape::search(&mut problem, &mut kinds, fixed);
-        let deviance = problem.minimise();
+    /// Fits the coefficients of `kinds` and the shapes of those that are `free`.
+    #[inline(never)]
+    pub(crate) fn shaped_rival(&self, kinds: &[Kind], free: Free) -> Rival {
+        let mut problem = Problem::empty();
+        problem.take(&self.points, kinds);
+        shape::search(&self.points, &mut problem, free);
+        let deviance = problem.minimise(&self.points);
         self.compared(&problem, deviance)
     }
 
     /// The variance of the residual along the change of the model says what chance would gain.
-    fn compared(&self, rival: &Problem, deviance: f64) -> Rival {
-        let mut change = [0.0; MAX_POINTS];
-        for ((entry, old), new) in change.iter_mut().zip(&self.problem.points).zip(&rival.points) {
-            let ratio = dot(&new.basis, &rival.squares) / dot(&old.basis, &self.problem.squares);
-            *entry = sqrt(old.edf / 2.0) * ln(ratio);
+    fn compared(&self, rival: &Problem<POINTS>, deviance: f64) -> Rival {
+        let mut change = [0.0; POINTS];
+        for (at, (entry, point)) in change.iter_mut().zip(&self.points.measured).enumerate() {
+            let ratio = rival.modelled(at, &rival.squares) / self.modelled[at];
+            *entry = sqrt(point.edf / 2.0) * ln(ratio);
         }
-        for known in &self.explained {
-            let along = dot(&change, known);
-            change.iter_mut().zip(known).for_each(|(entry, known)| *entry -= along * known);
+        for known in &self.explained.columns[..self.directions] {
+            take_away(&mut change, known);
         }
-        let length = dot(&change, &change);
-        let scatter = pairs(&self.problem.points, &change).sum::<f64>() / length;
+        let length: f64 = change.iter().map(|entry| entry * entry).sum();
+        let [variance] = self.points.variances([&change]);
+        let scatter = variance / length;
         let fall = if length > 0.0 { self.deviance - deviance } else { 0.0 };
         Rival { kinds: rival.kinds.clone(), fall, scatter: scatter.max(1.0) }
     }
-}
-
-/// The terms of `changeᵀ·R·change`, with the correlations R of the points.
-fn pairs<'a>(points: &'a [Measured], change: &'a [f64; MAX_POINTS]) -> impl Iterator<Item = f64> + 'a {
-    let of = move |(i, a): (usize, &'a Measured)| {
-        points.iter().enumerate().map(move |(j, b)| change[i] * change[j] * correlation(a, b))
-    };
-    points.iter().enumerate().flat_map(of)
 }

@@ -69,34 +69,43 @@ pub(crate) fn dot<const N: usize>(a: &Vector<N>, b: &Vector<N>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Solves `Ax = b` for the unknowns in the bit set, the others being 0, by Cholesky's decomposition of the matrix
-/// scaled to a unit diagonal (the terms' squares differ by many orders of magnitude).
+/// Solves `Ax = b` for the unknowns in the bit set, the others being 0.
 pub(crate) fn solve<const N: usize>(a: &Matrix<N>, b: &Vector<N>, set: usize) -> Option<Vector<N>> {
+    let (mut a, mut x) = (*a, [0.0; N]);
+    (0..N).filter(|i| set >> i & 1 == 1).for_each(|i| x[i] = b[i]);
+    solve_in_place(&mut a, &mut x, set)?;
+    Some(x)
+}
+
+/// The same where they stand: `x` is `b` before. Of `a` the lower triangle is looked at, and used up.
+///
+/// By Cholesky's decomposition of the matrix scaled to a unit diagonal (the terms' squares differ by many orders of
+/// magnitude).
+pub(crate) fn solve_in_place<const N: usize>(a: &mut Matrix<N>, x: &mut Vector<N>, set: usize) -> Option<()> {
     let chosen = |i: &usize| set >> i & 1 == 1;
-    let scale = |i: usize| sqrt(a[i][i]);
-    let mut factor = [[0.0; N]; N];
-    let mut x = [0.0; N];
+    let mut scale = [0.0; N];
+    (0..N).for_each(|i| scale[i] = sqrt(a[i][i]));
     for i in (0..N).filter(chosen) {
         for j in (0..=i).filter(chosen) {
-            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let rest = a[i][j] / (scale(i) * scale(j)) - known;
+            let known: f64 = (0..j).filter(chosen).map(|k| a[i][k] * a[j][k]).sum();
+            let rest = a[i][j] / (scale[i] * scale[j]) - known;
             if i != j {
-                factor[i][j] = rest / factor[j][j];
+                a[i][j] = rest / a[j][j];
             } else if rest > 1e-12 {
-                factor[i][i] = sqrt(rest);
+                a[i][i] = sqrt(rest);
             } else {
                 return None; // singular, or not a number
             }
         }
-        let known: f64 = (0..i).map(|k| factor[i][k] * x[k]).sum();
-        x[i] = (b[i] / scale(i) - known) / factor[i][i];
+        let known: f64 = (0..i).filter(chosen).map(|k| a[i][k] * x[k]).sum();
+        x[i] = (x[i] / scale[i] - known) / a[i][i];
     }
     for i in (0..N).rev().filter(chosen) {
-        let known: f64 = (i + 1..N).map(|k| factor[k][i] * x[k]).sum();
-        x[i] = (x[i] - known) / factor[i][i];
+        let known: f64 = (i + 1..N).filter(chosen).map(|k| a[k][i] * x[k]).sum();
+        x[i] = (x[i] - known) / a[i][i];
     }
     for (i, entry) in x.iter_mut().enumerate().filter(|(i, _)| chosen(i)) {
-        *entry /= scale(i);
+        *entry /= scale[i];
     }
-    Some(x)
+    Some(())
 }

@@ -1,112 +1,89 @@
 //! The likelihood of a curve under terms of given shapes, and the coefficients that make it largest.
 
-use super::least_squares::{Matrix, Vector, dot, non_negative};
-use crate::confidence::Shares;
+use super::least_squares::{Matrix, Vector, non_negative};
+use super::points::{Measured, Points};
 use crate::model::{MAX_TERMS, Model, Term};
-use crate::{Curve, Kind, Point, math};
+use crate::{Curve, Kind, math};
 use heapless::Vec;
 
-/// Points that a fit looks at.
-pub(super) const MAX_POINTS: usize = 32;
+/// Coefficients and parameters of shapes together.
+pub(super) const MAX_PARAMETERS: usize = 12;
 const SCORING_ROUNDS: usize = 60;
 
-/// A measured point with what is known of it before the coefficients are.
-#[derive(Clone)]
-pub(super) struct Measured {
-    pub(super) n: u64,
-    pub(super) avar: f64,
-    pub(super) edf: f64,
-    /// Without the memory of narrow terms, which all points share.
-    pub(super) near_edf: f64,
-    pub(super) shares: Shares,
-    pub(super) basis: Vector<MAX_TERMS>,
-}
-
-/// The points with a positive variance, and the terms.
-pub(super) struct Problem {
-    pub(super) sample_period: f64,
+/// Terms with the squares of their coefficients, and what each does to the points.
+pub(super) struct Problem<const POINTS: usize> {
     pub(super) kinds: Vec<Kind, MAX_TERMS>,
-    pub(super) points: Vec<Measured, MAX_POINTS>,
     pub(super) squares: Vector<MAX_TERMS>,
+    /// Derivatives of the modelled variance at every point: to the squares of the terms, and where those of the
+    /// shapes are asked for, to them.
+    pub(super) columns: [[f64; POINTS]; MAX_PARAMETERS],
 }
 
-impl Problem {
-    pub(super) fn new<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Self {
-        let measured = |point: &Point| Measured {
-            n: point.n,
-            avar: point.avar,
-            edf: point.edf,
-            near_edf: point.edf,
-            shares: Shares::WHITE,
-            basis: [0.0; MAX_TERMS],
-        };
-        Self {
-            sample_period: curve.sample_period(),
-            kinds: Vec::new(),
-            points: positive(curve).map(measured).take(MAX_POINTS).collect(),
-            squares: [0.0; MAX_TERMS],
-        }
-        .with_kinds(kinds)
+impl<const POINTS: usize> Problem<POINTS> {
+    /// Without terms. Filled where it stands: a problem is too large to be handed about on a small stack.
+    #[inline(always)]
+    pub(super) const fn empty() -> Self {
+        Self { kinds: Vec::new(), squares: [0.0; MAX_TERMS], columns: [[0.0; POINTS]; MAX_PARAMETERS] }
     }
 
-    /// At the coefficients of a model, weighed by it.
-    pub(super) fn of<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
-        let kinds: Vec<Kind, MAX_TERMS> = model.terms().iter().map(|term| term.kind).collect();
-        let mut problem = Self::new(curve, &kinds);
-        for (square, term) in problem.squares.iter_mut().zip(model.terms()) {
-            *square = term.value * term.value;
+    /// Takes the first [`MAX_TERMS`] of `kinds` for its terms.
+    pub(super) fn take(&mut self, points: &Points<POINTS>, kinds: &[Kind]) {
+        self.kinds.extend(kinds.iter().copied().take(MAX_TERMS));
+        for term in 0..self.kinds.len() {
+            self.set_kind(points, term, self.kinds[term]);
         }
-        problem.weigh(curve, model);
-        problem
     }
 
-    /// The same points at the same weights, with other terms.
-    pub(super) fn with_kinds(&self, kinds: &[Kind]) -> Self {
-        let mut other = Self {
-            sample_period: self.sample_period,
-            kinds: kinds.iter().copied().take(MAX_TERMS).collect(),
-            points: self.points.clone(),
-            squares: [0.0; MAX_TERMS],
-        };
-        for term in 0..other.kinds.len() {
-            other.set_kind(term, other.kinds[term]);
+    /// Takes the terms and the coefficients of a model, which also weighs the points.
+    #[inline(never)] // here and below: so that stack frames do not add up
+    pub(super) fn take_model(&mut self, points: &mut Points<POINTS>, curve: &Curve<POINTS>, model: &Model) {
+        points.weigh(curve, model);
+        for (term, &Term { kind, value, .. }) in model.terms().iter().enumerate() {
+            // A model has no more terms than a problem.
+            let _ = self.kinds.push(kind);
+            self.squares[term] = value * value;
+            self.set_kind(points, term, kind);
         }
-        other
     }
 
     /// Alternates between the coefficients and the degrees of freedom that follow from them.
-    pub(super) fn settle<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, rounds: usize) -> Model {
-        let mut model = self.model();
+    pub(super) fn settle(&mut self, points: &mut Points<POINTS>, curve: &Curve<POINTS>, rounds: usize) {
         for _ in 0..rounds {
-            self.minimise();
-            model = self.model();
+            self.minimise(points);
             if self.squares.iter().any(|&square| square > 0.0) {
-                self.weigh(curve, &model);
+                self.weigh(points, curve);
             }
         }
-        model
+    }
+
+    /// Weighs the points by what the terms are now.
+    #[inline(never)]
+    pub(super) fn weigh(&self, points: &mut Points<POINTS>, curve: &Curve<POINTS>) {
+        points.weigh(curve, &self.model(points.sample_period));
     }
 
     /// Replaces a term by one of the same kind in another shape.
-    pub(super) fn set_kind(&mut self, term: usize, kind: Kind) {
+    #[inline(never)]
+    pub(super) fn set_kind(&mut self, points: &Points<POINTS>, term: usize, kind: Kind) {
         self.kinds[term] = kind;
-        for point in &mut self.points {
-            point.basis[term] = kind.avar(point.n, self.sample_period);
+        for (entry, point) in self.columns[term].iter_mut().zip(&points.measured) {
+            *entry = kind.avar(point.n, points.sample_period);
         }
     }
 
     /// Finds the squares of the coefficients that minimise the deviance at the present weights, and returns it.
-    pub(super) fn minimise(&mut self) -> f64 {
-        let start = self.scoring_step(|point| point.avar);
-        let (mut squares, mut deviance) = (start, self.deviance(&start));
+    #[inline(never)]
+    pub(super) fn minimise(&mut self, points: &Points<POINTS>) -> f64 {
+        let start = self.scoring_step(points, None);
+        let (mut squares, mut deviance) = (start, self.deviance_at(points, &start));
         // Never worse than where a smaller model was left.
-        let left = self.deviance(&self.squares);
+        let left = self.deviance(points);
         if left < deviance {
             (squares, deviance) = (self.squares, left);
         }
         for _ in 0..SCORING_ROUNDS {
-            let proposed = self.scoring_step(|point| dot(&point.basis, &squares));
-            let Some((next, lower)) = self.descend(&squares, &proposed, deviance) else {
+            let proposed = self.scoring_step(points, Some(&squares));
+            let Some((next, lower)) = self.descend(points, &squares, &proposed, deviance) else {
                 break;
             };
             let settled = deviance - lower <= 1e-10 * math::abs(deviance);
@@ -122,6 +99,7 @@ impl Problem {
     /// Goes towards `proposed` as far as the deviance falls; `None` where it does not fall at all.
     fn descend(
         &self,
+        points: &Points<POINTS>,
         from: &Vector<MAX_TERMS>,
         proposed: &Vector<MAX_TERMS>,
         deviance: f64,
@@ -132,7 +110,7 @@ impl Problem {
             for (entry, target) in next.iter_mut().zip(proposed) {
                 *entry += length * (target - *entry);
             }
-            let lower = self.deviance(&next);
+            let lower = self.deviance_at(points, &next);
             if lower < deviance {
                 return Some((next, lower));
             }
@@ -142,47 +120,48 @@ impl Problem {
     }
 
     /// `Σ edf·(v/m − 1 − ln(v/m))`; infinite where the model says that there is no variance.
-    pub(super) fn deviance(&self, squares: &Vector<MAX_TERMS>) -> f64 {
-        let of = |point: &Measured| {
-            let ratio = point.avar / dot(&point.basis, squares);
+    pub(super) fn deviance(&self, points: &Points<POINTS>) -> f64 {
+        self.deviance_at(points, &self.squares)
+    }
+
+    fn deviance_at(&self, points: &Points<POINTS>, squares: &Vector<MAX_TERMS>) -> f64 {
+        let of = |(at, point): (usize, &Measured)| {
+            let ratio = point.avar / self.modelled(at, squares);
             point.edf * (ratio - 1.0 - math::ln(ratio))
         };
-        let sum: f64 = self.points.iter().map(of).sum();
+        let sum: f64 = points.measured.iter().enumerate().map(of).sum();
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
-    /// Non-negative least squares with the variances that `expected` tells.
-    fn scoring_step(&self, expected: impl Fn(&Measured) -> f64) -> Vector<MAX_TERMS> {
+    /// The variance at a point that the terms add up to.
+    pub(super) fn modelled(&self, at: usize, squares: &Vector<MAX_TERMS>) -> f64 {
+        let terms = self.columns.iter().zip(squares).take(self.kinds.len());
+        terms.map(|(column, square)| square * column[at]).sum()
+    }
+
+    /// Non-negative least squares with the variances that `squares` tell, or with the measured ones.
+    #[inline(never)]
+    fn scoring_step(&self, points: &Points<POINTS>, squares: Option<&Vector<MAX_TERMS>>) -> Vector<MAX_TERMS> {
         let mut normal: Matrix<MAX_TERMS> = [[0.0; MAX_TERMS]; MAX_TERMS];
         let mut right = [0.0; MAX_TERMS];
-        for point in &self.points {
-            let variance = expected(point);
+        let terms = self.kinds.len();
+        for (at, point) in points.measured.iter().enumerate() {
+            let variance = squares.map_or(point.avar, |squares| self.modelled(at, squares));
             let weight = point.edf / 2.0 / (variance * variance);
-            for (i, row) in normal.iter_mut().enumerate().take(self.kinds.len()) {
-                right[i] += weight * point.basis[i] * point.avar;
-                for (j, entry) in row.iter_mut().enumerate().take(self.kinds.len()) {
-                    *entry += weight * point.basis[i] * point.basis[j];
-                }
+            for (i, (row, right)) in normal.iter_mut().zip(&mut right).enumerate().take(terms) {
+                let weighted = weight * self.columns[i][at];
+                *right += weighted * point.avar;
+                row.iter_mut()
+                    .zip(&self.columns)
+                    .take(terms)
+                    .for_each(|(entry, column)| *entry += weighted * column[at]);
             }
         }
-        non_negative(&normal, &right, self.kinds.len())
+        non_negative(&normal, &right, terms)
     }
 
-    /// Takes the degrees of freedom from the mixture of noises that `model` says.
-    fn weigh<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, model: &Model) {
-        for (measured, point) in self.points.iter_mut().zip(positive(curve)) {
-            measured.shares = model.shares(point.n);
-            measured.edf = model.edf(point);
-            measured.near_edf = model.near_edf(point);
-        }
-    }
-
-    pub(super) fn model(&self) -> Model {
+    pub(super) fn model(&self, sample_period: f64) -> Model {
         let term = |(&kind, &square): (&Kind, &f64)| Term::exact(kind, math::sqrt(square));
-        Model::new(self.sample_period, self.kinds.iter().zip(&self.squares).map(term))
+        Model::new(sample_period, self.kinds.iter().zip(&self.squares).map(term))
     }
-}
-
-fn positive<const POINTS: usize>(curve: &Curve<POINTS>) -> impl Iterator<Item = &Point> {
-    curve.points().iter().filter(|point| point.avar > 0.0)
 }

@@ -1,6 +1,7 @@
 //! The estimator: on average, at its worst, and what reads beside it.
 
-use crate::{instructions, report};
+use crate::report;
+use crate::timer::instructions;
 use allan_core::{Between, Cascade, Coupling, Hadamard};
 use core::hint::black_box;
 use cortex_m_semihosting::{hprint, hprintln};
@@ -72,11 +73,11 @@ fn beside(samples: &[i32; SAMPLES]) {
         ("hadamard_p8", run(samples, |a, _| hadamard.observe(a))),
         ("between_p8", run(samples, |a, _| between.observe(a))),
     ] {
-        hprintln!("count {} {}", name, (total - pushes) / SAMPLES as u32);
+        hprintln!("count {} {}", name, (total - pushes) / SAMPLES as u64);
     }
 }
 
-fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Pushed, &Pushed)) -> u32 {
+fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Pushed, &Pushed)) -> u64 {
     let (mut a, mut b) = (Pushed::new(), Pushed::new());
     instructions(|| {
         for &sample in samples {

@@ -1,6 +1,6 @@
 //! libm's and micromath's functions: instructions, and the bits of their answers for the host to judge.
 
-use crate::instructions;
+use crate::timer::instructions;
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use micromath::F32Ext;
@@ -30,14 +30,14 @@ fn compare(name: &str, argument: impl Fn(f64) -> f64, exact: fn(f64) -> f64, coa
     let arguments: [f64; VALUES] = core::array::from_fn(|k| argument(k as f64));
     let mut answers = arguments;
     let taken = instructions(|| answers.iter_mut().for_each(|value| *value = black_box(exact)(*value)));
-    hprintln!("libm {} {}", name, taken / VALUES as u32);
+    hprintln!("libm {} {}", name, taken / VALUES as u64);
     for (argument, answer) in arguments.iter().zip(answers) {
         hprintln!("libm {} {:016x} {:016x}", name, argument.to_bits(), answer.to_bits());
     }
     if let Some(coarse) = coarse {
         let mut answers = arguments.map(|value| value as f32);
         let taken = instructions(|| answers.iter_mut().for_each(|value| *value = black_box(coarse)(*value)));
-        hprintln!("micromath {} {}", name, taken / VALUES as u32);
+        hprintln!("micromath {} {}", name, taken / VALUES as u64);
         for (argument, answer) in arguments.iter().zip(answers) {
             hprintln!("micromath {} {:016x} {:08x}", name, argument.to_bits(), answer.to_bits());
         }
