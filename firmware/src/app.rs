@@ -7,7 +7,7 @@ mod report;
 use crate::board::Board;
 use crate::command::{Command, Mistake, Parser};
 use crate::epoch::Epoch;
-use crate::estimators::CHANNELS;
+use crate::estimators::{CHANNELS, Estimator};
 use crate::last_words::line;
 use crate::retained::{Retained, Settings};
 use crate::sensor::{Identity, auto_null, bring_up};
@@ -103,6 +103,7 @@ fn config(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
 
 impl App {
     /// Goes on with what survived, if anything did: the settings, and the statistics of each channel.
+    #[inline(never)] // so that what it moves is not on everybody's stack
     pub fn new(start: Start, board: &mut impl Board) -> Self {
         let Start { spi_clock_hz, mut boot, mut retained, finished } = start;
         let kept = retained.settings().and_then(|kept| Some((kept, config(kept.smpl_prd, kept.sens_avg)?)));
@@ -331,8 +332,8 @@ impl App {
     }
 
     fn keep_channel(&mut self, board: &mut impl Board, index: usize) {
-        if let Some(estimator) = board.estimators(|estimators| estimators.get(index).cloned()) {
-            self.retained.keep_estimator(index, &estimator);
+        if let Some(estimator) = &copy_of(board, index) {
+            self.retained.keep_estimator(index, estimator);
         }
     }
 
@@ -392,6 +393,12 @@ impl App {
     fn epoch_age_s(&self, now_us: u64) -> u64 {
         (now_us - self.epoch_began_us) / 1_000_000
     }
+}
+
+/// The estimator of [`CHANNELS`]`[index]` as it stands. Not inlined, and to be borrowed: then the stack holds it once.
+#[inline(never)]
+fn copy_of(board: &mut impl Board, index: usize) -> Option<Estimator> {
+    board.estimators(|estimators| estimators.get(index).cloned())
 }
 
 fn interval_us(settings: Settings) -> u64 {

@@ -1,7 +1,7 @@
 //! Answers for a person: lines of text, made one at a time.
 
 use super::epoch::{INERTIAL, Verdict};
-use super::{App, Sensor};
+use super::{App, Sensor, copy_of};
 use crate::board::Board;
 use crate::command::HELP;
 use crate::estimators::CHANNELS;
@@ -112,8 +112,8 @@ impl App {
 
     fn coefficients_line(&self, board: &mut impl Board, index: usize) -> Option<Line> {
         let channel = CHANNELS[index];
-        let estimator = board.estimators(|estimators| estimators.get(index).cloned())?;
-        let model = channel_model(channel, &estimator, self.config);
+        let Some(estimator) = &copy_of(board, index) else { return None };
+        let model = channel_model(channel, estimator, self.config);
         let mut text = line(format_args!("{}", channel.name()));
         for term in model.terms() {
             // What does not fit is cut.

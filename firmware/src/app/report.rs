@@ -1,9 +1,9 @@
 //! A report in frames: who speaks, every channel, health. Made one message at a time.
 
 use super::epoch::INERTIAL;
-use super::{App, Sensor};
+use super::{App, Sensor, copy_of};
 use crate::board::Board;
-use crate::estimators::CHANNELS;
+use crate::estimators::{CHANNELS, Estimator};
 use crate::summary::{channel_model, channel_report};
 use adis16405_driver::GyroRange;
 use link::{Health, Hello, Message};
@@ -122,17 +122,23 @@ impl App {
         }
     }
 
+    /// The estimator that the report is of, held once on the stack as [`copy_of`] does.
+    #[inline(never)]
+    fn reported(&self, board: &mut impl Board, k: usize) -> Option<Estimator> {
+        match self.school.finished().filter(|_| self.report.closing) {
+            Some(epoch) => Some(epoch.estimator(k)),
+            None => copy_of(board, k),
+        }
+    }
+
     #[inline(never)]
     fn channel(&mut self, board: &mut impl Board, k: usize) -> Option<Message> {
         let channel = CHANNELS[k];
-        let estimator = match self.school.finished().filter(|_| self.report.closing) {
-            Some(epoch) => epoch.estimator(k),
-            None => board.estimators(|estimators| estimators.get(k).cloned())?,
-        };
+        let Some(estimator) = &self.reported(board, k) else { return None };
         let lesson = self.school.lessons.get(k);
-        let model = lesson.map(|_| channel_model(channel, &estimator, self.config));
+        let model = lesson.map(|_| channel_model(channel, estimator, self.config));
         let previous = lesson.and_then(|lesson| lesson.declared(self.config));
-        let report = channel_report(channel, &estimator, self.config, model.as_ref(), previous.as_ref());
+        let report = channel_report(channel, estimator, self.config, model.as_ref(), previous.as_ref());
         Some(Message::Channel(report))
     }
 
