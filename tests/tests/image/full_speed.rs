@@ -21,8 +21,10 @@ const QUIET_S: (f64, f64) = (3.0, 8.0);
 #[test]
 fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
     let seconds = std::env::var("OBSERVATORY_SECONDS").map_or(SECONDS, |text| text.parse().expect("seconds"));
-    let mut keys = vec![(1.0, b"i 0\rf 819.2\r".to_vec()), (QUIET_S.1, b"i 10\rw 1\r".to_vec())];
-    let typed = [&b"r"[..], b"t", b"?", b"s", b"k", b"e 0\r", b"x\r"];
+    let mut keys = vec![(1.0, b"i 0\rf 819.2\r".to_vec()), (QUIET_S.1, b"i 30\rw 1\r".to_vec())];
+    // The first two take a fit of every channel.
+    let typed =
+        [&b"r"[..], b"t", b"?", b"s", b"k", b"e 0\r", b"x\r", b"v", b"k", b"s", b"i 30\r", b"k", b"?", b"s", b"k"];
     let times = (0..).map(|k| QUIET_S.1 + 1.3 + 2.7 * f64::from(k)).take_while(|&at| at < seconds - 4.0);
     keys.extend(times.zip(typed.iter().cycle()).map(|(at, keys)| (at, keys.to_vec())));
     keys.push((seconds - 2.5, b"w 0\r".to_vec()));
