@@ -2,7 +2,7 @@
 
 use crate::bench::{Outcome, Scenario, Work, run};
 use crate::decoded::{Decoded, on_host};
-use crate::{image, sensor};
+use crate::{image, sensor, stack_suffices};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
 use host_sim::analysis::analyze;
 use host_sim::record::port::Tape;
@@ -78,7 +78,7 @@ fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
         health.sampling_cycles, health.estimator_cycles
     );
     println!("stack {} of {} B, at most {} bursts waited", health.stack_bytes, health.stack_size, health.queue_peak);
-    assert!(health.stack_bytes + crate::INTERRUPTS_STACK < health.stack_size, "{health:?}");
+    stack_suffices(&health);
     assert!(quiet.1 < 5.0, "more than 5 % of the processor");
     assert!(health.sampling_cycles < 168 * 20, "a sampling interrupt of more than 20 us");
 }

@@ -17,7 +17,7 @@ use bench::{Outcome, Scenario, run};
 use decoded::{Decoded, on_host};
 use firmware::CHANNELS;
 use host_sim::sensor::{NoiseModel, VirtualAdis16405};
-use link::{Boot, BootCause, Counters, Hello, Message};
+use link::{Boot, BootCause, Counters, Health, Hello, Message};
 use sensor::Sensor;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -29,6 +29,11 @@ const SCK_HZ: u32 = 84_000_000 / 128;
 /// 104 bytes that the processor stacks (with floating point) and the frames of its functions, which disassembled are
 /// 5.3 kB of the estimators (a full message of the raw stream is framed there) and 160 bytes of the others together.
 const INTERRUPTS_STACK: u32 = 4 * 104 + 6 * 1024 + 256;
+
+/// The stack that was left over takes what interrupts may add.
+fn stack_suffices(health: &Health) {
+    assert!(health.stack_bytes + INTERRUPTS_STACK <= health.stack_size, "{health:?}");
+}
 
 /// The image, built at most once a run; `OBSERVATORY_IMAGE` names another.
 fn image() -> &'static Path {
