@@ -2,7 +2,12 @@
 //!
 //! In the differences of an octave a channel is `d(y) = Σ βᵢ·d(cᵢ) + d(e)`. Each octave is worth its degrees of
 //! freedom over the variance of the rest `e`, which is the fitted model's. A covariate that is measured with noise of
-//! its own would make `β` too small; what its curve shows as white is taken off first.
+//! its own would make `β` too small; what its curve shows as white is taken off first. Slow channels have few degrees
+//! of freedom, and a chance likeness of two random walks goes far: a sensitivity is judged by Student's distribution.
+
+mod sensitivity;
+
+pub use sensitivity::Sensitivity;
 
 use crate::confidence::{Shares, octave_correlation};
 use crate::coupling::Covariance;
@@ -18,9 +23,11 @@ use heapless::Vec;
 pub const MAX_COVARIATES: usize = 8;
 /// A share of a covariate's variance that is its own noise above which an octave says nothing about the sensitivity.
 const NOISE_SHARE: f64 = 0.5;
-/// Standard deviations from 0 from which on a sensitivity is believed: slow channels have few degrees of freedom, and a
-/// chance likeness of two random walks goes far.
-const DOUBT: f64 = 5.0;
+/// Degrees of freedom below which nothing is said.
+const LEAST_FREEDOM: f64 = 2.0;
+/// Standard deviations of a normal distribution from which on a sensitivity is believed. Smooth covariates pass it by
+/// chance in some 2 of 10,000 pairs, more often than the normal distribution says.
+const DOUBT: f64 = 4.5;
 
 /// A measured quantity that a channel may follow.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,25 +97,6 @@ pub struct Beside<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
     pub mutual: &'a [Shared<COUPLED>],
 }
 
-/// How a channel follows a covariate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensitivity {
-    /// Which covariate.
-    pub covariate: usize,
-    /// In the channel's unit over the covariate's.
-    pub value: f64,
-    /// Standard deviation of the value.
-    pub error: f64,
-}
-
-impl Sensitivity {
-    /// Distance from 0 in standard deviations.
-    #[must_use]
-    pub fn sigmas(&self) -> f64 {
-        crate::math::abs(self.value) / self.error
-    }
-}
-
 impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     /// The covariates that the channel follows beyond doubt, the clearest chosen first.
     #[must_use]
@@ -149,7 +137,8 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
 
     /// What the channel would be without the covariates, as far as N, B and K describe it.
     fn rest(&self, followed: &[Sensitivity]) -> Rest<POINTS> {
-        let curve = self.compensated(followed);
+        let curve = self
+            .less(followed, |covariate, n| self.covariates[covariate].signal(n).map_or(0.0, |(_, measured)| measured));
         Rest { model: fit(&curve, &Kind::DECLARED), curve }
     }
 
@@ -180,19 +169,29 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
             let along = |j: usize| (0..count).map(|k| row[k] * scatter[j][k]).sum::<f64>();
             sqrt((0..count).map(|j| row[j] * along(j)).sum())
         };
-        Some((0..count).map(|i| Sensitivity { covariate: chosen[i], value: value[i], error: error(i) }).collect())
+        let sensitivity = |i: usize| {
+            let freedom = freedom(&told, i);
+            let left = freedom - count as f64;
+            (left >= LEAST_FREEDOM)
+                .then(|| Sensitivity::new(chosen[i], value[i], error(i) * sqrt(freedom / left), left))
+        };
+        (0..count).map(sensitivity).collect()
     }
 
     /// The channel's curve less what follows the covariates.
     #[must_use]
     pub fn compensated(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
+        self.less(sensitivities, |covariate, n| self.shared(covariate, covariate, n))
+    }
+
+    /// The channel's curve less covariates of such a variance.
+    fn less(&self, sensitivities: &[Sensitivity], variance: impl Fn(usize, u64) -> f64) -> Curve<POINTS> {
         self.channel.clone().with_avar(|point| {
             let of = |a: &Sensitivity| {
-                let square = self.shared(a.covariate, a.covariate, point.n);
                 let others = sensitivities.iter().filter(|b| b.covariate < a.covariate);
                 let products = others.map(|b| 2.0 * b.value * self.shared(a.covariate, b.covariate, point.n));
                 let followed = covariance(&self.with_channel[a.covariate], point.n);
-                a.value * (a.value * square - 2.0 * followed + products.sum::<f64>())
+                a.value * (a.value * variance(a.covariate, point.n) - 2.0 * followed + products.sum::<f64>())
             };
             // An estimate of what is left can come out below 0 where almost nothing is.
             let least = 0.01 * point.avar;
@@ -229,8 +228,10 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         if variance <= 0.0 {
             return None;
         }
+        let edf = rest.edf(point);
         let mut octave = Told {
-            weight: rest.edf(point) / variance,
+            edf,
+            weight: edf / variance,
             shares: rest.shares(point.n),
             with_channel: [0.0; MAX_COVARIATES],
             signal: [[0.0; MAX_COVARIATES]; MAX_COVARIATES],
@@ -268,6 +269,7 @@ struct Rest<const POINTS: usize> {
 
 /// What one octave tells.
 struct Told {
+    edf: f64,
     /// Degrees of freedom over the variance of the rest.
     weight: f64,
     shares: Shares,
@@ -300,6 +302,20 @@ fn scatter(told: &[Told], count: usize) -> Matrix<MAX_COVARIATES> {
 fn pair(a: usize, b: usize) -> usize {
     let (high, low) = (a.max(b), a.min(b));
     high * (high - 1) / 2 + low
+}
+
+/// Degrees of freedom of one sensitivity: of the octaves, each as it counts, less what they repeat of each other.
+fn freedom(told: &[Told], covariate: usize) -> f64 {
+    let counts = |octave: &Told| octave.weight * octave.measured[covariate];
+    let (mut sum, mut square) = (0.0, 0.0);
+    for (k, a) in told.iter().enumerate() {
+        sum += counts(a);
+        for (l, b) in told.iter().enumerate() {
+            let correlation = octave_correlation(k.abs_diff(l), a.shares, b.shares);
+            square += correlation * counts(a) * counts(b) / sqrt(a.edf * b.edf);
+        }
+    }
+    if square > 0.0 { sum * sum / square } else { 0.0 }
 }
 
 fn covariance(shared: &[Covariance], n: u64) -> f64 {

@@ -23,7 +23,7 @@ pub struct Followed {
     pub cause: usize,
     /// Sensitivity in the channel's unit over the covariate's.
     pub value: f64,
-    /// Standard deviation of the sensitivity.
+    /// Such that the value ± 1.96 of it hold 95 %.
     pub error: f64,
     /// Value of the covariate at which nothing is subtracted, in its unit: the mean of the epoch that taught.
     pub reference: f64,
@@ -85,12 +85,8 @@ pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Follow
         let _ = covariates.push(Covariate::as_measured(coupled(epoch, member, config)));
     }
     let (with_channel, mutual) = shared(epoch.couplings()?, index, &members, config);
-    let sensitivity = |(covariate, followed): (usize, &Followed)| Sensitivity {
-        covariate,
-        value: followed.value,
-        error: followed.error,
-    };
-    let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(sensitivity).collect();
+    let known = |(covariate, followed): (usize, &Followed)| Sensitivity::exact(covariate, followed.value);
+    let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(known).collect();
     let channel = &epoch.curve(index, config);
     let beside = Beside { channel, covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
     Some(beside.subtracted(&sensitivities))
