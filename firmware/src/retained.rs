@@ -9,15 +9,16 @@ use crate::summary::OCTAVES;
 use allan_core::Learnt;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Words of a record: the samples, the missing ones, and for every octave two sums of 128 and a count of 64 bits.
-const PAYLOAD: usize = 4 + OCTAVES * 10;
+/// Words of a record: the samples, the missing ones, and for every octave a sum of 128 and a count of 64 bits. Fourth powers
+/// are not kept: nothing that the device reports is made of them.
+const PAYLOAD: usize = 4 + OCTAVES * 6;
 /// Payload, and before it the kind, the version and the generation, after it the checksum.
 const SLOT_WORDS: usize = PAYLOAD + 4;
 /// Records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
 /// Told from memory that holds something else; in the upper half of a slot's first word. Changes with the layout.
-const MAGIC: u32 = 0xAD15_0000;
+const MAGIC: u32 = 0xAD16_0000;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -110,8 +111,8 @@ impl Retained {
         let wide = |at| u64::from(word(slot, 3 + at)) | u64::from(word(slot, 4 + at)) << 32;
         let sum = |at| u128::from(wide(at)) | u128::from(wide(at + 2)) << 64;
         let learnt = core::array::from_fn(|octave| {
-            let at = 4 + 10 * octave;
-            Learnt { squares: sum(at), fourths: sum(at + 4), count: wide(at + 8) }
+            let at = 4 + 6 * octave;
+            Learnt { squares: sum(at), fourths: 0, count: wide(at + 4) }
         });
         Some(Estimator::resumed(wide(0), wide(2), &learnt))
     }
@@ -129,9 +130,8 @@ impl Retained {
     pub fn keep_estimator(&mut self, index: usize, estimator: &Estimator) {
         let halves = |wide: u64| [wide as u32, (wide >> 32) as u32];
         let octaves = (0..OCTAVES).flat_map(|octave| {
-            let Learnt { squares, fourths, count } = estimator.learnt(octave).unwrap_or_default();
-            let upper = |sum: u128| (sum >> 64) as u64;
-            [squares as u64, upper(squares), fourths as u64, upper(fourths), count].into_iter().flat_map(halves)
+            let Learnt { squares, count, .. } = estimator.learnt(octave).unwrap_or_default();
+            [squares as u64, (squares >> 64) as u64, count].into_iter().flat_map(halves)
         });
         let words = [estimator.len(), estimator.missing()].into_iter().flat_map(halves).chain(octaves);
         if index < CHANNELS.len() {
