@@ -56,7 +56,19 @@ RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps --package adis16405-
 step "the driver with all its features"
 run cargo test --locked --package adis16405-driver --all-features
 
-step "tests, the image in the emulator among them"
-run cargo test --locked --workspace --ignore-rust-version
+step "tests, the images in emulators among them; ten emulated minutes at full speed go on beside the others"
+run cargo test --locked --workspace --ignore-rust-version --no-run
+TEN_MINUTES=no_sample_is_lost_or_doubled_while_everything_is_going_on
+log=$(mktemp)
+set -m # a process group of its own
+OBSERVATORY_SECONDS=600 cargo test --locked --ignore-rust-version --package system-tests --test image -- --nocapture \
+    "$TEN_MINUTES" >"$log" 2>&1 &
+beside=$!
+set +m
+trap 'kill -- -"$beside" 2>/dev/null || true; rm -f "$log"' EXIT
+run cargo test --locked --workspace --ignore-rust-version -- --skip "$TEN_MINUTES"
+step "ten emulated minutes"
+wait "$beside" || { cat "$log"; exit 1; }
+cat "$log"
 
 step "all passed"
