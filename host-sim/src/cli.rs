@@ -218,4 +218,7 @@ pub struct Output {
     /// Write the report as a page into this folder.
     #[arg(long, value_name = "DIR", global = true)]
     pub page: Option<PathBuf>,
+    /// Write the noise model of the accelerometers and gyros as Kalibr's YAML.
+    #[arg(long, value_name = "OUT", global = true)]
+    pub kalibr: Option<PathBuf>,
 }

@@ -13,6 +13,7 @@ pub mod cli;
 pub mod coefficients;
 pub mod device;
 pub mod explain;
+pub mod export;
 pub mod grid;
 pub mod innovation;
 pub mod monitor;

@@ -15,7 +15,7 @@ use host_sim::report::Report;
 use host_sim::source::{csv, folder};
 use host_sim::timeline::Timeline;
 use host_sim::undeclared::Plan;
-use host_sim::{page, terminal, uf2};
+use host_sim::{export, page, terminal, uf2};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fs::{self, File};
@@ -122,8 +122,8 @@ fn watch(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Re
 }
 
 fn explain_all(arguments: &Explain, output: &Output) -> Result<()> {
-    if output.page.is_some() || output.json.is_some() {
-        bail!("explain writes tables only: leave out --page and --json");
+    if output.page.is_some() || output.json.is_some() || output.kalibr.is_some() {
+        bail!("explain writes tables only: leave out --page, --json and --kalibr");
     }
     for path in &arguments.recordings {
         for file in folder::tables(path)? {
@@ -155,8 +155,8 @@ fn draw(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()
 }
 
 fn benchmark(plan: &Plan, output: &Output) -> Result<()> {
-    if output.page.is_some() {
-        bail!("undeclared has no page: leave out --page");
+    if output.page.is_some() || output.kalibr.is_some() {
+        bail!("undeclared is not of one sensor: leave out --page and --kalibr");
     }
     let bar = ProgressBar::new(0);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} recordings, {eta} left") {
@@ -177,8 +177,8 @@ fn benchmark(plan: &Plan, output: &Output) -> Result<()> {
 }
 
 fn paper(experiment: Experiment, output: &Output) -> Result<()> {
-    if output.page.is_some() {
-        bail!("paper has no page: leave out --page");
+    if output.page.is_some() || output.kalibr.is_some() {
+        bail!("paper is not of one sensor: leave out --page and --kalibr");
     }
     let bar = ProgressBar::new(experiment.seeds);
     let outcome = experiment.run(|done| bar.set_position(done));
@@ -204,6 +204,9 @@ fn report(recording: &Recording, rate: Option<f64>) -> Result<Report> {
 fn write(report: &Report, output: &Output) -> Result<()> {
     if let Some(file) = &output.json {
         write_json(report, file).with_context(|| file.display().to_string())?;
+    }
+    if let Some(file) = &output.kalibr {
+        fs::write(file, export::kalibr(report)).with_context(|| file.display().to_string())?;
     }
     let page = output.page.as_ref().map(|dir| page::write(report, dir)).transpose()?;
     let mut out = BufWriter::new(io::stdout().lock());

@@ -6,7 +6,7 @@ use crate::innovation;
 use crate::navigation::{self, CALIBRATION_S};
 use crate::record_length;
 use crate::report::Parameter;
-use crate::spectrum::Welch;
+use crate::spectrum::{Welch, correlation_time};
 use crate::trace::Series;
 use crate::units::{GRAVITY, conversions};
 use allan_core::{Kind, Model};
@@ -28,6 +28,9 @@ pub struct Practice {
     pub innovations: Option<Innovations>,
     /// N by Welch's spectrum of the whole record, which knows nothing of the Allan variance.
     pub angle_random_walk_by_spectrum: Option<Parameter>,
+    /// Correlation time of the model's Markov process by the autocorrelation of the whole record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub markov_time_by_autocorrelation: Option<Parameter>,
     /// Records that would tell a coefficient to ±20 %.
     pub record: Vec<Record>,
 }
@@ -106,6 +109,12 @@ impl Practice {
                 whiteness_p: found.whiteness,
             }),
             angle_random_walk_by_spectrum: angle_random_walk(&whole, model, series.unit),
+            markov_time_by_autocorrelation: correlation_time(&whole, model).map(|time| Parameter {
+                value: time.value,
+                low: time.low,
+                high: time.high,
+                unit: "s".to_owned(),
+            }),
             record: records(model, whole.duration() / 2.0),
         }
     }

@@ -8,6 +8,7 @@
 //!        └► Welch ─► Shape ─► N, B, K            (independent of the Allan variance)
 //! ```
 
+pub mod autocorrelation;
 mod background;
 pub mod line;
 mod lorentz;
@@ -16,5 +17,6 @@ pub mod shape;
 mod sine;
 pub mod welch;
 
+pub use autocorrelation::{CorrelationTime, correlation_time};
 pub use line::{Line, lines};
 pub use welch::Welch;

@@ -21,6 +21,10 @@ pub(super) fn practice(practice: &Practice) -> Markup {
                 li { b { "N by the spectrum" } ": " (number(spectrum.value)) " " (unit(&spectrum.unit))
                     " (" (interval(spectrum.low, spectrum.high)) ")" }
             }
+            @if let Some(time) = &practice.markov_time_by_autocorrelation {
+                li { b { "Markov time by the autocorrelation" } ": " (number(time.value)) " " (unit(&time.unit))
+                    " (" (interval(time.low, time.high)) ")" }
+            }
             @for record in &practice.record { li { (advice(record)) } }
         }
     }

@@ -29,6 +29,10 @@ pub(super) fn write(practice: &Practice, out: &mut impl Write) -> io::Result<()>
         let value = format!("{} {}", number(by_spectrum.value), unit(&by_spectrum.unit));
         writeln!(out, "• N by the spectrum: {value} ({}).", interval(by_spectrum.low, by_spectrum.high))?;
     }
+    if let Some(time) = &practice.markov_time_by_autocorrelation {
+        let value = format!("{} {}", number(time.value), unit(&time.unit));
+        writeln!(out, "• Markov time by the autocorrelation: {value} ({}).", interval(time.low, time.high))?;
+    }
     practice.record.iter().try_for_each(|record| writeln!(out, "• {}.", advice(record)))
 }
 

@@ -127,6 +127,7 @@ fn practice(scale: f64) -> Practice {
             whiteness_p: 0.4321,
         }),
         angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
+        markov_time_by_autocorrelation: Some(parameter(2.1, "s")),
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
             .map(|(kind, more_hours)| Record { kind: kind.to_owned(), half_s: None, more_hours })
             .into(),
