@@ -12,7 +12,7 @@ pub mod rp2040;
 pub mod stm32f4;
 pub mod survivors;
 
-pub use processor::{ESTIMATOR_CYCLES, Processor, SAMPLING_CYCLES, measure};
+pub use processor::{ESTIMATOR_CYCLES, Processor, SAMPLING_CYCLES, count_lost_bytes, measure};
 
 use adis16405_driver::BURST_BYTES;
 use defmt_rtt as _;

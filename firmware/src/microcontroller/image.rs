@@ -32,7 +32,7 @@ macro_rules! observatory {
             use $crate::spi_clock::BURST_LIMIT_HZ;
             use $crate::microcontroller::{
                 Bus as _, DataReady as _, ESTIMATOR_CYCLES, Incoming, Line, Microcontroller, Parts, Port as _, Processor,
-                SAMPLING_CYCLES, measure, survivors,
+                SAMPLING_CYCLES, count_lost_bytes, measure, survivors,
             };
             use $crate::{
                 Arrival, Arrivals, Epoch, Estimators, FIRST_CONFIG, Locks, Outbox, Outgoing, Sampler, Start, Statistics,
@@ -136,7 +136,7 @@ macro_rules! observatory {
 
             #[task(binds = $serial, priority = 4, local = [port])]
             fn port(context: port::Context) {
-                Processor::<$microcontroller>::lost_bytes(context.local.port.serve());
+                count_lost_bytes(context.local.port.serve());
             }
 
             #[task(binds = SysTick, priority = 1)]

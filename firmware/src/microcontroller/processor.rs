@@ -28,6 +28,11 @@ pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     }
 }
 
+/// Counts bytes lost on the way in.
+pub fn count_lost_bytes(lost: u32) {
+    SERIAL_OVERRUNS.store(SERIAL_OVERRUNS.load(Relaxed).saturating_add(lost), Relaxed);
+}
+
 /// The processor of a microcontroller, as the main loop sees it.
 pub struct Processor<M> {
     microcontroller: M,
@@ -44,11 +49,6 @@ impl<M: Microcontroller> Processor<M> {
         systick.enable_interrupt();
         systick.enable_counter();
         Self { microcontroller, transmit }
-    }
-
-    /// Counts bytes lost on the way in.
-    pub fn lost_bytes(lost: u32) {
-        SERIAL_OVERRUNS.store(SERIAL_OVERRUNS.load(Relaxed).saturating_add(lost), Relaxed);
     }
 }
 

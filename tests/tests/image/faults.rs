@@ -44,7 +44,7 @@ fn recovers_from_everything(rate_hz: f64, seed: u64) {
         (14.5, Event::Unplugged(true)),
         (15.7, Event::Unplugged(false)),
     ];
-    let scenario = Scenario { sensor: Some(sensor(seed)), keys, events, seconds: 22.0 };
+    let scenario = Scenario { sensor: Some(sensor(seed)), keys, events, seconds: 24.0 };
     let Outcome { sensor, received, complaints, .. } = run(image(), scenario);
     assert_eq!(complaints, [""; 0], "no reset, no access that is none");
     let sensor = sensor.expect("a sensor");

@@ -25,10 +25,10 @@ fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
     // The first two take a fit of every channel.
     let typed =
         [&b"r"[..], b"t", b"?", b"s", b"k", b"e 0\r", b"x\r", b"v", b"k", b"s", b"i 30\r", b"k", b"?", b"s", b"k"];
-    let times = (0..).map(|k| QUIET_S.1 + 1.3 + 2.7 * f64::from(k)).take_while(|&at| at < seconds - 4.0);
+    let times = (0..).map(|k| QUIET_S.1 + 1.3 + 2.7 * f64::from(k)).take_while(|&at| at < seconds - 6.0);
     keys.extend(times.zip(typed.iter().cycle()).map(|(at, keys)| (at, keys.to_vec())));
-    keys.push((seconds - 2.5, b"w 0\r".to_vec()));
-    keys.push((seconds - 2.0, b"r".to_vec()));
+    keys.push((seconds - 3.5, b"w 0\r".to_vec()));
+    keys.push((seconds - 3.0, b"r".to_vec()));
     let scenario = Scenario { sensor: Some(sensor(2)), keys, seconds, ..Scenario::default() };
     let Outcome { sensor, received, complaints, work } = run(image(), scenario);
     let sensor = sensor.expect("the sensor hangs on the bus");
@@ -45,7 +45,7 @@ fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
     let decoded = Decoded::of(&received);
     assert_eq!((decoded.counters.missing, decoded.counters.bad_frames), (0, 0), "{:?}", decoded.counters);
     let raw = decoded.raw();
-    assert!(raw.len() as f64 > (seconds - QUIET_S.1 - 2.6) * RATE_HZ, "{} bursts in the stream", raw.len());
+    assert!(raw.len() as f64 > (seconds - QUIET_S.1 - 3.6) * RATE_HZ, "{} bursts in the stream", raw.len());
     let sent: Vec<Burst> = bursts.iter().map(|(_, bytes)| Burst::from_bytes(bytes)).collect();
     let first = raw[0].0 as usize;
     for (k, (number, burst)) in raw.iter().enumerate() {
@@ -69,7 +69,7 @@ fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
     a_recording_off_the_cable_analyses_to_the_identical_report(&decoded, &bursts[first..]);
 
     let quiet = between(&work, QUIET_S);
-    let busy = between(&work, (QUIET_S.1 + 1.0, seconds - 3.0));
+    let busy = between(&work, (QUIET_S.1 + 1.0, seconds - 4.0));
     println!("{seconds} s at {RATE_HZ} SPS, {} bursts read, {} in the raw stream", bursts.len(), raw.len());
     println!("sampling and estimating: {} instructions a sample, {:.2} % of 168 MHz", quiet.0, quiet.1);
     println!("with raw stream, reports and keys: {} instructions a sample, {:.2} %", busy.0, busy.1);

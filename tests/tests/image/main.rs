@@ -51,7 +51,7 @@ fn sensor(seed: u64) -> Sensor {
 fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     const ASKED_AT_S: f64 = 4.5;
     let keys = vec![(ASKED_AT_S, b"r".to_vec())];
-    let scenario = Scenario { sensor: Some(sensor(1)), keys, seconds: 6.0, ..Scenario::default() };
+    let scenario = Scenario { sensor: Some(sensor(1)), keys, seconds: 7.0, ..Scenario::default() };
     let Outcome { sensor, received, complaints, .. } = run(image(), scenario);
     let sensor = sensor.expect("the sensor hangs on the bus");
     assert_eq!(complaints, [""; 0], "the emulator has nothing to complain about");

@@ -21,7 +21,7 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
 
 #[test]
 fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
-    const SECONDS: f64 = 10.0;
+    const SECONDS: f64 = 20.0;
     let outcome = run(sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
     println!("{} instructions in {SECONDS} s; {}", outcome.instructions, outcome.complaints);
     let (bursts, part) = (&outcome.bursts, &outcome.part);
