@@ -14,7 +14,7 @@ pub struct Sensitivity {
     pub value: f64,
     /// Such that the value ± 1.96 of it hold 95 %.
     pub error: f64,
-    /// Degrees of freedom behind it.
+    /// Degrees of freedom behind it; infinite where the error follows the normal distribution.
     pub freedom: f64,
 }
 
@@ -36,6 +36,9 @@ impl Sensitivity {
     pub fn sigmas(&self) -> f64 {
         let widening = student(NORMAL_975, self.freedom) / NORMAL_975;
         let ratio = abs(self.value) * widening / self.error;
+        if self.freedom.is_infinite() {
+            return ratio;
+        }
         sqrt(self.freedom * ln(1.0 + ratio * ratio / self.freedom)) / wallace(self.freedom)
     }
 }
@@ -43,10 +46,29 @@ impl Sensitivity {
 /// Student's t that is as rarely exceeded as a normal deviate, by Wallace's approximation (Ann. Math. Statist. 30,
 /// 1959): within 0.3 % at the 0.975 quantile from 3 degrees of freedom on.
 fn student(normal: f64, freedom: f64) -> f64 {
+    if freedom.is_infinite() {
+        return normal;
+    }
     let z = normal * wallace(freedom);
     sqrt(freedom * expm1(z * z / freedom))
 }
 
 fn wallace(freedom: f64) -> f64 {
     (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two-sided 5 % of Student's t, and of the normal distribution, from tables.
+    #[test]
+    fn bounds_and_significance_are_students() {
+        for (freedom, quantile) in [(3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (30.0, 2.042), (f64::INFINITY, 1.960)] {
+            let sensitivity = Sensitivity::new(0, quantile, 1.0, freedom);
+            assert!((sensitivity.error * NORMAL_975 / quantile - 1.0).abs() < 0.01, "{sensitivity:?}");
+            assert!((sensitivity.sigmas() / NORMAL_975 - 1.0).abs() < 0.01, "{sensitivity:?}");
+        }
+        assert!(Sensitivity::exact(0, 1.0).sigmas().is_infinite());
+    }
 }
