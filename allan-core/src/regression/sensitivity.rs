@@ -44,7 +44,7 @@ impl Sensitivity {
 }
 
 /// Student's t that is as rarely exceeded as a normal deviate, by Wallace's approximation (Ann. Math. Statist. 30,
-/// 1959): within 0.3 % at the 0.975 quantile from 3 degrees of freedom on.
+/// 1959): within 1.2 % at the 0.975 quantile from 3 degrees of freedom on.
 fn student(normal: f64, freedom: f64) -> f64 {
     if freedom.is_infinite() {
         return normal;
@@ -66,8 +66,8 @@ mod tests {
     fn bounds_and_significance_are_students() {
         for (freedom, quantile) in [(3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (30.0, 2.042), (f64::INFINITY, 1.960)] {
             let sensitivity = Sensitivity::new(0, quantile, 1.0, freedom);
-            assert!((sensitivity.error * NORMAL_975 / quantile - 1.0).abs() < 0.01, "{sensitivity:?}");
-            assert!((sensitivity.sigmas() / NORMAL_975 - 1.0).abs() < 0.01, "{sensitivity:?}");
+            assert!((sensitivity.error * NORMAL_975 / quantile - 1.0).abs() < 0.015, "{sensitivity:?}");
+            assert!((sensitivity.sigmas() / NORMAL_975 - 1.0).abs() < 0.015, "{sensitivity:?}");
         }
         assert!(Sensitivity::exact(0, 1.0).sigmas().is_infinite());
     }
