@@ -4,7 +4,7 @@
 //! coefficient that few degrees of freedom tell would also be claimed too well wherever it came out too small: its
 //! bounds are the values under which the estimate lies at the end of *their* scatter (test inversion), not of its own.
 
-use super::least_squares::{Matrix, Vector, solve_in_place};
+use super::least_squares::{Matrix, Vector, dot, solve_in_place};
 use super::parameter::Parameter;
 use super::points::Points;
 use super::problem::{MAX_PARAMETERS, Problem};
@@ -112,13 +112,11 @@ fn direction<const POINTS: usize>(
     let mut information: Matrix<MAX_PARAMETERS> = [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS];
     for (at, (weight, point)) in weights.iter_mut().zip(&points.measured).enumerate() {
         *weight = sqrt(point.edf / 2.0) / problem.modelled(at, &problem.squares);
-        for (i, row) in information.iter_mut().enumerate().take(parameters) {
-            let weighted = *weight * *weight * problem.columns[i][at];
-            row.iter_mut()
-                .zip(&problem.columns)
-                .take(i + 1)
-                .for_each(|(entry, column)| *entry += weighted * column[at]);
-        }
+    }
+    for (i, row) in information.iter_mut().enumerate().take(parameters) {
+        let mut weighted = problem.columns[i];
+        weighted.iter_mut().zip(weights.iter()).for_each(|(entry, weight)| *entry *= weight * weight);
+        row.iter_mut().zip(&problem.columns).take(i + 1).for_each(|(entry, column)| *entry = dot(&weighted, column));
     }
     let mut direction = [0.0; MAX_PARAMETERS];
     direction[column] = 1.0;

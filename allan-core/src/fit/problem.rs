@@ -1,6 +1,6 @@
 //! The likelihood of a curve under terms of given shapes, and the coefficients that make it largest.
 
-use super::least_squares::{Matrix, Vector, non_negative};
+use super::least_squares::{Matrix, Vector, dot, non_negative};
 use super::points::{Measured, Points};
 use crate::model::{MAX_TERMS, Model, Term};
 use crate::{Curve, Kind, math};
@@ -145,17 +145,16 @@ impl<const POINTS: usize> Problem<POINTS> {
         let mut normal: Matrix<MAX_TERMS> = [[0.0; MAX_TERMS]; MAX_TERMS];
         let mut right = [0.0; MAX_TERMS];
         let terms = self.kinds.len();
-        for (at, point) in points.measured.iter().enumerate() {
+        let mut weights = [0.0; POINTS];
+        for (at, (weight, point)) in weights.iter_mut().zip(&points.measured).enumerate() {
             let variance = squares.map_or(point.avar, |squares| self.modelled(at, squares));
-            let weight = point.edf / 2.0 / (variance * variance);
-            for (i, (row, right)) in normal.iter_mut().zip(&mut right).enumerate().take(terms) {
-                let weighted = weight * self.columns[i][at];
-                *right += weighted * point.avar;
-                row.iter_mut()
-                    .zip(&self.columns)
-                    .take(terms)
-                    .for_each(|(entry, column)| *entry += weighted * column[at]);
-            }
+            *weight = point.edf / 2.0 / (variance * variance);
+        }
+        for (i, (row, right)) in normal.iter_mut().zip(&mut right).enumerate().take(terms) {
+            let mut weighted = self.columns[i];
+            weighted.iter_mut().zip(&weights).for_each(|(entry, weight)| *entry *= weight);
+            *right = weighted.iter().zip(&points.measured).map(|(weighted, point)| weighted * point.avar).sum();
+            row.iter_mut().zip(&self.columns).take(terms).for_each(|(entry, column)| *entry = dot(&weighted, column));
         }
         non_negative(&normal, &right, terms)
     }

@@ -32,33 +32,36 @@ pub struct Resonance {
 /// Below this `|λ·n|` the power series is the better one.
 const SLOW: f64 = 0.03;
 
-impl Process for Markov {
-    fn structure(&self, m: f64, sample_period: f64) -> f64 {
-        structure(self.rate(sample_period), m)
+/// What decays as `Re exp(−λ·|j|)` from one sample to the next.
+trait Decaying {
+    /// λ: decay and angle a sample.
+    fn rate(&self, sample_period: f64) -> Complex;
+
+    /// The shortest record, in s, that can tell the process from its neighbours.
+    fn record_needed(&self) -> f64;
+}
+
+impl Decaying for Markov {
+    fn rate(&self, sample_period: f64) -> Complex {
+        Complex { re: sample_period / self.time_constant, im: 0.0 }
     }
 
-    fn density(&self, frequency: f64, sample_period: f64) -> f64 {
-        line(self.rate(sample_period).re, 2.0 * PI * frequency * sample_period) * sample_period
-    }
-
-    fn record_needed(&self, _sample_period: f64) -> f64 {
+    fn record_needed(&self) -> f64 {
         20.0 * self.time_constant
-    }
-
-    fn avar(&self, n: u64, sample_period: f64) -> f64 {
-        avar(self.rate(sample_period), n as f64)
-    }
-
-    fn covariance(&self, lag: f64, n: u64, sample_period: f64) -> f64 {
-        covariance(self.rate(sample_period), lag, n as f64)
-    }
-
-    fn memory_beyond(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
-        memory_beyond(self.rate(sample_period), n as f64, stride)
     }
 }
 
-impl Process for Resonance {
+impl Decaying for Resonance {
+    fn rate(&self, sample_period: f64) -> Complex {
+        Complex { re: PI * self.bandwidth * sample_period, im: 2.0 * PI * self.frequency * sample_period }
+    }
+
+    fn record_needed(&self) -> f64 {
+        10.0 / self.bandwidth
+    }
+}
+
+impl<T: Decaying> Process for T {
     fn structure(&self, m: f64, sample_period: f64) -> f64 {
         structure(self.rate(sample_period), m)
     }
@@ -70,7 +73,7 @@ impl Process for Resonance {
     }
 
     fn record_needed(&self, _sample_period: f64) -> f64 {
-        10.0 / self.bandwidth
+        Decaying::record_needed(self)
     }
 
     fn avar(&self, n: u64, sample_period: f64) -> f64 {
@@ -83,18 +86,6 @@ impl Process for Resonance {
 
     fn memory_beyond(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
         memory_beyond(self.rate(sample_period), n as f64, stride)
-    }
-}
-
-impl Markov {
-    fn rate(&self, sample_period: f64) -> Complex {
-        Complex { re: sample_period / self.time_constant, im: 0.0 }
-    }
-}
-
-impl Resonance {
-    fn rate(&self, sample_period: f64) -> Complex {
-        Complex { re: PI * self.bandwidth * sample_period, im: 2.0 * PI * self.frequency * sample_period }
     }
 }
 
