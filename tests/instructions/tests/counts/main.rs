@@ -38,7 +38,7 @@ fn a_cortex_m4f() {
             ("gap_p8", 1_584.0),
             ("coupling_p8", 1_240.0),
             ("hadamard_p8", 1_146.0),
-            ("between_p8", 1_220.0),
+            ("between_p8", 1_290.0),
         ],
     );
 }
