@@ -31,7 +31,7 @@ const EDF_ROUNDS: usize = 4;
 /// A curve without points, or of a channel that never changed, gives coefficients of 0.
 #[must_use]
 pub fn fit<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
-    fit_free_shapes(curve, kinds, Free::Nothing)
+    fit_free_shapes(curve, kinds, Free::Nothing, &mut || true)
 }
 
 /// Whether `model`, which was fitted to `curve`, is enough to describe it.
@@ -56,12 +56,17 @@ pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model
 /// Fits the coefficients of `kinds` and also the shapes of those that have one, from the given ones on.
 #[must_use]
 pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
-    fit_free_shapes(curve, kinds, Free::AllBut(&[]))
+    fit_free_shapes(curve, kinds, Free::AllBut(&[]), &mut || true)
 }
 
 /// As [`fit_shapes`], of those that are `free`.
 #[inline(never)] // so that its stack is not everybody's
-pub(crate) fn fit_free_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind], free: Free) -> Model {
+pub(crate) fn fit_free_shapes<const POINTS: usize>(
+    curve: &Curve<POINTS>,
+    kinds: &[Kind],
+    free: Free,
+    keep_on: &mut dyn FnMut() -> bool,
+) -> Model {
     let (mut points, mut problem) = (Points::empty(), Problem::empty());
     points.take(curve);
     problem.take(&points, kinds);
@@ -69,7 +74,7 @@ pub(crate) fn fit_free_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds:
     problem.settle(&mut points, curve, if searched { 2 } else { EDF_ROUNDS });
     if searched {
         for _ in 0..2 {
-            shape::search(&points, &mut problem, free);
+            shape::search(&points, &mut problem, free, keep_on);
             problem.settle(&mut points, curve, 2);
         }
     }

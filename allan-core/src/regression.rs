@@ -149,7 +149,7 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         let count = chosen.len().min(MAX_COVARIATES);
         let mut normal: Matrix<MAX_COVARIATES> = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
         let mut right: Vector<MAX_COVARIATES> = [0.0; MAX_COVARIATES];
-        let mut told: Vec<Told, POINTS> = Vec::new();
+        let mut told: Vec<Told, COUPLED> = Vec::new();
         for point in rest.curve.points() {
             let Some(octave) = self.told(point, chosen, &rest.model) else { continue };
             for (i, row) in normal.iter_mut().enumerate().take(count) {
@@ -158,7 +158,7 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
                     *entry += octave.weight * signal;
                 }
             }
-            // As many as the curve has points.
+            // As many as the covariates have points.
             let _ = told.push(octave);
         }
         let value = solve(&normal, &right, (1 << count) - 1)?;
@@ -223,6 +223,10 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     }
 
     fn told(&self, point: &Point, chosen: &[usize], rest: &Model) -> Option<Told> {
+        let is_told = |&covariate: &usize| self.covariates[covariate].signal(point.n).is_some();
+        if !chosen.iter().any(is_told) {
+            return None;
+        }
         // What the model lacks is noise to the regression too.
         let variance = rest.avar(point.n).max(point.avar);
         if variance <= 0.0 {

@@ -96,7 +96,8 @@ pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace 
     }
 }
 
-/// The same, asking before every fit of a candidate whether to keep on; `None` if the answer was no.
+/// The same, asking before every fit of a candidate and every step of a search whether to keep on; `None` if the answer
+/// was no.
 ///
 /// For a microcontroller that has other things to do as well: `keep_on` can do them.
 #[must_use]
@@ -112,7 +113,8 @@ pub fn trace_while<const POINTS: usize>(
         let residual = largest_residual(curve, &after);
         // A filter that is read slowly has taken the place of the white noise.
         let term = if rival.kinds.len() == after.terms().len() { 0 } else { after.terms().len() };
-        after = fit_free_shapes(curve, &rival.kinds, search.free);
+        after = fit_free_shapes(curve, &rival.kinds, search.free, search.keep_on);
+        search.go_on().ok()?;
         // There is room: the loop ends when it is full.
         let _ = found.push(Found { term, score: rival.score(), residual });
         if found.len() > 1 {
@@ -158,7 +160,8 @@ impl Search<'_> {
             }
             // In the place of the old one.
             let _ = kinds.insert(known.term.min(kinds.len()), other);
-            let candidate = fit_free_shapes(curve, &kinds, self.free);
+            let candidate = fit_free_shapes(curve, &kinds, self.free, self.keep_on);
+            self.go_on()?;
             if deviance(curve, &candidate) < deviance(curve, &model) - CONVINCING {
                 model = candidate;
             }
@@ -188,7 +191,7 @@ impl Search<'_> {
             }
             let Some((_, best)) = best else { continue };
             self.go_on()?;
-            let rival = baseline.shaped_rival(&best, self.free);
+            let rival = baseline.shaped_rival(&best, self.free, self.keep_on);
             let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters() - 1);
             let gain = rival.gain(cost);
             if gain > 0.0 && most.as_ref().is_none_or(|(other, _)| gain.total_cmp(other).is_ge()) {

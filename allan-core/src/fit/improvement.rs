@@ -75,10 +75,10 @@ impl<const POINTS: usize> Baseline<POINTS> {
 
     /// Fits the coefficients of `kinds` and the shapes of those that are `free`.
     #[inline(never)]
-    pub(crate) fn shaped_rival(&self, kinds: &[Kind], free: Free) -> Rival {
+    pub(crate) fn shaped_rival(&self, kinds: &[Kind], free: Free, keep_on: &mut dyn FnMut() -> bool) -> Rival {
         let mut problem = Problem::empty();
         problem.take(&self.points, kinds);
-        shape::search(&self.points, &mut problem, free);
+        shape::search(&self.points, &mut problem, free, keep_on);
         let deviance = problem.minimise(&self.points);
         self.compared(&problem, deviance)
     }

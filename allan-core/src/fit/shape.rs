@@ -30,8 +30,15 @@ impl Free<'_> {
 }
 
 /// Moves the shapes of all terms that are free to where the deviance is least, at the present weights.
+///
+/// Stops where it is as soon as `keep_on`, which is asked before every step, says no.
 #[inline(never)]
-pub(super) fn search<const POINTS: usize>(points: &Points<POINTS>, problem: &mut Problem<POINTS>, free: Free) {
+pub(super) fn search<const POINTS: usize>(
+    points: &Points<POINTS>,
+    problem: &mut Problem<POINTS>,
+    free: Free,
+    keep_on: &mut dyn FnMut() -> bool,
+) {
     let mut deviance = problem.minimise(points);
     // Decided before any of them moves.
     let mut moving = [false; MAX_TERMS];
@@ -40,6 +47,9 @@ pub(super) fn search<const POINTS: usize>(points: &Points<POINTS>, problem: &mut
     for _ in 0..ROUNDS {
         for term in (0..problem.kinds.len()).filter(|&term| moving[term]) {
             for index in problem.kinds[term].freedom() {
+                if !keep_on() {
+                    return;
+                }
                 deviance = walk(points, problem, (term, index), &mut steps[term][index], deviance);
             }
         }
