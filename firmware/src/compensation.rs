@@ -41,7 +41,7 @@ pub type Causes = Vec<Followed, MAX_CAUSES>;
 pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMut() -> bool) -> Option<Causes> {
     let Some(couplings) = epoch.couplings() else { return Some(Causes::new()) };
     let mut members: Members = causes(index).collect();
-    let channel = coupled(epoch, index, config);
+    let channel = epoch.curve(index, config);
     let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
     for &member in &members {
         if !keep_on() {
@@ -50,12 +50,13 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
         // There is room for as many as there are members.
         let _ = covariates.push(covariate(epoch, member, config));
     }
+    let mut shared = AllShared::default();
     let followed = loop {
-        let (with_channel, mutual) = shared(couplings, index, &members, config);
-        let beside =
-            Beside { channel: &channel, covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
+        shared.fill(couplings, index, &members, config);
+        let AllShared { with_channel, mutual } = &shared;
+        let beside = Beside { channel: &channel, covariates: &covariates, with_channel, mutual };
         let followed = beside.followed_while(keep_on)?;
-        let harm = || harms(epoch, (index, &channel), &members, config, &followed, &beside.subtracted(&followed));
+        let harm = || harms(epoch, &members, config, &followed, (&channel, &beside.subtracted(&followed)));
         // The least clear of them is told last.
         let Some(worst) = followed.last().filter(|_| harm()) else { break followed };
         members.remove(worst.covariate);
@@ -84,11 +85,13 @@ pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Follow
     for &member in &members {
         let _ = covariates.push(Covariate::as_measured(coupled(epoch, member, config)));
     }
-    let (with_channel, mutual) = shared(epoch.couplings()?, index, &members, config);
+    let mut shared = AllShared::default();
+    shared.fill(epoch.couplings()?, index, &members, config);
+    let AllShared { with_channel, mutual } = &shared;
     let known = |(covariate, followed): (usize, &Followed)| Sensitivity::exact(covariate, followed.value);
     let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(known).collect();
     let channel = &epoch.curve(index, config);
-    let beside = Beside { channel, covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
+    let beside = Beside { channel, covariates: &covariates, with_channel, mutual };
     Some(beside.subtracted(&sensitivities))
 }
 
@@ -118,12 +121,26 @@ fn causes(index: usize) -> impl Iterator<Item = usize> {
 type Members = Vec<usize, MAX_CAUSES>;
 
 /// What a channel has in common with each of its causes, and what they have with each other.
-type AllShared = (Vec<Shared<COUPLED>, MAX_CAUSES>, Vec<Shared<COUPLED>, { MAX_CAUSES * (MAX_CAUSES - 1) / 2 }>);
+#[derive(Default)]
+struct AllShared {
+    with_channel: Vec<Shared<COUPLED>, MAX_CAUSES>,
+    mutual: Vec<Shared<COUPLED>, { MAX_CAUSES * (MAX_CAUSES - 1) / 2 }>,
+}
 
-fn shared(couplings: &Couplings, index: usize, members: &Members, config: Config) -> AllShared {
-    let shared = |a: usize, b: usize| couplings.shared(a, b, (lsb(a, config), lsb(b, config)));
-    let pairs = members.iter().enumerate().flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
-    (members.iter().map(|&member| shared(index, member)).collect(), pairs.map(|(a, b)| shared(a, b)).collect())
+impl AllShared {
+    #[inline(never)] // in place, for want of stack
+    fn fill(&mut self, couplings: &Couplings, index: usize, members: &Members, config: Config) {
+        let shared = |a: usize, b: usize| couplings.shared(a, b, (lsb(a, config), lsb(b, config)));
+        self.with_channel.clear();
+        self.mutual.clear();
+        for (i, &member) in members.iter().enumerate() {
+            // There is room for as many as there are members, and for their pairs.
+            let _ = self.with_channel.push(shared(index, member));
+            for &other in &members[..i] {
+                let _ = self.mutual.push(shared(member, other));
+            }
+        }
+    }
 }
 
 /// The curve of [`CHANNELS`]`[index]` where it is coupled.
@@ -148,21 +165,20 @@ fn lsb(index: usize, config: Config) -> f64 {
 #[inline(never)]
 fn harms(
     epoch: &Epoch,
-    (index, channel): (usize, &Curve<COUPLED>),
     members: &Members,
     config: Config,
     followed: &[Sensitivity],
-    subtracted: &Curve<COUPLED>,
+    (raw, subtracted): (&Curve<OCTAVES>, &Curve<OCTAVES>),
 ) -> bool {
-    let worse = |raw: &Point, other: f64| other > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf));
-    let mut added = [0.0; FIRST];
+    let mut added = [0.0; OCTAVES];
     for sensitivity in followed {
         let covariate = epoch.curve(members[sensitivity.covariate], config);
-        for (added, point) in added.iter_mut().zip(covariate.points()) {
+        for (added, point) in added.iter_mut().zip(covariate.points()).take(FIRST) {
             *added += sensitivity.value * sensitivity.value * point.avar;
         }
     }
-    let whole = epoch.curve(index, config);
-    whole.points().iter().zip(added).any(|(raw, added)| worse(raw, raw.avar + added))
-        || channel.points().iter().zip(subtracted.points()).any(|(raw, subtracted)| worse(raw, subtracted.avar))
+    let worse = |((raw, subtracted), added): ((&Point, &Point), f64)| {
+        subtracted.avar + added > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf))
+    };
+    raw.points().iter().zip(subtracted.points()).zip(added).any(worse)
 }

@@ -28,29 +28,30 @@ const _: () = assert!(MAX_ADDED == link::MAX_EFFECTS);
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lesson {
     /// N, B and K of the stream itself.
-    declared: Coefficients,
+    declared: Option<Declared>,
     /// The traced model of the compensated stream.
-    traced: Coefficients,
+    traced: Vec<(Kind, f64), MAX_TERMS>,
     /// What is subtracted.
     pub causes: Causes,
 }
 
-type Coefficients = Vec<(Kind, f64), MAX_TERMS>;
+type Declared = [f64; Kind::DECLARED.len()];
 
 impl Lesson {
     /// Before anything was learnt.
-    pub const NOTHING: Self = Self { declared: Vec::new(), traced: Vec::new(), causes: Vec::new() };
+    pub const NOTHING: Self = Self { declared: None, traced: Vec::new(), causes: Vec::new() };
 
     /// N, B and K of the stream itself; `None` before anything was learnt.
     #[must_use]
     pub fn declared(&self, config: Config) -> Option<Model> {
-        model(&self.declared, config)
+        let terms = Kind::DECLARED.into_iter().zip(self.declared?);
+        Some(model(terms, config))
     }
 
     /// Every term of the compensated stream.
     #[must_use]
     pub fn traced(&self, config: Config) -> Option<Model> {
-        model(&self.traced, config)
+        (!self.traced.is_empty()).then(|| model(self.traced.iter().copied(), config))
     }
 
     /// The terms beyond N, B and K.
@@ -59,13 +60,14 @@ impl Lesson {
     }
 }
 
-fn coefficients(model: &Model) -> Coefficients {
-    model.terms().iter().map(|term| (term.kind, term.value)).collect()
+fn model(terms: impl Iterator<Item = (Kind, f64)>, config: Config) -> Model {
+    Model::new(1.0 / config.sample_period().hz(), terms.map(|(kind, value)| Term::exact(kind, value)))
 }
 
-fn model(coefficients: &Coefficients, config: Config) -> Option<Model> {
-    let terms = coefficients.iter().map(|&(kind, value)| Term::exact(kind, value));
-    (!coefficients.is_empty()).then(|| Model::new(1.0 / config.sample_period().hz(), terms))
+/// The coefficients of a model of the declared terms.
+fn declared(model: &Model) -> Option<Declared> {
+    let mut values = model.terms().iter().map(|term| term.value);
+    Some([values.next()?, values.next()?, values.next()?])
 }
 
 /// Learns from an epoch what the inertial channel [`CHANNELS`]`[index]` follows, and what N, B and K lack in the rest.
@@ -83,7 +85,7 @@ pub fn study(
     let causes = learn(epoch, index, config, keep_on)?;
     let curve = compensated(epoch, index, config, &causes).unwrap_or_else(|| epoch.curve(index, config));
     let trace = traced(&curve, keep_on)?;
-    let declared = if causes.is_empty() { coefficients(&trace.before) } else { declared(&epoch.curve(index, config)) };
+    let declared = if causes.is_empty() { declared(&trace.before) } else { refitted(&epoch.curve(index, config)) };
     let learnt = Learnt {
         channel: CHANNELS[index] as u8,
         epoch: epoch.number,
@@ -92,7 +94,8 @@ pub fn study(
         p_before: trace.before_goodness.p_value,
         p_after: trace.after_goodness.p_value,
     };
-    Some((Lesson { declared, traced: coefficients(&trace.after), causes }, learnt))
+    let traced = trace.after.terms().iter().map(|term| (term.kind, term.value)).collect();
+    Some((Lesson { declared, traced, causes }, learnt))
 }
 
 #[inline(never)]
@@ -105,8 +108,8 @@ fn traced(curve: &Curve<OCTAVES>, keep_on: &mut dyn FnMut() -> bool) -> Option<T
 }
 
 #[inline(never)]
-fn declared(curve: &Curve<OCTAVES>) -> Coefficients {
-    coefficients(&fit(curve, &Kind::DECLARED))
+fn refitted(curve: &Curve<OCTAVES>) -> Option<Declared> {
+    declared(&fit(curve, &Kind::DECLARED))
 }
 
 /// What an epoch says to a lesson of the one before; `means` are that one's. `None` if there was no lesson, or if the epoch

@@ -2,6 +2,7 @@
 
 mod bench;
 mod build;
+mod compensation;
 mod crash;
 mod decoded;
 mod exti;

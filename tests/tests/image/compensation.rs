@@ -1,0 +1,166 @@
+//! The loop on the device: an epoch teaches, what was learnt is subtracted, and the next epoch shows what that was worth.
+
+use crate::bench::{Outcome, Scenario, run};
+use crate::decoded::Decoded;
+use crate::sensor::Sensor;
+use crate::{SCK_HZ, image};
+use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
+use firmware::lesson::{Lesson, check, study};
+use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Statistics};
+use host_sim::sensor::effect::surroundings::TemperatureCourse;
+use host_sim::sensor::{Effect, Hidden, NoiseModel, Surroundings, VirtualAdis16405};
+use link::{Checked, Decoder, Drift, Learnt, Message, Received, Term};
+
+const EPOCH_S: f64 = 60.0;
+const RATE_HZ: f64 = 204.8;
+/// deg/s/°C of gyro x.
+const SENSITIVITY: f64 = 0.05;
+/// Of the line on gyro z.
+const LINE_HZ: f64 = 20.5;
+
+/// A part that warms up by 8 °C in a room that is heated in turns of 50 s; its gyro x follows if `effects` say so.
+fn part(effects: Vec<Effect>) -> Sensor {
+    let temperature = TemperatureCourse { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 50.0 };
+    let surroundings = Surroundings { temperature, ..Surroundings::default() };
+    let hidden = Hidden { surroundings, effects };
+    Sensor::new(VirtualAdis16405::hiding(&hidden, NoiseModel::paper(), 1), SCK_HZ)
+}
+
+/// What two epochs have brought.
+struct Heard {
+    /// From the first, by channel.
+    learnt: Vec<Learnt>,
+    /// What the second says to it.
+    checked: Vec<Checked>,
+    /// Seconds that the first took to teach, and that a key press waited meanwhile.
+    taught_s: f64,
+    waited_s: f64,
+}
+
+fn two_epochs(effects: Vec<Effect>) -> Heard {
+    const PRESSED_S: f64 = EPOCH_S + 5.0;
+    let keys = vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (PRESSED_S, b"v".to_vec())];
+    let scenario = Scenario { sensor: Some(part(effects)), keys, seconds: 2.0 * EPOCH_S + 5.0, ..Scenario::default() };
+    let Outcome { sensor, received, complaints, .. } = run(image(), scenario);
+    assert_eq!(complaints, [""; 0]);
+    let sensor = sensor.expect("the sensor hangs on the bus");
+    assert_eq!(sensor.part.violations(), []);
+    let decoded = Decoded::of(&received);
+    assert_eq!((decoded.counters.missing, decoded.counters.bad_frames), (0, 0), "{:?}", decoded.counters);
+
+    // Nothing was lost while the first epoch taught, and every sample is in one epoch or the other.
+    let health = **decoded.healths().first().expect("the first epoch's report");
+    assert_eq!((health.used, health.queue_full, health.lost_edges), (health.bursts, 0, 0), "{health:?}");
+    assert!(health.stack_bytes + crate::INTERRUPTS_STACK < health.stack_size, "{health:?}");
+    println!("stack {} of {} B", health.stack_bytes, health.stack_size);
+    let samples: Vec<u64> = decoded.channels().iter().map(|report| report.samples).collect();
+    let samples = &samples[..2 * CHANNELS.len()];
+
+    let (mut learnt, mut checked) = (Vec::new(), Vec::new());
+    for message in &decoded.messages {
+        match message {
+            Message::Learnt(message) if message.epoch == 0 => learnt.push(message.clone()),
+            Message::Checked(message) => checked.push(message.clone()),
+            _ => {}
+        }
+    }
+    assert_eq!(
+        (&learnt, &checked),
+        (&on_host(&sensor.bursts, samples).0, &on_host(&sensor.bursts, samples).1),
+        "bit for bit"
+    );
+    let first = |wanted: fn(&Received) -> bool| {
+        let mut decoder = Decoder::new();
+        let found = received.iter().find(|(_, byte)| decoder.push(*byte).is_some_and(|received| wanted(&received)));
+        found.expect("was received").0 as f64 * 1e-9
+    };
+    let taught = first(|received| matches!(received, Received::Message { message: Message::Health(_), .. }));
+    let answered = first(|received| matches!(received, Received::Line(line) if line.contains("observatory")));
+    Heard { learnt, checked, taught_s: taught - EPOCH_S, waited_s: answered - PRESSED_S }
+}
+
+/// The same from the bursts that the sensor sent; `samples` of both epochs, channel by channel.
+fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learnt>, Vec<Checked>) {
+    assert_eq!(FIRST_CONFIG.sample_period(), SamplePeriod::nearest(RATE_HZ).expect("a rate"));
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
+    let at_us = |sample: u64| (sample as f64 * 1e6 / RATE_HZ) as u64;
+    estimators.trust(at_us(bursts[0].0));
+    let mut bursts = bursts.iter();
+    let mut epochs = Vec::new();
+    for (number, samples) in (0..).zip(samples.chunks(CHANNELS.len())) {
+        assert!(
+            samples.iter().all(|other| *other == samples[0]),
+            "all channels of an epoch have taken the same samples"
+        );
+        for (sample, bytes) in bursts.by_ref().take(samples[0] as usize) {
+            let arrival = Arrival { at_us: at_us(*sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) };
+            estimators.take(arrival, 0);
+        }
+        let mut epoch = Epoch::EMPTY;
+        epoch.number = number;
+        estimators.finish_epoch(&mut epoch);
+        epochs.push(epoch);
+    }
+    let [first, second] = &epochs[..] else { panic!("two epochs") };
+    let couplings = first.couplings().expect("no restart");
+    let means = core::array::from_fn(|index| couplings.mean(index));
+    let taught: Vec<(Lesson, Learnt)> =
+        (0..6).map(|index| study(first, index, FIRST_CONFIG, &mut || true).expect("nobody says no")).collect();
+    let checked =
+        |(index, (lesson, _)): (usize, &(Lesson, Learnt))| check(lesson, Some(&means), second, index, FIRST_CONFIG);
+    let checked = taught.iter().enumerate().filter_map(checked).collect();
+    (taught.into_iter().map(|(_, learnt)| learnt).collect(), checked)
+}
+
+#[test]
+fn a_hidden_temperature_effect_is_learnt_and_subtracted() {
+    let Heard { learnt, checked, taught_s, waited_s } = two_epochs(vec![
+        Effect::Temperature { channel: Channel::GyroX, sensitivity: SENSITIVITY },
+        Effect::Sinusoid { channel: Channel::GyroZ, frequency_hz: LINE_HZ, amplitude: 0.4, phase_rad: 0.0 },
+    ]);
+    println!("an epoch taught for {taught_s:.1} s; a key press waited {waited_s:.2} s meanwhile");
+    assert!(waited_s < 2.0, "an answer after {waited_s} s");
+    for (learnt, checked) in learnt.iter().zip(&checked) {
+        let gyro_x = learnt.channel == Channel::GyroX as u8;
+        let causes: Vec<u8> = learnt.causes.iter().map(|cause| cause.covariate).collect();
+        assert_eq!(causes, if gyro_x { vec![Channel::Temp as u8] } else { vec![] }, "{learnt:?}");
+        let same = checked.drift.iter().all(|drift| drift.raw == drift.compensated);
+        assert_eq!(same, !gyro_x, "{checked:?}");
+    }
+
+    let cause = learnt[0].causes[0];
+    assert!((cause.low..=cause.high).contains(&SENSITIVITY), "{cause:?}");
+    println!(
+        "gyro x follows temp: {:.4} ({:.4} to {:.4}) deg/s/degC, truth {SENSITIVITY}",
+        cause.value, cause.low, cause.high
+    );
+    for Drift { n, raw, compensated } in &checked[0].drift {
+        println!("unseen, at {:5.1} s: {raw:.4} -> {compensated:.4} deg/s", *n as f64 / RATE_HZ);
+    }
+    // A cycle of amplitude A and period T has σ = A·sin²(πτ/T)/(πτ/T): 0.082 deg/s at 10 s. The noise of the gyro has
+    // √(0.0368²/10 + (0.664·0.0093)² + 0.0013²·10/3) = 0.0134, half as much again at its worst (5 degrees of freedom), and
+    // the interval of the sensitivity, 17 % of it, leaves 0.014: together less than 0.025.
+    let ten = checked[0].drift.iter().find(|drift| drift.n == 2048).expect("10 s of 60");
+    assert!((ten.raw / 0.082 - 1.0).abs() < 0.25, "{ten:?}");
+    assert!(ten.compensated < 0.025 && ten.raw > 3.0 * ten.compensated, "{ten:?}");
+
+    // The line on gyro z is no cause that could be subtracted; the model has it.
+    let [line, ..] = &learnt[2].effects[..] else { panic!("{:?}", learnt[2]) };
+    assert!(matches!(line.coefficient.term, Term::Sinusoid | Term::Resonance), "{line:?}");
+    assert!((line.shape[0].value / LINE_HZ - 1.0).abs() < 0.1, "octaves place a line to ten percent: {line:?}");
+    let (before, after) = (checked[2].before.expect("a model"), checked[2].after.expect("a model"));
+    println!("gyro z, unseen: deviance per point {:.1} -> {:.2}", before.deviance_per_point, after.deviance_per_point);
+    assert!(before.deviance_per_point > 10.0 && after.deviance_per_point < 5.0, "{before:?}, {after:?}");
+}
+
+#[test]
+fn where_nothing_is_hidden_nothing_is_subtracted() {
+    let Heard { learnt, checked, .. } = two_epochs(vec![]);
+    assert_eq!((learnt.len(), checked.len()), (6, 6));
+    assert!(learnt.iter().all(|learnt| learnt.causes.is_empty()), "{learnt:?}");
+    assert!(
+        checked.iter().flat_map(|checked| &checked.drift).all(|drift| drift.raw == drift.compensated),
+        "{checked:?}"
+    );
+}
