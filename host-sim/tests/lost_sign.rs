@@ -13,7 +13,7 @@ fn health(part: VirtualAdis16405) -> Health {
     let mut decoder = Decoder::new();
     let messages = device.run_until(11_000_000).into_iter().filter_map(move |byte| decoder.push(byte)?.message());
     let health = messages.filter_map(|message| if let Message::Health(health) = message { Some(health) } else { None });
-    health.last().expect("a report after 10 s")
+    health.reduce(|_, later| later).expect("a report after 10 s")
 }
 
 #[test]
