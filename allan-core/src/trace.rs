@@ -90,24 +90,26 @@ impl<'a> Lines<'a> {
 /// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
 #[must_use]
 pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
-    match trace_while(curve, lines, &mut || true) {
+    let declared = Trace::declared(curve);
+    match trace_while(declared.clone(), curve, lines, &mut || true) {
         Some(trace) => trace,
-        None => Trace::declared(curve), // nobody said no
+        None => declared, // nobody said no
     }
 }
 
-/// The same, asking before every fit of a candidate and every step of a search whether to keep on; `None` if the answer
-/// was no.
+/// The same from the curve's [`Trace::declared`] on, asking before every fit of a candidate and every step of a search
+/// whether to keep on; `None` if the answer was no.
 ///
 /// For a microcontroller that has other things to do as well: `keep_on` can do them.
 #[must_use]
 pub fn trace_while<const POINTS: usize>(
+    declared: Trace,
     curve: &Curve<POINTS>,
     lines: Lines,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> Option<Trace> {
     let mut search = Search { families: Families::new(curve, lines), free: lines.free(), keep_on };
-    let Trace { before, before_goodness, mut after, mut found, .. } = Trace::declared(curve);
+    let Trace { before, before_goodness, mut after, mut found, .. } = declared;
     while after.terms().len() < MAX_TERMS && !found.is_full() {
         let Some(rival) = search.most_telling(curve, &after).ok()? else { break };
         let residual = largest_residual(curve, &after);

@@ -44,19 +44,13 @@ impl Lesson {
     /// N, B and K of the stream itself; `None` before anything was learnt.
     #[must_use]
     pub fn declared(&self, config: Config) -> Option<Model> {
-        let terms = Kind::DECLARED.into_iter().zip(self.declared?);
-        Some(model(terms, config))
+        Some(model(Kind::DECLARED.into_iter().zip(self.declared?), config))
     }
 
     /// Every term of the compensated stream.
     #[must_use]
     pub fn traced(&self, config: Config) -> Option<Model> {
         (!self.traced.is_empty()).then(|| model(self.traced.iter().copied(), config))
-    }
-
-    /// The terms beyond N, B and K.
-    pub fn effects(&self) -> impl Iterator<Item = (Kind, f64)> {
-        self.traced.iter().copied().filter(|(kind, _)| !Kind::DECLARED.contains(kind))
     }
 }
 
@@ -104,7 +98,7 @@ fn traced(curve: &Curve<OCTAVES>, keep_on: &mut dyn FnMut() -> bool) -> Option<T
     if declared.before_goodness.p_value > ENOUGH {
         return Some(declared);
     }
-    trace_while(curve, Lines::InTheCurve, keep_on)
+    trace_while(declared, curve, Lines::InTheCurve, keep_on)
 }
 
 #[inline(never)]

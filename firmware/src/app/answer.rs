@@ -127,9 +127,8 @@ impl App {
     fn cause_line(&self, index: usize, cause: usize) -> Option<Line> {
         let followed = self.school.lessons[index].causes.get(cause)?;
         let (value, error) = (Short(followed.value), Short(followed.error));
-        let (channel, cause) = (CHANNELS[index], CHANNELS[followed.cause]);
-        let (unit, of) = (channel.unit(), cause.unit());
-        Some(line(format_args!("{} follows {}: {value} +- {error} {unit}/{of}", channel.name(), cause.name())))
+        let (name, cause) = (CHANNELS[index].name(), CHANNELS[followed.cause].name());
+        Some(line(format_args!("{name} follows {cause}: {value} +- {error}")))
     }
 
     /// What the last epoch said to what was learnt before it.
