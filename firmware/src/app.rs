@@ -7,7 +7,7 @@ mod report;
 use crate::board::Board;
 use crate::command::{Command, Mistake, Parser};
 use crate::epoch::Epoch;
-use crate::estimators::{CHANNELS, Estimator};
+use crate::estimators::CHANNELS;
 use crate::last_words::line;
 use crate::retained::{Retained, Settings};
 use crate::sensor::{Identity, auto_null, bring_up};
@@ -17,7 +17,7 @@ use core::fmt::Arguments;
 use epoch::School;
 use heapless::Deque;
 use link::{Boot, Line, Message};
-use report::Report;
+use report::{Report, copy_of};
 
 /// What a board knows when it starts the application.
 pub struct Start {
@@ -393,12 +393,6 @@ impl App {
     fn epoch_age_s(&self, now_us: u64) -> u64 {
         (now_us - self.epoch_began_us) / 1_000_000
     }
-}
-
-/// The estimator of [`CHANNELS`]`[index]` as it stands. Not inlined, and to be borrowed: then the stack holds it once.
-#[inline(never)]
-fn copy_of(board: &mut impl Board, index: usize) -> Option<Estimator> {
-    board.estimators(|estimators| estimators.get(index).cloned())
 }
 
 fn interval_us(settings: Settings) -> u64 {

@@ -1,7 +1,8 @@
 //! Answers for a person: lines of text, made one at a time.
 
 use super::epoch::{INERTIAL, Verdict};
-use super::{App, Sensor, copy_of};
+use super::report::copy_of;
+use super::{App, Sensor};
 use crate::board::Board;
 use crate::command::HELP;
 use crate::estimators::CHANNELS;

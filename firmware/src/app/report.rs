@@ -1,7 +1,7 @@
 //! A report in frames: who speaks, every channel, health. Made one message at a time.
 
 use super::epoch::INERTIAL;
-use super::{App, Sensor, copy_of};
+use super::{App, Sensor};
 use crate::board::Board;
 use crate::estimators::{CHANNELS, Estimator};
 use crate::summary::{channel_model, channel_report};
@@ -78,6 +78,12 @@ impl Report {
     pub(super) fn is_closing(&self) -> bool {
         self.closing
     }
+}
+
+/// The estimator of [`CHANNELS`]`[index]` as it stands. Not inlined, and to be borrowed: then the stack holds it once.
+#[inline(never)]
+pub(super) fn copy_of(board: &mut impl Board, index: usize) -> Option<Estimator> {
+    board.estimators(|estimators| estimators.get(index).cloned())
 }
 
 impl App {
