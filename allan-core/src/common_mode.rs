@@ -2,7 +2,7 @@
 
 use crate::confidence::octave_correlation;
 use crate::coupling::Covariance;
-use crate::math::{abs, sqrt};
+use crate::math::{abs, atanh, sqrt};
 use crate::regression::Shared;
 use crate::term::{Kind, Markov};
 use crate::{Curve, Model};
@@ -12,6 +12,11 @@ use heapless::Vec;
 const DOUBT: f64 = 5.0;
 /// Averaging factors below this are not what is slow: neighbouring channels share noise of their common electronics.
 const SLOW: u64 = 32;
+
+/// Degrees of freedom above which Fisher's transform of a correlation is normal enough.
+const FEWEST_TRANSFORMED: f64 = 4.0;
+/// Correlations beyond this are taken for it.
+const CLOSEST: f64 = 0.999;
 
 /// What two channels share.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +36,7 @@ pub struct CommonMode {
 /// One octave of the two.
 struct Octave {
     n: u64,
-    /// Correlation of the two channels times the root of the degrees of freedom: of variance 1 if they share nothing.
+    /// How clearly the two channels correlate: of variance 1 if they share nothing.
     score: f64,
     covariance: f64,
     /// Standard deviation of the covariance if they share nothing.
@@ -54,7 +59,7 @@ pub fn common_mode<const POINTS: usize>(
         let error = sqrt(variance / edf);
         (error > 0.0).then_some(Octave {
             n: point.n,
-            score: covariance.covariance / error,
+            score: clarity(covariance.covariance / sqrt(variance), edf),
             covariance: covariance.covariance,
             error,
             shares: model_a.shares(point.n),
@@ -68,6 +73,16 @@ pub fn common_mode<const POINTS: usize>(
     let (time_constant, variance, error) = as_markov(&octaves[from..], a.sample_period())?;
     let deviation = sqrt(abs(variance));
     Some(CommonMode { from_n: octaves[from].n, sigmas, deviation, error: error / (2.0 * deviation), time_constant })
+}
+
+/// A correlation over its scatter if there is none: by R. A. Fisher's transform, without which a correlation near 1 of
+/// few degrees of freedom counts for far too little.
+fn clarity(correlation: f64, edf: f64) -> f64 {
+    if edf > FEWEST_TRANSFORMED {
+        atanh(correlation.clamp(-CLOSEST, CLOSEST)) * sqrt(edf - 2.0)
+    } else {
+        correlation * sqrt(edf)
+    }
 }
 
 /// The run of octaves up to the longest that is least like chance.

@@ -57,6 +57,10 @@ pub(crate) fn expm1(x: f64) -> f64 {
     libm::expm1(x)
 }
 
+pub(crate) fn atanh(x: f64) -> f64 {
+    libm::atanh(x)
+}
+
 pub(crate) fn sin(x: f64) -> f64 {
     libm::sin(x)
 }

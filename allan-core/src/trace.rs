@@ -211,15 +211,15 @@ impl Search<'_> {
 /// The model with one term more; `None` where it has one that would be the same.
 fn with(kinds: &[Kind], candidate: &Kind) -> Option<Vec<Kind, MAX_TERMS>> {
     let mut with: Vec<Kind, MAX_TERMS> = kinds.iter().copied().collect();
+    let is_filter = |kind: &Kind| matches!(kind, Kind::Filtered(_));
+    if kinds.contains(candidate) || (is_filter(candidate) && kinds.iter().any(is_filter)) {
+        return None;
+    }
     // Read slowly, what is left of a filter cannot be told from a mixture with white noise: it takes its place.
     if matches!(candidate, Kind::Filtered(filter) if filter.decimation != 1.0) {
         let white = with.iter_mut().find(|kind| **kind == Kind::AngleRandomWalk)?;
         *white = *candidate;
         return Some(with);
-    }
-    let is_filter = |kind: &Kind| matches!(kind, Kind::Filtered(_));
-    if kinds.contains(candidate) || (is_filter(candidate) && kinds.iter().any(is_filter)) {
-        return None;
     }
     with.push(*candidate).ok()?;
     Some(with)

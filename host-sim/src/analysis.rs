@@ -4,34 +4,46 @@
 //! Effects are named on the whole record. The errors before and after come from the first half alone: what it shows
 //! to be missing is added, and judged on the second half.
 
+mod compensation;
 mod lines;
 mod naming;
 mod parts;
 mod repairs;
+mod spectral;
 mod study;
 
+use crate::grid::Grid;
 use crate::practice::Practice;
 use crate::recording::Recording;
 use crate::report::{
     ChannelReport, CurvePoint, Effect, ModelError, ModelReport, ReadOff, ReadOffValue, Report, SCHEMA, Term,
 };
+use crate::spectrum::shared;
 use crate::timeline::{Step, Timeline};
-use crate::trace::Series;
+use crate::trace::{Series, slow_cause};
 use adis16405_driver::Channel;
 use allan_core::common_mode::common_mode;
-use allan_core::term::{CoefficientUnit, Kind};
+use allan_core::term::{CoefficientUnit, Kind, Markov};
 use allan_core::{Cascade, Curve, Model, check, read_off, telegraph};
+use compensation::compensated;
 use firmware::{OCTAVES, OVERLAP};
 use lines::Line;
 use parts::{Part, Parts};
 use repairs::{Repairs, in_parallel};
 use std::collections::BTreeMap;
-use study::Study;
+use study::{Following, Study};
 
 /// Allan variance in counts², at the shortest octaves, from which on rounding adds white noise and nothing else.
 const DITHERED: f64 = 0.2;
 /// Behind a filter neighbouring samples are alike, and the noise shows at a few samples only.
 const DITHERED_OCTAVES: usize = 7;
+
+/// Lengths of a filter after which its rounded output is that of white noise again.
+const SETTLED: f64 = 20.0;
+/// Slowest filter, in samples to its time constant, that is told from a process of its own.
+const LOW_PASS: f64 = 64.0;
+/// Variance of rounding, in squares of its step.
+const ROUNDING: f64 = 1.0 / 12.0;
 
 /// The target's own.
 type Estimator = Cascade<OCTAVES, OVERLAP>;
@@ -62,12 +74,12 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     let repairs = Repairs::find(recording, timeline, &traced);
     let parts = Parts::of(recording, timeline, &coupled, &repairs);
     let studies = in_parallel(&recording.channels, |&channel| {
-        let series = traced.contains(&channel).then(|| repairs.series(recording, timeline, channel));
-        let studies = Studies::of(&parts, channel, series.as_ref());
-        let series = series.unwrap_or_else(|| Series::of(recording, timeline, channel));
+        let series = |channel: Channel| repairs.series(recording, timeline, channel);
+        let studies = Studies::of(&parts, channel, traced.contains(&channel), repairs.ramps(channel), series);
+        let series = if traced.contains(&channel) { series(channel) } else { Series::of(recording, timeline, channel) };
         // What the channel follows is no noise, and is in the series: there the declared model has to do.
         let trace = &studies.first.trace;
-        let model = if studies.first.followed.is_empty() { &trace.after } else { &trace.before };
+        let model = if studies.first.following.followed.is_empty() { &trace.after } else { &trace.before };
         let practice = Practice::of(&series, model);
         (studies, practice)
     });
@@ -79,7 +91,7 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
         if traced.contains(channel) {
             effects.extend(repairs.effects(*channel));
             let ramps = effects.iter().any(|effect| effect.kind == Kind::RateRamp.name());
-            let named = named(&parts.both, *channel, own, &studies, 1.0 / timeline.sample_rate_hz);
+            let named = named(&parts.both, *channel, own, &studies, |of| repairs.series(recording, timeline, of));
             effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != Kind::RateRamp.name()));
         }
         let whole = measured.clone().with_confidence(|point| own.first.trace.before.shares(point.n));
@@ -102,19 +114,31 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
 struct Studies {
     first: Study,
     both: Study,
+    /// Of the whole record.
     lines: Vec<Line>,
 }
 
 impl Studies {
-    fn of(parts: &Parts, channel: Channel, series: Option<&Series>) -> Self {
+    /// `series` gives the samples of a channel.
+    fn of(parts: &Parts, channel: Channel, traced: bool, ramps: bool, series: impl Fn(Channel) -> Series) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
-        let lines = series.map(lines::of).unwrap_or_default();
-        let half_lines = series.map(|series| lines::of(&series.first_half())).unwrap_or_default();
-        Self {
-            first: Study::of(&parts.first, position, series.map(|_| lines::kinds(&half_lines)).as_deref()),
-            both: Study::of(&parts.both, position, series.map(|_| lines::kinds(&lines)).as_deref()),
-            lines,
+        if !traced {
+            let [first, both] = [&parts.first, &parts.both].map(|part| Following::of(part, position, false, |_| None));
+            return Self { first: Study::declared(first), both: Study::declared(both), lines: Vec::new() };
         }
+        let own = series(channel);
+        let own_half = own.first_half();
+        let slow = |cause| repairs::is_slow(cause).then(|| series(cause));
+        let first = Following::of(&parts.first, position, ramps, |cause| {
+            slow_cause::find(&own_half, &slow(cause)?.first_half())
+        });
+        let both = Following::of(&parts.both, position, ramps, |cause| slow_cause::find(&own, &slow(cause)?));
+        let without = |following: &Following| compensated(&own, following, |cause| series(parts.both.channels[cause]));
+        let half = without(&first).map(|rest| rest.first_half());
+        let whole = without(&both);
+        let (first, _) = spectral::study(first, &own_half, half.as_ref());
+        let (both, lines) = spectral::study(both, &own, whole.as_ref());
+        Self { first, both, lines }
     }
 
     fn before(&self, parts: &Parts, channel: Channel, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
@@ -133,7 +157,7 @@ impl Studies {
         let model = &self.first.trace.after;
         // What the channel follows is in the measured curve, not in the model of the rest.
         let raw = parts.both.curve(position);
-        let rest = self.first.compensated(&parts.both, position);
+        let rest = self.first.following.compensated(&parts.both, position);
         let followed = |n: u64| {
             let of = |curve: &Curve<OCTAVES>| curve.points().iter().find(|point| point.n == n).map(|point| point.avar);
             of(&raw).zip(of(&rest)).map_or(0.0, |(raw, rest)| (raw - rest).max(0.0))
@@ -141,33 +165,52 @@ impl Studies {
         ModelReport {
             terms: terms(model, unit),
             adev: whole.points().iter().map(|point| (model.avar(point.n) + followed(point.n)).sqrt()).collect(),
-            fitted: model_error(model, &self.first.curve),
-            unseen: model_error(model, &self.first.compensated(&parts.second, position)),
+            fitted: model_error(model, &self.first.following.curve),
+            unseen: model_error(model, &self.first.following.compensated(&parts.second, position)),
         }
     }
 }
 
 /// Everything that the whole record shows in a channel beyond the declared model.
-fn named(part: &Part, channel: Channel, own: &Studies, all: &[(Channel, Studies)], period_s: f64) -> Vec<Effect> {
+fn named(
+    part: &Part,
+    channel: Channel,
+    own: &Studies,
+    all: &[(Channel, Studies)],
+    series: impl Fn(Channel) -> Series,
+) -> Vec<Effect> {
+    let period_s = own.both.trace.after.sample_period();
     let (study, unit) = (&own.both, channel.unit());
     let causes: Vec<_> = study.causes().map(|(cause, followed)| (part.channels[cause], *followed)).collect();
     let mut effects = naming::followed_effects(&causes, unit);
-    let common = partner(part, channel, own, all)
-        .map(|(partner, common)| naming::common_effect(&common, partner, unit, period_s));
+    let common = partner(part, channel, own, all).map(|(partner, common)| {
+        let [own, other] = [channel, partner].map(|channel| Grid::of(&series(channel)));
+        naming::common_effect(&common, shared::markov(&own, &other), partner, unit, period_s)
+    });
     // Where the noise does not reach from one count to the next, rounding is no noise, and the curve shows its steps.
-    let count = part.position(channel).map_or(0.0, |position| part.count(position));
-    let shortest = study.curve.points().iter().take(DITHERED_OCTAVES).map(|point| point.avar);
-    let dithered = shortest.fold(0.0, f64::max) > DITHERED * count * count;
+    let step = part.position(channel).map_or(0.0, |position| part.step(position));
+    let reaches = |octaves: usize| {
+        let shortest = study.following.curve.points().iter().take(octaves).map(|point| point.avar);
+        shortest.fold(0.0, f64::max) > DITHERED * step * step
+    };
+    let dithered = reaches(DITHERED_OCTAVES);
+    // Behind a filter, what rounding adds is alike over as many samples as the noise is.
+    let settled_s = if reaches(1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
     for found in &study.trace.found {
         let term = &study.trace.after.terms()[found.term];
         match term.kind {
             Kind::Filtered(_) => effects.push(naming::term_effect(term, found, unit, period_s)),
             _ if !dithered => {}
+            Kind::Markov(Markov { time_constant }) if time_constant < settled_s => {}
+            Kind::Quantization if settled_s > 0.0 => {}
             // The spectrum tells them better.
             Kind::Sinusoid(_) | Kind::Resonance(_) => {}
             // What is shared needs no second name.
             Kind::Markov(_) | Kind::RateRamp if common.is_some() => {}
-            Kind::Markov(markov) => match telegraph::judge(&study.curve, &study.trace.after, markov) {
+            Kind::Markov(markov) if is_low_pass(&study.trace.after, markov, step) => {
+                effects.push(naming::low_pass_effect(term, markov, found, period_s));
+            }
+            Kind::Markov(markov) => match telegraph::judge(&study.following.curve, &study.trace.after, markov) {
                 Some(verdict) if verdict.is_telegraph() => {
                     effects.push(naming::telegraph_effect(term, found, &verdict, unit, period_s));
                 }
@@ -179,6 +222,16 @@ fn named(part: &Part, channel: Channel, own: &Studies, all: &[(Channel, Studies)
     effects.extend(common);
     effects.extend(own.lines.iter().map(|line| naming::line_effect(line, unit)));
     effects
+}
+
+/// Whether a Markov term is what a first-order low-pass filter makes of white noise: it forgets within some samples, and
+/// nothing is left that is white but the rounding to steps.
+fn is_low_pass(model: &Model, markov: Markov, step: f64) -> bool {
+    let period_s = model.sample_period();
+    let rounding = ROUNDING * step * step * period_s;
+    let white = model.terms().iter().filter(|term| term.kind == Kind::AngleRandomWalk);
+    let left: f64 = white.map(|term| term.low * term.low).sum();
+    markov.time_constant < LOW_PASS * period_s && left <= rounding
 }
 
 /// The channel of the same sort that a channel most clearly shares a slow part with.

@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! Grid ─► Periodogram ─► Background ─► lines   (line: sinusoids and resonances, the whole record at once)
+//!        ├► sine tapers ─► shared                   (what two channels have in common at low frequencies)
 //!        └► Welch ─► Shape ─► N, B, K            (independent of the Allan variance)
 //! ```
 
@@ -12,11 +13,14 @@ pub mod autocorrelation;
 mod background;
 pub mod line;
 mod lorentz;
+mod mixture;
 mod periodogram;
 pub mod shape;
+pub mod shared;
 mod sine;
+mod tapered;
 pub mod welch;
 
 pub use autocorrelation::{CorrelationTime, correlation_time};
-pub use line::{Line, lines};
+pub use line::{Line, lines, lines_over};
 pub use welch::Welch;

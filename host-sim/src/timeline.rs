@@ -37,6 +37,8 @@ pub enum Step {
 pub struct Timeline {
     /// As given, or as measured from the time stamps, Hz.
     pub sample_rate_hz: f64,
+    /// What the user says the rate is, Hz.
+    pub stated_rate_hz: Option<f64>,
     /// In the order of time.
     pub steps: Vec<Step>,
     /// Samples that the steps leave out, by cause; `gap` (always there) counts those that never arrived.
@@ -103,7 +105,7 @@ impl Timeline {
         let (steps, never_arrived) = steps(&used, &slots);
         dropped.insert("gap", never_arrived);
         let sample_rate_hz = rate.or(measured).ok_or(TimelineError::NoRate)?;
-        Ok(Self { sample_rate_hz, steps, dropped, flagged })
+        Ok(Self { sample_rate_hz, stated_rate_hz: rate, steps, dropped, flagged })
     }
 }
 

@@ -5,11 +5,13 @@
 
 pub mod bias_step;
 pub(crate) mod block;
+pub mod coarse_counts;
 pub mod deliveries;
 pub(crate) mod normal;
 pub mod rate_ramp;
 pub mod sample_clock;
 pub mod series;
+pub mod slow_cause;
 pub mod spikes;
 
 #[cfg(test)]

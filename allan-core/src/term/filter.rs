@@ -41,6 +41,9 @@ impl Filter {
     fn autocorrelation(&self, samples: f64) -> f64 {
         let position = samples * self.decimation;
         let (below, above) = (floor(position), position - floor(position));
+        if above == 0.0 {
+            return self.of_values(below as i64);
+        }
         (1.0 - above) * self.of_values(below as i64) + above * self.of_values(below as i64 + 1)
     }
 

@@ -3,6 +3,7 @@
 use crate::grid::Grid;
 use crate::spectrum::{self, line::Estimate};
 use crate::trace::Series;
+use allan_core::Model;
 use allan_core::term::{Kind, Resonance, Sinusoid};
 
 /// Lines closer than this share of their frequency, or than a few of their widths, are one that wanders.
@@ -12,10 +13,12 @@ const NEAR_WIDTHS: f64 = 3.0;
 const NEAR_RESOLUTIONS: f64 = 8.0;
 /// A resonance is at a frequency of so many of its widths or higher.
 const BROADEST: f64 = 1.5;
-/// A line that changes its phase more seldom than so many times in the record is as good as steady …
+/// Noise beside a Markov process is at least this part of it.
+const LEAST_NOISE: f64 = 1e-6;
+/// A line that is wider than this part of its frequency may be the background's own form.
+const BROAD: f64 = 0.1;
+/// A line that changes its phase more seldom than so many times in the record is as good as steady.
 const CHANGES: f64 = 30.0;
-/// … and one that does so more seldom than this does not tell a model how its amplitude scatters.
-const TELLING_CHANGES: f64 = 150.0;
 
 /// Relative standard deviation of the clock that the sample rate was measured with: a crystal to ±100 ppm.
 const CLOCK: f64 = 5e-5;
@@ -36,15 +39,16 @@ pub(super) struct Line {
     duration_s: f64,
 }
 
-/// The lines of a series, the strongest first.
-pub(super) fn of(series: &Series) -> Vec<Line> {
+/// The lines of a series, the strongest first, over a background that `known` describes or, without it, over any of
+/// white, flicker and walking noise.
+pub(super) fn of(series: &Series, known: Option<&Model>) -> Vec<Line> {
     let duration_s = series.duration_s();
     let is_line = |line: &spectrum::Line| {
         let finite = line.frequency.error.is_finite() && line.deviation.error.is_finite();
         // Broader than high up: that is a Markov process, and the curve's.
         finite && line.frequency.value > BROADEST * line.width.map_or(0.0, |width| width.value)
     };
-    let mut rest: Vec<spectrum::Line> = spectrum::lines(&Grid::of(series)).into_iter().filter(is_line).collect();
+    let mut rest: Vec<spectrum::Line> = found(series, known).into_iter().filter(is_line).collect();
     let mut lines = Vec::new();
     while let Some(strongest) = rest.first().copied() {
         let reach = NEAR_WIDTHS * strongest.width.map_or(0.0, |width| width.value);
@@ -62,9 +66,29 @@ pub(super) fn of(series: &Series) -> Vec<Line> {
     lines
 }
 
+fn found(series: &Series, known: Option<&Model>) -> Vec<spectrum::Line> {
+    let grid = Grid::of(series);
+    match known {
+        Some(model) => spectrum::lines_over(&grid, |frequency| background(model, frequency)),
+        None => spectrum::lines(&grid),
+    }
+}
+
+/// By how much the Markov terms of a model raise the density of its other noise.
+fn background(model: &Model, frequency: f64) -> f64 {
+    let part = |of: &dyn Fn(&Kind) -> bool| {
+        let terms = model.terms().iter().copied().filter(|term| of(&term.kind));
+        Model::new(model.sample_period(), terms).density(frequency)
+    };
+    let markov = part(&|kind| matches!(kind, Kind::Markov(_)));
+    let noise = part(&|kind| !matches!(kind, Kind::Markov(_) | Kind::Resonance(_) | Kind::Sinusoid(_)));
+    // Where a filter leaves nothing, rounding does.
+    1.0 + markov / noise.max(LEAST_NOISE * markov)
+}
+
 /// The terms that a trace may add for them.
 pub(super) fn kinds(lines: &[Line]) -> Vec<Kind> {
-    lines.iter().map(|line| line.as_kind(TELLING_CHANGES)).collect()
+    lines.iter().map(Line::kind).collect()
 }
 
 impl Line {
@@ -96,14 +120,26 @@ impl Line {
         }
     }
 
-    /// A sinusoid, or a resonance where the phase is lost often.
-    pub(super) fn kind(&self) -> Kind {
-        self.as_kind(CHANGES)
+    /// Whether both are at one frequency.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let reach = self.width.value.max(other.width.value).max(NEAR_RESOLUTIONS / self.duration_s);
+        (self.frequency.value - other.frequency.value).abs() < reach
     }
 
-    fn as_kind(&self, changes: f64) -> Kind {
+    /// Whether it is a sinusoid.
+    pub(super) fn is_steady(&self) -> bool {
+        matches!(self.kind(), Kind::Sinusoid(_))
+    }
+
+    /// Whether it is broad enough to be taken for a part of the background, and the reverse.
+    pub(super) fn is_broad(&self) -> bool {
+        self.width.value > BROAD * self.frequency.value
+    }
+
+    /// A sinusoid, or a resonance where the phase is lost often.
+    pub(super) fn kind(&self) -> Kind {
         let (frequency, bandwidth) = (self.frequency.value, self.width.value);
-        if bandwidth * self.duration_s < changes {
+        if bandwidth * self.duration_s < CHANGES {
             Kind::Sinusoid(Sinusoid { frequency })
         } else {
             Kind::Resonance(Resonance { frequency, bandwidth })

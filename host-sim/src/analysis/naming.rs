@@ -4,14 +4,16 @@ use super::coefficient_unit;
 use super::lines::Line;
 use crate::report::{Effect, Parameter};
 use crate::spectrum::line::Estimate;
+use crate::spectrum::shared::{Bounded, Shared};
 use adis16405_driver::Channel;
 use allan_core::common_mode::CommonMode;
 use allan_core::model::Term;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::Verdict;
-use allan_core::term::{Filter, Kind};
+use allan_core::term::{Filter, Kind, Markov};
 use allan_core::trace::Found;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 /// Rate of the part's own filter, Hz (data sheet: internal sample clock).
 const INTERNAL_RATE_HZ: f64 = 819.2;
@@ -51,6 +53,13 @@ pub(super) fn term_effect(term: &Term, found: &Found, unit: &str, period_s: f64)
     Effect { kind: term.kind.name().to_owned(), parameters: parameters(term, unit), evidence }
 }
 
+/// With its normal 95 % bounds; nothing here is negative.
+fn estimated(estimate: Estimate, unit: &str) -> Parameter {
+    let half_width = NORMAL_975 * estimate.error;
+    let (low, high) = ((estimate.value - half_width).max(0.0), estimate.value + half_width);
+    Parameter { value: estimate.value, low, high, unit: unit.to_owned() }
+}
+
 /// A Markov term whose fourth moments show two levels.
 pub(super) fn telegraph_effect(term: &Term, found: &Found, verdict: &Verdict, unit: &str, period_s: f64) -> Effect {
     let markov = term_effect(term, found, unit, period_s);
@@ -65,6 +74,31 @@ pub(super) fn telegraph_effect(term: &Term, found: &Found, verdict: &Verdict, un
         verdict.ratio, verdict.error, markov.evidence,
     );
     Effect { kind: "telegraph".to_owned(), parameters, evidence }
+}
+
+/// A Markov term that stands in the place of the white noise.
+pub(super) fn low_pass_effect(term: &Term, markov: Markov, found: &Found, period_s: f64) -> Effect {
+    let corner = |time_constant: f64| 0.5 / (PI * time_constant);
+    let (shortest, longest) = term.shape[0];
+    let bandwidth = Parameter {
+        value: corner(markov.time_constant),
+        low: corner(longest),
+        high: corner(shortest),
+        unit: "Hz".to_owned(),
+    };
+    let evidence = format!(
+        "{:+.1} % at tau = {} s ({:.0} sigma); all the white noise is correlated over {} s and none is left: \
+         a low-pass filter of the first order",
+        100.0 * found.residual.excess,
+        seconds(found.residual.n as f64 * period_s),
+        found.residual.sigmas.abs(),
+        seconds(markov.time_constant),
+    );
+    Effect {
+        kind: "filter_bandwidth".to_owned(),
+        parameters: BTreeMap::from([("bandwidth".to_owned(), bandwidth)]),
+        evidence,
+    }
 }
 
 /// What a channel follows: temperature, supply, and the specific force on its axes as one effect.
@@ -106,22 +140,17 @@ pub(super) fn followed_effects(followed: &[(Channel, Sensitivity)], unit: &str) 
 
 /// A line that the spectrum shows.
 pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
-    let parameter = |estimate: Estimate, unit: &str| {
-        let half_width = NORMAL_975 * estimate.error;
-        let (low, high) = ((estimate.value - half_width).max(0.0), estimate.value + half_width);
-        Parameter { value: estimate.value, low, high, unit: unit.to_owned() }
-    };
     let (kind, root) = (line.kind(), 2f64.sqrt());
     let parameters = match kind {
         Kind::Resonance(_) => {
-            vec![("deviation", parameter(line.deviation, unit)), ("bandwidth", parameter(line.width, "Hz"))]
+            vec![("deviation", estimated(line.deviation, unit)), ("bandwidth", estimated(line.width, "Hz"))]
         }
         _ => {
             let Estimate { value, error } = line.deviation;
-            vec![("amplitude", parameter(Estimate { value: root * value, error: root * error }, unit))]
+            vec![("amplitude", estimated(Estimate { value: root * value, error: root * error }, unit))]
         }
     };
-    let frequency = ("frequency", parameter(line.frequency, "Hz"));
+    let frequency = ("frequency", estimated(line.frequency, "Hz"));
     let width = match line.width.value {
         width if width > 0.0 => format!("{width:.4} Hz wide"),
         _ => "no wider than the record resolves".to_owned(),
@@ -139,21 +168,29 @@ pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
     }
 }
 
-/// A slow part that a channel shares with `partner`.
-pub(super) fn common_effect(common: &CommonMode, partner: Channel, unit: &str, period_s: f64) -> Effect {
-    let half_width = NORMAL_975 * common.error;
-    let deviation = Parameter {
-        value: common.deviation,
-        low: (common.deviation - half_width).max(0.0),
-        high: common.deviation + half_width,
-        unit: unit.to_owned(),
+/// A slow part that a channel shares with `partner`; `shared` is what their spectra say of it.
+pub(super) fn common_effect(
+    common: &CommonMode,
+    shared: Option<Shared>,
+    partner: Channel,
+    unit: &str,
+    period_s: f64,
+) -> Effect {
+    let parameter =
+        |of: Bounded, unit: &str| Parameter { value: of.value, low: of.low, high: of.high, unit: unit.to_owned() };
+    let (deviation, time_constant) = match shared {
+        Some(shared) => (parameter(shared.deviation, unit), parameter(shared.time_constant, "s")),
+        None => {
+            let deviation = Estimate { value: common.deviation, error: common.error };
+            let time = common.time_constant;
+            // The times that were tried are a factor of 1.3 apart, and few independent stretches tell them.
+            let time = Bounded { value: time, low: time / 2.0, high: time * 2.0 };
+            (estimated(deviation, unit), parameter(time, "s"))
+        }
     };
-    let time = common.time_constant;
-    // The times that were tried are a factor of 1.3 apart, and few independent stretches tell them.
-    let time = Parameter { value: time, low: time / 2.0, high: time * 2.0, unit: "s".to_owned() };
     Effect {
         kind: "common_mode".to_owned(),
-        parameters: BTreeMap::from([("deviation".to_owned(), deviation), ("time_constant".to_owned(), time)]),
+        parameters: BTreeMap::from([("deviation".to_owned(), deviation), ("time_constant".to_owned(), time_constant)]),
         evidence: format!(
             "moves with {} from tau = {} s on, {:+.0} sigma, and no measured cause explains it; \
              a shared reference, supply or temperature gradient",

@@ -18,6 +18,8 @@ pub(super) struct Part {
     pub(super) channels: Vec<Channel>,
     /// Physical unit of a number that was pushed, by channel.
     lsb: Vec<f64>,
+    /// Physical unit of one step of the values, by channel.
+    steps: Vec<f64>,
     period_s: f64,
     cascades: Vec<Estimator>,
     /// Channel `i` with `j < i` at `i·(i−1)/2 + j`.
@@ -41,7 +43,8 @@ impl Parts {
         let others: Vec<Channel> =
             recording.channels.iter().copied().filter(|channel| !coupled.contains(channel)).collect();
         let channels: Vec<Channel> = coupled.iter().copied().chain(others).collect();
-        let part = Part::new(channels, coupled.len(), 1.0 / timeline.sample_rate_hz, lsb);
+        let steps = channels.iter().map(|channel| f64::from(repairs.step(*channel)) * lsb(channel)).collect();
+        let part = Part::new(channels, coupled.len(), 1.0 / timeline.sample_rate_hz, lsb, steps);
         let mut halves = [part.clone(), part];
         let mut position = 0;
         for &step in &timeline.steps {
@@ -78,8 +81,15 @@ impl Parts {
 }
 
 impl Part {
-    fn new(channels: Vec<Channel>, coupled: usize, period_s: f64, lsb: impl Fn(&Channel) -> f64) -> Self {
+    fn new(
+        channels: Vec<Channel>,
+        coupled: usize,
+        period_s: f64,
+        lsb: impl Fn(&Channel) -> f64,
+        steps: Vec<f64>,
+    ) -> Self {
         Self {
+            steps,
             lsb: channels.iter().map(|channel| lsb(channel) / PARTS_OF_COUNT).collect(),
             cascades: channels.iter().map(|_| Cascade::new()).collect(),
             couplings: vec![Coupling::new(); coupled * coupled.saturating_sub(1) / 2],
@@ -117,9 +127,9 @@ impl Part {
         self.cascades[channel].curve(self.period_s).scaled(self.lsb[channel])
     }
 
-    /// One count of a channel in its unit.
-    pub(super) fn count(&self, channel: usize) -> f64 {
-        self.lsb[channel] * PARTS_OF_COUNT
+    /// One step of a channel's values in its unit: a count, or several.
+    pub(super) fn step(&self, channel: usize) -> f64 {
+        self.steps[channel]
     }
 
     /// What two channels have in common, in the product of their units.

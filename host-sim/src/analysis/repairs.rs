@@ -5,8 +5,11 @@
 use crate::recording::Recording;
 use crate::report::Effect;
 use crate::timeline::Timeline;
-use crate::trace::{Finding, Repair, Series, bias_step, deliveries, rate_ramp, sample_clock, spikes};
+use crate::trace::{
+    Finding, Repair, Series, bias_step, coarse_counts, deliveries, rate_ramp, sample_clock, slow_cause, spikes,
+};
 use adis16405_driver::Channel;
+use allan_core::Kind;
 use std::collections::BTreeSet;
 
 /// Effects in the samples, and their repairs.
@@ -17,6 +20,8 @@ pub(super) struct Repairs {
     of_channel: Vec<(Channel, Effect)>,
     left_out: BTreeSet<usize>,
     levels: Vec<(Channel, usize, f64)>,
+    /// Counts to a step of a channel's values, where it is more than one.
+    coarse: Vec<(Channel, u32)>,
 }
 
 impl Repairs {
@@ -32,32 +37,48 @@ impl Repairs {
             repairs.left_out.extend(left_out(&finding.repair));
             repairs.everywhere.push(finding.effect);
         }
-        let of = |channel: Channel| Series::of(recording, timeline, channel);
+        let measured = |channel: Channel| Series::of(recording, timeline, channel);
+        let coarse = in_parallel(&recording.channels, |&channel| coarse_counts::step(&measured(channel)));
+        repairs.coarse = recording.channels.iter().copied().zip(coarse).filter(|(_, counts)| *counts > 1).collect();
+        let of = |channel: Channel| measured(channel).with_steps(repairs.step(channel));
         let causes: Vec<(Channel, Series)> = recording.channels.iter().map(|&channel| (channel, of(channel))).collect();
         let found = in_parallel(traced, |&channel| {
             let series = of(channel);
+            let coarse = coarse_counts::find(&measured(channel));
             let spikes = spikes::find(&series);
             let left = spikes.as_ref().map(|finding| left_out(&finding.repair)).unwrap_or_default();
             let cleaned = series.repaired(&Repair::LeaveOut(left.clone()));
-            let others: Vec<&Series> =
-                causes.iter().filter(|(of, _)| may_cause(*of, channel)).map(|(_, series)| series).collect();
+            let may = causes.iter().filter(|(of, _)| may_cause(*of, channel));
             // A cause must have the same samples.
-            let others = if left.is_empty() { others } else { Vec::new() };
-            let step = bias_step::find(&cleaned, &others);
-            // A step is a ramp too, if a bad one.
-            let ramp = if step.is_none() { rate_ramp::find(&cleaned, &others) } else { None };
-            (spikes, step, ramp, left)
+            let others: Vec<(Channel, Series)> =
+                may.map(|(of, series)| (*of, series.clone().repaired(&Repair::LeaveOut(left.clone())))).collect();
+            let courses: Vec<&Series> = others.iter().map(|(_, series)| series).collect();
+            let step = bias_step::find(&cleaned, &courses);
+            let level = step.as_ref().map(|step| unit_step(&cleaned, &step.repair));
+            let known: Vec<&Series> = others
+                .iter()
+                .filter(|(cause, course)| is_slow(*cause) && slow_cause::find(&cleaned, course).is_some())
+                .map(|(_, course)| course)
+                .chain(&level)
+                .collect();
+            let ramp = rate_ramp::find(&cleaned, &courses, &known);
+            (coarse, spikes, step, ramp, left)
         });
-        for (&channel, (spikes, step, ramp, left)) in traced.iter().zip(found) {
+        for (&channel, (coarse, spikes, step, ramp, left)) in traced.iter().zip(found) {
             if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
                 repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
             }
             repairs.left_out.extend(left);
-            repairs
-                .of_channel
-                .extend(spikes.into_iter().chain(step).chain(ramp).map(|finding| (channel, finding.effect)));
+            repairs.of_channel.extend(
+                coarse.into_iter().chain(spikes).chain(step).chain(ramp).map(|finding| (channel, finding.effect)),
+            );
         }
         repairs
+    }
+
+    /// Counts to a step of the channel's values.
+    pub(super) fn step(&self, channel: Channel) -> u32 {
+        self.coarse.iter().find(|(of, _)| *of == channel).map_or(1, |(_, counts)| *counts)
     }
 
     /// Whether the sample at `position` of the timeline is not to be used.
@@ -72,11 +93,16 @@ impl Repairs {
 
     /// A channel's series without what was found in it.
     pub(super) fn series(&self, recording: &Recording, timeline: &Timeline, channel: Channel) -> Series {
-        let mut series = Series::of(recording, timeline, channel);
+        let mut series = Series::of(recording, timeline, channel).with_steps(self.step(channel));
         for &(_, from, size) in self.levels.iter().filter(|(of, ..)| *of == channel) {
             series = series.repaired(&Repair::Level { from, size });
         }
         series.repaired(&Repair::LeaveOut(self.left_out.iter().copied().collect()))
+    }
+
+    /// Whether a channel has a ramp.
+    pub(super) fn ramps(&self, channel: Channel) -> bool {
+        self.effects(channel).any(|effect| effect.kind == Kind::RateRamp.name())
     }
 
     /// What was found in a channel.
@@ -104,10 +130,22 @@ fn left_out(repair: &Repair) -> Vec<usize> {
 
 /// Surroundings and motion may step and take a channel along.
 fn may_cause(cause: Channel, channel: Channel) -> bool {
-    let surroundings = matches!(cause, Channel::Temp | Channel::Supply);
+    let surroundings = is_slow(cause);
     let is_gyro = |of: Channel| Channel::INERTIAL[..3].contains(&of);
     let motion = Channel::INERTIAL[3..].contains(&cause) && is_gyro(channel);
     surroundings || motion
+}
+
+/// Causes that take long to move.
+pub(super) fn is_slow(cause: Channel) -> bool {
+    matches!(cause, Channel::Temp | Channel::Supply)
+}
+
+/// A step of size 1 where `repair` takes one out.
+fn unit_step(series: &Series, repair: &Repair) -> Series {
+    let from = if let Repair::Level { from, .. } = repair { *from } else { 0 };
+    let values = (0..series.values.len()).map(|at| if at < from { 0.0 } else { 1.0 }).collect();
+    Series { values, slots: series.slots.clone(), ..*series }
 }
 
 /// The position that a sample had before those at `left` were left out.

@@ -1,6 +1,8 @@
 //! One channel of one part: what it follows, and what its model lacks.
 
 use super::parts::Part;
+use super::repairs::is_slow;
+use crate::trace::slow_cause::Followed;
 use adis16405_driver::Channel;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
 use allan_core::trace::{Lines, Trace, trace};
@@ -20,13 +22,18 @@ pub(super) struct Surroundings {
     mutual: Vec<Shared<OCTAVES>>,
 }
 
-/// What was learnt of a channel from one part.
-pub(super) struct Study {
-    pub(super) surroundings: Surroundings,
+/// What a channel follows in one part.
+pub(super) struct Following {
+    surroundings: Surroundings,
     /// In the order of [`Surroundings`].
     pub(super) followed: Vec<Sensitivity>,
     /// The channel without what it follows.
     pub(super) curve: Curve<OCTAVES>,
+}
+
+/// What was learnt of a channel from one part.
+pub(super) struct Study {
+    pub(super) following: Following,
     pub(super) trace: Trace,
 }
 
@@ -35,7 +42,7 @@ impl Surroundings {
         let members: Vec<usize> = causes(part.channels[channel]).filter_map(|cause| part.position(cause)).collect();
         let covariate = |(index, &member): (usize, &usize)| match known {
             Some(known) => known.covariates[index].continued(part.curve(member)),
-            None => Covariate::new(part.curve(member), part.count(member)),
+            None => Covariate::new(part.curve(member), part.step(member)),
         };
         let pairs = members.iter().enumerate().flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
         Self {
@@ -57,18 +64,27 @@ impl Surroundings {
     }
 }
 
-impl Study {
-    /// Learns from `part` what `channel` follows and what it lacks; `lines` are those that a spectrum has shown. `None`
-    /// leaves it at the declared model.
-    pub(super) fn of(part: &Part, channel: usize, lines: Option<&[Kind]>) -> Self {
+impl Following {
+    /// From the differences that `part` has summed, and from the courses of slow causes: `slow` tells how the channel
+    /// follows one of them. Of the two the one counts that is clearer. Where the channel `ramps`, the differences follow
+    /// whatever else drifts, and the course alone counts.
+    pub(super) fn of(part: &Part, channel: usize, ramps: bool, slow: impl Fn(Channel) -> Option<Followed>) -> Self {
         let surroundings = Surroundings::of(part, channel, None);
-        let followed: Vec<Sensitivity> = surroundings.beside().followed().into_iter().collect();
+        let mut followed: Vec<Sensitivity> = surroundings.beside().followed().into_iter().collect();
+        for (covariate, &member) in surroundings.members.iter().enumerate() {
+            let cause = part.channels[member];
+            let Some(Followed { sensitivity: value, error }) = slow(cause) else {
+                followed.retain(|known| known.covariate != covariate || !ramps || !is_slow(cause));
+                continue;
+            };
+            match followed.iter_mut().find(|known| known.covariate == covariate) {
+                Some(known) if known.error <= error => {}
+                Some(known) => (known.value, known.error) = (value, error),
+                None => followed.push(Sensitivity { covariate, value, error }),
+            }
+        }
         let curve = surroundings.beside().compensated(&followed);
-        let trace = match lines {
-            Some(lines) => traced(&curve, lines),
-            None => Trace::declared(&curve),
-        };
-        Self { surroundings, followed, curve, trace }
+        Self { surroundings, followed, curve }
     }
 
     /// The curve of the same channel in another part, compensated with what was learnt here.
@@ -79,6 +95,25 @@ impl Study {
     /// What the channel follows: each covariate's place in the part, with the sensitivity.
     pub(super) fn causes(&self) -> impl Iterator<Item = (usize, &Sensitivity)> {
         self.followed.iter().map(|followed| (self.surroundings.members[followed.covariate], followed))
+    }
+}
+
+impl Study {
+    /// Leaves it at the declared model.
+    pub(super) fn declared(following: Following) -> Self {
+        let trace = Trace::declared(&following.curve);
+        Self { following, trace }
+    }
+
+    /// Traces what the channel lacks; `lines` are those that a spectrum has shown.
+    pub(super) fn traced(following: Following, lines: &[Kind]) -> Self {
+        let trace = traced(&following.curve, lines);
+        Self { following, trace }
+    }
+
+    /// What the channel follows: each covariate's place in the part, with the sensitivity.
+    pub(super) fn causes(&self) -> impl Iterator<Item = (usize, &Sensitivity)> {
+        self.following.causes()
     }
 
     /// What two channels share beyond what both follow.
@@ -105,7 +140,7 @@ impl Study {
 
     /// The channel without what it follows, and the model of that.
     pub(super) fn rest(&self) -> (&Curve<OCTAVES>, &Model) {
-        (&self.curve, &self.trace.after)
+        (&self.following.curve, &self.trace.after)
     }
 }
 

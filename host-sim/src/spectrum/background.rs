@@ -15,7 +15,9 @@ const MEDIAN_LOSS: f64 = 2.08;
 const FLOOR: f64 = 1e-7;
 
 /// The shape and its local correction.
-pub(super) struct Background {
+pub(super) struct Background<'a> {
+    /// What the shape is to be multiplied with.
+    known: &'a dyn Fn(f64) -> f64,
     shape: Shape,
     floor: f64,
     resolution: f64,
@@ -29,18 +31,28 @@ pub(super) struct Level {
     pub(super) ordinates: f64,
 }
 
-impl Background {
+impl<'a> Background<'a> {
     /// Of `density` at the multiples of `resolution` Hz from 0 on; `None` if there is too little of it, or no power.
-    pub(super) fn of(density: &[f64], resolution: f64, sample_period: f64) -> Option<Self> {
+    pub(super) fn of(
+        density: &[f64],
+        known: &'a dyn Fn(f64) -> f64,
+        resolution: f64,
+        sample_period: f64,
+    ) -> Option<Self> {
         let bands: Vec<Band> = bands(density.len())
-            .map(|range| Band {
-                frequency: resolution * (range.start + range.end - 1) as f64 / 2.0,
-                density: median(&mut density[range.clone()].to_vec()) / expected_median(range.len()),
-                ordinates: (range.len() as f64 / MEDIAN_LOSS).max(1.0),
+            .map(|range| {
+                let frequency = resolution * (range.start + range.end - 1) as f64 / 2.0;
+                let median = median(&mut density[range.clone()].to_vec());
+                Band {
+                    frequency,
+                    density: median / expected_median(range.len()) / known(frequency),
+                    ordinates: (range.len() as f64 / MEDIAN_LOSS).max(1.0),
+                }
             })
             .collect();
         let enough = bands.len() >= 8 && bands.iter().all(|band| band.density > 0.0);
         enough.then(|| Self {
+            known,
             shape: Shape::fit(&bands, sample_period),
             floor: FLOOR * median(&mut bands.iter().map(|band| band.density).collect::<Vec<f64>>()),
             resolution,
@@ -50,7 +62,8 @@ impl Background {
 
     /// Density at `bin` resolutions, before the local correction.
     pub(super) fn shape_at(&self, bin: f64) -> f64 {
-        self.shape.density(bin * self.resolution) + self.floor
+        let frequency = bin * self.resolution;
+        (self.known)(frequency) * (self.shape.density(frequency) + self.floor)
     }
 
     /// Median level of ordinates that are divided by the shape, around `bin`.

@@ -14,7 +14,7 @@ use statrs::function::beta::beta_reg;
 use std::f64::consts::PI;
 
 /// Chance that a record of a channel without any line shows one sinusoid or more; as much again for a resonance.
-pub const FALSE_ALARM: f64 = 1e-3;
+pub const FALSE_ALARM: f64 = 2e-4;
 
 /// Lines below this many periods in the record are not told from its drift.
 pub const FEWEST_PERIODS: usize = 8;
@@ -77,11 +77,19 @@ impl Line {
 /// has too few ordinates to tell a line.
 #[must_use]
 pub fn lines(grid: &Grid) -> Vec<Line> {
+    lines_over(grid, |_| 1.0)
+}
+
+/// As [`lines`], where the background is white, flicker and walking noise times a density that is `known` at every
+/// frequency in Hz.
+#[must_use]
+pub fn lines_over(grid: &Grid, known: impl Fn(f64) -> f64) -> Vec<Line> {
+    let known: &dyn Fn(f64) -> f64 = &known;
     let mut rest = grid.clone().dithered().detrended();
     let mut sines = Vec::new();
     let mut resonances: Vec<Resonance> = Vec::new();
     while sines.len() + resonances.len() < MOST
-        && let Some(spectrum) = Spectrum::of(&rest, &resonances, None)
+        && let Some(spectrum) = Spectrum::of(&rest, known, &resonances, None)
     {
         match spectrum.most_significant(&rest) {
             Some(Found::Sine(line, sine)) => {
@@ -92,7 +100,7 @@ pub fn lines(grid: &Grid) -> Vec<Line> {
                 resonances.push(resonance);
                 // Every round transforms the whole record for every resonance.
                 if resonances.len() <= POLISHED {
-                    polish(&rest, &mut resonances);
+                    polish(&rest, known, &mut resonances);
                 }
             }
             None => break,
@@ -106,10 +114,10 @@ pub fn lines(grid: &Grid) -> Vec<Line> {
 }
 
 /// Fits each resonance again over the background that is left when all are gone: a strong one bends the first estimate.
-fn polish(rest: &Grid, resonances: &mut [Resonance]) {
+fn polish(rest: &Grid, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
     for _ in 0..POLISHING {
         for index in 0..resonances.len() {
-            let Some(spectrum) = Spectrum::of(rest, resonances, Some(index)) else { return };
+            let Some(spectrum) = Spectrum::of(rest, known, resonances, Some(index)) else { return };
             let Resonance { line, lorentz } = resonances[index];
             if let Some(better) = spectrum.resonance(lorentz.centre, [lorentz.width]) {
                 resonances[index] = Resonance { line: spectrum.line_of(&better, line.p_value), lorentz: better };
@@ -139,9 +147,9 @@ struct Resonance {
 }
 
 /// A record's spectrum over its background.
-struct Spectrum {
+struct Spectrum<'a> {
     resolution: f64,
-    background: Background,
+    background: Background<'a>,
     /// Ordinates at the multiples of the resolution over the background's shape.
     whitened: Vec<f64>,
     /// Ordinates at the multiples of `1/PADDING` of it.
@@ -150,9 +158,9 @@ struct Spectrum {
     deflation: Vec<f64>,
 }
 
-impl Spectrum {
+impl<'a> Spectrum<'a> {
     /// Without the `resonances`, except the one that is to be `kept`.
-    fn of(grid: &Grid, resonances: &[Resonance], kept: Option<usize>) -> Option<Self> {
+    fn of(grid: &Grid, known: &'a dyn Fn(f64) -> f64, resonances: &[Resonance], kept: Option<usize>) -> Option<Self> {
         let periodogram = Periodogram::of(grid)?;
         let deflation = |bin: f64, but: Option<usize>| {
             let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != but);
@@ -162,7 +170,7 @@ impl Spectrum {
         for (bin, ordinate) in density.iter_mut().enumerate() {
             *ordinate *= deflation(bin as f64, None);
         }
-        let background = Background::of(&density, periodogram.resolution(), grid.sample_period())?;
+        let background = Background::of(&density, known, periodogram.resolution(), grid.sample_period())?;
         let bin = |at: usize| at as f64 / PADDING as f64;
         let deflation: Vec<f64> = (0..periodogram.padded().len()).map(|at| deflation(bin(at), kept)).collect();
         let over_shape = |(at, (ordinate, deflation)): (usize, (&f64, &f64))| match at {

@@ -3,12 +3,12 @@
 //! Fitted by Whittle's likelihood: an ordinate of a spectrum is gamma distributed around the density, so `Σ g·(ln S + P/S)`
 //! is least, `g` being half the degrees of freedom of an ordinate.
 
+use super::mixture;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
 /// Filters of the part: two averages of `2^M` samples each.
 const LARGEST_TAPS_LOG2: u32 = 6;
-const ROUNDS: usize = 300;
 
 /// White, 1/f, 1/f² behind the filter; the floor is not filtered.
 const TERMS: usize = 4;
@@ -80,54 +80,12 @@ impl Shape {
     fn fit_behind(bands: &[Band], sample_period: f64, taps: u32) -> Self {
         let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| basis(band.frequency, sample_period, taps)).collect();
         let mut shape = Self { sample_period, taps, densities: [0.0; TERMS] };
-        for (term, density) in shape.densities.iter_mut().enumerate() {
-            // Each term alone, at its share of the whole.
-            let (sum, weight) = bands.iter().zip(&bases).filter(|(_, basis)| basis[term] > 0.0).fold(
-                (0.0, 0.0),
-                |(sum, weight), (band, basis)| {
-                    (
-                        sum + band.ordinates * (band.density / basis[term]).max(f64::MIN_POSITIVE).ln(),
-                        weight + band.ordinates,
-                    )
-                },
-            );
-            *density = if weight > 0.0 { (sum / weight).exp() / TERMS as f64 } else { 0.0 };
-        }
-        for _ in 0..ROUNDS {
-            shape.improve(bands, &bases);
-        }
+        mixture::fit(bands, &bases, &mut shape.densities);
         shape
     }
 
-    /// One multiplicative step: never negative, never worse (C. Févotte and J. Idier, "Algorithms for nonnegative matrix
-    /// factorization with the β-divergence", 2011, for the Itakura-Saito divergence, which is Whittle's likelihood).
-    fn improve(&mut self, bands: &[Band], bases: &[[f64; TERMS]]) {
-        let (mut pull, mut push) = ([0.0; TERMS], [0.0; TERMS]);
-        for (band, basis) in bands.iter().zip(bases) {
-            let density: f64 = basis.iter().zip(self.densities).map(|(basis, density)| basis * density).sum();
-            if density <= 0.0 {
-                continue;
-            }
-            for term in 0..TERMS {
-                let weight = band.ordinates * basis[term] / density;
-                pull[term] += weight * band.density / density;
-                push[term] += weight;
-            }
-        }
-        for term in 0..TERMS {
-            if push[term] > 0.0 {
-                self.densities[term] *= (pull[term] / push[term]).sqrt();
-            }
-        }
-    }
-
-    /// Whittle's objective.
     fn whittle(&self, bands: &[Band]) -> f64 {
-        let of = |band: &Band| {
-            let density = self.density(band.frequency).max(f64::MIN_POSITIVE);
-            band.ordinates * (density.ln() + band.density / density)
-        };
-        bands.iter().map(of).sum()
+        mixture::objective(bands, |band| self.density(band.frequency))
     }
 }
 

@@ -4,7 +4,7 @@
 //! stretches of the record by the likelihood ratio under noise whose mixture of white, flicker and random walk is free
 //! with the step and without, and it has to explain more than a ramp or any other cause that is offered.
 
-use super::block::{BLOCKS, Blocks, Whitening, dot, fitted, residual, without};
+use super::block::{BLOCKS, Blocks, Whitening, dot, residual, size, without};
 use super::normal::{NORMAL_975, upper_tail};
 use super::{Finding, Repair, SIGNIFICANCE, Series, effect, parameter};
 use std::f64::consts::PI;
@@ -52,7 +52,7 @@ pub fn find(series: &Series, causes: &[&Series]) -> Option<Finding> {
     }
     let place = Place::of(series, &blocks, best.at)?;
     let step = blocks.step_at(series.slots[place.position]);
-    let (size, error) = fitted(best.noise, &blocks.means, &step);
+    let (size, error) = size(&noises, &blocks.means, &step, &[]);
     let left = best.noise.deviance(residual(best.noise, &blocks.means, std::slice::from_ref(&step)));
     let second = left - Scan::of(best.noise, &blocks, std::slice::from_ref(&step)).deviance;
     if second > (SECOND * deviance).max(2.0 * AHEAD) {

@@ -97,6 +97,8 @@ pub(crate) struct Whitening {
     rows: Vec<Vec<f64>>,
     log_determinant: f64,
     ones: Vec<f64>,
+    /// Of the level, in noise of scale 1.
+    level_information: f64,
 }
 
 impl Whitening {
@@ -130,9 +132,10 @@ impl Whitening {
             rows.push(line);
         }
         let log_determinant = 2.0 * rows.iter().enumerate().map(|(at, row)| row[at].ln()).sum::<f64>();
-        let mut whitening = Self { rows, log_determinant, ones: Vec::new() };
+        let mut whitening = Self { rows, log_determinant, ones: Vec::new(), level_information: 1.0 };
         let ones = whitening.whitened(&vec![1.0; size]);
         let norm = dot(&ones, &ones).sqrt();
+        whitening.level_information = norm * norm;
         whitening.ones = ones.iter().map(|value| value / norm).collect();
         Some(whitening)
     }
@@ -175,17 +178,57 @@ pub(crate) fn without(mut values: Vec<f64>, direction: &[f64]) -> Vec<f64> {
 /// Sum of squares of the whitened data less their part along `shapes`.
 pub(crate) fn residual(noise: &Whitening, means: &[f64], shapes: &[Vec<f64>]) -> f64 {
     let mut rest = noise.free(means);
+    let mut known: Vec<Vec<f64>> = Vec::with_capacity(shapes.len());
     for shape in shapes {
-        rest = without(rest, &noise.free(shape));
+        // What is new in it.
+        let shape = known.iter().fold(noise.free(shape), |rest, known| without(rest, known));
+        rest = without(rest, &shape);
+        known.push(shape);
     }
     dot(&rest, &rest)
 }
 
-/// Size of `shape` in the data and its standard error.
-pub(crate) fn fitted(noise: &Whitening, means: &[f64], shape: &[f64]) -> (f64, f64) {
-    let (data, shape) = (noise.free(means), noise.free(shape));
-    let norm = dot(&shape, &shape);
-    let size = dot(&data, &shape) / norm;
-    let rest = dot(&data, &data) - size * size * norm;
-    (size, (rest / (data.len() as f64 - 2.0) / norm).sqrt())
+/// Size of `shape` in the data beside `known` ones and its standard error, over all noises, each as likely as the data
+/// make it: which of them it is nobody knows.
+///
+/// The likelihood is that of what the shapes leave (REML; D. Harville, "Maximum likelihood approaches to variance component
+/// estimation", 1977): a ramp takes much of a walk away, and the walk would seem small.
+pub(crate) fn size(noises: &[Whitening], means: &[f64], shape: &[f64], known: &[Vec<f64>]) -> (f64, f64) {
+    let each: Vec<Fitted> = noises.iter().map(|noise| Fitted::of(noise, means, shape, known)).collect();
+    let least = each.iter().map(|fitted| fitted.deviance).fold(f64::INFINITY, f64::min);
+    let weight = |fitted: &Fitted| (0.5 * (least - fitted.deviance)).exp();
+    let total: f64 = each.iter().map(weight).sum();
+    let mean =
+        |value: &dyn Fn(&Fitted) -> f64| each.iter().map(|fitted| weight(fitted) * value(fitted)).sum::<f64>() / total;
+    let size = mean(&|fitted| fitted.size);
+    (size, mean(&|fitted| fitted.error * fitted.error + (fitted.size - size).powi(2)).sqrt())
+}
+
+/// A shape in one noise.
+struct Fitted {
+    size: f64,
+    error: f64,
+    /// −2 ln of the restricted likelihood.
+    deviance: f64,
+}
+
+impl Fitted {
+    fn of(noise: &Whitening, means: &[f64], shape: &[f64], known: &[Vec<f64>]) -> Self {
+        let mut taken: Vec<Vec<f64>> = Vec::with_capacity(known.len() + 1);
+        for shape in known.iter().map(Vec::as_slice).chain([shape]) {
+            // What is new in it.
+            taken.push(taken.iter().fold(noise.free(shape), |rest, known| without(rest, known)));
+        }
+        let data = taken.iter().take(known.len()).fold(noise.free(means), |rest, known| without(rest, known));
+        let shape = &taken[known.len()];
+        let norm = dot(shape, shape);
+        let size = dot(&data, shape) / norm;
+        let rest = dot(&data, &data) - size * size * norm;
+        // Free: the level, the shapes.
+        let freedom = data.len() as f64 - 1.0 - taken.len() as f64;
+        let information: f64 = taken.iter().map(|shape| dot(shape, shape).ln()).sum();
+        let deviance =
+            freedom * (rest / freedom).ln() + noise.log_determinant + noise.level_information.ln() + information;
+        Self { size, error: (rest / freedom / norm).sqrt(), deviance }
+    }
 }

@@ -13,7 +13,7 @@ pub struct Series {
     pub values: Vec<f64>,
     /// s.
     pub period_s: f64,
-    /// One count, in the channel's unit.
+    /// One step of the values, in the channel's unit: a count, if nothing else is known.
     pub resolution: f64,
     /// Of the values.
     pub unit: &'static str,
@@ -56,6 +56,12 @@ impl Series {
             }
         }
         Self { slots, values, period_s: 1.0 / timeline.sample_rate_hz, resolution, unit: channel.unit() }
+    }
+
+    /// The same values, known to be steps of so many counts.
+    #[must_use]
+    pub fn with_steps(self, counts: u32) -> Self {
+        Self { resolution: self.resolution * f64::from(counts), ..self }
     }
 
     /// Time from the first sample to the last, s.

@@ -1,7 +1,9 @@
 //! Every detector on recordings of the virtual sensor: silent where there is nothing, right where there is something.
 
 use super::normal::{poisson_bounds, poisson_tail, quantile, upper_tail};
-use super::{Finding, Repair, Series, bias_step, deliveries, rate_ramp, sample_clock, spikes};
+use super::{
+    Finding, Repair, Series, bias_step, coarse_counts, deliveries, rate_ramp, sample_clock, slow_cause, spikes,
+};
 use crate::record::{Host, Simulation};
 use crate::recording::Recording;
 use crate::sensor::effect::surroundings::TemperatureCourse;
@@ -44,7 +46,7 @@ impl Case {
     fn findings(&self) -> Vec<Finding> {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
-            [spikes::find(&series), bias_step::find(&series, &[]), rate_ramp::find(&series, &[])]
+            [spikes::find(&series), bias_step::find(&series, &[]), rate_ramp::find(&series, &[], &[])]
         });
         let common = [
             deliveries::dropped(&self.timeline),
@@ -145,13 +147,63 @@ fn a_level_that_moves_otherwise_is_no_step() {
 fn a_ramp_is_measured_and_told_from_a_step() {
     let case = Case::hiding(vec![Effect::RateRamp { channel: GYRO, slope: -1e-3 }], 600.0, 14);
     let series = case.series(GYRO);
-    let finding = rate_ramp::find(&series, &[]).unwrap();
+    let finding = rate_ramp::find(&series, &[], &[]).unwrap();
     assert_covers(&finding, "slope", -1e-3);
     assert!((finding.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
-    assert_eq!(rate_ramp::find(&series.repaired(&finding.repair), &[]), None);
+    assert_eq!(rate_ramp::find(&series.repaired(&finding.repair), &[], &[]), None);
 
     let step = Effect::BiasStep { channel: GYRO, time_s: 300.0, size: 0.3 };
-    assert_eq!(rate_ramp::find(&Case::hiding(vec![step], 600.0, 15).series(GYRO), &[]), None);
+    assert_eq!(rate_ramp::find(&Case::hiding(vec![step], 600.0, 15).series(GYRO), &[], &[]), None);
+}
+
+#[test]
+fn a_ramp_shows_beside_a_step_that_is_known() {
+    let effects = vec![
+        Effect::RateRamp { channel: GYRO, slope: 1e-3 },
+        Effect::BiasStep { channel: GYRO, time_s: 200.0, size: 0.3 },
+    ];
+    let series = Case::hiding(effects, 600.0, 16).series(GYRO);
+    // The part begins a little before the record.
+    let from = series.slots.partition_point(|&slot| (slot as f64) * series.period_s < 200.0);
+    let values = (0..series.values.len()).map(|at| if at < from { 0.0 } else { 1.0 }).collect();
+    let level = Series { values, slots: series.slots.clone(), ..series };
+    let finding = rate_ramp::find(&series, &[], &[&level]).unwrap();
+    assert_covers(&finding, "slope", 1e-3);
+}
+
+#[test]
+fn a_slow_cause_is_told_from_a_ramp() {
+    let warming = |effect: Effect, seed: u64| {
+        let mut simulation = Simulation::of_paper(600.0, seed);
+        simulation.hidden.effects = vec![effect];
+        simulation.hidden.surroundings.temperature =
+            TemperatureCourse { rise_c: 8.0, time_constant_s: 100.0, ..TemperatureCourse::default() };
+        Case::of(simulation)
+    };
+    let case = warming(Effect::Temperature { channel: GYRO, sensitivity: -0.05 }, 17);
+    let followed = slow_cause::find(&case.series(GYRO), &case.series(Channel::Temp)).unwrap();
+    assert!((followed.sensitivity + 0.05).abs() < 3.0 * followed.error, "{followed:?}");
+    assert!(followed.error < 0.005, "{followed:?}");
+    assert_eq!(slow_cause::find(&case.series(Channel::GyroX), &case.series(Channel::Temp)), None);
+
+    let case = warming(Effect::RateRamp { channel: GYRO, slope: 1e-3 }, 18);
+    assert_eq!(slow_cause::find(&case.series(GYRO), &case.series(Channel::Temp)), None);
+}
+
+#[test]
+fn values_that_skip_counts_have_a_coarser_step() {
+    let series = Case::hiding(Vec::new(), 60.0, 19).series(GYRO);
+    assert_eq!(coarse_counts::find(&series), None);
+    // Twelve bits instead of fourteen.
+    let count = 0.05;
+    let values = series.values.iter().map(|value| (value / count / 4.0).round() * 4.0 * count).collect();
+    let coarse = Series { values, slots: series.slots.clone(), ..series };
+    let finding = coarse_counts::find(&coarse).unwrap();
+    assert_eq!(finding.effect.kind, "quantization");
+    assert!((finding.effect.parameters["step"].value - 0.2).abs() < 1e-9);
+    // A channel that hardly ever changes says nothing.
+    let values = (0..coarse.values.len()).map(|at| if at % 5_000 < 2_500 { 0.0 } else { 0.2 }).collect();
+    assert_eq!(coarse_counts::find(&Series { values, slots: coarse.slots.clone(), ..coarse }), None);
 }
 
 #[test]
