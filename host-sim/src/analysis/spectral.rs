@@ -3,8 +3,7 @@
 use super::lines::{self, Line};
 use super::study::{Following, Study};
 use crate::trace::Series;
-use allan_core::Kind;
-use allan_core::Model;
+use allan_core::{Kind, Model};
 
 /// Share of a line's deviation that must be left when what the channel follows is taken off; else it is that's line.
 const OWN: f64 = 0.5;

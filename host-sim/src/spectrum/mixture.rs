@@ -49,10 +49,10 @@ pub(super) fn total<const TERMS: usize>(basis: &[f64; TERMS], densities: &[f64; 
 }
 
 /// `Σ g·(ln S + P/S)`, `g` being half the degrees of freedom of a band's density `P` and `S` the `modelled` one.
-pub(super) fn objective(bands: &[Band], modelled: impl Fn(&Band) -> f64) -> f64 {
-    let of = |band: &Band| {
-        let density = modelled(band).max(f64::MIN_POSITIVE);
+pub(super) fn objective(bands: &[Band], modelled: &[f64]) -> f64 {
+    let of = |(band, modelled): (&Band, &f64)| {
+        let density = modelled.max(f64::MIN_POSITIVE);
         band.ordinates * (density.ln() + band.density / density)
     };
-    bands.iter().map(of).sum()
+    bands.iter().zip(modelled).map(of).sum()
 }

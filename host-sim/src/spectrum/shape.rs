@@ -85,7 +85,8 @@ impl Shape {
     }
 
     fn whittle(&self, bands: &[Band]) -> f64 {
-        mixture::objective(bands, |band| self.density(band.frequency))
+        let modelled: Vec<f64> = bands.iter().map(|band| self.density(band.frequency)).collect();
+        mixture::objective(bands, &modelled)
     }
 }
 

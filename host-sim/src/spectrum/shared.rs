@@ -1,7 +1,7 @@
-//! A Markov process that two channels share, from their spectra and what these have in common.
+//! A Markov process that two channels share, from the spectra of their half sum and their half difference.
 //!
-//! The cross-spectrum of two channels is that of the shared process alone, whatever noise each has of its own. The
-//! likelihood is Wishart's for the two-by-two spectral matrix, band by band.
+//! The difference has nothing of what both share alike, and as much of their own noise as the sum: it tells what the sum
+//! would be without the process.
 
 use super::mixture;
 use super::shape::Band;
@@ -16,10 +16,12 @@ const TERMS: usize = 4;
 const SHORTEST: f64 = 16.0;
 const LONGEST: f64 = 0.5;
 const FACTOR: f64 = 1.25;
-/// Rounds of golden sections for the variance.
-const ROUNDS: usize = 40;
 /// Highest frequency, as part of the sample rate.
 const HIGHEST: f64 = 0.02;
+/// Information below which nothing is known of the variance.
+const LEAST_INFORMATION: f64 = 1e-2;
+/// Fewest bands that tell four densities and a time.
+const FEWEST_BANDS: usize = 16;
 
 /// What two channels share: likeliest values with 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,120 +45,97 @@ pub struct Bounded {
 
 impl Bounded {
     /// By mean and standard deviation of the logarithm.
-    fn of((mean, deviation): (f64, f64)) -> Self {
+    fn of(value: f64, (mean, deviation): (f64, f64)) -> Self {
         let half = NORMAL_975 * deviation;
-        Self { value: mean.exp(), low: (mean - half).exp(), high: (mean + half).exp() }
+        Self { value, low: (mean - half).exp().min(value), high: (mean + half).exp().max(value) }
     }
 }
 
-/// One band of both channels.
-struct Pair {
-    frequency: f64,
-    densities: [f64; 2],
-    common: f64,
-    ordinates: f64,
-}
-
-/// The Markov process that makes what `a` and `b` have in common likeliest; `None` if their samples differ, or if none does.
+/// The Markov process that makes the spectra of `a` and `b` likeliest; `None` if their samples differ, or are too few.
 #[must_use]
 pub fn markov(a: &Grid, b: &Grid) -> Option<Shared> {
     let [first, second] = [a, b].map(|grid| Tapered::of(&grid.detrended()));
     let (first, second) = (first?, second?);
-    let pairs = pairs(&first, &second)?;
-    let times: Vec<f64> = time_constants(a).collect();
-    let judged: Vec<(f64, f64)> = times.iter().map(|&time| best_variance(&pairs, a.sample_period(), time)).collect();
-    let least = judged.iter().map(|(_, objective)| *objective).fold(f64::INFINITY, f64::min);
+    if first.length != second.length {
+        return None;
+    }
+    let ranges: Vec<_> = ranges((HIGHEST / a.sample_period() / first.resolution()) as usize).collect();
+    let together: f64 = ranges.iter().cloned().flatten().map(|at| first.common(&second, at)).sum();
+    // One may rise as the other falls.
+    let sign = together.signum();
+    let halved = |sign: f64| -> Vec<Band> {
+        let density = |at: usize| {
+            let both = first.common(&first, at) + second.common(&second, at);
+            0.25 * (both + 2.0 * sign * first.common(&second, at))
+        };
+        let band = |range: &std::ops::Range<usize>| Band {
+            frequency: first.resolution() * (range.start + range.end - 1) as f64 / 2.0,
+            density: range.clone().map(density).sum::<f64>() / range.len() as f64,
+            ordinates: range.len() as f64,
+        };
+        ranges.iter().map(band).collect()
+    };
+    let (sum, difference) = (halved(sign), halved(-sign));
+    let bands = [sum, difference].concat();
+    if ranges.len() < FEWEST_BANDS || bands.iter().any(|band| band.density <= 0.0) {
+        return None;
+    }
+    let fits: Vec<Fit> = time_constants(a).map(|time| Fit::of(&bands, a.sample_period(), time)).collect();
+    let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective))?;
     // Every time constant as likely as the data make it: a record of few of them leaves time and variance in doubt
     // together.
-    let weights: Vec<f64> = judged.iter().map(|(_, objective)| (least - objective).exp()).collect();
-    let weighted = |values: &[f64]| {
-        let total: f64 = weights.iter().sum();
+    let weighted = |value: &dyn Fn(&Fit) -> f64| {
         let mean = |of: &dyn Fn(f64) -> f64| {
-            weights.iter().zip(values).map(|(weight, value)| weight * of(*value)).sum::<f64>() / total
+            let (sum, total) = fits.iter().fold((0.0, 0.0), |(sum, total), fit| {
+                let weight = (likeliest.objective - fit.objective).exp();
+                (sum + weight * of(value(fit)), total + weight)
+            });
+            sum / total
         };
         let middle = mean(&|value| value);
         (middle, mean(&|value| (value - middle).powi(2)).sqrt())
     };
-    let logarithms: Vec<f64> = times.iter().map(|time| time.ln()).collect();
-    let (time, of_time) = weighted(&logarithms);
-    let deviations: Vec<f64> =
-        judged.iter().map(|(variance, _)| 0.5 * variance.abs().max(f64::MIN_POSITIVE).ln()).collect();
-    let (deviation, of_deviation) = weighted(&deviations);
-    let alone = 0.5 * error_at(&pairs, a.sample_period(), time.exp(), (2.0 * deviation).exp());
+    let (time, of_time) = weighted(&|fit| fit.time.ln());
+    let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.max(f64::MIN_POSITIVE).ln());
+    let (alone, _) = weighted(&|fit| 0.5 * fit.error);
     Some(Shared {
-        deviation: Bounded::of((deviation, of_deviation.hypot(alone))),
+        deviation: Bounded::of(likeliest.variance.sqrt(), (deviation, of_deviation.hypot(alone))),
         // Within a step of the grid any is as likely.
-        time_constant: Bounded::of((time, of_time.hypot(FACTOR.ln() / 12f64.sqrt()))),
+        time_constant: Bounded::of(likeliest.time, (time, of_time.hypot(FACTOR.ln() / 12f64.sqrt()))),
     })
 }
 
-fn pairs(a: &Tapered, b: &Tapered) -> Option<Vec<Pair>> {
-    if a.length != b.length {
-        return None;
-    }
-    let highest = HIGHEST / a.sample_period;
-    let mean = |range: &std::ops::Range<usize>, of: &dyn Fn(usize) -> f64| {
-        range.clone().map(of).sum::<f64>() / range.len() as f64
-    };
-    let pair = |range: std::ops::Range<usize>| Pair {
-        frequency: a.resolution() * (range.start + range.end - 1) as f64 / 2.0,
-        densities: [mean(&range, &|at| a.common(a, at)), mean(&range, &|at| b.common(b, at))],
-        common: mean(&range, &|at| a.common(b, at)),
-        ordinates: range.len() as f64,
-    };
-    let pairs: Vec<Pair> = ranges((highest / a.resolution()) as usize).map(pair).collect();
-    let told = |pair: &Pair| pair.densities.iter().all(|density| *density > 0.0);
-    (pairs.len() > 8 && pairs.iter().all(told)).then_some(pairs)
+/// The likeliest noise and process of a time constant.
+struct Fit {
+    time: f64,
+    variance: f64,
+    /// Relative standard deviation of the variance, the rest being known.
+    error: f64,
+    objective: f64,
 }
 
-/// The likeliest shared variance for a time constant, and the objective there.
-fn best_variance(pairs: &[Pair], sample_period: f64, time: f64) -> (f64, f64) {
-    let own = [0, 1].map(|channel| {
-        let bands: Vec<Band> = pairs
-            .iter()
-            .map(|pair| Band { frequency: pair.frequency, density: pair.densities[channel], ordinates: pair.ordinates })
-            .collect();
-        let bases: Vec<_> = bands.iter().map(|band| basis(band.frequency, sample_period, Some(time))).collect();
+impl Fit {
+    /// To the bands of the half sum, which has the process, and then of the half difference.
+    fn of(bands: &[Band], sample_period: f64, time: f64) -> Self {
+        let basis = |(at, band): (usize, &Band)| {
+            let [white, flicker, walk, process] = basis(band.frequency, sample_period, time);
+            [white, flicker, walk, if at < bands.len() / 2 { process } else { 0.0 }]
+        };
+        let bases: Vec<[f64; TERMS]> = bands.iter().enumerate().map(basis).collect();
         let mut densities = [0.0; TERMS];
-        mixture::fit(&bands, &bases, &mut densities);
-        bases.iter().map(|basis| mixture::total(basis, &densities)).collect::<Vec<f64>>()
-    });
-    let process: Vec<f64> =
-        pairs.iter().map(|pair| basis(pair.frequency, sample_period, Some(time))[TERMS - 1]).collect();
-    let bands = || pairs.iter().zip(&process).zip(own[0].iter().zip(&own[1]));
-    // The two channels' coherence is at most 1.
-    let most = bands().map(|((_, process), (a, b))| (a * b).sqrt() / process).fold(f64::INFINITY, f64::min);
-    let objective = |variance: f64| -> f64 {
-        bands()
-            .map(|((pair, process), (a, b))| {
-                let common = variance * process;
-                let determinant = a * b - common * common;
-                let trace = b * pair.densities[0] + a * pair.densities[1] - 2.0 * common * pair.common;
-                pair.ordinates * (determinant.max(1e-9 * a * b).ln() + trace / determinant.max(1e-9 * a * b))
-            })
-            .sum()
-    };
-    let golden = (5f64.sqrt() - 1.0) / 2.0;
-    let (mut low, mut high) = (-0.999 * most, 0.999 * most);
-    for _ in 0..ROUNDS {
-        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-        if objective(a) < objective(b) { high = b } else { low = a }
+        mixture::fit(bands, &bases, &mut densities);
+        let totals: Vec<f64> = bases.iter().map(|basis| mixture::total(basis, &densities)).collect();
+        let variance = densities[TERMS - 1];
+        let share = |(basis, total): (&[f64; TERMS], &f64)| basis[TERMS - 1] * variance / total;
+        let shares = bases.iter().zip(&totals).map(share);
+        let information: f64 = shares.zip(bands).map(|(share, band)| band.ordinates * share * share).sum();
+        Self {
+            time,
+            variance,
+            error: information.max(LEAST_INFORMATION).sqrt().recip(),
+            objective: mixture::objective(bands, &totals),
+        }
     }
-    let variance = (low + high) / 2.0;
-    (variance, objective(variance))
-}
-
-/// Relative standard deviation of the variance when the time constant is known, by the ordinates that show the process.
-fn error_at(pairs: &[Pair], sample_period: f64, time: f64, variance: f64) -> f64 {
-    let information: f64 = pairs
-        .iter()
-        .map(|pair| {
-            let common = variance * basis(pair.frequency, sample_period, Some(time))[TERMS - 1];
-            let product = pair.densities[0] * pair.densities[1];
-            2.0 * pair.ordinates * common * common / (product + common * common)
-        })
-        .sum();
-    1.0 / information.max(1.0).sqrt()
 }
 
 /// Time constants to be tried on a record, s.
@@ -167,13 +146,11 @@ fn time_constants(grid: &Grid) -> impl Iterator<Item = f64> {
 }
 
 /// One-sided densities: of white noise and 1/f at 1, of a walk, and of a process of variance 1 with this time constant.
-fn basis(frequency: f64, sample_period: f64, time: Option<f64>) -> [f64; TERMS] {
+fn basis(frequency: f64, sample_period: f64, time: f64) -> [f64; TERMS] {
     let walk = PI * sample_period / (PI * frequency * sample_period).sin();
-    let markov = time.map_or(0.0, |time| {
-        let kept = (-sample_period / time).exp();
-        let turn = (2.0 * PI * frequency * sample_period).cos();
-        2.0 * sample_period * (1.0 - kept * kept) / (1.0 - 2.0 * kept * turn + kept * kept)
-    });
+    let kept = (-sample_period / time).exp();
+    let turn = (2.0 * PI * frequency * sample_period).cos();
+    let markov = 2.0 * sample_period * (1.0 - kept * kept) / (1.0 - 2.0 * kept * turn + kept * kept);
     [1.0, 1.0 / frequency, walk * walk, markov]
 }
 
