@@ -7,9 +7,6 @@ use crate::{Curve, Kind};
 /// Shapes of one family: what lies between them is reached by the search.
 const MAX_SHAPES: usize = 64;
 
-/// Lengths of a single moving average: the part's filter has two, that of whoever recorded it may have one.
-const AVERAGES: [u16; 14] = [2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 64];
-
 /// Terms that differ in their shape alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Family {
@@ -17,8 +14,6 @@ pub(super) enum Family {
     RateRamp,
     /// Behind the filter the converter's rounding adds white noise.
     Filter,
-    /// Of any length, and not the part's own: it has to earn more than its parameters cost.
-    Average,
     /// It takes the place of the white noise: the rate is all that it adds.
     SlowlyReadFilter,
     Markov,
@@ -28,13 +23,12 @@ pub(super) enum Family {
 }
 
 impl Family {
-    /// Parameters that it adds to the model, or costs as much as.
+    /// Parameters that it adds to the model.
     pub(super) fn parameters(self) -> u32 {
         match self {
             Self::Quantization | Self::RateRamp => 1,
             Self::Filter | Self::SlowlyReadFilter | Self::Markov | Self::Sinusoid | Self::KnownLine => 2,
             Self::Resonance => 3,
-            Self::Average => 4,
         }
     }
 }
@@ -62,7 +56,7 @@ impl<'a> Families<'a> {
             Lines::Known(_) => &[KnownLine],
             Lines::InTheCurve => &[Sinusoid, Resonance],
         };
-        [Quantization, RateRamp, Filter, Average, SlowlyReadFilter, Markov].iter().chain(lines).copied()
+        [Quantization, RateRamp, Filter, SlowlyReadFilter, Markov].iter().chain(lines).copied()
     }
 
     /// The shapes of a family, one at a time: all of them would fill a small stack.
@@ -76,7 +70,6 @@ impl<'a> Families<'a> {
             Family::Quantization => (index == 0).then_some(Kind::Quantization),
             Family::RateRamp => (index == 0).then_some(Kind::RateRamp),
             Family::Filter => (index < 6).then(|| Kind::Filtered(Filter::bartlett(2 << index))),
-            Family::Average => AVERAGES.get(index).map(|&taps| Kind::Filtered(Filter::boxcar(taps))),
             Family::SlowlyReadFilter => [6.1, 8.1, 10.1, 12.1]
                 .get(index)
                 .map(|&decimation| Kind::Filtered(Filter { stages: 2, taps: 8, decimation })),
