@@ -49,9 +49,7 @@ impl<'a> Families<'a> {
 
     /// The simplest first.
     pub(super) fn all(&self) -> impl Iterator<Item = Family> {
-        use Family::{
-            Average, Filter, KnownLine, Markov, Quantization, RateRamp, Resonance, Sinusoid, SlowlyReadFilter,
-        };
+        use Family::{Filter, KnownLine, Markov, Quantization, RateRamp, Resonance, Sinusoid, SlowlyReadFilter};
         let lines: &[Family] = match self.lines {
             Lines::Known(_) => &[KnownLine],
             Lines::InTheCurve => &[Sinusoid, Resonance],
