@@ -12,6 +12,9 @@ use firmware::OCTAVES;
 /// Probability of the residual under a model below which another one is tried.
 const UNEXPLAINED: f64 = 1e-3;
 
+/// Degrees of freedom of a course: the stretches that a record is cut into, nearly.
+const FREE: f64 = crate::trace::block::BLOCKS as f64;
+
 /// The covariates of a channel in a part, ready for the regression.
 pub(super) struct Surroundings {
     channel: Curve<OCTAVES>,
@@ -79,8 +82,8 @@ impl Following {
             };
             match followed.iter_mut().find(|known| known.covariate == covariate) {
                 Some(known) if known.error <= error => {}
-                Some(known) => (known.value, known.error) = (value, error),
-                None => followed.push(Sensitivity { covariate, value, error }),
+                Some(known) => *known = Sensitivity { covariate, value, error, freedom: FREE },
+                None => followed.push(Sensitivity { covariate, value, error, freedom: FREE }),
             }
         }
         let curve = surroundings.beside().compensated(&followed);
