@@ -61,7 +61,8 @@ run cargo test --locked --workspace --ignore-rust-version --no-run
 TEN_MINUTES=no_sample_is_lost_or_doubled_while_everything_is_going_on
 log=$(mktemp)
 set -m # a process group of its own
-OBSERVATORY_SECONDS=600 cargo test --locked --ignore-rust-version --package system-tests --test image -- --nocapture \
+# --workspace, so that nothing is built again with other features
+OBSERVATORY_SECONDS=600 cargo test --locked --workspace --ignore-rust-version --test image -- --nocapture \
     "$TEN_MINUTES" >"$log" 2>&1 &
 beside=$!
 set +m
