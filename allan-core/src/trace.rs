@@ -90,10 +90,9 @@ impl<'a> Lines<'a> {
 /// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
 #[must_use]
 pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
-    let declared = Trace::declared(curve);
-    match trace_while(declared.clone(), curve, lines, &mut || true) {
+    match trace_while(Trace::declared(curve), curve, lines, &mut || true) {
         Some(trace) => trace,
-        None => declared, // nobody said no
+        None => Trace::declared(curve), // nobody said no
     }
 }
 
