@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The estimator's speed beside its peers', on the same machine in the same run: nanoseconds a sample and channel.
 #
-# Installs allantools from PyPI into a virtual environment and builds two crates, all below target/peers. numpy takes the
+# Installs allantools into a virtual environment and builds two crates, all below target/peers. numpy takes the
 # vector instructions of the machine that it runs on; so may the crates.
 set -euo pipefail
 cd "$(dirname "$0")/speed"

@@ -2,13 +2,14 @@
 #![no_std]
 #![no_main]
 
+mod end;
 mod estimator;
 mod functions;
 mod timer;
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hprintln};
+use cortex_m_semihosting::hprintln;
 use timer::instructions;
 
 #[entry]
@@ -16,19 +17,7 @@ fn main() -> ! {
     timer::start();
     estimator::count();
     functions::count();
-    debug::exit(debug::EXIT_SUCCESS);
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-#[panic_handler]
-fn panic(info: &core::panic::PanicInfo) -> ! {
-    hprintln!("{}", info);
-    debug::exit(debug::EXIT_FAILURE);
-    loop {
-        cortex_m::asm::wfi();
-    }
+    end::success()
 }
 
 /// Says how many instructions each of `times` runs took on average.

@@ -3,6 +3,8 @@
 #![no_std]
 #![no_main]
 
+#[path = "../end.rs"]
+mod end;
 mod stack;
 #[path = "../timer.rs"]
 mod timer;
@@ -12,7 +14,7 @@ use allan_core::trace::{Lines, trace};
 use allan_core::{Cascade, Curve, Kind};
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hprintln};
+use cortex_m_semihosting::hprintln;
 
 const OCTAVES: usize = 24;
 /// An hour and a half at 204.8 samples a second: 20 points.
@@ -48,19 +50,7 @@ fn main() -> ! {
     let mut found = 0;
     measure("trace_tone", || found = black_box(trace(&toned, Lines::InTheCurve)).found.len());
     hprintln!("count found_tone {}", found);
-    debug::exit(debug::EXIT_SUCCESS);
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-#[panic_handler]
-fn panic(info: &core::panic::PanicInfo) -> ! {
-    hprintln!("{}", info);
-    debug::exit(debug::EXIT_FAILURE);
-    loop {
-        cortex_m::asm::wfi();
-    }
+    end::success()
 }
 
 fn measure(name: &str, work: impl FnOnce()) {
