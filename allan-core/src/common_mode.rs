@@ -2,7 +2,7 @@
 
 use crate::confidence::octave_correlation;
 use crate::coupling::Covariance;
-use crate::math::{abs, atanh, sqrt};
+use crate::math::{abs, atanh, clamp, sqrt};
 use crate::regression::Shared;
 use crate::term::{Kind, Markov};
 use crate::{Curve, Model};
@@ -79,7 +79,7 @@ pub fn common_mode<const POINTS: usize>(
 /// few degrees of freedom counts for far too little.
 fn clarity(correlation: f64, edf: f64) -> f64 {
     if edf > FEWEST_TRANSFORMED {
-        atanh(correlation.clamp(-CLOSEST, CLOSEST)) * sqrt(edf - 2.0)
+        atanh(clamp(correlation, -CLOSEST, CLOSEST)) * sqrt(edf - 2.0)
     } else {
         correlation * sqrt(edf)
     }

@@ -25,8 +25,8 @@ use problem::Problem;
 
 const EDF_ROUNDS: usize = 4;
 
-/// Fits the coefficients of `kinds` (the first [`MAX_TERMS`](crate::model::MAX_TERMS) of them, each once) to all points of a curve; their
-/// shapes stay as they are given.
+/// Fits the coefficients of `kinds` (the first [`MAX_TERMS`](crate::model::MAX_TERMS) of them, each once) to all points
+/// of a curve; their shapes stay as they are given.
 ///
 /// A curve without points, or of a channel that never changed, gives coefficients of 0.
 #[must_use]

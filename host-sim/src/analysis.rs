@@ -75,12 +75,13 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     let parts = Parts::of(recording, timeline, &coupled, &repairs);
     let studies = in_parallel(&recording.channels, |&channel| {
         let series = |channel: Channel| repairs.series(recording, timeline, channel);
-        let studies = Studies::of(&parts, channel, traced.contains(&channel), repairs.ramps(channel), series);
-        let series = if traced.contains(&channel) { series(channel) } else { Series::of(recording, timeline, channel) };
+        let traced = traced.contains(&channel);
+        let own = if traced { series(channel) } else { Series::of(recording, timeline, channel) };
+        let studies = Studies::of(&parts, channel, traced.then_some(&own), repairs.ramps(channel), series);
         // What the channel follows is no noise, and is in the series: there the declared model has to do.
         let trace = &studies.first.trace;
         let model = if studies.first.following.followed.is_empty() { &trace.after } else { &trace.before };
-        let practice = Practice::of(&series, model);
+        let practice = Practice::of(&own, model);
         (studies, practice)
     });
     let (studies, practices): (Vec<Studies>, Vec<Practice>) = studies.into_iter().unzip();
@@ -119,25 +120,30 @@ struct Studies {
 }
 
 impl Studies {
-    /// `series` gives the samples of a channel.
-    fn of(parts: &Parts, channel: Channel, traced: bool, ramps: bool, series: impl Fn(Channel) -> Series) -> Self {
+    /// `own` are the samples of a channel that is traced, `series` gives those of others.
+    fn of(
+        parts: &Parts,
+        channel: Channel,
+        own: Option<&Series>,
+        ramps: bool,
+        series: impl Fn(Channel) -> Series,
+    ) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
-        if !traced {
+        let Some(own) = own else {
             let [first, both] = [&parts.first, &parts.both].map(|part| Following::of(part, position, false, |_| None));
             return Self { first: Study::declared(first), both: Study::declared(both), lines: Vec::new() };
-        }
-        let own = series(channel);
+        };
         let own_half = own.first_half();
         let slow = |cause| repairs::is_slow(cause).then(|| series(cause));
         let first = Following::of(&parts.first, position, ramps, |cause| {
             slow_cause::find(&own_half, &slow(cause)?.first_half())
         });
-        let both = Following::of(&parts.both, position, ramps, |cause| slow_cause::find(&own, &slow(cause)?));
-        let without = |following: &Following| compensated(&own, following, |cause| series(parts.both.channels[cause]));
+        let both = Following::of(&parts.both, position, ramps, |cause| slow_cause::find(own, &slow(cause)?));
+        let without = |following: &Following| compensated(own, following, |cause| series(parts.both.channels[cause]));
         let half = without(&first).map(|rest| rest.first_half());
         let whole = without(&both);
         let (first, _) = spectral::study(first, &own_half, half.as_ref());
-        let (both, lines) = spectral::study(both, &own, whole.as_ref());
+        let (both, lines) = spectral::study(both, own, whole.as_ref());
         Self { first, both, lines }
     }
 

@@ -1,9 +1,7 @@
 //! How a channel follows a covariate, and how sure that is where few degrees of freedom tell.
 
+use crate::chi_square::NORMAL_975;
 use crate::math::{abs, expm1, ln, sqrt};
-
-/// Quantile of the normal distribution at 0.975.
-const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 /// How a channel follows a covariate.
 #[derive(Debug, Clone, Copy, PartialEq)]
