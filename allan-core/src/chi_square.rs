@@ -1,5 +1,6 @@
 //! Quantiles of the χ² distribution for any real number of degrees of freedom.
 
+use crate::confidence::NORMAL_975;
 use crate::math::{abs, clamp, exp, ln, ln_gamma, sqrt};
 
 /// Above this the Wilson–Hilferty cube is within 2·10⁻⁶ in probability.
@@ -80,9 +81,6 @@ fn normal_quantile(p: f64) -> f64 {
     let t = sqrt(-2.0 * ln(1.0 - p));
     t - (2.515_517 + t * (0.802_853 + t * 0.010_328)) / (1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308)))
 }
-
-/// The normal quantile of 0.975: half the width of a 95 % interval in standard deviations.
-pub(crate) const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,9 @@ mod law;
 use crate::math::{abs, ln, sqrt};
 pub(crate) use law::{Difference, Law};
 
+/// The normal quantile of 0.975: half the width of a 95 % interval in standard deviations.
+pub const NORMAL_975: f64 = 1.959_963_984_540_054;
+
 /// What part of a point's variance is due to which power law; the parts sum to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shares {

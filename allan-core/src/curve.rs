@@ -113,22 +113,14 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self
     }
 
-    /// The same curve from averaging factor `n` on, as far as there is room.
-    #[must_use]
-    pub fn from_factor<const ROOM: usize>(&self, n: u64) -> Curve<ROOM> {
-        let points = self.points.iter().filter(|point| point.n >= n).copied().take(ROOM).collect();
-        Curve { sample_period: self.sample_period, samples: self.samples, points }
-    }
-
-    /// The same points with another variance.
-    pub(crate) fn with_avar(mut self, avar: impl Fn(&Point) -> f64) -> Self {
+    /// Gives the points another variance.
+    pub(crate) fn change_avar(&mut self, avar: impl Fn(&Point) -> f64) {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
             let ratio = avar(point) / point.avar;
             point.avar *= ratio;
             point.low *= ratio;
             point.high *= ratio;
         }
-        self
     }
 
     /// The same curve with the confidence of the noise that `shares` tells for each point.

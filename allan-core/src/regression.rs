@@ -5,96 +5,46 @@
 //! its own would make `β` too small; what its curve shows as white is taken off first. Slow channels have few degrees
 //! of freedom, and a chance likeness of two random walks goes far: a sensitivity is judged by Student's distribution.
 
+mod covariate;
+mod octave;
 mod sensitivity;
 
+pub use covariate::Covariate;
 pub use sensitivity::Sensitivity;
 
-use crate::confidence::{Shares, octave_correlation};
 use crate::coupling::Covariance;
 use crate::fit::{
     fit,
-    least_squares::{Matrix, Vector, inverse, solve},
+    least_squares::{Matrix, Vector, solve},
 };
 use crate::math::sqrt;
-use crate::{Curve, Kind, Model, Point};
+use crate::{Curve, Kind, Point};
 use heapless::Vec;
+use octave::{Octave, freedom, scatter};
 
 /// Covariates that can be taken at once.
-pub const MAX_COVARIATES: usize = 8;
-/// A share of a covariate's variance that is its own noise above which an octave says nothing about the sensitivity.
-const NOISE_SHARE: f64 = 0.5;
+pub const MAX_COVARIATES: usize = 6;
 /// Degrees of freedom below which nothing is said.
 const LEAST_FREEDOM: f64 = 2.0;
 /// Standard deviations of a normal distribution from which on a sensitivity is believed. Smooth covariates pass it by
 /// chance in some 2 of 10,000 pairs, more often than the normal distribution says.
 const DOUBT: f64 = 4.5;
 
-/// A measured quantity that a channel may follow.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Covariate<const POINTS: usize> {
-    curve: Curve<POINTS>,
-    noise: Model,
-    /// Variance of one step of its converter where no noise dithers it; 0 where it does.
-    step: f64,
-}
-
-impl<const POINTS: usize> Covariate<POINTS> {
-    /// A covariate with its curve in a physical unit, in which its converter has steps of `lsb`.
-    #[must_use]
-    pub fn new(curve: Curve<POINTS>, lsb: f64) -> Self {
-        let noise = fit(
-            &curve,
-            &[Kind::Quantization, Kind::AngleRandomWalk, Kind::BiasInstability, Kind::RateRandomWalk, Kind::RateRamp],
-        );
-        let white =
-            noise.terms().iter().copied().filter(|t| matches!(t.kind, Kind::Quantization | Kind::AngleRandomWalk));
-        let noise = Model::new(curve.sample_period(), white);
-        let dithered = curve.points().first().is_some_and(|point| point.avar > 0.2 * lsb * lsb);
-        Self { curve, noise, step: if dithered { 0.0 } else { lsb * lsb / 12.0 } }
-    }
-
-    /// A covariate that is to be subtracted as it is measured, noise and all.
-    #[must_use]
-    pub fn as_measured(curve: Curve<POINTS>) -> Self {
-        let noise = Model::new(curve.sample_period(), core::iter::empty());
-        Self { curve, noise, step: 0.0 }
-    }
-
-    /// Another stretch of the same covariate, whose noise is known from this one.
-    #[must_use]
-    pub fn continued(&self, curve: Curve<POINTS>) -> Self {
-        Self { curve, noise: self.noise.clone(), step: self.step }
-    }
-
-    /// The same from averaging factor `n` on, as far as there is room.
-    #[must_use]
-    pub fn from_factor<const ROOM: usize>(self, n: u64) -> Covariate<ROOM> {
-        Covariate { curve: self.curve.from_factor(n), noise: self.noise, step: self.step }
-    }
-
-    /// Allan variance of what was really there to be followed, and of all that was measured.
-    fn signal(&self, n: u64) -> Option<(f64, f64)> {
-        let measured = self.curve.points().iter().find(|point| point.n == n)?.avar;
-        let noise = self.noise.avar(n);
-        let told = measured > 0.0 && noise < NOISE_SHARE * measured && measured > 4.0 * self.step;
-        told.then_some((measured - noise, measured))
-    }
-}
-
 /// The coupling of two channels in the product of their physical units.
 pub type Shared<const POINTS: usize> = Vec<Covariance, POINTS>;
 
+/// Sensitivities to several covariates at once.
+type Sensitivities = Vec<Sensitivity, MAX_COVARIATES>;
+
 /// A channel, the covariates that it may follow, and what they share, at `COUPLED` octaves or fewer.
-#[derive(Debug)]
 pub struct Beside<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
     /// The channel.
     pub channel: &'a Curve<POINTS>,
     /// At most [`MAX_COVARIATES`].
     pub covariates: &'a [Covariate<COUPLED>],
-    /// The channel with each covariate.
-    pub with_channel: &'a [Shared<COUPLED>],
-    /// The covariates with each other: `i` with `j < i` at `i·(i−1)/2 + j`.
-    pub mutual: &'a [Shared<COUPLED>],
+    /// The covariance of the channel (`None`) or of another covariate with a covariate at an averaging factor, in the
+    /// product of their units; `None` where it is not known.
+    pub covariance: &'a dyn Fn(Option<usize>, usize, u64) -> Option<f64>,
 }
 
 impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
@@ -106,12 +56,13 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
 
     /// The same, asking before every fit whether to keep on; `None` if the answer was no.
     #[must_use]
+    #[inline(never)] // here and below: so that stack frames do not add up
     pub fn followed_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
-        let mut followed: Vec<Sensitivity, MAX_COVARIATES> = Vec::new();
+        let mut followed = Sensitivities::new();
         while followed.len() < self.covariates.len() {
-            let rest = self.rest(&followed);
-            let mut best: Vec<Sensitivity, MAX_COVARIATES> = Vec::new();
-            let clarity = |tried: &Vec<Sensitivity, MAX_COVARIATES>| tried.last().map_or(0.0, Sensitivity::sigmas);
+            let octaves = self.octaves(&followed);
+            let mut best = Sensitivities::new();
+            let clarity = |tried: &Sensitivities| tried.last().map_or(0.0, Sensitivity::sigmas);
             for next in (0..self.covariates.len()).filter(|i| followed.iter().all(|known| known.covariate != *i)) {
                 if !keep_on() {
                     return None;
@@ -120,8 +71,8 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
                     followed.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
                 // What is left is smaller when it is subtracted: weigh the octaves by that.
                 let tried = self
-                    .sensitivities(&chosen, &rest)
-                    .and_then(|first| self.sensitivities(&chosen, &self.rest(&first)))
+                    .sensitivities(&chosen, &octaves)
+                    .and_then(|first| self.sensitivities(&chosen, &self.octaves(&first)))
                     .unwrap_or_default();
                 if clarity(&tried).total_cmp(&clarity(&best)).is_ge() {
                     best = tried;
@@ -135,68 +86,89 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         Some(followed)
     }
 
-    /// What the channel would be without the covariates, as far as N, B and K describe it.
-    fn rest(&self, followed: &[Sensitivity]) -> Rest<POINTS> {
-        let curve = self
-            .less(followed, |covariate, n| self.covariates[covariate].signal(n).map_or(0.0, |(_, measured)| measured));
-        Rest { model: fit(&curve, &Kind::DECLARED), curve }
+    /// What each octave that is known of a covariate is worth, as far as N, B and K describe the channel without what
+    /// it follows.
+    #[inline(never)]
+    fn octaves(&self, followed: &[Sensitivity]) -> Vec<Octave, COUPLED> {
+        let mut rest = self.channel.clone();
+        self.subtract(&mut rest, followed, |covariate, n| {
+            self.covariates[covariate].signal(n).map_or(0.0, |(_, measured)| measured)
+        });
+        let model = fit(&rest, &Kind::DECLARED);
+        let is_known = |point: &&Point| self.covariates.iter().any(|covariate| covariate.avar(point.n).is_some());
+        rest.points().iter().filter(is_known).filter_map(|point| Octave::of(point, &model)).take(COUPLED).collect()
     }
 
     /// Sensitivities to the covariates in `chosen`.
     ///
     /// `None` where the covariates move too little, or too much alike.
-    fn sensitivities(&self, chosen: &[usize], rest: &Rest<POINTS>) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
-        let count = chosen.len().min(MAX_COVARIATES);
+    #[inline(never)]
+    fn sensitivities(&self, chosen: &[usize], octaves: &[Octave]) -> Option<Sensitivities> {
         let mut normal: Matrix<MAX_COVARIATES> = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
         let mut right: Vector<MAX_COVARIATES> = [0.0; MAX_COVARIATES];
-        let mut told: Vec<Told, COUPLED> = Vec::new();
-        for point in rest.curve.points() {
-            let Some(octave) = self.told(point, chosen, &rest.model) else { continue };
-            for (i, row) in normal.iter_mut().enumerate().take(count) {
-                right[i] += octave.weight * octave.with_channel[i];
-                for (entry, signal) in row.iter_mut().zip(octave.signal[i]) {
-                    *entry += octave.weight * signal;
+        for octave in octaves {
+            for (i, &covariate) in chosen.iter().enumerate() {
+                if self.covariates[covariate].signal(octave.n).is_some() {
+                    right[i] += octave.weight * self.with_channel(covariate, octave.n);
+                }
+                for (j, &other) in chosen[..=i].iter().enumerate() {
+                    normal[i][j] += octave.weight * self.shared(covariate, other, octave.n);
                 }
             }
-            // As many as the covariates have points.
-            let _ = told.push(octave);
         }
-        let value = solve(&normal, &right, (1 << count) - 1)?;
-        let inverse = inverse(&normal, count)?;
-        let scatter = scatter(&told, count);
-        let error = |i: usize| {
-            let row = &inverse[i];
-            let along = |j: usize| (0..count).map(|k| row[k] * scatter[j][k]).sum::<f64>();
-            sqrt((0..count).map(|j| row[j] * along(j)).sum())
+        let all = (1 << chosen.len()) - 1;
+        let value = solve(&normal, &right, all)?;
+        let scatter = self.scatter(chosen, octaves);
+        let sensitivity = |(i, &covariate): (usize, &usize)| {
+            let mut unit = [0.0; MAX_COVARIATES];
+            unit[i] = 1.0;
+            let row = solve(&normal, &unit, all)?;
+            let along = |(entry, scatter): (f64, Vector<MAX_COVARIATES>)| {
+                entry * row.iter().zip(scatter).map(|(a, b)| a * b).sum::<f64>()
+            };
+            let error = sqrt(row.into_iter().zip(scatter).map(along).sum());
+            let freedom = freedom(octaves, |n| self.measured(covariate, n));
+            let left = freedom - chosen.len() as f64;
+            (left >= LEAST_FREEDOM).then(|| Sensitivity::new(covariate, value[i], error * sqrt(freedom / left), left))
         };
-        let sensitivity = |i: usize| {
-            let freedom = freedom(&told, i);
-            let left = freedom - count as f64;
-            (left >= LEAST_FREEDOM)
-                .then(|| Sensitivity::new(chosen[i], value[i], error(i) * sqrt(freedom / left), left))
-        };
-        (0..count).map(sensitivity).collect()
+        chosen.iter().enumerate().map(sensitivity).collect()
+    }
+
+    /// Covariance of the right side of the normal equations.
+    #[inline(never)]
+    fn scatter(&self, chosen: &[usize], octaves: &[Octave]) -> Matrix<MAX_COVARIATES> {
+        let mut matrix = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
+        for (i, &a) in chosen.iter().enumerate() {
+            for (j, &b) in chosen[..=i].iter().enumerate() {
+                let of = |n: u64| if i == j { self.measured(a, n) } else { self.shared(a, b, n) };
+                matrix[i][j] = scatter::<COUPLED>(octaves, of);
+                matrix[j][i] = matrix[i][j];
+            }
+        }
+        matrix
     }
 
     /// The channel's curve less what follows the covariates.
     #[must_use]
     pub fn compensated(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
-        self.less(sensitivities, |covariate, n| self.shared(covariate, covariate, n))
+        let mut curve = self.channel.clone();
+        self.subtract(&mut curve, sensitivities, |covariate, n| self.shared(covariate, covariate, n));
+        curve
     }
 
-    /// The channel's curve less covariates of such a variance.
-    fn less(&self, sensitivities: &[Sensitivity], variance: impl Fn(usize, u64) -> f64) -> Curve<POINTS> {
-        self.channel.clone().with_avar(|point| {
+    /// Takes covariates of such a variance from the channel's `curve`.
+    fn subtract(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity], variance: impl Fn(usize, u64) -> f64) {
+        curve.change_avar(|point| {
             let of = |a: &Sensitivity| {
                 let others = sensitivities.iter().filter(|b| b.covariate < a.covariate);
                 let products = others.map(|b| 2.0 * b.value * self.shared(a.covariate, b.covariate, point.n));
-                let followed = covariance(&self.with_channel[a.covariate], point.n);
+                let followed = self.with_channel(a.covariate, point.n);
                 a.value * (a.value * variance(a.covariate, point.n) - 2.0 * followed + products.sum::<f64>())
             };
             // An estimate of what is left can come out below 0 where almost nothing is.
             let least = 0.01 * point.avar;
             (point.avar + sensitivities.iter().map(of).sum::<f64>()).max(least)
-        })
+        });
     }
 
     /// The channel's curve when the covariates, as they are measured, are subtracted from its samples.
@@ -205,53 +177,30 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     /// of the channel.
     #[must_use]
     pub fn subtracted(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
-        self.channel.clone().with_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar))
+        let mut curve = self.channel.clone();
+        curve.change_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
+        curve
     }
 
     fn subtracted_at(&self, point: &Point, sensitivities: &[Sensitivity]) -> Option<f64> {
-        let known =
-            |shared: &[Covariance]| shared.iter().find(|other| other.n == point.n).map(|other| other.covariance);
         let mut avar = point.avar;
         for (i, a) in sensitivities.iter().enumerate() {
-            let own = self.covariates[a.covariate].curve.points().iter().find(|own| own.n == point.n)?.avar;
-            avar += a.value * (a.value * own - 2.0 * known(&self.with_channel[a.covariate])?);
+            let own = self.covariates[a.covariate].avar(point.n)?;
+            avar += a.value * (a.value * own - 2.0 * (self.covariance)(None, a.covariate, point.n)?);
             for b in &sensitivities[..i] {
-                avar += 2.0 * a.value * b.value * known(&self.mutual[pair(a.covariate, b.covariate)])?;
+                avar += 2.0 * a.value * b.value * (self.covariance)(Some(b.covariate), a.covariate, point.n)?;
             }
         }
         Some(avar.max(0.0))
     }
 
-    fn told(&self, point: &Point, chosen: &[usize], rest: &Model) -> Option<Told> {
-        let is_told = |&covariate: &usize| self.covariates[covariate].signal(point.n).is_some();
-        if !chosen.iter().any(is_told) {
-            return None;
-        }
-        // What the model lacks is noise to the regression too.
-        let variance = rest.avar(point.n).max(point.avar);
-        if variance <= 0.0 {
-            return None;
-        }
-        let edf = rest.edf(point);
-        let mut octave = Told {
-            edf,
-            weight: edf / variance,
-            shares: rest.shares(point.n),
-            with_channel: [0.0; MAX_COVARIATES],
-            signal: [[0.0; MAX_COVARIATES]; MAX_COVARIATES],
-            measured: [0.0; MAX_COVARIATES],
-        };
-        for (i, &covariate) in chosen.iter().enumerate().take(MAX_COVARIATES) {
-            let (_, measured) = self.covariates[covariate].signal(point.n).unwrap_or_default();
-            octave.measured[i] = measured;
-            if measured > 0.0 {
-                octave.with_channel[i] = covariance(&self.with_channel[covariate], point.n);
-            }
-            for (j, &other) in chosen.iter().enumerate().take(MAX_COVARIATES) {
-                octave.signal[i][j] = self.shared(covariate, other, point.n);
-            }
-        }
-        Some(octave)
+    fn with_channel(&self, covariate: usize, n: u64) -> f64 {
+        (self.covariance)(None, covariate, n).unwrap_or_default()
+    }
+
+    /// All the variance of a covariate at an octave that says something of it.
+    fn measured(&self, covariate: usize, n: u64) -> f64 {
+        self.covariates[covariate].signal(n).map_or(0.0, |(_, measured)| measured)
     }
 
     /// What two covariates have in common, noise taken off; 0 at an octave that says nothing of either.
@@ -259,69 +208,8 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         let signal = |covariate: usize| self.covariates[covariate].signal(n);
         match (signal(a), signal(b)) {
             (Some((signal, _)), Some(_)) if a == b => signal,
-            (Some(_), Some(_)) => covariance(&self.mutual[pair(a, b)], n),
+            (Some(_), Some(_)) => (self.covariance)(Some(b), a, n).unwrap_or_default(),
             _ => 0.0,
         }
     }
-}
-
-/// A channel without what it follows: measured, and modelled.
-struct Rest<const POINTS: usize> {
-    curve: Curve<POINTS>,
-    model: Model,
-}
-
-/// What one octave tells.
-struct Told {
-    edf: f64,
-    /// Degrees of freedom over the variance of the rest.
-    weight: f64,
-    shares: Shares,
-    with_channel: Vector<MAX_COVARIATES>,
-    signal: Matrix<MAX_COVARIATES>,
-    measured: Vector<MAX_COVARIATES>,
-}
-
-/// Covariance of the right side of the normal equations: octaves are not independent.
-fn scatter(told: &[Told], count: usize) -> Matrix<MAX_COVARIATES> {
-    let mut scatter = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
-    for (k, a) in told.iter().enumerate() {
-        for (l, b) in told.iter().enumerate() {
-            let correlation = octave_correlation(k.abs_diff(l), a.shares, b.shares) * sqrt(a.weight * b.weight);
-            for (i, row) in scatter.iter_mut().enumerate().take(count) {
-                for (j, entry) in row.iter_mut().enumerate().take(count) {
-                    let of = |octave: &Told| {
-                        if i == j { octave.measured[i] } else { octave.signal[i][j] }
-                    };
-                    let sign = if of(a) * of(b) < 0.0 { -1.0 } else { 1.0 };
-                    *entry += correlation * sign * sqrt(crate::math::abs(of(a) * of(b)));
-                }
-            }
-        }
-    }
-    scatter
-}
-
-/// Where a pair of covariates stands among the mutual ones.
-fn pair(a: usize, b: usize) -> usize {
-    let (high, low) = (a.max(b), a.min(b));
-    high * (high - 1) / 2 + low
-}
-
-/// Degrees of freedom of one sensitivity: of the octaves, each as it counts, less what they repeat of each other.
-fn freedom(told: &[Told], covariate: usize) -> f64 {
-    let counts = |octave: &Told| octave.weight * octave.measured[covariate];
-    let (mut sum, mut square) = (0.0, 0.0);
-    for (k, a) in told.iter().enumerate() {
-        sum += counts(a);
-        for (l, b) in told.iter().enumerate() {
-            let correlation = octave_correlation(k.abs_diff(l), a.shares, b.shares);
-            square += correlation * counts(a) * counts(b) / sqrt(a.edf * b.edf);
-        }
-    }
-    if square > 0.0 { sum * sum / square } else { 0.0 }
-}
-
-fn covariance(shared: &[Covariance], n: u64) -> f64 {
-    shared.iter().find(|covariance| covariance.n == n).map_or(0.0, |covariance| covariance.covariance)
 }

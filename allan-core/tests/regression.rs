@@ -39,16 +39,20 @@ fn measured(channels: &[Vec<f64>]) -> (Vec<Curve<OCTAVES>>, Vec<Shared<OCTAVES>>
     (curves, couplings.iter().map(in_units).collect())
 }
 
+/// Of the channel, which comes first, or of a covariate with a covariate.
+fn covariance(shared: &[Shared<OCTAVES>], with: Option<usize>, covariate: usize, n: u64) -> Option<f64> {
+    let (a, b) = (with.map_or(0, |other| other + 1), covariate + 1);
+    let (high, low) = (a.max(b), a.min(b));
+    let points = &shared[high * (high - 1) / 2 + low];
+    points.iter().find(|point| point.n == n).map(|point| point.covariance)
+}
+
 /// What the first channel follows of the others.
 fn followed(channels: &[Vec<f64>]) -> Vec<Sensitivity> {
     let (curves, shared) = measured(channels);
-    let covariates: Vec<Covariate<OCTAVES>> =
-        curves[1..].iter().map(|curve| Covariate::new(curve.clone(), LSB)).collect();
-    let pair = |i: usize, j: usize| shared[i * (i - 1) / 2 + j].clone();
-    let with_channel: Vec<_> = (1..channels.len()).map(|i| pair(i, 0)).collect();
-    let mutual: Vec<_> =
-        (2..channels.len()).flat_map(|i| (1..i).map(move |j| (i, j))).map(|(i, j)| pair(i, j)).collect();
-    let beside = Beside { channel: &curves[0], covariates: &covariates, with_channel: &with_channel, mutual: &mutual };
+    let covariates: Vec<Covariate<OCTAVES>> = curves[1..].iter().map(|curve| Covariate::new(curve, LSB, 1)).collect();
+    let covariance = |a: Option<usize>, b: usize, n: u64| covariance(&shared, a, b, n);
+    let beside = Beside { channel: &curves[0], covariates: &covariates, covariance: &covariance };
     beside.followed().into_iter().collect()
 }
 
@@ -63,19 +67,18 @@ fn subtracting_is_exact_without_a_second_pass() {
         .collect();
     let (curves, shared) = measured(&channels);
     let (expected, _) = measured(&[less, channels[0].clone()]);
-    let covariates: Vec<_> = curves[1..].iter().cloned().map(Covariate::as_measured).collect();
-    let with_channel = [shared[0].clone(), shared[1].clone()];
-    let beside =
-        Beside { channel: &curves[0], covariates: &covariates, with_channel: &with_channel, mutual: &shared[2..] };
+    let covariates: Vec<Covariate<OCTAVES>> =
+        curves[1..].iter().map(|curve| Covariate::as_measured(curve, 1)).collect();
+    let known = |a: Option<usize>, b: usize, n: u64| covariance(&shared, a, b, n);
+    let beside = Beside { channel: &curves[0], covariates: &covariates, covariance: &known };
     let subtracted = beside.subtracted(&[Sensitivity::exact(0, 3.0), Sensitivity::exact(1, -2.0)]);
     for (found, expected) in subtracted.points().iter().zip(expected[0].points()) {
         // Differences of sums 10⁴ times as large.
         assert!((found.avar / expected.avar - 1.0).abs() < 1e-9, "{found:?}, {expected:?}");
     }
     // Where a covariance is not known nothing is subtracted.
-    let from = |n| Covariate::as_measured(curves[1].from_factor::<OCTAVES>(n));
-    let (short, known) = ([from(256)], [shared[0].clone()]);
-    let beside = Beside { channel: &curves[0], covariates: &short, with_channel: &known, mutual: &[] };
+    let short = [Covariate::<OCTAVES>::as_measured(&curves[1], 256)];
+    let beside = Beside { channel: &curves[0], covariates: &short, covariance: &known };
     let subtracted = beside.subtracted(&[Sensitivity::exact(0, 3.0)]);
     for (found, raw) in subtracted.points().iter().zip(curves[0].points()) {
         assert_eq!(found.avar == raw.avar, found.n < 256, "{found:?}");

@@ -8,7 +8,7 @@ use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::summary::OCTAVES;
 use adis16405_driver::{Channel, Config};
-use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
+use allan_core::regression::{Beside, Covariate, Sensitivity};
 use allan_core::{Curve, Point};
 use heapless::Vec;
 use link::Shift;
@@ -50,11 +50,11 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
         // There is room for as many as there are members.
         let _ = covariates.push(covariate(epoch, member, config));
     }
-    let mut shared = AllShared::default();
     let followed = loop {
-        shared.fill(couplings, index, &members, config);
-        let AllShared { with_channel, mutual } = &shared;
-        let beside = Beside { channel: &channel, covariates: &covariates, with_channel, mutual };
+        let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+            shared(couplings, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
+        };
+        let beside = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
         let followed = beside.followed_while(keep_on)?;
         let harm = || harms(epoch, &members, config, &followed, (&channel, &beside.subtracted(&followed)));
         // The least clear of them is told last.
@@ -83,15 +83,16 @@ pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Follow
     let members: Members = causes.iter().map(|followed| followed.cause).collect();
     let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
     for &member in &members {
-        let _ = covariates.push(Covariate::as_measured(coupled(epoch, member, config)));
+        let _ = covariates.push(Covariate::as_measured(&epoch.curve(member, config), 1 << FIRST));
     }
-    let mut shared = AllShared::default();
-    shared.fill(epoch.couplings()?, index, &members, config);
-    let AllShared { with_channel, mutual } = &shared;
     let known = |(covariate, followed): (usize, &Followed)| Sensitivity::exact(covariate, followed.value);
     let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(known).collect();
     let channel = &epoch.curve(index, config);
-    let beside = Beside { channel, covariates: &covariates, with_channel, mutual };
+    let couplings = epoch.couplings()?;
+    let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+        shared(couplings, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
+    };
+    let beside = Beside { channel, covariates: &covariates, covariance: &covariance };
     Some(beside.subtracted(&sensitivities))
 }
 
@@ -120,38 +121,14 @@ fn causes(index: usize) -> impl Iterator<Item = usize> {
 /// Channels that may be causes.
 type Members = Vec<usize, MAX_CAUSES>;
 
-/// What a channel has in common with each of its causes, and what they have with each other.
-#[derive(Default)]
-struct AllShared {
-    with_channel: Vec<Shared<COUPLED>, MAX_CAUSES>,
-    mutual: Vec<Shared<COUPLED>, { MAX_CAUSES * (MAX_CAUSES - 1) / 2 }>,
-}
-
-impl AllShared {
-    #[inline(never)] // in place, for want of stack
-    fn fill(&mut self, couplings: &Couplings, index: usize, members: &Members, config: Config) {
-        let shared = |a: usize, b: usize| couplings.shared(a, b, (lsb(a, config), lsb(b, config)));
-        self.with_channel.clear();
-        self.mutual.clear();
-        for (i, &member) in members.iter().enumerate() {
-            // There is room for as many as there are members, and for their pairs.
-            let _ = self.with_channel.push(shared(index, member));
-            for &other in &members[..i] {
-                let _ = self.mutual.push(shared(member, other));
-            }
-        }
-    }
-}
-
-/// The curve of [`CHANNELS`]`[index]` where it is coupled.
-#[inline(never)]
-fn coupled(epoch: &Epoch, index: usize, config: Config) -> Curve<COUPLED> {
-    epoch.curve(index, config).from_factor(1 << FIRST)
+/// What two channels have in common at averaging factor `n`, in the product of their units.
+fn shared(couplings: &Couplings, (a, b): (usize, usize), n: u64, config: Config) -> Option<f64> {
+    Some(couplings.covariance(a, b, n)? * lsb(a, config) * lsb(b, config))
 }
 
 #[inline(never)]
 fn covariate(epoch: &Epoch, index: usize, config: Config) -> Covariate<COUPLED> {
-    Covariate::new(epoch.curve(index, config), lsb(index, config)).from_factor(1 << FIRST)
+    Covariate::new(&epoch.curve(index, config), lsb(index, config), 1 << FIRST)
 }
 
 fn lsb(index: usize, config: Config) -> f64 {

@@ -1,9 +1,6 @@
 //! What the channels have in common at the longer octaves, and their means: exact sums over samples that all took together.
 
 use crate::estimators::{CHANNELS, Estimator};
-use allan_core::Covariance;
-use allan_core::regression::Shared;
-use heapless::Vec;
 
 /// First octave that is coupled: 256 samples. What can be subtracted is slow, and at an eighth of its averaging time the
 /// products of an octave cost next to nothing.
@@ -77,19 +74,14 @@ impl Couplings {
         self.totals.get(index).map_or(0.0, |&total| total as f64 / self.samples.max(1) as f64)
     }
 
-    /// What two channels have in common, in the product of the units in which a count of each is `lsb`.
-    ///
-    /// Nothing for two gyros, which no one follows.
+    /// What two channels have in common at averaging factor `n`, in the product of their counts; `None` where it is not
+    /// known, as for two gyros, which no one follows.
     #[must_use]
-    pub fn shared<const POINTS: usize>(&self, a: usize, b: usize, lsb: (f64, f64)) -> Shared<POINTS> {
-        let Some(pair) = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b))) else { return Vec::new() };
-        let octaves = (FIRST..).zip(self.products.iter().zip(&self.counts)).filter(|&(_, (_, &count))| count > 0);
-        let covariance = |(octave, (products, &count)): (usize, (&[i128; PAIRS.len()], &u64))| {
-            let n = 1_u64 << octave;
-            let counts = products[pair] as f64 / (2.0 * count as f64 * n as f64 * n as f64);
-            Covariance { n, covariance: counts * lsb.0 * lsb.1, count }
-        };
-        octaves.map(covariance).take(POINTS).collect()
+    pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
+        let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
+        let octave = (n.trailing_zeros() as usize).checked_sub(FIRST).filter(|_| n.is_power_of_two())?;
+        let (products, &count) = (self.products.get(octave)?, self.counts.get(octave)?);
+        (count > 0).then(|| products[pair] as f64 / (2.0 * count as f64 * n as f64 * n as f64))
     }
 }
 

@@ -6,15 +6,13 @@ use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::summary::{OCTAVES, model_error, term_of};
 use adis16405_driver::Config;
+use allan_core::confidence::NORMAL_975;
 use allan_core::fit::fit;
 use allan_core::model::{MAX_TERMS, Term};
 use allan_core::trace::{Found, Lines, MAX_ADDED, Trace, trace_while};
 use allan_core::{Curve, Kind, Model};
 use heapless::Vec;
 use link::{Bounded, Cause, Checked, Coefficient, Drift, Effect, Learnt};
-
-/// Half the width of a 95 % interval in standard deviations.
-const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 /// Probability of the residual under N, B and K above which nothing is sought.
 ///

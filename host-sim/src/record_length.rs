@@ -1,6 +1,7 @@
 //! How long to record: the information that a longer record would hold.
 
 use allan_core::Model;
+use allan_core::confidence::NORMAL_975;
 use allan_core::model::Term;
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +9,6 @@ use nalgebra::{DMatrix, DVector};
 pub const WANTED: f64 = 0.2;
 /// Longest record that is advised, s.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
-const NORMAL_975: f64 = 1.96;
 
 /// Record length in s at which the 95 % bounds of a coefficient are [`WANTED`] wide, for a model that is true.
 ///

@@ -1,7 +1,7 @@
 //! The law of a mean of squared, correlated Gaussian differences.
 
-use super::Shares;
-use crate::chi_square::{NORMAL_975, quantile};
+use super::{NORMAL_975, Shares};
+use crate::chi_square::quantile;
 use crate::math::{exp, sqrt};
 
 /// Which differences of the running sum are squared.

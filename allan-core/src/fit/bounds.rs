@@ -9,7 +9,8 @@ use super::parameter::Parameter;
 use super::points::Points;
 use super::problem::{MAX_PARAMETERS, Problem};
 use crate::Curve;
-use crate::chi_square::{NORMAL_975, quantile};
+use crate::chi_square::quantile;
+use crate::confidence::NORMAL_975;
 use crate::math::{abs, clamp, exp, sqrt};
 use crate::model::{MAX_TERMS, Model};
 

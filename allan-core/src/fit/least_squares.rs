@@ -51,20 +51,6 @@ fn settle<const N: usize>(a: &Matrix<N>, b: &Vector<N>, x: &Vector<N>, mut free:
     Some((x, free))
 }
 
-/// The inverse of the leading `count × count` block; `None` if it is singular.
-pub(crate) fn inverse<const N: usize>(a: &Matrix<N>, count: usize) -> Option<Matrix<N>> {
-    let mut inverse = [[0.0; N]; N];
-    for column in 0..count {
-        let mut unit = [0.0; N];
-        unit[column] = 1.0;
-        let x = solve(a, &unit, (1 << count) - 1)?;
-        for (row, entry) in inverse.iter_mut().zip(x) {
-            row[column] = entry;
-        }
-    }
-    Some(inverse)
-}
-
 pub(crate) fn dot<const N: usize>(a: &Vector<N>, b: &Vector<N>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

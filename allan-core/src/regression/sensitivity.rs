@@ -1,6 +1,6 @@
 //! How a channel follows a covariate, and how sure that is where few degrees of freedom tell.
 
-use crate::chi_square::NORMAL_975;
+use crate::confidence::NORMAL_975;
 use crate::math::{abs, expm1, ln, sqrt};
 
 /// How a channel follows a covariate.
@@ -27,6 +27,13 @@ impl Sensitivity {
     pub(super) fn new(covariate: usize, value: f64, deviation: f64, freedom: f64) -> Self {
         let widening = student(NORMAL_975, freedom) / NORMAL_975;
         Self { covariate, value, error: deviation * widening, freedom }
+    }
+
+    /// 95 % bounds of the value.
+    #[must_use]
+    pub fn bounds(&self) -> (f64, f64) {
+        let half_width = NORMAL_975 * self.error;
+        (self.value - half_width, self.value + half_width)
     }
 
     /// Distance from 0 in standard deviations of a normal distribution that are as rarely exceeded.

@@ -7,6 +7,7 @@ use crate::spectrum::line::Estimate;
 use crate::spectrum::shared::{Bounded, Shared};
 use adis16405_driver::Channel;
 use allan_core::common_mode::CommonMode;
+use allan_core::confidence::NORMAL_975;
 use allan_core::model::Term;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::Verdict;
@@ -17,8 +18,6 @@ use std::f64::consts::PI;
 
 /// Rate of the part's own filter, Hz (data sheet: internal sample clock).
 const INTERNAL_RATE_HZ: f64 = 819.2;
-/// Two-sided 95 % of a normal variable.
-const NORMAL_975: f64 = 1.96;
 
 /// A term's parameters by name.
 pub(super) fn parameters(term: &Term, unit: &str) -> BTreeMap<String, Parameter> {
@@ -103,11 +102,9 @@ pub(super) fn low_pass_effect(term: &Term, markov: Markov, found: &Found, period
 
 /// What a channel follows: temperature, supply, and the specific force on its axes as one effect.
 pub(super) fn followed_effects(followed: &[(Channel, Sensitivity)], unit: &str) -> Vec<Effect> {
-    let parameter = |followed: &Sensitivity, of: &str| Parameter {
-        value: followed.value,
-        low: followed.value - NORMAL_975 * followed.error,
-        high: followed.value + NORMAL_975 * followed.error,
-        unit: format!("{unit}/{of}"),
+    let parameter = |followed: &Sensitivity, of: &str| {
+        let (low, high) = followed.bounds();
+        Parameter { value: followed.value, low, high, unit: format!("{unit}/{of}") }
     };
     let single = |cause: Channel, kind: &str, of: &str, meaning: &str| {
         let (_, followed) = followed.iter().find(|(channel, _)| *channel == cause)?;

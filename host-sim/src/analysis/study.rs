@@ -44,8 +44,8 @@ impl Surroundings {
     fn of(part: &Part, channel: usize, known: Option<&Self>) -> Self {
         let members: Vec<usize> = causes(part.channels[channel]).filter_map(|cause| part.position(cause)).collect();
         let covariate = |(index, &member): (usize, &usize)| match known {
-            Some(known) => known.covariates[index].continued(part.curve(member)),
-            None => Covariate::new(part.curve(member), part.step(member)),
+            Some(known) => known.covariates[index].continued(&part.curve(member), 1),
+            None => Covariate::new(&part.curve(member), part.step(member), 1),
         };
         let pairs = members.iter().enumerate().flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
         Self {
@@ -57,13 +57,19 @@ impl Surroundings {
         }
     }
 
-    fn beside(&self) -> Beside<'_, OCTAVES> {
-        Beside {
-            channel: &self.channel,
-            covariates: &self.covariates,
-            with_channel: &self.with_channel,
-            mutual: &self.mutual,
-        }
+    /// What `work` makes of the channel beside its covariates.
+    fn beside<T>(&self, work: impl FnOnce(&Beside<OCTAVES>) -> T) -> T {
+        let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+            let shared = match with {
+                None => &self.with_channel[covariate],
+                Some(other) => {
+                    let (high, low) = (covariate.max(other), covariate.min(other));
+                    &self.mutual[high * (high - 1) / 2 + low]
+                }
+            };
+            shared.iter().find(|point| point.n == n).map(|point| point.covariance)
+        };
+        work(&Beside { channel: &self.channel, covariates: &self.covariates, covariance: &covariance })
     }
 }
 
@@ -73,7 +79,7 @@ impl Following {
     /// whatever else drifts, and the course alone counts.
     pub(super) fn of(part: &Part, channel: usize, ramps: bool, slow: impl Fn(Channel) -> Option<Followed>) -> Self {
         let surroundings = Surroundings::of(part, channel, None);
-        let mut followed: Vec<Sensitivity> = surroundings.beside().followed().into_iter().collect();
+        let mut followed: Vec<Sensitivity> = surroundings.beside(|beside| beside.followed()).into_iter().collect();
         for (covariate, &member) in surroundings.members.iter().enumerate() {
             let cause = part.channels[member];
             let Some(Followed { sensitivity: value, error }) = slow(cause) else {
@@ -86,13 +92,14 @@ impl Following {
                 None => followed.push(Sensitivity { covariate, value, error, freedom: FREE }),
             }
         }
-        let curve = surroundings.beside().compensated(&followed);
+        let curve = surroundings.beside(|beside| beside.compensated(&followed));
         Self { surroundings, followed, curve }
     }
 
     /// The curve of the same channel in another part, compensated with what was learnt here.
     pub(super) fn compensated(&self, part: &Part, channel: usize) -> Curve<OCTAVES> {
-        Surroundings::of(part, channel, Some(&self.surroundings)).beside().compensated(&self.followed)
+        let surroundings = Surroundings::of(part, channel, Some(&self.surroundings));
+        surroundings.beside(|beside| beside.compensated(&self.followed))
     }
 
     /// What the channel follows: each covariate's place in the part, with the sensitivity.

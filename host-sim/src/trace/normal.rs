@@ -2,8 +2,7 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// 97.5 % point of the normal law.
-pub(crate) const NORMAL_975: f64 = 1.959_963_984_540_054;
+pub(crate) use allan_core::confidence::NORMAL_975;
 
 /// Probability that a standard normal number exceeds `z`.
 pub(crate) fn upper_tail(z: f64) -> f64 {

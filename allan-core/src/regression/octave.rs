@@ -1,0 +1,58 @@
+//! What the octaves are worth to the regression, and how much of that they repeat of each other.
+
+use crate::confidence::{Shares, octave_correlation};
+use crate::math::{abs, sqrt};
+use crate::{Model, Point};
+
+/// What one octave is worth.
+pub(super) struct Octave {
+    pub(super) n: u64,
+    edf: f64,
+    /// Degrees of freedom over the variance of the channel without what it follows.
+    pub(super) weight: f64,
+    shares: Shares,
+}
+
+impl Octave {
+    /// Of a point of the channel's curve under the model of it; `None` where nothing moves.
+    pub(super) fn of(point: &Point, model: &Model) -> Option<Self> {
+        // What the model lacks is noise to the regression too.
+        let variance = model.avar(point.n).max(point.avar);
+        let edf = model.edf(point);
+        (variance > 0.0).then(|| Self { n: point.n, edf, weight: edf / variance, shares: model.shares(point.n) })
+    }
+}
+
+/// Variance of a sum over the octaves of products whose variance at averaging factor `n` goes as `common(n)`: what two
+/// covariates have in common.
+pub(super) fn scatter<const COUPLED: usize>(octaves: &[Octave], common: impl Fn(u64) -> f64) -> f64 {
+    let mut roots = [0.0; COUPLED];
+    for (root, octave) in roots.iter_mut().zip(octaves) {
+        let common = common(octave.n);
+        let modulus = sqrt(octave.weight * abs(common));
+        *root = if common < 0.0 { -modulus } else { modulus };
+    }
+    correlated(octaves, |k| roots[k])
+}
+
+/// Degrees of freedom of one sensitivity: of the octaves, each as the covariate's variance counts, less what they
+/// repeat of each other.
+pub(super) fn freedom(octaves: &[Octave], measured: impl Fn(u64) -> f64) -> f64 {
+    let counts = |octave: &Octave| octave.weight * measured(octave.n);
+    let sum: f64 = octaves.iter().map(counts).sum();
+    let square = correlated(octaves, |k| counts(&octaves[k]) / sqrt(octaves[k].edf));
+    if square > 0.0 { sum * sum / square } else { 0.0 }
+}
+
+/// `Σ rₖₗ·fₖ·fₗ` with the correlations of the octaves.
+fn correlated(octaves: &[Octave], factor: impl Fn(usize) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for (k, a) in octaves.iter().enumerate() {
+        let mut along = factor(k) / 2.0;
+        for (l, b) in octaves.iter().enumerate().take(k) {
+            along += octave_correlation(k - l, a.shares, b.shares) * factor(l);
+        }
+        sum += 2.0 * factor(k) * along;
+    }
+    sum
+}
