@@ -86,6 +86,8 @@ pub struct Unseen {
     pub after: f64,
     /// Of the true model.
     pub truth: f64,
+    /// Of the true terms, fitted to the half that is seen: what is lost to the fit, not to the trace.
+    pub refitted: f64,
 }
 
 /// What became of one recording.
@@ -122,7 +124,12 @@ pub fn examine(case: &Case) -> Result<Outcome, ExamineError> {
         let of = report.channels.iter().find(|report| report.name == channel.name());
         outcome.unseen = of.zip(truth).and_then(|(report, truth)| {
             let before = report.before.unseen.deviance_per_point?;
-            Some(Unseen { before, after: report.after.unseen.deviance_per_point?, truth })
+            Some(Unseen {
+                before,
+                after: report.after.unseen.deviance_per_point?,
+                truth: truth.model,
+                refitted: truth.fitted,
+            })
         });
     }
     Ok(outcome)

@@ -1,11 +1,11 @@
 //! What came of all recordings, in numbers.
 
+mod text;
+
 use super::Group;
-use super::examine::{Answer, Estimate, Outcome};
+use super::examine::{Answer, Estimate, Outcome, Unseen};
 use super::kind::Kind;
 use serde::Serialize;
-use std::collections::BTreeMap;
-use std::io::{self, Write};
 
 /// From this strength on an effect is to be named.
 pub const STRONG: f64 = 2.0;
@@ -103,11 +103,11 @@ impl Table {
         Share::of(self.singles().flat_map(|outcome| &outcome.estimates).map(Estimate::is_covered))
     }
 
-    /// Recordings with a strong effect whose unseen error is within 1.5 times that of the true model.
+    /// Recordings with a strong effect whose unseen error is within 1.5 times what `which` compares it with.
     #[must_use]
-    pub fn unseen(&self) -> Share {
+    pub fn unseen(&self, which: fn(&Unseen) -> bool) -> Share {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
-        Share::of(strong.filter_map(|outcome| outcome.unseen).map(|unseen| unseen.after <= 1.5 * unseen.truth))
+        Share::of(strong.filter_map(|outcome| outcome.unseen).map(|unseen| which(&unseen)))
     }
 
     /// Of strong single effects, of one kind or of all.
@@ -116,145 +116,6 @@ impl Table {
         strong
             .flat_map(|outcome| &outcome.estimates)
             .filter(move |estimate| kind.is_none_or(|kind| estimate.kind == kind))
-    }
-
-    /// Writes all of it.
-    ///
-    /// # Errors
-    /// Those of `out`.
-    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        self.write_rates(out)?;
-        self.write_confusion(out)?;
-        self.write_parameters(out)?;
-        self.write_unseen(out)?;
-        self.write_summary(out)
-    }
-
-    fn kinds(&self) -> Vec<Kind> {
-        Kind::ALL.into_iter().filter(|kind| self.answers(*kind).next().is_some()).collect()
-    }
-
-    fn write_rates(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "Named, by strength over the smallest effect that any test could see\n")?;
-        write!(out, "{:<18}", "")?;
-        for name in CLASS_NAMES {
-            write!(out, "{name:>12}")?;
-        }
-        writeln!(out)?;
-        for kind in self.kinds() {
-            write!(out, "{:<18}", kind.name())?;
-            let mut from = 0.0;
-            for to in CLASSES {
-                let within = self.answers(kind).filter(|answer| (from..to).contains(&answer.strength));
-                let share = Share::of(within.map(|answer| answer.named));
-                let cell = if share.all == 0 { "–".to_owned() } else { format!("{}/{}", share.yes, share.all) };
-                write!(out, "{cell:>12}")?;
-                from = to;
-            }
-            writeln!(out)?;
-        }
-        Ok(())
-    }
-
-    fn write_confusion(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "\nConfusion: strong effects (rows) and what was named in their channels\n")?;
-        let initials = |kind: Kind| kind.name().chars().take(5).collect::<String>();
-        write!(out, "{:<18}", "")?;
-        for kind in Kind::ALL {
-            write!(out, "{:>6}", initials(kind))?;
-        }
-        writeln!(out, "{:>6}{:>6}", "other", "none")?;
-        for kind in self.kinds() {
-            let mut named: BTreeMap<Option<&str>, usize> = BTreeMap::new();
-            for answer in self.answers(kind).filter(|answer| answer.strength >= STRONG) {
-                let name = if answer.named { Some(kind.name()) } else { answer.instead.as_deref() };
-                *named.entry(name).or_insert(0) += 1;
-            }
-            write!(out, "{:<18}", kind.name())?;
-            for column in Kind::ALL {
-                write!(out, "{:>6}", cell(named.remove(&Some(column.name()))))?;
-            }
-            let none = named.remove(&None);
-            writeln!(out, "{:>6}{:>6}", cell((!named.is_empty()).then(|| named.values().sum())), cell(none))?;
-        }
-        Ok(())
-    }
-
-    fn write_parameters(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "\nParameters of strong effects that were named\n")?;
-        writeln!(
-            out,
-            "{:<34}{:>8}{:>14}{:>14}{:>12}{:>10}",
-            "", "number", "median error", "90 % within", "near enough", "coverage"
-        )?;
-        for kind in self.kinds() {
-            let mut names: Vec<&str> = self.estimates(Some(kind)).map(|estimate| estimate.name).collect();
-            names.sort_unstable();
-            names.dedup();
-            for name in names {
-                let of = || self.estimates(Some(kind)).filter(|estimate| estimate.name == name);
-                let errors: Vec<f64> = of().map(|estimate| 100.0 * estimate.relative_error).collect();
-                writeln!(
-                    out,
-                    "{:<34}{:>8}{:>14}{:>14}{:>12}{:>10}",
-                    format!("{} {name}", kind.name()),
-                    errors.len(),
-                    percent(quantile(&errors, 0.5)),
-                    percent(quantile(&errors, 0.9)),
-                    Share::of(of().map(Estimate::is_near)).to_string(),
-                    Share::of(of().map(Estimate::is_covered)).to_string(),
-                )?;
-            }
-        }
-        Ok(())
-    }
-
-    fn write_unseen(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "\nDeviance per point on unseen data, medians over strong effects\n")?;
-        writeln!(out, "{:<18}{:>12}{:>12}{:>14}{:>22}", "", "before", "after", "true model", "after ≤ 1.5 × true")?;
-        for kind in self.kinds() {
-            let strong = self.outcomes(Group::Single(kind)).filter(|outcome| is_strong(outcome));
-            let unseen: Vec<_> = strong.filter_map(|outcome| outcome.unseen).collect();
-            let median = |of: fn(&super::examine::Unseen) -> f64| {
-                quantile(&unseen.iter().map(of).collect::<Vec<_>>(), 0.5)
-                    .map_or("–".to_owned(), |v| format!("{v:.2}"))
-            };
-            writeln!(
-                out,
-                "{:<18}{:>12}{:>12}{:>14}{:>22}",
-                kind.name(),
-                median(|unseen| unseen.before),
-                median(|unseen| unseen.after),
-                median(|unseen| unseen.truth),
-                Share::of(unseen.iter().map(|unseen| unseen.after <= 1.5 * unseen.truth)).to_string(),
-            )?;
-        }
-        Ok(())
-    }
-
-    fn write_summary(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out)?;
-        let lines = [
-            ("named, single effects of twice the limit or more", self.named()),
-            ("nothing hidden, yet something reported", self.false_alarms()),
-            ("one effect hidden, and something else reported too", self.something_else()),
-            ("both effects of a pair named", self.both()),
-            ("parameters within 10 % (frequencies 2 %)", self.near()),
-            ("95 % intervals that hold the truth", self.coverage()),
-            ("unseen error within 1.5 times the true model's", self.unseen()),
-        ];
-        for (what, share) in lines {
-            let percent = share.percent().map_or("–".to_owned(), |percent| format!("{percent:.1} %"));
-            writeln!(out, "{what:<52}{percent:>8}   ({} of {})", share.yes, share.all)?;
-        }
-        let mut alarms: BTreeMap<&str, usize> = BTreeMap::new();
-        for alarm in self.outcomes(Group::Nothing).flat_map(|outcome| &outcome.false_alarms) {
-            *alarms.entry(alarm).or_insert(0) += 1;
-        }
-        for (alarm, count) in alarms {
-            writeln!(out, "  false alarm, nothing hidden: {alarm} × {count}")?;
-        }
-        Ok(())
     }
 }
 
@@ -268,22 +129,29 @@ impl Estimate {
     }
 }
 
+impl Unseen {
+    /// Most of the unseen error, over another's, that counts as no worse.
+    const NO_WORSE: f64 = 1.5;
+
+    /// Whether the error after is no worse than the true model's.
+    #[must_use]
+    pub fn is_near_truth(&self) -> bool {
+        self.after <= Self::NO_WORSE * self.truth
+    }
+
+    /// Whether the error after is no worse than that of the true terms, fitted.
+    #[must_use]
+    pub fn is_near_true_terms(&self) -> bool {
+        self.after <= Self::NO_WORSE * self.refitted
+    }
+
+    /// Whether the true terms, fitted, are no worse than the true model.
+    #[must_use]
+    pub fn are_true_terms_near_truth(&self) -> bool {
+        self.refitted <= Self::NO_WORSE * self.truth
+    }
+}
+
 fn is_strong(outcome: &Outcome) -> bool {
     outcome.answers.iter().all(|answer| answer.strength >= STRONG)
-}
-
-fn cell(count: Option<usize>) -> String {
-    count.map_or(".".to_owned(), |count| count.to_string())
-}
-
-fn percent(value: Option<f64>) -> String {
-    value.map_or("–".to_owned(), |value| format!("{value:.2} %"))
-}
-
-/// The value below which the part `level` of `values` lies.
-fn quantile(values: &[f64], level: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = (level * sorted.len() as f64).ceil() as usize;
-    sorted.get(at.saturating_sub(1)).copied()
 }

@@ -3,7 +3,7 @@
 use super::examine::score;
 use super::limit::spectrum::{self, Record};
 use super::limit::{events, needed, size, telegraph_from_markov, waveform};
-use super::{Case, Group, Kind, Plan, case};
+use super::{Case, Group, Kind, Plan, case, truth};
 use crate::report::{ChannelReport, Effect as Reported, ModelError, ModelReport, Parameter, ReadOff, Report, SCHEMA};
 use crate::sensor::{ChannelNoise, Effect, NoiseModel};
 use adis16405_driver::Channel;
@@ -214,6 +214,22 @@ fn a_common_effect_needs_half_of_its_channels() {
         score(&case, &report(&found), 0.0).answers[0].named
     };
     assert_eq!([listed(2), listed(3), listed(6)], [false, true, true]);
+}
+
+/// The true model scores 1 on any data, give or take 0.5 by some ten octaves that hang together: 0.2 for the mean of
+/// eight. What is fitted to as much data as it is judged on errs by as much again for each of its parameters: of five
+/// beside ten octaves, less than twice the true model's error on average.
+#[test]
+fn the_truth_scores_one_and_its_terms_fitted_little_more() {
+    let channel = |case: &Case| case.simulation.hidden.effects[0].channels()[0];
+    let errors: Vec<_> = (0..8)
+        .map(|seed| Case::draw(&[Kind::Sinusoid], 60.0, seed))
+        .map(|case| truth::unseen_error(&case, channel(&case)).unwrap().unwrap())
+        .collect();
+    let mean = |of: fn(&truth::UnseenError) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
+    let (model, fitted) = (mean(|error| error.model), mean(|error| error.fitted));
+    assert!((model - 1.0).abs() < 0.6, "{errors:?}");
+    assert!(fitted > model && fitted < 2.0 * model, "{errors:?}");
 }
 
 #[test]

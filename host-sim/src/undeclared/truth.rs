@@ -2,10 +2,11 @@
 
 use super::draw::Case;
 use crate::record::{RecordError, SAMPLE_RATE_HZ, Simulation};
-use crate::recording::Recording;
+use crate::recording::Sample;
 use crate::sensor::{ChannelNoise, Effect, Hidden};
 use adis16405_driver::{Channel, GyroRange};
 use allan_core::check::ModelError;
+use allan_core::fit::fit_shapes;
 use allan_core::model::Term;
 use allan_core::term::{Filter, Markov, Resonance, Sinusoid};
 use allan_core::{Cascade, Kind, Model};
@@ -56,12 +57,21 @@ fn can_be_taken_out(effect: &Effect) -> bool {
     )
 }
 
-/// `deviance_per_point` of the true model of `channel` on the second half of the record, from which a true estimator
-/// would have taken out what can be. A common mode counts as taken out: the channels tell it from what they do not share.
+/// What the truth reaches as `deviance_per_point` on the second half of a record, from which a true estimator would
+/// have taken out what can be. A common mode counts as taken out: the channels tell it from what they do not share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UnseenError {
+    /// Of the true model.
+    pub(super) model: f64,
+    /// Of the true terms, their coefficients and shapes fitted to the first half, as those of any model must be.
+    pub(super) fitted: f64,
+}
+
+/// Of `channel`; `None` where there is too little data.
 ///
 /// # Errors
 /// The recording without the effects cannot be made.
-pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<f64>, RecordError> {
+pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<UnseenError>, RecordError> {
     let effects: Vec<Effect> =
         case.simulation.hidden.effects.iter().filter(|effect| !can_be_taken_out(effect)).cloned().collect();
     let model = model(case.simulation.noise.channel(channel), channel, &effects);
@@ -71,8 +81,13 @@ pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<f64>,
         ..case.simulation.hidden.clone()
     };
     let recording = Simulation { hidden, ..case.simulation.clone() }.run(|_| ())?;
-    let error = ModelError::between(&model, &second_half(&recording, channel));
-    Ok(error.map(|error| error.deviance_per_point))
+    let (first, second) = recording.samples.split_at(recording.samples.len() / 2);
+    let curve = |samples: &[Sample]| curve(samples, channel, recording.range);
+    let mut kinds: Vec<Kind> = model.terms().iter().map(|term| term.kind).collect();
+    kinds.dedup();
+    let fitted = fit_shapes(&curve(first), &kinds);
+    let error = |model: &Model| Some(ModelError::between(model, &curve(second))?.deviance_per_point);
+    Ok(error(&model).zip(error(&fitted)).map(|(model, fitted)| UnseenError { model, fitted }))
 }
 
 fn nothing_if_taken_out(effect: &Effect) -> Effect {
@@ -119,10 +134,10 @@ fn term(effect: &Effect) -> Option<Term> {
     Some(Term::exact(kind, value))
 }
 
-fn second_half(recording: &Recording, channel: Channel) -> allan_core::Curve<OCTAVES> {
+fn curve(samples: &[Sample], channel: Channel, range: GyroRange) -> allan_core::Curve<OCTAVES> {
     let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
-    for sample in &recording.samples[recording.samples.len() / 2..] {
+    for sample in samples {
         cascade.push(i32::from(sample.counts.get(channel)));
     }
-    cascade.curve(1.0 / SAMPLE_RATE_HZ).scaled(channel.lsb(recording.range))
+    cascade.curve(1.0 / SAMPLE_RATE_HZ).scaled(channel.lsb(range))
 }
