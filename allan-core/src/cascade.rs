@@ -11,8 +11,7 @@ pub use checkpoint::Learnt;
 pub(crate) use moments::Moments;
 use moments::ROUNDED;
 
-use crate::curve::{Curve, Point};
-use crate::noise_type::Noise;
+use crate::curve::Curve;
 use core::mem::replace;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
@@ -227,7 +226,10 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Forgets everything.
     pub fn reset(&mut self) {
-        *self = Self::new();
+        // In place: a new one would pass over the stack.
+        self.recent.fill(0);
+        self.octaves.fill(Octave::NEW);
+        (self.elapsed, self.sum, self.ended, self.missing) = (0, 0, 0, 0);
     }
 
     /// Samples taken.
@@ -268,20 +270,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// [`fit`](crate::fit::fit) gives the one of the fitted mixture.
     #[must_use]
     pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
-        let points = (0..OCTAVES).filter(|&octave| self.count(octave) > 0).map(|octave| {
-            let n = 1_u64 << octave;
-            let overlap = n.min(OVERLAP as u64) as u32;
-            Point::new(
-                n,
-                sample_period,
-                &self.octaves[octave].moments,
-                octave,
-                self.count(octave),
-                overlap,
-                Noise::White,
-            )
-        });
-        Curve::new(sample_period, self.len(), points.collect())
+        Self::curve_of(sample_period, self.len(), |octave| self.learnt(octave).unwrap_or_default())
     }
 
     fn count(&self, octave: usize) -> u64 {

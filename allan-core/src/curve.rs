@@ -70,17 +70,35 @@ pub struct Curve<const OCTAVES: usize> {
 }
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    pub(crate) fn new(sample_period: f64, samples: u64, mut points: Vec<Point, OCTAVES>) -> Self {
-        let levels: Vec<Level, OCTAVES> = points.iter().map(Point::level).collect();
-        for (at, point) in points.iter_mut().enumerate() {
-            point.noise = identify(&levels, at);
-        }
-        Self::of_named(sample_period, samples, points)
+    pub(crate) fn new(sample_period: f64, samples: u64, points: impl Iterator<Item = Point>) -> Self {
+        // In place from here on: a curve is too large to be handed about on a small stack.
+        let mut curve = Self { sample_period, samples, points: Vec::new() };
+        curve.points.extend(points);
+        curve.name();
+        curve.weigh(&mut |point| point.noise.shares());
+        curve
     }
 
     /// Of points whose noise type is known already.
     pub(crate) fn of_named(sample_period: f64, samples: u64, points: Vec<Point, OCTAVES>) -> Self {
         Self { sample_period, samples, points }.with_confidence(|point| point.noise.shares())
+    }
+
+    /// Finds the power law around each point.
+    #[inline(never)] // so that its stack is not everybody's
+    fn name(&mut self) {
+        let levels: Vec<Level, OCTAVES> = self.points.iter().map(Point::level).collect();
+        for (at, point) in self.points.iter_mut().enumerate() {
+            point.noise = identify(&levels, at);
+        }
+    }
+
+    fn weigh(&mut self, shares: &mut dyn FnMut(&Point) -> Shares) {
+        for point in &mut self.points {
+            let law = Law::new(Difference::Second, point.n, point.count, point.overlap, shares(point));
+            point.edf = law.edf;
+            (point.low, point.high) = law.bounds(point.avar);
+        }
     }
 
     /// Seconds between samples.
@@ -104,13 +122,18 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// The same curve with the samples' unit replaced: `avar` and its bounds times the square of `lsb`.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
+        self.scale(lsb);
+        self
+    }
+
+    /// The same in place.
+    pub fn scale(&mut self, lsb: f64) {
         let square = lsb * lsb;
         for point in &mut self.points {
             point.avar *= square;
             point.low *= square;
             point.high *= square;
         }
-        self
     }
 
     /// Gives the points another variance.
@@ -126,11 +149,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// The same curve with the confidence of the noise that `shares` tells for each point.
     #[must_use]
     pub fn with_confidence(mut self, mut shares: impl FnMut(&Point) -> Shares) -> Self {
-        for point in &mut self.points {
-            let law = Law::new(Difference::Second, point.n, point.count, point.overlap, shares(point));
-            point.edf = law.edf;
-            (point.low, point.high) = law.bounds(point.avar);
-        }
+        self.weigh(&mut shares);
         self
     }
 }

@@ -17,7 +17,7 @@ use core::fmt::Arguments;
 use epoch::School;
 use heapless::Deque;
 use link::{Boot, Line, Message};
-use report::{Report, copy_of};
+use report::{Report, sums};
 
 /// What a board knows when it starts the application.
 pub struct Start {
@@ -113,8 +113,8 @@ impl App {
         boot.starts = settings.starts;
         board.estimators(|estimators| estimators.begin(config));
         for index in 0..CHANNELS.len() {
-            if let Some(estimator) = retained.estimator(index).filter(|_| !fresh) {
-                board.estimators(|estimators| estimators.resume(index, estimator));
+            if let Some(sums) = retained.sums(index).filter(|_| !fresh) {
+                board.estimators(|estimators| estimators.resume(index, &sums));
                 boot.kept_channels += 1;
             }
         }
@@ -324,7 +324,8 @@ impl App {
     /// Keeps one record now and then, so that a restart costs a second of statistics.
     fn keep(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
-        if now_us >= self.next_keep_us {
+        // The finished epoch has its place as long as it is needed.
+        if now_us >= self.next_keep_us && !self.report.is_closing() {
             self.next_keep_us = now_us + KEEP_US;
             self.keep = (self.keep + 1) % CHANNELS.len();
             self.keep_channel(board, self.keep);
@@ -332,9 +333,7 @@ impl App {
     }
 
     fn keep_channel(&mut self, board: &mut impl Board, index: usize) {
-        if let Some(estimator) = &copy_of(board, index) {
-            self.retained.keep_estimator(index, estimator);
-        }
+        self.retained.keep_sums(index, &sums(board, index));
     }
 
     fn look_at_clock(&mut self, board: &mut impl Board) {

@@ -3,7 +3,7 @@
 //! The compensated stream is `y − Σ βᵢ·(cᵢ − rᵢ)`, sample by sample, with sensitivities `β` and references `r` of the epoch
 //! before. Its Allan variance follows from the curves and couplings of the epoch: no second estimator is needed.
 
-use crate::couplings::{COUPLED, Couplings, FIRST, GYROS};
+use crate::couplings::{COUPLED, Covariances, FIRST, GYROS, Means};
 use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::summary::OCTAVES;
@@ -39,7 +39,7 @@ pub type Causes = Vec<Followed, MAX_CAUSES>;
 #[must_use]
 #[inline(never)] // so that its stack is not everybody's
 pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMut() -> bool) -> Option<Causes> {
-    let Some(couplings) = epoch.couplings() else { return Some(Causes::new()) };
+    let Some(known) = epoch.covariances() else { return Some(Causes::new()) };
     let mut members: Members = causes(index).collect();
     let channel = epoch.curve(index, config);
     let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
@@ -52,7 +52,7 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
     }
     let followed = loop {
         let covariance = |with: Option<usize>, covariate: usize, n: u64| {
-            shared(couplings, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
+            shared(known, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
         };
         let beside = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
         let followed = beside.followed_while(keep_on)?;
@@ -64,7 +64,7 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
     };
     let with_reference = |sensitivity: &Sensitivity| {
         let cause = members[sensitivity.covariate];
-        let reference = couplings.mean(cause) * lsb(cause, config) + CHANNELS[cause].zero();
+        let reference = known.means[cause] * lsb(cause, config) + CHANNELS[cause].zero();
         Followed { cause, value: sensitivity.value, error: sensitivity.error, reference }
     };
     Some(followed.iter().map(with_reference).take(MAX_CAUSES).collect())
@@ -85,12 +85,12 @@ pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Follow
     for &member in &members {
         let _ = covariates.push(Covariate::as_measured(&epoch.curve(member, config), 1 << FIRST));
     }
-    let known = |(covariate, followed): (usize, &Followed)| Sensitivity::exact(covariate, followed.value);
-    let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(known).collect();
+    let exact = |(covariate, followed): (usize, &Followed)| Sensitivity::exact(covariate, followed.value);
+    let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(exact).collect();
     let channel = &epoch.curve(index, config);
-    let couplings = epoch.couplings()?;
+    let known = epoch.covariances()?;
     let covariance = |with: Option<usize>, covariate: usize, n: u64| {
-        shared(couplings, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
+        shared(known, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
     };
     let beside = Beside { channel, covariates: &covariates, covariance: &covariance };
     Some(beside.subtracted(&sensitivities))
@@ -100,15 +100,12 @@ pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Follow
 /// channel's unit. `before` are the means of all channels in counts.
 #[must_use]
 pub fn shift(epoch: &Epoch, index: usize, config: Config, causes: &[Followed], before: &Means) -> Option<Shift> {
-    let couplings = epoch.couplings()?;
-    let moved = |index: usize| (couplings.mean(index) - before[index]) * CHANNELS[index].lsb(config.range());
+    let means = &epoch.covariances()?.means;
+    let moved = |index: usize| (means[index] - before[index]) * CHANNELS[index].lsb(config.range());
     let raw = moved(index);
     let followed = causes.iter().map(|followed| followed.value * moved(followed.cause)).sum::<f64>();
     Some(Shift { raw, compensated: raw - followed })
 }
-
-/// Mean of every channel in counts.
-pub type Means = [f64; CHANNELS.len()];
 
 /// What an inertial channel may follow: every one the surroundings, a gyro the acceleration too.
 fn causes(index: usize) -> impl Iterator<Item = usize> {
@@ -122,8 +119,8 @@ fn causes(index: usize) -> impl Iterator<Item = usize> {
 type Members = Vec<usize, MAX_CAUSES>;
 
 /// What two channels have in common at averaging factor `n`, in the product of their units.
-fn shared(couplings: &Couplings, (a, b): (usize, usize), n: u64, config: Config) -> Option<f64> {
-    Some(couplings.covariance(a, b, n)? * lsb(a, config) * lsb(b, config))
+fn shared(known: &Covariances, (a, b): (usize, usize), n: u64, config: Config) -> Option<f64> {
+    Some(known.covariance(a, b, n)? * lsb(a, config) * lsb(b, config))
 }
 
 #[inline(never)]

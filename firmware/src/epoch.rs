@@ -1,77 +1,64 @@
 //! What a finished epoch has left: sums, while the next epoch's are under way.
 
-use crate::couplings::Couplings;
+use crate::couplings::{Couplings, Covariances};
 use crate::estimators::{CHANNELS, Estimator};
+use crate::retained::{Records, Retained};
 use crate::summary::OCTAVES;
+use crate::sums::Sums;
 use adis16405_driver::Config;
-use allan_core::{Curve, Learnt};
+use allan_core::Curve;
 
-/// The exact sums of an epoch that is over. Fourth moments are not kept.
-#[derive(Debug, Clone)]
+/// An epoch that is over. The sums of its channels lie where those of the running one are kept for the next start: as long
+/// as they are needed, nothing else may be kept there.
+#[derive(Clone)]
 pub struct Epoch {
     /// Epochs finished before it.
     pub number: u32,
-    channels: [Sums; CHANNELS.len()],
-    couplings: Couplings,
-}
-
-/// The sums of one channel.
-#[derive(Debug, Clone, Copy)]
-struct Sums {
-    samples: u64,
-    missing: u64,
-    squares: [u128; OCTAVES],
-    counts: [u64; OCTAVES],
+    records: Records,
+    covariances: Covariances,
 }
 
 impl Epoch {
     /// An epoch of no samples.
-    pub const EMPTY: Self = Self {
-        number: 0,
-        channels: [Sums { samples: 0, missing: 0, squares: [0; OCTAVES], counts: [0; OCTAVES] }; CHANNELS.len()],
-        couplings: Couplings::new(),
-    };
+    pub const EMPTY: Self = Self { number: 0, records: Records::NONE, covariances: Covariances::NONE };
 
     /// Takes the place of what was there before.
-    pub(crate) fn take(&mut self, cascades: &[Estimator; CHANNELS.len()], couplings: &Couplings) {
-        for (sums, cascade) in self.channels.iter_mut().zip(cascades) {
-            (sums.samples, sums.missing) = (cascade.len(), cascade.missing());
-            for octave in 0..OCTAVES {
-                (sums.squares[octave], sums.counts[octave]) = cascade.sum_of_squares(octave).unwrap_or_default();
-            }
+    pub(crate) fn take(
+        &mut self,
+        retained: &mut Retained,
+        cascades: &[Estimator; CHANNELS.len()],
+        couplings: &Couplings,
+    ) {
+        for (index, cascade) in cascades.iter().enumerate() {
+            retained.keep_sums(index, &Sums::of(cascade));
         }
-        self.couplings.clone_from(couplings);
+        self.records = retained.records();
+        self.covariances.take(couplings);
     }
 
-    /// The estimator of [`CHANNELS`]`[index]` as the epoch left it, without its fourth moments.
+    /// The sums of [`CHANNELS`]`[index]`.
     #[must_use]
-    pub fn estimator(&self, index: usize) -> Estimator {
-        let sums = &self.channels[index];
-        let learnt = core::array::from_fn(|octave| Learnt {
-            squares: sums.squares[octave],
-            fourths: 0,
-            count: sums.counts[octave],
-        });
-        Estimator::resumed(sums.samples, sums.missing, &learnt)
+    pub fn sums(&self, index: usize) -> Sums {
+        self.records.sums(index)
     }
 
     /// The curve of [`CHANNELS`]`[index]` in its unit.
     #[must_use]
-    #[inline(never)] // so that the estimator is not on everybody's stack
+    #[inline(never)] // so that the sums are not on everybody's stack
     pub fn curve(&self, index: usize, config: Config) -> Curve<OCTAVES> {
-        self.estimator(index).curve(1.0 / config.sample_period().hz()).scaled(CHANNELS[index].lsb(config.range()))
+        self.sums(index).curve(CHANNELS[index], config)
     }
 
     /// What the channels have in common; `None` if that is not known of all their samples, as after a restart.
     #[must_use]
-    pub fn couplings(&self) -> Option<&Couplings> {
-        let whole = self.channels.iter().all(|sums| sums.samples == self.couplings.samples());
-        whole.then_some(&self.couplings)
+    pub fn covariances(&self) -> Option<&Covariances> {
+        let whole = (0..CHANNELS.len()).all(|index| self.samples(index) == self.covariances.samples);
+        whole.then_some(&self.covariances)
     }
 
     /// Samples of [`CHANNELS`]`[index]`.
     #[must_use]
     pub fn samples(&self, index: usize) -> u64 {
-        self.channels[index].samples
+        self.records.samples(index)
     }
 }

@@ -5,7 +5,9 @@ use crate::cadence::{Cadence, Step};
 use crate::couplings::Couplings;
 use crate::epoch::Epoch;
 use crate::outbox::Outbox;
+use crate::retained::Retained;
 use crate::summary::{OCTAVES, OVERLAP};
+use crate::sums::Sums;
 use adis16405_driver::{Burst, Channel, Config, Faults, Judge};
 use allan_core::Cascade;
 use heapless::spsc;
@@ -123,14 +125,14 @@ impl<'m> Estimators<'m> {
     }
 
     /// Hands over the statistics and begins again without losing a sample; the counters go on.
-    pub fn finish_epoch(&mut self, finished: &mut Epoch) {
-        finished.take(&self.statistics.cascades, &self.statistics.couplings);
+    pub fn finish_epoch(&mut self, retained: &mut Retained, finished: &mut Epoch) {
+        finished.take(retained, &self.statistics.cascades, &self.statistics.couplings);
         self.begin_epoch();
     }
 
     fn begin_epoch(&mut self) {
         self.statistics.cascades.iter_mut().for_each(Cascade::reset);
-        self.statistics.couplings = Couplings::new();
+        self.statistics.couplings.reset();
     }
 
     /// Forgets the statistics and the counters, and keeps step with the sensor.
@@ -156,10 +158,10 @@ impl<'m> Estimators<'m> {
         self.statistics.cascades.get(index)
     }
 
-    /// Puts what was learnt before a restart in place of the estimator of [`CHANNELS`]`[index]`.
-    pub fn resume(&mut self, index: usize, estimator: Estimator) {
+    /// Has the estimator of [`CHANNELS`]`[index]` go on from what was learnt before a restart.
+    pub fn resume(&mut self, index: usize, sums: &Sums) {
         if let Some(cascade) = self.statistics.cascades.get_mut(index) {
-            *cascade = estimator;
+            sums.resume(cascade);
         }
     }
 

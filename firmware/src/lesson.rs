@@ -1,7 +1,7 @@
 //! What an epoch teaches of an inertial channel, and what the next epoch, which was not seen, says to it.
 
-use crate::compensation::{Causes, Means, compensated, learn, shift};
-use crate::couplings::FIRST;
+use crate::compensation::{Causes, compensated, learn, shift};
+use crate::couplings::{FIRST, Means};
 use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::summary::{OCTAVES, model_error, term_of};

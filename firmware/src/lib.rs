@@ -32,6 +32,7 @@ pub mod retained;
 pub mod sensor;
 pub mod spi_clock;
 mod summary;
+mod sums;
 pub mod table;
 mod uptime;
 
@@ -45,4 +46,5 @@ pub use last_words::LastWords;
 pub use outbox::{Outbox, Outgoing};
 pub use retained::Retained;
 pub use summary::{OCTAVES, OVERLAP, channel_model, channel_report};
+pub use sums::Sums;
 pub use uptime::Uptime;

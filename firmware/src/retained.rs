@@ -4,13 +4,12 @@
 //! one slot more than there are records. A record is always written into the slot of which a newer version exists, or
 //! none, so that a reset in the middle of it costs that version and never the one before.
 
-use crate::estimators::{CHANNELS, Estimator};
+use crate::estimators::CHANNELS;
 use crate::summary::OCTAVES;
-use allan_core::Learnt;
+use crate::sums::Sums;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Words of a record: the samples, the missing ones, and for every octave a sum of 128 and a count of 64 bits. Fourth powers
-/// are not kept: nothing that the device reports is made of them.
+/// Words of a record: the samples, the missing ones, and for every octave a sum of 128 and a count of 64 bits.
 const PAYLOAD: usize = 4 + OCTAVES * 6;
 /// Payload, and before it the kind, the version and the generation, after it the checksum.
 const SLOT_WORDS: usize = PAYLOAD + 4;
@@ -23,7 +22,7 @@ const MAGIC: u32 = 0xAD16_0000;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// The memory, for a section that is not initialised at the start.
-pub type Memory = [[AtomicU32; SLOT_WORDS]; KINDS + 1];
+pub type Memory = [Slot; KINDS + 1];
 
 /// What [`Memory`] is where it is initialised: nothing kept.
 #[must_use]
@@ -103,18 +102,15 @@ impl Retained {
 
     /// The statistics of [`CHANNELS`]`[index]` that were kept under these settings.
     #[must_use]
-    pub fn estimator(&self, index: usize) -> Option<Estimator> {
+    pub fn sums(&self, index: usize) -> Option<Sums> {
         let slot = &self.memory[self.newest.get(1 + index).copied()??];
-        if word(slot, 2) != self.generation {
-            return None;
-        }
-        let wide = |at| u64::from(word(slot, 3 + at)) | u64::from(word(slot, 4 + at)) << 32;
-        let sum = |at| u128::from(wide(at)) | u128::from(wide(at + 2)) << 64;
-        let learnt = core::array::from_fn(|octave| {
-            let at = 4 + 6 * octave;
-            Learnt { squares: sum(at), fourths: 0, count: wide(at + 4) }
-        });
-        Some(Estimator::resumed(wide(0), wide(2), &learnt))
+        (word(slot, 2) == self.generation).then(|| sums(slot))
+    }
+
+    /// The records of all channels, under whatever settings. They stay until others are kept.
+    #[must_use]
+    pub fn records(&self) -> Records {
+        Records(core::array::from_fn(|index| self.newest[1 + index].map(|slot| &self.memory[slot])))
     }
 
     /// Keeps the settings. Statistics that were kept under others are out of date with `fresh`.
@@ -127,15 +123,12 @@ impl Retained {
     }
 
     /// Keeps what the estimator of [`CHANNELS`]`[index]` has learnt.
-    pub fn keep_estimator(&mut self, index: usize, estimator: &Estimator) {
+    pub fn keep_sums(&mut self, index: usize, sums: &Sums) {
         let halves = |wide: u64| [wide as u32, (wide >> 32) as u32];
-        let octaves = (0..OCTAVES).flat_map(|octave| {
-            let Learnt { squares, count, .. } = estimator.learnt(octave).unwrap_or_default();
-            [squares as u64, (squares >> 64) as u64, count].into_iter().flat_map(halves)
-        });
-        let words = [estimator.len(), estimator.missing()].into_iter().flat_map(halves).chain(octaves);
+        let octave = |&(squares, count): &(u128, u64)| [squares as u64, (squares >> 64) as u64, count];
+        let wide = [sums.samples, sums.missing].into_iter().chain(sums.octaves.iter().flat_map(octave));
         if index < CHANNELS.len() {
-            self.write(1 + index, words);
+            self.write(1 + index, wide.flat_map(halves));
         }
     }
 
@@ -156,6 +149,44 @@ impl Retained {
     }
 }
 
+/// The channels' records of one moment, where they are kept.
+#[derive(Clone)]
+pub struct Records([Option<&'static Slot>; CHANNELS.len()]);
+
+impl Records {
+    /// None at all.
+    pub const NONE: Self = Self([None; CHANNELS.len()]);
+
+    /// The statistics of [`CHANNELS`]`[index]`; none of a channel that was not kept.
+    #[must_use]
+    pub fn sums(&self, index: usize) -> Sums {
+        self.slot(index).map_or(Sums::NONE, sums)
+    }
+
+    /// Samples of [`CHANNELS`]`[index]`.
+    #[must_use]
+    pub fn samples(&self, index: usize) -> u64 {
+        self.slot(index).map_or(0, |slot| wide(slot, 0))
+    }
+
+    fn slot(&self, index: usize) -> Option<&'static Slot> {
+        self.0.get(index).copied().flatten()
+    }
+}
+
+type Slot = [AtomicU32; SLOT_WORDS];
+
+/// Two words of the payload.
+fn wide(slot: &Slot, at: usize) -> u64 {
+    u64::from(word(slot, 3 + at)) | u64::from(word(slot, 4 + at)) << 32
+}
+
+fn sums(slot: &Slot) -> Sums {
+    let sum = |at| u128::from(wide(slot, at)) | u128::from(wide(slot, at + 2)) << 64;
+    let octaves = core::array::from_fn(|octave| (sum(4 + 6 * octave), wide(slot, 8 + 6 * octave)));
+    Sums { samples: wide(slot, 0), missing: wide(slot, 2), octaves }
+}
+
 fn word(slot: &[AtomicU32], index: usize) -> u32 {
     slot[index].load(Relaxed)
 }
@@ -169,7 +200,7 @@ fn checksum(words: &[AtomicU32]) -> u32 {
 }
 
 /// The kind and version of the record in a slot, if it is whole.
-fn whole(slot: &[AtomicU32; SLOT_WORDS]) -> Option<(usize, u32)> {
+fn whole(slot: &Slot) -> Option<(usize, u32)> {
     let kind = (word(slot, 0) ^ MAGIC) as usize;
     let intact = kind < KINDS && word(slot, SLOT_WORDS - 1) == checksum(&slot[..SLOT_WORDS - 1]);
     intact.then(|| (kind, word(slot, 1)))

@@ -1,4 +1,5 @@
 use super::*;
+use crate::estimators::Estimator;
 
 extern crate std;
 use std::boxed::Box;
@@ -9,17 +10,11 @@ fn memory() -> &'static Memory {
     Box::leak(Box::new(blank()))
 }
 
-fn estimator(samples: i32) -> Estimator {
+fn sums(samples: i32) -> Sums {
     let mut estimator = Estimator::new();
     (0..samples).for_each(|k| estimator.push(k * k % 8191 - 4096));
     estimator.gap(5);
-    estimator
-}
-
-/// What is kept of an estimator: all but the fourth powers.
-fn learnt(estimator: &Estimator) -> (u64, u64, [Learnt; OCTAVES]) {
-    let sums = core::array::from_fn(|octave| Learnt { fourths: 0, ..estimator.learnt(octave).unwrap() });
-    (estimator.len(), estimator.missing(), sums)
+    Sums::of(&estimator)
 }
 
 #[test]
@@ -27,15 +22,15 @@ fn what_was_kept_is_found_after_a_restart() {
     let memory = memory();
     let mut before = Retained::open(memory);
     assert_eq!(before.settings(), None);
-    assert!(before.estimator(0).is_none());
+    assert!(before.sums(0).is_none());
     before.keep_settings(KEPT, true);
     for round in 1..4 {
-        (0..CHANNELS.len()).for_each(|index| before.keep_estimator(index, &estimator(100 * round + index as i32)));
+        (0..CHANNELS.len()).for_each(|index| before.keep_sums(index, &sums(100 * round + index as i32)));
     }
     let after = Retained::open(memory);
     assert_eq!(after.settings(), Some(KEPT));
     for index in 0..CHANNELS.len() {
-        assert_eq!(learnt(&after.estimator(index).unwrap()), learnt(&estimator(300 + index as i32)));
+        assert_eq!(after.sums(index).unwrap(), sums(300 + index as i32));
     }
 }
 
@@ -45,14 +40,10 @@ fn wide_sums_are_kept_whole() {
     let memory = memory();
     let mut retained = Retained::open(memory);
     retained.keep_settings(KEPT, true);
-    let sums = core::array::from_fn(|octave| Learnt {
-        squares: u128::MAX - octave as u128,
-        fourths: u128::MAX / 3 + octave as u128,
-        count: u64::MAX - octave as u64,
-    });
-    let wide = Estimator::resumed(u64::MAX, 1 << 33, &sums);
-    retained.keep_estimator(3, &wide);
-    assert_eq!(learnt(&Retained::open(memory).estimator(3).unwrap()), learnt(&wide));
+    let octaves = core::array::from_fn(|octave| (u128::MAX - octave as u128, u64::MAX - octave as u64));
+    let wide = Sums { samples: u64::MAX, missing: 1 << 33, octaves };
+    retained.keep_sums(3, &wide);
+    assert_eq!(Retained::open(memory).sums(3).unwrap(), wide);
 }
 
 #[test]
@@ -60,11 +51,11 @@ fn statistics_under_other_settings_are_out_of_date() {
     let memory = memory();
     let mut retained = Retained::open(memory);
     retained.keep_settings(KEPT, true);
-    retained.keep_estimator(1, &estimator(50));
+    retained.keep_sums(1, &sums(50));
     retained.keep_settings(Settings { epoch_s: 60, ..KEPT }, false);
-    assert!(Retained::open(memory).estimator(1).is_some());
+    assert!(Retained::open(memory).sums(1).is_some());
     retained.keep_settings(KEPT, true);
-    assert!(Retained::open(memory).estimator(1).is_none());
+    assert!(Retained::open(memory).sums(1).is_none());
     retained.clear();
     assert_eq!(Retained::open(memory).settings(), None);
 }
@@ -76,11 +67,11 @@ fn damage_costs_one_version_and_no_more() {
         let memory = memory();
         let mut retained = Retained::open(memory);
         retained.keep_settings(KEPT, true);
-        retained.keep_estimator(2, &estimator(100));
-        retained.keep_estimator(2, &estimator(200));
+        retained.keep_sums(2, &sums(100));
+        retained.keep_sums(2, &sums(200));
         let slot = retained.newest[3].unwrap();
         memory[slot][word].fetch_xor(0x10, Relaxed);
-        assert_eq!(Retained::open(memory).estimator(2).map(|estimator| estimator.len()), Some(100), "word {word}");
+        assert_eq!(Retained::open(memory).sums(2).map(|sums| sums.samples), Some(100), "word {word}");
     }
 }
 
@@ -90,12 +81,12 @@ fn a_reset_while_writing_costs_that_version_only() {
     let memory = memory();
     let mut retained = Retained::open(memory);
     retained.keep_settings(KEPT, true);
-    retained.keep_estimator(0, &estimator(100));
-    retained.keep_estimator(0, &estimator(200));
+    retained.keep_sums(0, &sums(100));
+    retained.keep_sums(0, &sums(200));
     let newest = retained.newest[1].unwrap();
     let free = (0..memory.len()).find(|index| !retained.newest.contains(&Some(*index))).unwrap();
     for (done, (to, from)) in memory[free].iter().zip(&memory[newest]).enumerate() {
-        assert_eq!(Retained::open(memory).estimator(0).map(|estimator| estimator.len()), Some(200), "{done} words");
+        assert_eq!(Retained::open(memory).sums(0).map(|sums| sums.samples), Some(200), "{done} words");
         to.store(!from.load(Relaxed), Relaxed);
     }
 }

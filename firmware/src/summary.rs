@@ -1,6 +1,6 @@
-//! From an estimator to what is reported of it: exact sums, and the declared model fitted to them.
+//! From an estimator's sums to what is reported of it: exact sums, and the declared model fitted to them.
 
-use crate::estimators::Estimator;
+use crate::sums::Sums;
 use adis16405_driver::{Channel, Config};
 use allan_core::{Curve, Kind, Model, check, fit::fit};
 use link::{ChannelReport, Coefficient, ModelError, Point, Term};
@@ -10,23 +10,18 @@ pub const OCTAVES: usize = 24;
 /// Overlap of the differences.
 pub const OVERLAP: usize = 8;
 
-/// The curve of one channel in its unit.
-fn curve(channel: Channel, estimator: &Estimator, config: Config) -> Curve<OCTAVES> {
-    estimator.curve(1.0 / config.sample_period().hz()).scaled(channel.lsb(config.range()))
-}
-
 /// The declared model fitted to one channel, in its unit.
 #[must_use]
 #[inline(never)] // so that its stack is not everybody's
-pub fn channel_model(channel: Channel, estimator: &Estimator, config: Config) -> Model {
-    fit(&curve(channel, estimator, config), &Kind::DECLARED)
+pub fn channel_model(channel: Channel, sums: &Sums, config: Config) -> Model {
+    fit(&sums.curve(channel, config), &Kind::DECLARED)
 }
 
 /// What is reported of one channel. `model` is fitted to it, `previous` to the epoch before.
 #[must_use]
 pub fn channel_report(
     channel: Channel,
-    estimator: &Estimator,
+    sums: &Sums,
     config: Config,
     model: Option<&Model>,
     previous: Option<&Model>,
@@ -35,15 +30,13 @@ pub fn channel_report(
         let (value, low, high) = (term.value, term.low, term.high);
         Coefficient { term: term_of(term.kind), value, low, high }
     });
-    let points = (0..OCTAVES).filter_map(|octave| {
-        let (sum, count) = estimator.sum_of_squares(octave)?;
-        (count > 0).then_some(Point { n: 1 << octave, sum, count })
-    });
-    let unseen = previous.and_then(|previous| model_error(previous, &curve(channel, estimator, config)));
+    let octaves = sums.octaves.iter().enumerate().filter(|(_, (_, count))| *count > 0);
+    let points = octaves.map(|(octave, &(sum, count))| Point { n: 1 << octave, sum, count });
+    let unseen = previous.and_then(|previous| model_error(previous, &sums.curve(channel, config)));
     ChannelReport {
         channel: channel as u8,
-        samples: estimator.len(),
-        missing: estimator.missing(),
+        samples: sums.samples,
+        missing: sums.missing,
         points: points.take(link::MAX_POINTS).collect(),
         coefficients: coefficients.take(link::MAX_COEFFICIENTS).collect(),
         unseen,

@@ -1,6 +1,8 @@
 //! What was learnt, as plain data: to be stored before a restart and gone on from after it.
 
 use super::{Cascade, Moments};
+use crate::curve::{Curve, Point};
+use crate::noise_type::Noise;
 
 /// What an estimator has learnt at one octave, exactly.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -25,11 +27,31 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// `missing` missing.
     #[must_use]
     pub fn resumed(samples: u64, missing: u64, learnt: &[Learnt; OCTAVES]) -> Self {
-        let mut resumed = Self { ended: samples, missing, ..Self::new() };
-        for (octave, &Learnt { squares, fourths, count }) in resumed.octaves.iter_mut().zip(learnt) {
-            octave.moments = Moments { squares: squares.into(), fourths: fourths.into() };
-            octave.differences = count;
-        }
+        let mut resumed = Self::new();
+        resumed.resume(samples, missing, |octave| learnt[octave]);
         resumed
+    }
+
+    /// The same in the place of what there is: `learnt` tells it octave by octave.
+    pub fn resume(&mut self, samples: u64, missing: u64, learnt: impl Fn(usize) -> Learnt) {
+        self.reset();
+        (self.ended, self.missing) = (samples, missing);
+        for (octave, place) in self.octaves.iter_mut().enumerate() {
+            let Learnt { squares, fourths, count } = learnt(octave);
+            place.moments = Moments { squares: squares.into(), fourths: fourths.into() };
+            place.differences = count;
+        }
+    }
+
+    /// The [`curve`](Self::curve) of an estimator that has `learnt` so much of `samples` samples, without the estimator.
+    #[must_use]
+    pub fn curve_of(sample_period: f64, samples: u64, learnt: impl Fn(usize) -> Learnt) -> Curve<OCTAVES> {
+        let points = (0..OCTAVES).map(|octave| (octave, learnt(octave))).filter(|(_, learnt)| learnt.count > 0);
+        let point = |(octave, Learnt { squares, fourths, count })| {
+            let moments = Moments { squares: squares.into(), fourths: fourths.into() };
+            let n = 1_u64 << octave;
+            Point::new(n, sample_period, &moments, octave, count, n.min(OVERLAP as u64) as u32, Noise::White)
+        };
+        Curve::new(sample_period, samples, points.map(point))
     }
 }

@@ -1,7 +1,7 @@
 //! Answers for a person: lines of text, made one at a time.
 
 use super::epoch::{INERTIAL, Verdict};
-use super::report::copy_of;
+use super::report::sums;
 use super::{App, Sensor};
 use crate::board::Board;
 use crate::command::HELP;
@@ -113,8 +113,7 @@ impl App {
 
     fn coefficients_line(&self, board: &mut impl Board, index: usize) -> Option<Line> {
         let channel = CHANNELS[index];
-        let Some(estimator) = &copy_of(board, index) else { return None };
-        let model = channel_model(channel, estimator, self.config);
+        let model = channel_model(channel, &sums(board, index), self.config);
         let mut text = line(format_args!("{}", channel.name()));
         for term in model.terms() {
             // What does not fit is cut.

@@ -3,7 +3,7 @@
 use super::App;
 use super::report::Report;
 use crate::board::Board;
-use crate::compensation::Means;
+use crate::couplings::Means;
 use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::lesson::{Lesson, check, study};
@@ -73,7 +73,8 @@ impl App {
     /// teaching, this one goes on.
     pub(super) fn finish_epoch(&mut self, board: &mut impl Board) {
         let Some(finished) = self.school.finished.as_deref_mut().filter(|_| !self.report.is_closing()) else { return };
-        board.estimators(|estimators| estimators.finish_epoch(finished));
+        let retained = &mut self.retained;
+        board.estimators(|estimators| estimators.finish_epoch(retained, finished));
         finished.number = self.settings.epoch;
         self.settings.epoch = self.settings.epoch.saturating_add(1);
         self.report.close();
@@ -108,8 +109,7 @@ impl App {
         });
         let last = index + 1 == INERTIAL;
         if taught.is_some() && last {
-            let couplings = epoch.couplings();
-            self.school.means = couplings.map(|couplings| core::array::from_fn(|index| couplings.mean(index)));
+            self.school.means = epoch.covariances().map(|covariances| covariances.means);
         }
         self.school.finished = Some(epoch);
         let (lesson, learnt) = taught?;

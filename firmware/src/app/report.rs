@@ -3,8 +3,9 @@
 use super::epoch::INERTIAL;
 use super::{App, Sensor};
 use crate::board::Board;
-use crate::estimators::{CHANNELS, Estimator};
+use crate::estimators::CHANNELS;
 use crate::summary::{channel_model, channel_report};
+use crate::sums::Sums;
 use adis16405_driver::GyroRange;
 use link::{Health, Hello, Message};
 
@@ -80,10 +81,10 @@ impl Report {
     }
 }
 
-/// The estimator of [`CHANNELS`]`[index]` as it stands. Not inlined, and to be borrowed: then the stack holds it once.
+/// The sums of [`CHANNELS`]`[index]` as they stand.
 #[inline(never)]
-pub(super) fn copy_of(board: &mut impl Board, index: usize) -> Option<Estimator> {
-    board.estimators(|estimators| estimators.get(index).cloned())
+pub(super) fn sums(board: &mut impl Board, index: usize) -> Sums {
+    board.estimators(|estimators| estimators.get(index).map_or(Sums::NONE, Sums::of))
 }
 
 impl App {
@@ -128,23 +129,23 @@ impl App {
         }
     }
 
-    /// The estimator that the report is of, held once on the stack as [`copy_of`] does.
+    /// The sums that the report is of.
     #[inline(never)]
-    fn reported(&self, board: &mut impl Board, k: usize) -> Option<Estimator> {
+    fn reported(&self, board: &mut impl Board, k: usize) -> Sums {
         match self.school.finished().filter(|_| self.report.closing) {
-            Some(epoch) => Some(epoch.estimator(k)),
-            None => copy_of(board, k),
+            Some(epoch) => epoch.sums(k),
+            None => sums(board, k),
         }
     }
 
     #[inline(never)]
     fn channel(&mut self, board: &mut impl Board, k: usize) -> Option<Message> {
         let channel = CHANNELS[k];
-        let Some(estimator) = &self.reported(board, k) else { return None };
+        let sums = &self.reported(board, k);
         let lesson = self.school.lessons.get(k);
-        let model = lesson.map(|_| channel_model(channel, estimator, self.config));
+        let model = lesson.map(|_| channel_model(channel, sums, self.config));
         let previous = lesson.and_then(|lesson| lesson.declared(self.config));
-        let report = channel_report(channel, estimator, self.config, model.as_ref(), previous.as_ref());
+        let report = channel_report(channel, sums, self.config, model.as_ref(), previous.as_ref());
         Some(Message::Channel(report))
     }
 

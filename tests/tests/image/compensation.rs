@@ -6,7 +6,8 @@ use crate::sensor::Sensor;
 use crate::{SCK_HZ, image};
 use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
 use firmware::lesson::{Lesson, check, study};
-use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Statistics};
+use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Retained, Statistics};
+use host_sim::device::Device;
 use host_sim::sensor::effect::surroundings::TemperatureCourse;
 use host_sim::sensor::{Effect, Hidden, NoiseModel, Surroundings, VirtualAdis16405};
 use link::{Bounded, Checked, Decoder, Drift, Learnt, Message, Received, Term};
@@ -102,12 +103,11 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learnt>
         }
         let mut epoch = Epoch::EMPTY;
         epoch.number = number;
-        estimators.finish_epoch(&mut epoch);
+        estimators.finish_epoch(&mut Retained::open(Device::blank_memory()), &mut epoch);
         epochs.push(epoch);
     }
     let [first, second] = &epochs[..] else { panic!("two epochs") };
-    let couplings = first.couplings().expect("no restart");
-    let means = core::array::from_fn(|index| couplings.mean(index));
+    let means = first.covariances().expect("no restart").means;
     let taught: Vec<(Lesson, Learnt)> =
         (0..6).map(|index| study(first, index, FIRST_CONFIG, &mut || true).expect("nobody says no")).collect();
     let checked =

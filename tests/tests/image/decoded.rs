@@ -1,7 +1,7 @@
 //! What the image said, decoded by the host's decoder, and what the host makes of the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
-use firmware::{Arrival, CHANNELS, Estimator, Estimators, Statistics, channel_model, channel_report};
+use firmware::{Arrival, CHANNELS, Estimator, Estimators, Statistics, Sums, channel_model, channel_report};
 use link::{ChannelReport, Counters, Decoder, Health, Hello, Message, Raw, Received};
 
 pub(crate) struct Decoded {
@@ -80,7 +80,7 @@ pub(crate) fn in_stretches(
     for bursts in stretches {
         let mut statistics = Statistics::new();
         let mut estimators = Estimators::new(&mut statistics, config);
-        estimators.resume(index, resumed(&estimator));
+        estimators.resume(index, &Sums::of(&estimator));
         let at_us = |sample: u64| (sample as f64 * 1e6 / rate_hz) as u64;
         estimators.trust(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
         for &(sample, ref bytes) in *bursts {
@@ -92,12 +92,7 @@ pub(crate) fn in_stretches(
         estimator.clone_from(estimators.get(index).expect("a channel"));
     }
     let channel = CHANNELS[index];
-    let model = (index < 6).then(|| channel_model(channel, &estimator, config));
-    channel_report(channel, &estimator, config, model.as_ref(), None)
-}
-
-/// What a restart leaves of an estimator.
-fn resumed(estimator: &Estimator) -> Estimator {
-    let learnt = core::array::from_fn(|octave| estimator.learnt(octave).expect("an octave"));
-    Estimator::resumed(estimator.len(), estimator.missing(), &learnt)
+    let sums = Sums::of(&estimator);
+    let model = (index < 6).then(|| channel_model(channel, &sums, config));
+    channel_report(channel, &sums, config, model.as_ref(), None)
 }
