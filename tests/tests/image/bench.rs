@@ -239,7 +239,11 @@ impl Driver<Bench> for Plant {
         if now >= self.end {
             return None;
         }
-        while let Some((_, event)) = self.events.pop_front_if(|&mut (at, _)| now >= at) {
+        // Between frames: what happens to the part must not mix with what it is being sent.
+        let between = |session: &mut Session<Bench>| session.board_mut().sensor().is_none_or(|sensor| !sensor.selected);
+        while between(session)
+            && let Some((_, event)) = self.events.pop_front_if(|&mut (at, _)| now >= at)
+        {
             self.happen(event, session, stop, host);
         }
         let fallen = self.falls.take_if(|falls| now >= *falls).is_some();

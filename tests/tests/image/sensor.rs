@@ -19,7 +19,8 @@ pub(crate) struct Sensor {
     byte_ns: u64,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
-    selected: bool,
+    /// Whether a frame is under way.
+    pub(crate) selected: bool,
 }
 
 impl Sensor {
