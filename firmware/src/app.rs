@@ -16,7 +16,7 @@ use answer::Answer;
 use core::fmt::Arguments;
 use epoch::School;
 use heapless::Deque;
-use link::{Boot, Line, Message};
+use link::{Boot, Line, MessageRef};
 use report::{Report, sums};
 
 /// What a board knows when it starts the application.
@@ -386,7 +386,7 @@ impl App {
     /// A line in a message, for a program too.
     fn log(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = line(text);
-        board.outbox(|outbox| outbox.send(&Message::Log(line)));
+        board.outbox(|outbox| outbox.send(MessageRef::Log(&line)));
     }
 
     fn epoch_age_s(&self, now_us: u64) -> u64 {

@@ -11,7 +11,7 @@ use crate::sums::Sums;
 use adis16405_driver::{Burst, Channel, Config, Faults, Judge};
 use allan_core::Cascade;
 use heapless::spsc;
-use link::{Health, MAX_RAW, Message, Raw, RawBurst};
+use link::{Health, MessageRef, Raw, RawBurst};
 
 /// What is estimated: the inertial channels, then the covariates temperature and supply.
 pub const CHANNELS: [Channel; 8] = {
@@ -78,21 +78,21 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Takes what the next data-ready edge brought; `waiting` is how many more the queue holds. A full message of the
-    /// raw stream, if it is on, is handed back.
-    pub fn take(&mut self, arrival: Arrival, waiting: usize) -> Option<Raw> {
+    /// Takes what the next data-ready edge brought; `waiting` is how many more the queue holds. True if a message of the
+    /// [`raw`](Self::raw) stream is full now.
+    pub fn take(&mut self, arrival: Arrival, waiting: usize) -> bool {
         let health = &mut self.health;
         health.queue_peak = health.queue_peak.max(u32::try_from(waiting).unwrap_or(u32::MAX).saturating_add(1));
         add(&mut health.queue_full, arrival.dropped);
         let Step::Periods(periods) = self.cadence.edge(arrival.at_us) else {
             add(&mut health.stray_edges, 1);
-            return None;
+            return false;
         };
         let missing = periods.saturating_sub(1);
         add(&mut health.lost_edges, missing.saturating_sub(arrival.dropped));
         self.gap(missing);
         self.next += u64::from(missing) + 1;
-        let full = arrival.burst.and_then(|burst| self.stream(&burst, arrival.at_us));
+        let full = arrival.burst.as_ref().is_some_and(|burst| self.stream(burst, arrival.at_us));
         self.judge(arrival.burst.as_ref());
         full
     }
@@ -121,7 +121,9 @@ impl<'m> Estimators<'m> {
         self.config = config;
         self.cadence = Cadence::new(config.sample_period());
         self.next = 0;
-        self.raw = self.raw.take().map(|_| empty(config));
+        if self.raw.is_some() {
+            self.set_raw(true);
+        }
     }
 
     /// Hands over the statistics and begins again without losing a sample; the counters go on.
@@ -144,7 +146,18 @@ impl<'m> Estimators<'m> {
 
     /// Starts or stops the raw stream. What was gathered and not yet sent is dropped.
     pub fn set_raw(&mut self, on: bool) {
-        self.raw = on.then(|| empty(self.config));
+        // In place: it is not small.
+        self.raw = None;
+        if on {
+            let sens_avg = self.config.sens_avg();
+            self.raw = Some(Raw { first: 0, at_us: 0, sens_avg, bursts: heapless::Vec::new() });
+        }
+    }
+
+    /// The message of the raw stream that is being filled, if it is on. A full one makes room for the next burst.
+    #[must_use]
+    pub fn raw(&self) -> Option<&Raw> {
+        self.raw.as_ref()
     }
 
     /// The raw stream found no room on the line.
@@ -231,9 +244,12 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Adds a burst to the raw stream, usable or not.
-    fn stream(&mut self, burst: &Burst, at_us: u64) -> Option<Raw> {
-        let raw = self.raw.as_mut()?;
+    /// Adds a burst to the raw stream, usable or not. True if that fills a message.
+    fn stream(&mut self, burst: &Burst, at_us: u64) -> bool {
+        let Some(raw) = self.raw.as_mut() else { return false };
+        if raw.bursts.is_full() {
+            raw.bursts.clear();
+        }
         let number = self.next - 1;
         let (last_number, last_us) = self.last_raw;
         self.last_raw = (number, at_us);
@@ -247,12 +263,8 @@ impl<'m> Estimators<'m> {
         let words = burst.words.map(|word| word.0.to_be_bytes());
         let burst = RawBurst { after_us: saturated(after_us), periods: saturated(periods), words };
         let _never_full = raw.bursts.push(burst);
-        (raw.bursts.len() == MAX_RAW).then(|| core::mem::replace(raw, empty(self.config)))
+        raw.bursts.is_full()
     }
-}
-
-fn empty(config: Config) -> Raw {
-    Raw { first: 0, at_us: 0, sens_avg: config.sens_avg(), bursts: heapless::Vec::new() }
 }
 
 fn add(counter: &mut u32, more: u32) {
@@ -264,9 +276,9 @@ fn add(counter: &mut u32, more: u32) {
 /// To be called below the sampling and above the main loop.
 pub fn estimate(estimators: &mut Estimators<'_>, outbox: &mut Outbox<'_>, arrivals: &mut spsc::Consumer<'_, Arrival>) {
     while let Some(arrival) = arrivals.dequeue() {
-        if let Some(raw) = estimators.take(arrival, arrivals.len())
-            && !outbox.send(&Message::Raw(raw))
-        {
+        let full = estimators.take(arrival, arrivals.len());
+        let full = estimators.raw().filter(|_| full);
+        if full.is_some_and(|raw| !outbox.send(MessageRef::Raw(raw))) {
             estimators.raw_was_dropped();
         }
     }

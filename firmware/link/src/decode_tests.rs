@@ -1,8 +1,8 @@
 use super::*;
 use crate::{
-    Bounded, Cause, ChannelReport, Checked, Coefficient, Drift, Effect, Encoder, Frame, Health, Learnt, MAX_CAUSES,
-    MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, ModelError, Point, Raw, RawBurst, Shift, Term,
-    line_bytes,
+    Bounded, Cause, ChannelReport, Checked, Coefficient, Drift, Effect, Encoder, Health, Learnt, MAX_CAUSES,
+    MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, MAX_RAW_FRAME, MAX_TEXT, ModelError, Point, Raw,
+    RawBurst, Shift, Term, line_bytes,
 };
 
 extern crate std;
@@ -10,6 +10,12 @@ use std::vec::Vec as StdVec;
 
 fn log(text: &str) -> Message {
     Message::Log(text.try_into().unwrap())
+}
+
+fn frame(encoder: &mut Encoder, message: &Message) -> StdVec<u8> {
+    let mut frame = StdVec::new();
+    encoder.encode(message.into(), &mut |bytes| frame.extend(bytes));
+    frame
 }
 
 fn decode(stream: &[u8]) -> (StdVec<Received>, Counters) {
@@ -98,18 +104,30 @@ fn every_message_comes_back_in_order() {
     let health = Message::Health(Health { bursts: 7, ..Health::default() });
     let messages = [log("start"), largest(), health, raw(), checked(), learnt(), log("")];
     let mut encoder = Encoder::new();
-    let stream: StdVec<u8> = messages.iter().flat_map(|message| encoder.encode(message).unwrap()).collect();
+    let stream: StdVec<u8> = messages.iter().flat_map(|message| frame(&mut encoder, message)).collect();
     let (found, counters) = decode(&stream);
     assert_eq!(sequences(&found), [0, 1, 2, 3, 4, 5, 6]);
     assert!(found.into_iter().filter_map(Received::message).eq(messages));
     assert_eq!(counters, Counters { frames: 7, ..Counters::default() });
 }
 
+/// What a sender makes room for, since it sends in pieces what it cannot take back.
+#[test]
+fn no_frame_is_longer_than_it_is_said() {
+    let length = |message: &Message| frame(&mut Encoder { sequence: u16::MAX }, message).len();
+    for message in [log(&"-".repeat(MAX_TEXT)), raw()] {
+        assert!(length(&message) <= MAX_RAW_FRAME, "{} bytes: {message:?}", length(&message));
+    }
+    for message in [largest(), checked(), learnt()] {
+        assert!(length(&message) <= MAX_FRAME, "{} bytes: {message:?}", length(&message));
+    }
+}
+
 /// The bytes of one short frame worked out by hand: version 3, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is
 /// zlib's of 03 00 03 01 41; COBS puts a length before each stretch without zeros.
 #[test]
 fn a_frame_is_what_the_format_says() {
-    let frame = Encoder::new().encode(&log("A")).unwrap();
+    let frame = frame(&mut Encoder::new(), &log("A"));
     let [a, b, c, d] = 0x9B04_73D3_u32.to_le_bytes();
     assert_eq!(frame.as_slice(), [0, 2, 3, 8, 3, 1, 0x41, a, b, c, d, 0]);
 }
@@ -117,7 +135,7 @@ fn a_frame_is_what_the_format_says() {
 #[test]
 fn frames_may_arrive_in_pieces_of_any_length() {
     let mut encoder = Encoder::new();
-    let stream: StdVec<u8> = (0..5).flat_map(|_| encoder.encode(&largest()).unwrap()).collect();
+    let stream: StdVec<u8> = (0..5).flat_map(|_| frame(&mut encoder, &largest())).collect();
     for piece in [1, 2, 3, 7, 64, 1000, stream.len()] {
         let mut decoder = Decoder::new();
         let mut found = 0;
@@ -140,7 +158,7 @@ fn frames_may_arrive_in_pieces_of_any_length() {
 #[test]
 fn a_changed_byte_costs_that_frame_and_no_other() {
     let mut encoder = Encoder::new();
-    let frames: [Frame; 3] = core::array::from_fn(|i| encoder.encode(&log(["before", "hit", "after"][i])).unwrap());
+    let frames: [StdVec<u8>; 3] = core::array::from_fn(|i| frame(&mut encoder, &log(["before", "hit", "after"][i])));
     let start = frames[0].len();
     for at in 1..frames[1].len() - 1 {
         for bit in 0..8 {
@@ -161,7 +179,7 @@ fn noise_between_frames_costs_no_frame() {
     let mut stream = StdVec::new();
     for round in 0..200 {
         stream.extend((0..round * 20).map(|_| noise.byte()));
-        stream.extend(encoder.encode(&log("between")).unwrap());
+        stream.extend(frame(&mut encoder, &log("between")));
     }
     let (found, counters) = decode(&stream);
     assert_eq!(found.len(), 200);
@@ -172,7 +190,7 @@ fn noise_between_frames_costs_no_frame() {
 #[test]
 fn a_cut_frame_is_counted_and_the_next_one_read() {
     let mut encoder = Encoder::new();
-    let [first, second, third]: [Frame; 3] = core::array::from_fn(|_| encoder.encode(&largest()).unwrap());
+    let [first, second, third]: [StdVec<u8>; 3] = core::array::from_fn(|_| frame(&mut encoder, &largest()));
     let stream: StdVec<u8> = first.iter().chain(&second[..second.len() / 2]).chain(&third).copied().collect();
     let (found, counters) = decode(&stream);
     assert_eq!(sequences(&found), [0, 2]);
@@ -182,7 +200,7 @@ fn a_cut_frame_is_counted_and_the_next_one_read() {
 #[test]
 fn an_endless_stream_without_zeros_is_bounded_and_counted() {
     let mut stream = std::vec![0x55; 10 * MAX_FRAME];
-    stream.extend(Encoder::new().encode(&log("still here")).unwrap());
+    stream.extend(frame(&mut Encoder::new(), &log("still here")));
     let (found, counters) = decode(&stream);
     assert_eq!(found.len(), 1);
     assert_eq!((counters.bad_frames, counters.discarded_bytes), (1, 10 * MAX_FRAME as u64));
@@ -222,7 +240,7 @@ fn sequence_numbers_wrap_without_a_gap() {
     let mut encoder = Encoder::new();
     let mut decoder = Decoder::new();
     for _ in 0..70_000 {
-        for byte in encoder.encode(&log("")).unwrap() {
+        for byte in frame(&mut encoder, &log("")) {
             decoder.push(byte);
         }
     }
@@ -234,11 +252,11 @@ fn lines_of_text_are_told_from_noise_and_disturb_no_frame() {
     let mut encoder = Encoder::new();
     let line = |text: &str| line_bytes(&text.try_into().unwrap());
     let mut stream = StdVec::new();
-    stream.extend(encoder.encode(&log("before")).unwrap());
+    stream.extend(frame(&mut encoder, &log("before")));
     stream.extend(line("? help"));
     stream.extend(line(""));
     stream.extend(b"no line without its end\0");
-    stream.extend(encoder.encode(&log("after")).unwrap());
+    stream.extend(frame(&mut encoder, &log("after")));
     let (found, counters) = decode(&stream);
     let [Received::Message { .. }, Received::Line(help), Received::Line(empty), Received::Message { .. }] = &found[..]
     else {

@@ -1,16 +1,14 @@
-//! From messages to frames.
+//! From messages to frames, byte by byte as they leave: no frame is held whole.
 
-use crate::{CRC, Envelope, MAX_FRAME, Message, VERSION};
+use crate::{CRC, Envelope, MessageRef, VERSION};
+use cobs::{EncoderState, PushResult};
 use heapless::Vec;
-use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
-
-/// The bytes of one frame, zero bytes at either end included.
-pub type Frame = Vec<u8, MAX_FRAME>;
+use postcard::ser_flavors::{Flavor, crc::CrcModifier};
 
 /// Numbers the messages and frames them.
 #[derive(Debug, Default)]
 pub struct Encoder {
-    sequence: u16,
+    pub(crate) sequence: u16,
 }
 
 impl Encoder {
@@ -20,18 +18,62 @@ impl Encoder {
         Self { sequence: 0 }
     }
 
-    /// The frame of a message, or `None` if it would be longer than [`MAX_FRAME`]; a message that was refused takes no
-    /// sequence number.
-    pub fn encode(&mut self, message: &Message) -> Option<Frame> {
-        let mut frame = Frame::new();
-        frame.resize(MAX_FRAME, 0).ok()?;
-        let (_leading_zero, rest) = frame.split_first_mut()?;
-        let cobs = Cobs::try_new(Slice::new(rest)).ok()?;
+    /// Numbers a message that is lost before it can be sent, so that the receiver misses it.
+    pub fn skip(&mut self) {
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    /// Gives the frame of a message to `line`, in pieces.
+    pub fn encode(&mut self, message: MessageRef<'_>, line: &mut dyn FnMut(&[u8])) {
+        line(&[0]);
+        let mut stretch = Vec::new();
+        let cobs = Cobs { state: EncoderState::default(), stretch: &mut stretch, line };
         let checked = CrcModifier::new(cobs, CRC.digest());
         let envelope = Envelope { version: VERSION, sequence: self.sequence, message };
-        let length = postcard::serialize_with_flavor(&envelope, checked).ok()?.len();
-        frame.truncate(1 + length);
-        self.sequence = self.sequence.wrapping_add(1);
-        Some(frame)
+        // A flavor that takes every byte refuses no message.
+        let _ = postcard::serialize_with_flavor(&envelope, checked);
+        self.skip();
+    }
+}
+
+/// Stretches without zeros leave as soon as they are complete, each behind its length.
+struct Cobs<'a> {
+    state: EncoderState,
+    stretch: &'a mut Vec<u8, 254>,
+    line: &'a mut dyn FnMut(&[u8]),
+}
+
+impl Cobs<'_> {
+    fn add(&mut self, byte: u8) -> postcard::Result<()> {
+        self.stretch.push(byte).map_err(|_| postcard::Error::SerializeBufferFull)
+    }
+
+    fn end_stretch(&mut self, length: u8) {
+        (self.line)(&[length]);
+        (self.line)(self.stretch);
+        self.stretch.clear();
+    }
+}
+
+impl Flavor for Cobs<'_> {
+    type Output = ();
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        match self.state.push(byte) {
+            PushResult::AddSingle(byte) => self.add(byte)?,
+            PushResult::ModifyFromStartAndSkip((_, length)) => self.end_stretch(length),
+            PushResult::ModifyFromStartAndPushAndSkip((_, length, byte)) => {
+                self.add(byte)?;
+                self.end_stretch(length);
+            }
+        }
+        Ok(())
+    }
+
+    fn finalize(mut self) -> postcard::Result<()> {
+        let (_, length) = self.state.clone().finalize();
+        self.end_stretch(length);
+        (self.line)(&[0]);
+        Ok(())
     }
 }

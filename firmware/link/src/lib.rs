@@ -19,11 +19,11 @@ mod message;
 mod text;
 
 pub use decode::{Counters, Decoder, Received};
-pub use encode::{Encoder, Frame};
+pub use encode::Encoder;
 pub use message::{
     Boot, BootCause, Bounded, Cause, ChannelReport, Checked, Coefficient, Drift, Effect, Health, Hello, Learnt,
-    MAX_CAUSES, MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, MAX_TEXT, Message, ModelError, Point,
-    Raw, RawBurst, Shift, Term,
+    MAX_CAUSES, MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, MAX_TEXT, Message, MessageRef,
+    ModelError, Point, Raw, RawBurst, Shift, Term,
 };
 pub use text::{Line, line_bytes};
 
@@ -35,6 +35,9 @@ pub const VERSION: u8 = 3;
 /// A channel report with [`MAX_POINTS`] points and [`MAX_COEFFICIENTS`] coefficients, every integer in its longest
 /// encoding, takes 1 397 bytes before COBS, which adds one byte in 254.
 pub const MAX_FRAME: usize = 1408;
+
+/// Longest frame of the raw stream in bytes: [`MAX_RAW`] bursts, every integer in its longest encoding.
+pub const MAX_RAW_FRAME: usize = 584;
 
 /// What COBS encloses: the message between the version and sequence number and the checksum.
 #[derive(serde::Serialize, serde::Deserialize)]

@@ -18,9 +18,9 @@ pub const MAX_TEXT: usize = 120;
 /// Most bursts in one message of the raw stream.
 pub const MAX_RAW: usize = 16;
 
-/// One message. Variants are only ever appended: their position is their number on the wire.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[allow(clippy::large_enum_variant, reason = "messages are built, sent and dropped one at a time")]
+/// One message, as it is received. Variants are only ever appended: their position is their number on the wire.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[allow(clippy::large_enum_variant, reason = "messages are received and dropped one at a time")]
 pub enum Message {
     /// Who speaks and with which settings; the first message of every report.
     Hello(Hello),
@@ -36,6 +36,33 @@ pub enum Message {
     Checked(Checked),
     /// What an epoch has taught of a channel, for the one after it.
     Learnt(Learnt),
+}
+
+/// One message, as it is sent: from where its content is, on a device that has no room for a copy. Variants as in [`Message`].
+#[derive(Debug, Clone, Copy, Serialize)]
+#[allow(missing_docs, reason = "those of `Message`")]
+pub enum MessageRef<'a> {
+    Hello(&'a Hello),
+    Channel(&'a ChannelReport),
+    Health(&'a Health),
+    Log(&'a str),
+    Raw(&'a Raw),
+    Checked(&'a Checked),
+    Learnt(&'a Learnt),
+}
+
+impl<'a> From<&'a Message> for MessageRef<'a> {
+    fn from(message: &'a Message) -> Self {
+        match message {
+            Message::Hello(hello) => Self::Hello(hello),
+            Message::Channel(report) => Self::Channel(report),
+            Message::Health(health) => Self::Health(health),
+            Message::Log(text) => Self::Log(text),
+            Message::Raw(raw) => Self::Raw(raw),
+            Message::Checked(checked) => Self::Checked(checked),
+            Message::Learnt(learnt) => Self::Learnt(learnt),
+        }
+    }
 }
 
 /// Who speaks and with which settings.

@@ -1,14 +1,14 @@
 //! From one epoch to the next: its statistics are handed over, what was learnt before is checked on them, and they teach.
 
 use super::App;
-use super::report::Report;
+use super::report::{Report, send};
 use crate::board::Board;
 use crate::couplings::Means;
 use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
 use crate::lesson::{Lesson, check, study};
 use adis16405_driver::Channel;
-use link::{Checked, Drift, Message};
+use link::{Checked, Drift, MessageRef};
 
 /// Channels that are taught.
 pub(super) const INERTIAL: usize = Channel::INERTIAL.len();
@@ -88,17 +88,20 @@ impl App {
 
     /// The finished epoch against what was learnt of a channel in the one before.
     #[inline(never)] // so that its stack is not everybody's
-    pub(super) fn check(&mut self, index: usize) -> Option<Message> {
-        let (epoch, means) = (self.school.finished()?, self.school.means.as_ref());
+    pub(super) fn check(&mut self, board: &mut impl Board, index: usize) {
+        let Some(epoch) = self.school.finished() else { return };
+        let means = self.school.means.as_ref();
         let checked = check(&self.school.lessons[index], means, epoch, index, self.config);
         self.school.verdicts[index] = checked.as_ref().and_then(|checked| Verdict::of(checked, epoch.samples(index)));
-        checked.map(Message::Checked)
+        if let Some(checked) = &checked {
+            send(board, MessageRef::Checked(checked));
+        }
     }
 
     /// Learns what the finished epoch teaches of a channel, and goes on with everything else meanwhile.
     #[inline(never)]
-    pub(super) fn study(&mut self, board: &mut impl Board, index: usize) -> Option<Message> {
-        let epoch = self.school.finished.take()?;
+    pub(super) fn study(&mut self, board: &mut impl Board, index: usize) {
+        let Some(epoch) = self.school.finished.take() else { return };
         let config = self.config;
         let taught = study(epoch, index, config, &mut || {
             self.attend(board);
@@ -112,9 +115,9 @@ impl App {
             self.school.means = epoch.covariances().map(|covariances| covariances.means);
         }
         self.school.finished = Some(epoch);
-        let (lesson, learnt) = taught?;
+        let Some((lesson, learnt)) = taught else { return };
         self.school.lessons[index] = lesson;
-        Some(Message::Learnt(learnt))
+        send(board, MessageRef::Learnt(&learnt));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::estimators::CHANNELS;
 use crate::summary::{channel_model, channel_report};
 use crate::sums::Sums;
 use adis16405_driver::GyroRange;
-use link::{Health, Hello, Message};
+use link::{Health, Hello, MessageRef};
 
 /// Version of the firmware, from the manifest.
 const VERSION: (u8, u8, u8) = (
@@ -87,6 +87,12 @@ pub(super) fn sums(board: &mut impl Board, index: usize) -> Sums {
     board.estimators(|estimators| estimators.get(index).map_or(Sums::NONE, Sums::of))
 }
 
+/// Sends a message; there must be room for it.
+#[inline(never)]
+pub(super) fn send(board: &mut impl Board, message: MessageRef<'_>) {
+    board.outbox(|outbox| outbox.send(message));
+}
+
 impl App {
     /// Makes and sends the next message of the report under way; there must be room for it.
     #[inline(never)] // so that its stack is not everybody's
@@ -96,20 +102,29 @@ impl App {
             self.report = Report::default();
             return;
         };
-        let message = match part {
-            Part::Hello => Some(Message::Hello(self.hello(board))),
+        match part {
+            Part::Hello => self.say_hello(board),
             Part::Channel(k) => self.channel(board, k),
-            Part::Checked(k) => self.check(k),
+            Part::Checked(k) => self.check(board, k),
             Part::Learnt(k) => self.study(board, k),
-            Part::Health => Some(Message::Health(self.health(board))),
-        };
+            Part::Health => self.say_health(board),
+        }
         if self.report.closing == closing {
             // Otherwise the statistics were forgotten meanwhile.
             self.report.next = Some(index + 1);
         }
-        if let Some(message) = message {
-            board.outbox(|outbox| outbox.send(&message));
-        }
+    }
+
+    #[inline(never)] // here and below: so that no message is on the stack but the one that is made
+    fn say_hello(&self, board: &mut impl Board) {
+        let hello = self.hello(board);
+        send(board, MessageRef::Hello(&hello));
+    }
+
+    #[inline(never)]
+    fn say_health(&self, board: &mut impl Board) {
+        let health = self.health(board);
+        send(board, MessageRef::Health(&health));
     }
 
     /// What was lost so far, with what the board measures of itself.
@@ -139,14 +154,14 @@ impl App {
     }
 
     #[inline(never)]
-    fn channel(&mut self, board: &mut impl Board, k: usize) -> Option<Message> {
+    fn channel(&self, board: &mut impl Board, k: usize) {
         let channel = CHANNELS[k];
         let sums = &self.reported(board, k);
         let lesson = self.school.lessons.get(k);
         let model = lesson.map(|_| channel_model(channel, sums, self.config));
         let previous = lesson.and_then(|lesson| lesson.declared(self.config));
         let report = channel_report(channel, sums, self.config, model.as_ref(), previous.as_ref());
-        Some(Message::Channel(report))
+        send(board, MessageRef::Channel(&report));
     }
 
     fn hello(&self, board: &mut impl Board) -> Hello {
