@@ -270,7 +270,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// [`fit`](crate::fit::fit) gives the one of the fitted mixture.
     #[must_use]
     pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
-        Self::curve_of(sample_period, self.len(), |octave| self.learnt(octave).unwrap_or_default())
+        let mut curve = Curve::empty();
+        Self::draw(&mut curve, sample_period, self.len(), |octave| self.learnt(octave).unwrap_or_default());
+        curve
     }
 
     fn count(&self, octave: usize) -> u64 {

@@ -70,13 +70,20 @@ pub struct Curve<const OCTAVES: usize> {
 }
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    pub(crate) fn new(sample_period: f64, samples: u64, points: impl Iterator<Item = Point>) -> Self {
-        // In place from here on: a curve is too large to be handed about on a small stack.
-        let mut curve = Self { sample_period, samples, points: Vec::new() };
-        curve.points.extend(points);
-        curve.name();
-        curve.weigh(&mut |point| point.noise.shares());
-        curve
+    /// Without points: to be [drawn](crate::Cascade::draw) where it stands, as it is too large to be handed about on a small
+    /// stack.
+    #[must_use]
+    pub const fn empty() -> Self {
+        Self { sample_period: 0.0, samples: 0, points: Vec::new() }
+    }
+
+    /// Takes `points` in the place of its own.
+    pub(crate) fn take(&mut self, sample_period: f64, samples: u64, points: impl Iterator<Item = Point>) {
+        (self.sample_period, self.samples) = (sample_period, samples);
+        self.points.clear();
+        self.points.extend(points);
+        self.name();
+        self.weigh(&mut |point| point.noise.shares());
     }
 
     /// Of points whose noise type is known already.

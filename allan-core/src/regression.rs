@@ -178,11 +178,18 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     #[must_use]
     pub fn subtracted(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
         let mut curve = self.channel.clone();
-        curve.change_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
+        self.subtract_from(&mut curve, sensitivities);
         curve
     }
 
-    fn subtracted_at(&self, point: &Point, sensitivities: &[Sensitivity]) -> Option<f64> {
+    /// Makes a copy of the channel's curve that in place.
+    pub fn subtract_from(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity]) {
+        curve.change_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
+    }
+
+    /// The same at one point; `None` where a covariance is not known.
+    #[must_use]
+    pub fn subtracted_at(&self, point: &Point, sensitivities: &[Sensitivity]) -> Option<f64> {
         let mut avar = point.avar;
         for (i, a) in sensitivities.iter().enumerate() {
             let own = self.covariates[a.covariate].avar(point.n)?;

@@ -71,9 +71,27 @@ impl Trace {
     /// N, B and K fitted to `curve`, and nothing sought.
     #[must_use]
     pub fn declared<const POINTS: usize>(curve: &Curve<POINTS>) -> Self {
-        let before = fit(curve, &Kind::DECLARED);
-        let before_goodness = goodness(curve, &before);
-        Self { after: before.clone(), after_goodness: before_goodness, before, before_goodness, found: Vec::new() }
+        let mut trace = Self::empty();
+        trace.declare(curve);
+        trace
+    }
+
+    /// Of nothing: to be filled where it stands, as it is too large to be handed about on a small stack.
+    #[must_use]
+    pub fn empty() -> Self {
+        let nothing = Goodness { deviance: 0.0, p_value: 1.0 };
+        let (before, after) = (Model::new(0.0, []), Model::new(0.0, []));
+        Self { before, before_goodness: nothing, after, after_goodness: nothing, found: Vec::new() }
+    }
+
+    /// Makes it that of [`declared`](Self::declared).
+    #[inline(never)] // so that its stack is not everybody's
+    pub fn declare<const POINTS: usize>(&mut self, curve: &Curve<POINTS>) {
+        self.before = fit(curve, &Kind::DECLARED);
+        self.before_goodness = goodness(curve, &self.before);
+        self.after.clone_from(&self.before);
+        self.after_goodness = self.before_goodness;
+        self.found.clear();
     }
 }
 
@@ -90,40 +108,24 @@ impl<'a> Lines<'a> {
 /// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
 #[must_use]
 pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
-    match trace_while(Trace::declared(curve), curve, lines, &mut || true) {
-        Some(trace) => trace,
-        None => Trace::declared(curve), // nobody said no
-    }
+    let mut trace = Trace::declared(curve);
+    let _nobody_said_no = trace_while(&mut trace, curve, lines, &mut || true);
+    trace
 }
 
 /// The same from the curve's [`Trace::declared`] on, asking before every fit of a candidate and every step of a search
-/// whether to keep on; `None` if the answer was no.
+/// whether to keep on; false, and the trace unfinished, if the answer was no.
 ///
 /// For a microcontroller that has other things to do as well: `keep_on` can do them.
 #[must_use]
 pub fn trace_while<const POINTS: usize>(
-    declared: Trace,
+    trace: &mut Trace,
     curve: &Curve<POINTS>,
     lines: Lines,
     keep_on: &mut dyn FnMut() -> bool,
-) -> Option<Trace> {
+) -> bool {
     let mut search = Search { families: Families::new(curve, lines), free: lines.free(), keep_on };
-    let Trace { before, before_goodness, mut after, mut found, .. } = declared;
-    while after.terms().len() < MAX_TERMS && !found.is_full() {
-        let Some(rival) = search.most_telling(curve, &after).ok()? else { break };
-        let residual = largest_residual(curve, &after);
-        // A filter that is read slowly has taken the place of the white noise.
-        let term = if rival.kinds.len() == after.terms().len() { 0 } else { after.terms().len() };
-        after = fit_free_shapes(curve, &rival.kinds, search.free, search.keep_on);
-        search.go_on().ok()?;
-        // There is room: the loop ends when it is full.
-        let _ = found.push(Found { term, score: rival.score(), residual });
-        if found.len() > 1 {
-            after = search.reconsidered(curve, after, &found).ok()?;
-        }
-    }
-    let after_goodness = goodness(curve, &after);
-    Some(Trace { before, before_goodness, after, after_goodness, found })
+    search.complete(curve, trace).is_ok()
 }
 
 /// The candidates, and whether to go on.
@@ -137,15 +139,41 @@ struct Search<'a> {
 struct Stopped;
 
 impl Search<'_> {
+    /// Adds what is missing.
+    fn complete<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<(), Stopped> {
+        while trace.after.terms().len() < MAX_TERMS && !trace.found.is_full() && self.extend(curve, trace)? {
+            if trace.found.len() > 1 {
+                self.reconsider(curve, &mut trace.after, &trace.found)?;
+            }
+        }
+        trace.after_goodness = goodness(curve, &trace.after);
+        Ok(())
+    }
+
+    /// Adds the term that is most telling; false if there is none.
+    #[inline(never)] // here and below: so that stack frames do not add up
+    fn extend<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<bool, Stopped> {
+        let Some(rival) = self.most_telling(curve, &trace.after)? else { return Ok(false) };
+        let residual = largest_residual(curve, &trace.after);
+        // A filter that is read slowly has taken the place of the white noise.
+        let before = trace.after.terms().len();
+        let term = if rival.kinds.len() == before { 0 } else { before };
+        trace.after = fit_free_shapes(curve, &rival.kinds, self.free, self.keep_on);
+        self.go_on()?;
+        // There is room: nothing is added to a full list.
+        let _ = trace.found.push(Found { term, score: rival.score(), residual });
+        Ok(true)
+    }
+
     /// Terms that were found before others were known, put to the test again: each gives way to another that explains
     /// more.
-    #[inline(never)] // here and below: so that stack frames do not add up
-    fn reconsidered<const POINTS: usize>(
+    #[inline(never)]
+    fn reconsider<const POINTS: usize>(
         &mut self,
         curve: &Curve<POINTS>,
-        mut model: Model,
+        model: &mut Model,
         found: &[Found],
-    ) -> Result<Model, Stopped> {
+    ) -> Result<(), Stopped> {
         for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
             let without: Vec<Kind, MAX_TERMS> =
                 model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
@@ -163,11 +191,11 @@ impl Search<'_> {
             let _ = kinds.insert(known.term.min(kinds.len()), other);
             let candidate = fit_free_shapes(curve, &kinds, self.free, self.keep_on);
             self.go_on()?;
-            if deviance(curve, &candidate) < deviance(curve, &model) - CONVINCING {
-                model = candidate;
+            if deviance(curve, &candidate) < deviance(curve, model) - CONVINCING {
+                *model = candidate;
             }
         }
-        Ok(model)
+        Ok(())
     }
 
     /// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.

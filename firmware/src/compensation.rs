@@ -41,14 +41,15 @@ pub type Causes = Vec<Followed, MAX_CAUSES>;
 pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMut() -> bool) -> Option<Causes> {
     let Some(known) = epoch.covariances() else { return Some(Causes::new()) };
     let mut members: Members = causes(index).collect();
-    let channel = epoch.curve(index, config);
+    let mut channel = Curve::empty();
+    epoch.draw(&mut channel, index, config);
     let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
     for &member in &members {
         if !keep_on() {
             return None;
         }
         // There is room for as many as there are members.
-        let _ = covariates.push(covariate(epoch, member, config));
+        let _ = covariates.push(covariate(epoch, member, config, true));
     }
     let followed = loop {
         let covariance = |with: Option<usize>, covariate: usize, n: u64| {
@@ -56,7 +57,7 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
         };
         let beside = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
         let followed = beside.followed_while(keep_on)?;
-        let harm = || harms(epoch, &members, config, &followed, (&channel, &beside.subtracted(&followed)));
+        let harm = || harms(epoch, &members, config, &followed, &beside);
         // The least clear of them is told last.
         let Some(worst) = followed.last().filter(|_| harm()) else { break followed };
         members.remove(worst.covariate);
@@ -70,30 +71,41 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
     Some(followed.iter().map(with_reference).take(MAX_CAUSES).collect())
 }
 
-/// The curve of the compensated stream of [`CHANNELS`]`[index]` over an epoch, exact from 2⁸ samples on; below, that of the
-/// stream itself.
-///
-/// `None` if the epoch does not know what its channels have in common.
-#[must_use]
+/// Draws the curve of the compensated stream of [`CHANNELS`]`[index]` over an epoch, exact from 2⁸ samples on; below, that of
+/// the stream itself. `None`, and the curve that of the stream, if the epoch does not know what its channels have in common.
+pub fn compensated(
+    curve: &mut Curve<OCTAVES>,
+    epoch: &Epoch,
+    index: usize,
+    config: Config,
+    causes: &[Followed],
+) -> Option<()> {
+    epoch.draw(curve, index, config);
+    if causes.is_empty() { Some(()) } else { subtract(curve, epoch, index, config, causes) }
+}
+
 #[inline(never)]
-pub fn compensated(epoch: &Epoch, index: usize, config: Config, causes: &[Followed]) -> Option<Curve<OCTAVES>> {
-    if causes.is_empty() {
-        return Some(epoch.curve(index, config));
-    }
+fn subtract(
+    curve: &mut Curve<OCTAVES>,
+    epoch: &Epoch,
+    index: usize,
+    config: Config,
+    causes: &[Followed],
+) -> Option<()> {
+    let known = epoch.covariances()?;
     let members: Members = causes.iter().map(|followed| followed.cause).collect();
     let mut covariates: Vec<Covariate<COUPLED>, MAX_CAUSES> = Vec::new();
     for &member in &members {
-        let _ = covariates.push(Covariate::as_measured(&epoch.curve(member, config), 1 << FIRST));
+        let _ = covariates.push(covariate(epoch, member, config, false));
     }
     let exact = |(covariate, followed): (usize, &Followed)| Sensitivity::exact(covariate, followed.value);
     let sensitivities: Vec<Sensitivity, MAX_CAUSES> = causes.iter().enumerate().map(exact).collect();
-    let channel = &epoch.curve(index, config);
-    let known = epoch.covariances()?;
     let covariance = |with: Option<usize>, covariate: usize, n: u64| {
         shared(known, (with.map_or(index, |other| members[other]), members[covariate]), n, config)
     };
-    let beside = Beside { channel, covariates: &covariates, covariance: &covariance };
-    Some(beside.subtracted(&sensitivities))
+    let channel = &curve.clone();
+    Beside { channel, covariates: &covariates, covariance: &covariance }.subtract_from(curve, &sensitivities);
+    Some(())
 }
 
 /// How far the mean of the stream moved from one epoch to the next, and how far that of the compensated stream, in the
@@ -123,9 +135,16 @@ fn shared(known: &Covariances, (a, b): (usize, usize), n: u64, config: Config) -
     Some(known.covariance(a, b, n)? * lsb(a, config) * lsb(b, config))
 }
 
+/// A channel where it is coupled, its own noise `told` from the rest or not.
 #[inline(never)]
-fn covariate(epoch: &Epoch, index: usize, config: Config) -> Covariate<COUPLED> {
-    Covariate::new(&epoch.curve(index, config), lsb(index, config), 1 << FIRST)
+fn covariate(epoch: &Epoch, index: usize, config: Config, told: bool) -> Covariate<COUPLED> {
+    let mut curve = Curve::empty();
+    epoch.draw(&mut curve, index, config);
+    if told {
+        Covariate::new(&curve, lsb(index, config), 1 << FIRST)
+    } else {
+        Covariate::as_measured(&curve, 1 << FIRST)
+    }
 }
 
 fn lsb(index: usize, config: Config) -> f64 {
@@ -142,17 +161,19 @@ fn harms(
     members: &Members,
     config: Config,
     followed: &[Sensitivity],
-    (raw, subtracted): (&Curve<OCTAVES>, &Curve<OCTAVES>),
+    beside: &Beside<'_, OCTAVES, COUPLED>,
 ) -> bool {
     let mut added = [0.0; OCTAVES];
+    let mut covariate = Curve::empty();
     for sensitivity in followed {
-        let covariate = epoch.curve(members[sensitivity.covariate], config);
+        epoch.draw(&mut covariate, members[sensitivity.covariate], config);
         for (added, point) in added.iter_mut().zip(covariate.points()).take(FIRST) {
             *added += sensitivity.value * sensitivity.value * point.avar;
         }
     }
-    let worse = |((raw, subtracted), added): ((&Point, &Point), f64)| {
-        subtracted.avar + added > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf))
+    let worse = |(raw, added): (&Point, f64)| {
+        let subtracted = beside.subtracted_at(raw, followed).unwrap_or(raw.avar);
+        subtracted + added > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf))
     };
-    raw.points().iter().zip(subtracted.points()).zip(added).any(worse)
+    beside.channel.points().iter().zip(added).any(worse)
 }

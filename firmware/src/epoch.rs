@@ -42,11 +42,10 @@ impl Epoch {
         self.records.sums(index)
     }
 
-    /// The curve of [`CHANNELS`]`[index]` in its unit.
-    #[must_use]
+    /// Draws the curve of [`CHANNELS`]`[index]` in its unit.
     #[inline(never)] // so that the sums are not on everybody's stack
-    pub fn curve(&self, index: usize, config: Config) -> Curve<OCTAVES> {
-        self.sums(index).curve(CHANNELS[index], config)
+    pub fn draw(&self, curve: &mut Curve<OCTAVES>, index: usize, config: Config) {
+        self.sums(index).draw(curve, CHANNELS[index], config);
     }
 
     /// What the channels have in common; `None` if that is not known of all their samples, as after a restart.

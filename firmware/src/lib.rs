@@ -45,6 +45,6 @@ pub use estimators::{CHANNELS, Estimator, Estimators, Statistics, estimate};
 pub use last_words::LastWords;
 pub use outbox::{Outbox, Outgoing};
 pub use retained::Retained;
-pub use summary::{OCTAVES, OVERLAP, channel_model, channel_report};
+pub use summary::{OCTAVES, OVERLAP, channel_model, channel_report, unseen_error};
 pub use sums::Sums;
 pub use uptime::Uptime;

@@ -2,7 +2,8 @@
 
 use crate::sums::Sums;
 use adis16405_driver::{Channel, Config};
-use allan_core::{Curve, Kind, Model, check, fit::fit};
+use allan_core::{Curve, Kind, Model, check, fit::fit, model};
+use heapless::Vec;
 use link::{ChannelReport, Coefficient, ModelError, Point, Term};
 
 /// Octaves of averaging factors: up to 2²³ samples, 11 hours at 204.8 samples a second.
@@ -12,35 +13,48 @@ pub const OVERLAP: usize = 8;
 
 /// The declared model fitted to one channel, in its unit.
 #[must_use]
-#[inline(never)] // so that its stack is not everybody's
+#[inline(never)] // here and below: so that its stack is not everybody's
 pub fn channel_model(channel: Channel, sums: &Sums, config: Config) -> Model {
-    fit(&sums.curve(channel, config), &Kind::DECLARED)
+    let mut curve = Curve::empty();
+    sums.draw(&mut curve, channel, config);
+    fit(&curve, &Kind::DECLARED)
 }
 
-/// What is reported of one channel. `model` is fitted to it, `previous` to the epoch before.
+/// How wrong a model is on the curve of one channel; `None` if no octave can be compared.
+#[must_use]
+#[inline(never)]
+pub fn unseen_error(channel: Channel, sums: &Sums, config: Config, model: &Model) -> Option<ModelError> {
+    let mut curve = Curve::empty();
+    sums.draw(&mut curve, channel, config);
+    model_error(model, &curve)
+}
+
+/// What is reported of one channel: the model that was fitted to it, and how wrong that of the epoch before is.
 #[must_use]
 pub fn channel_report(
     channel: Channel,
     sums: &Sums,
-    config: Config,
     model: Option<&Model>,
-    previous: Option<&Model>,
+    unseen: Option<ModelError>,
 ) -> ChannelReport {
-    let coefficients = model.into_iter().flat_map(Model::terms).map(|term| {
-        let (value, low, high) = (term.value, term.low, term.high);
-        Coefficient { term: term_of(term.kind), value, low, high }
-    });
-    let octaves = sums.octaves.iter().enumerate().filter(|(_, (_, count))| *count > 0);
-    let points = octaves.map(|(octave, &(sum, count))| Point { n: 1 << octave, sum, count });
-    let unseen = previous.and_then(|previous| model_error(previous, &sums.curve(channel, config)));
-    ChannelReport {
+    let mut report = ChannelReport {
         channel: channel as u8,
         samples: sums.samples,
         missing: sums.missing,
-        points: points.take(link::MAX_POINTS).collect(),
-        coefficients: coefficients.take(link::MAX_COEFFICIENTS).collect(),
+        points: Vec::new(),
+        coefficients: Vec::new(),
         unseen,
-    }
+    };
+    let octaves = sums.octaves.iter().enumerate().filter(|(_, (_, count))| *count > 0);
+    let points = octaves.map(|(octave, &(sum, count))| Point { n: 1 << octave, sum, count });
+    report.points.extend(points.take(link::MAX_POINTS));
+    let coefficient = |term: &model::Term| {
+        let (value, low, high) = (term.value, term.low, term.high);
+        Coefficient { term: term_of(term.kind), value, low, high }
+    };
+    let coefficients = model.into_iter().flat_map(Model::terms).map(coefficient);
+    report.coefficients.extend(coefficients.take(link::MAX_COEFFICIENTS));
+    report
 }
 
 /// How wrong a model is on a curve; `None` if no octave can be compared.

@@ -32,14 +32,12 @@ impl Sums {
         estimator.resume(self.samples, self.missing, |octave| self.learnt(octave));
     }
 
-    /// The curve of a channel in its unit.
-    #[must_use]
+    /// Draws the curve of a channel in its unit.
     #[inline(never)] // so that its stack is not everybody's
-    pub fn curve(&self, channel: Channel, config: Config) -> Curve<OCTAVES> {
+    pub fn draw(&self, curve: &mut Curve<OCTAVES>, channel: Channel, config: Config) {
         let period = 1.0 / config.sample_period().hz();
-        let mut curve = Estimator::curve_of(period, self.samples, |octave| self.learnt(octave));
+        Estimator::draw(curve, period, self.samples, |octave| self.learnt(octave));
         curve.scale(channel.lsb(config.range()));
-        curve
     }
 
     fn learnt(&self, octave: usize) -> Learnt {

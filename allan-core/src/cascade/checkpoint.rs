@@ -43,15 +43,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// The [`curve`](Self::curve) of an estimator that has `learnt` so much of `samples` samples, without the estimator.
-    #[must_use]
-    pub fn curve_of(sample_period: f64, samples: u64, learnt: impl Fn(usize) -> Learnt) -> Curve<OCTAVES> {
+    /// Makes `curve` the [`curve`](Self::curve) of an estimator that has `learnt` so much of `samples` samples, without
+    /// the estimator.
+    pub fn draw(curve: &mut Curve<OCTAVES>, sample_period: f64, samples: u64, learnt: impl Fn(usize) -> Learnt) {
         let points = (0..OCTAVES).map(|octave| (octave, learnt(octave))).filter(|(_, learnt)| learnt.count > 0);
         let point = |(octave, Learnt { squares, fourths, count })| {
             let moments = Moments { squares: squares.into(), fourths: fourths.into() };
             let n = 1_u64 << octave;
             Point::new(n, sample_period, &moments, octave, count, n.min(OVERLAP as u64) as u32, Noise::White)
         };
-        Curve::new(sample_period, samples, points.map(point))
+        curve.take(sample_period, samples, points.map(point));
     }
 }

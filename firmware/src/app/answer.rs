@@ -94,6 +94,7 @@ impl App {
 
     /// Head, a row for every octave, a line of coefficients for every inertial channel; what the last epoch taught, and what
     /// it said to what was learnt before.
+    #[inline(never)] // here and below: so that its stack is not everybody's
     fn table_line(&self, board: &mut impl Board, index: usize) -> Next {
         if let Some(head) = HEAD.get(index) {
             return Next::Line(line(format_args!("{head}")));
@@ -111,6 +112,7 @@ impl App {
         }
     }
 
+    #[inline(never)]
     fn coefficients_line(&self, board: &mut impl Board, index: usize) -> Option<Line> {
         let channel = CHANNELS[index];
         let model = channel_model(channel, &sums(board, index), self.config);
@@ -124,6 +126,7 @@ impl App {
     }
 
     /// A covariate that is subtracted since the last epoch.
+    #[inline(never)]
     fn cause_line(&self, index: usize, cause: usize) -> Option<Line> {
         let followed = self.school.lessons[index].causes.get(cause)?;
         let (value, error) = (Short(followed.value), Short(followed.error));
@@ -132,6 +135,7 @@ impl App {
     }
 
     /// What the last epoch said to what was learnt before it.
+    #[inline(never)]
     fn checked_line(&self, index: usize) -> Option<Line> {
         let Verdict { errors, drift } = self.school.verdicts[index]?;
         let (before, after) = (Short(errors.0), Short(errors.1));
@@ -142,6 +146,7 @@ impl App {
         Some(line(text))
     }
 
+    #[inline(never)]
     fn status_line(&self, board: &mut impl Board, index: usize) -> Next {
         let now_us = board.now_us();
         let boot = &self.boot;
@@ -171,6 +176,7 @@ impl App {
 }
 
 /// A line for each counter that is not 0.
+#[inline(never)]
 fn faults_line(health: &Health, index: usize) -> Next {
     let counters = [
         ("bursts", health.bursts),

@@ -3,10 +3,11 @@
 use super::App;
 use super::report::{Report, send};
 use crate::board::Board;
+use crate::compensation::{Causes, learn};
 use crate::couplings::Means;
 use crate::epoch::Epoch;
 use crate::estimators::CHANNELS;
-use crate::lesson::{Lesson, check, study};
+use crate::lesson::{Lesson, Taught, check};
 use adis16405_driver::Channel;
 use link::{Checked, Drift, MessageRef};
 
@@ -87,7 +88,7 @@ impl App {
     }
 
     /// The finished epoch against what was learnt of a channel in the one before.
-    #[inline(never)] // so that its stack is not everybody's
+    #[inline(never)] // here and below: so that its stack is not everybody's
     pub(super) fn check(&mut self, board: &mut impl Board, index: usize) {
         let Some(epoch) = self.school.finished() else { return };
         let means = self.school.means.as_ref();
@@ -99,26 +100,43 @@ impl App {
     }
 
     /// Learns what the finished epoch teaches of a channel, and goes on with everything else meanwhile.
-    #[inline(never)]
     pub(super) fn study(&mut self, board: &mut impl Board, index: usize) {
         let Some(epoch) = self.school.finished.take() else { return };
         let config = self.config;
-        let taught = study(epoch, index, config, &mut || {
-            self.attend(board);
-            if self.speak_up(board) {
-                self.answer_briefly(board);
-            }
-            self.report.is_closing()
-        });
-        let last = index + 1 == INERTIAL;
-        if taught.is_some() && last {
-            self.school.means = epoch.covariances().map(|covariances| covariances.means);
+        if let Some(causes) = learn(epoch, index, config, &mut || self.goes_on(board)) {
+            self.trace(board, epoch, index, causes);
         }
         self.school.finished = Some(epoch);
-        let Some((lesson, learnt)) = taught else { return };
-        self.school.lessons[index] = lesson;
-        send(board, MessageRef::Learnt(&learnt));
     }
+
+    #[inline(never)]
+    fn trace(&mut self, board: &mut impl Board, epoch: &Epoch, index: usize, causes: Causes) {
+        let config = self.config;
+        let mut taught = Taught::of(causes);
+        if !taught.study(epoch, index, config, &mut || self.goes_on(board)) {
+            return;
+        }
+        if index + 1 == INERTIAL {
+            self.school.means = epoch.covariances().map(|covariances| covariances.means);
+        }
+        self.school.lessons[index] = taught.lesson();
+        say(board, &taught, index, epoch.number);
+    }
+
+    /// Everything else, while an epoch teaches. False if what it teaches is not wanted any more.
+    fn goes_on(&mut self, board: &mut impl Board) -> bool {
+        self.attend(board);
+        if self.speak_up(board) {
+            self.answer_briefly(board);
+        }
+        self.report.is_closing()
+    }
+}
+
+#[inline(never)]
+fn say(board: &mut impl Board, taught: &Taught, index: usize, epoch: u32) {
+    let learnt = taught.message(index, epoch);
+    send(board, MessageRef::Learnt(&learnt));
 }
 
 const _: () = assert!(CHANNELS.len() >= INERTIAL);

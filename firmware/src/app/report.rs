@@ -4,10 +4,12 @@ use super::epoch::INERTIAL;
 use super::{App, Sensor};
 use crate::board::Board;
 use crate::estimators::CHANNELS;
-use crate::summary::{channel_model, channel_report};
+use crate::lesson::Lesson;
+use crate::summary::{channel_model, channel_report, unseen_error};
 use crate::sums::Sums;
-use adis16405_driver::GyroRange;
-use link::{Health, Hello, MessageRef};
+use adis16405_driver::{Channel, GyroRange};
+use allan_core::Model;
+use link::{Health, Hello, MessageRef, ModelError};
 
 /// Version of the firmware, from the manifest.
 const VERSION: (u8, u8, u8) = (
@@ -87,6 +89,12 @@ pub(super) fn sums(board: &mut impl Board, index: usize) -> Sums {
     board.estimators(|estimators| estimators.get(index).map_or(Sums::NONE, Sums::of))
 }
 
+#[inline(never)]
+fn say(board: &mut impl Board, channel: Channel, sums: &Sums, model: Option<&Model>, unseen: Option<ModelError>) {
+    let report = channel_report(channel, sums, model, unseen);
+    send(board, MessageRef::Channel(&report));
+}
+
 /// Sends a message; there must be room for it.
 #[inline(never)]
 pub(super) fn send(board: &mut impl Board, message: MessageRef<'_>) {
@@ -155,13 +163,17 @@ impl App {
 
     #[inline(never)]
     fn channel(&self, board: &mut impl Board, k: usize) {
-        let channel = CHANNELS[k];
-        let sums = &self.reported(board, k);
+        let (channel, sums) = (CHANNELS[k], &self.reported(board, k));
         let lesson = self.school.lessons.get(k);
+        let unseen = lesson.and_then(|lesson| self.unseen(lesson, channel, sums));
         let model = lesson.map(|_| channel_model(channel, sums, self.config));
-        let previous = lesson.and_then(|lesson| lesson.declared(self.config));
-        let report = channel_report(channel, sums, self.config, model.as_ref(), previous.as_ref());
-        send(board, MessageRef::Channel(&report));
+        say(board, channel, sums, model.as_ref(), unseen);
+    }
+
+    /// How wrong what was learnt before is on the sums.
+    #[inline(never)]
+    fn unseen(&self, lesson: &Lesson, channel: Channel, sums: &Sums) -> Option<ModelError> {
+        unseen_error(channel, sums, self.config, &lesson.declared(self.config)?)
     }
 
     fn hello(&self, board: &mut impl Board) -> Hello {

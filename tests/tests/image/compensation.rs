@@ -5,7 +5,8 @@ use crate::decoded::Decoded;
 use crate::sensor::Sensor;
 use crate::{SCK_HZ, image};
 use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
-use firmware::lesson::{Lesson, check, study};
+use firmware::compensation::learn;
+use firmware::lesson::{Taught, check};
 use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Retained, Statistics};
 use host_sim::device::Device;
 use host_sim::sensor::effect::surroundings::TemperatureCourse;
@@ -108,12 +109,14 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learnt>
     }
     let [first, second] = &epochs[..] else { panic!("two epochs") };
     let means = first.covariances().expect("no restart").means;
-    let taught: Vec<(Lesson, Learnt)> =
-        (0..6).map(|index| study(first, index, FIRST_CONFIG, &mut || true).expect("nobody says no")).collect();
-    let checked =
-        |(index, (lesson, _)): (usize, &(Lesson, Learnt))| check(lesson, Some(&means), second, index, FIRST_CONFIG);
-    let checked = taught.iter().enumerate().filter_map(checked).collect();
-    (taught.into_iter().map(|(_, learnt)| learnt).collect(), checked)
+    let taught = |index: usize| {
+        let mut taught = Taught::of(learn(first, index, FIRST_CONFIG, &mut || true)?);
+        taught.study(first, index, FIRST_CONFIG, &mut || true).then_some(taught)
+    };
+    let taught: Vec<Taught> = (0..6).map(|index| taught(index).expect("nobody says no")).collect();
+    let check = |index: usize| check(&taught[index].lesson(), Some(&means), second, index, FIRST_CONFIG);
+    let learnt = taught.iter().enumerate().map(|(index, taught)| taught.message(index, first.number)).collect();
+    (learnt, (0..6).filter_map(check).collect())
 }
 
 #[test]

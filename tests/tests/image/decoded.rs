@@ -94,5 +94,5 @@ pub(crate) fn in_stretches(
     let channel = CHANNELS[index];
     let sums = Sums::of(&estimator);
     let model = (index < 6).then(|| channel_model(channel, &sums, config));
-    channel_report(channel, &sums, config, model.as_ref(), None)
+    channel_report(channel, &sums, model.as_ref(), None)
 }
