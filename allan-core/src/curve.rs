@@ -143,8 +143,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Gives the points another variance.
-    pub(crate) fn change_avar(&mut self, avar: impl Fn(&Point) -> f64) {
+    /// Gives the points whose variance is not 0 another one, with bounds in proportion and the same degrees of freedom.
+    pub fn change_avar(&mut self, avar: impl Fn(&Point) -> f64) {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
             let ratio = avar(point) / point.avar;
             point.avar *= ratio;

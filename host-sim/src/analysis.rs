@@ -231,11 +231,12 @@ fn named(
 }
 
 /// Whether a Markov term is what a first-order low-pass filter makes of white noise: it forgets within some samples, and
-/// nothing is left that is white but the rounding to steps.
+/// nothing is left that is white, or white before the part's own filter, but the rounding to steps.
 fn is_low_pass(model: &Model, markov: Markov, step: f64) -> bool {
     let period_s = model.sample_period();
     let rounding = ROUNDING * step * step * period_s;
-    let white = model.terms().iter().filter(|term| term.kind == Kind::AngleRandomWalk);
+    let is_white = |kind: &Kind| matches!(kind, Kind::AngleRandomWalk | Kind::Filtered(_));
+    let white = model.terms().iter().filter(|term| is_white(&term.kind));
     let left: f64 = white.map(|term| term.low * term.low).sum();
     markov.time_constant < LOW_PASS * period_s && left <= rounding
 }

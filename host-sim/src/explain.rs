@@ -14,9 +14,11 @@ pub mod text;
 use crate::recording::Recording;
 use crate::time_course::companion::Companion;
 use crate::time_course::control::Controls;
-use crate::time_course::moving::{Estimate, Free, Moving};
+use crate::time_course::drift::{beyond_drift, expected};
+use crate::time_course::moving::{Estimate, Free, Moving, State};
 use crate::time_course::stationarity::{Part, Stationarity, predictive_part, stationarity};
 use crate::time_course::tracking::{Tracked, track, what_moves};
+use crate::time_course::typical::typical;
 use crate::time_course::{Parts, deviance_per_point};
 use crate::timeline::Timeline;
 use crate::trace::{Series, deliveries, sample_clock};
@@ -58,12 +60,15 @@ pub struct ChannelExplanation {
     pub stationarity: Option<Stationarity>,
     /// What the predictive model was fitted to.
     pub part: Part,
-    /// The terms of the trace, fitted to that part.
+    /// The terms of the trace, fitted to that part; where the noise moves, to what it mostly is there.
     pub predictive: Model,
     /// The predictive model with what moves in it.
     pub moving: Moving,
     /// What moves.
     pub free: Free,
+    /// By how much on average from the part that the predictive model was fitted to to the unseen half, if it goes on as
+    /// in the fitted half: standard deviations.
+    pub drift: State,
     /// How, epoch by epoch: the fitted half, the unseen half.
     pub course: [Vec<Estimate>; 2],
     /// Deviance per point of every model.
@@ -87,6 +92,8 @@ pub struct Errors {
     pub standing_still: f64,
     /// The predictive model; on the part that it was fitted to and on the unseen half.
     pub predictive: [f64; 2],
+    /// The predictive model on the unseen half, beyond the drift that the fitted half lets expect.
+    pub beyond_drift: f64,
 }
 
 /// Explains the inertial channels of a recording; those that never change, or are too short to be cut up, are left out.
@@ -129,12 +136,17 @@ fn explain_channel(channel: Channel, series: &Series) -> Option<ChannelExplanati
         Part::FittedHalf => trace.after.clone(),
         Part::LatestQuarter => {
             let kinds: Vec<Kind> = trace.after.terms().iter().map(|term| term.kind).collect();
-            fit_shapes(&parts.quarters[1], &kinds)
+            fit_shapes(&typical(&parts.quarters[1], parts.latest_epochs()), &kinds)
         }
     };
     let (moving, _) = Moving::of(predictive.clone(), &parts.fitted_epochs);
     let free = what_moves(&moving, &parts.fitted_epochs);
     let epochs = [&parts.fitted_epochs[..], &parts.unseen_epochs[..]];
+    let learnt = match part {
+        Part::FittedHalf => epochs[0],
+        Part::LatestQuarter => parts.latest_epochs(),
+    };
+    let drift = expected(&moving, free, epochs[0], learnt.len(), epochs[1].len());
     let fitted_to = match part {
         Part::FittedHalf => &parts.fitted,
         Part::LatestQuarter => &parts.quarters[1],
@@ -145,6 +157,7 @@ fn explain_channel(channel: Channel, series: &Series) -> Option<ChannelExplanati
         traced: [error(&trace.after, &parts.fitted), error(&trace.after, &parts.unseen)],
         standing_still: deviance_per_point(&parts.unseen, of_fitted_half),
         predictive: [error(&predictive, fitted_to), error(&predictive, &parts.unseen)],
+        beyond_drift: beyond_drift(&moving, drift, &parts.unseen),
     };
     let seen = if free == Free::Nothing { Free::Level } else { free };
     Some(ChannelExplanation {
@@ -160,6 +173,7 @@ fn explain_channel(channel: Channel, series: &Series) -> Option<ChannelExplanati
         predictive,
         moving,
         free,
+        drift,
         parts,
     })
 }

@@ -1,9 +1,10 @@
 //! What moves while a record is made, and what a model is worth that knows it.
 //!
 //! ```text
-//! Series ─► Parts ─► Stationarity ─► which part of the fitted half predicts best
+//! Series ─► Parts ─► Stationarity ─► which part of the fitted half predicts best ─► typical: as it mostly is
 //!             │
 //!             └─► epochs ─► Moving: level and line, epoch by epoch ─► Tracked: each epoch foretold from those before
+//!                                                                   ├► drift: how far they may go in the unseen half
 //!                                                                   ├► Companion: the line as another channel shows it
 //!                                                                   └► Controls: the same without knowing any effect
 //! ```
@@ -14,10 +15,12 @@
 
 pub mod companion;
 pub mod control;
+pub mod drift;
 pub mod moving;
 pub mod parts;
 pub mod stationarity;
 pub mod tracking;
+pub mod typical;
 
 #[cfg(test)]
 mod tests;

@@ -37,12 +37,17 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
     )?;
     writeln!(
         out,
-        "above. Still: the first half's curve itself taken for the second half's. Nothing of these has seen"
+        "above, to the median of its epochs if it is the later quarter. Still: the first half's curve itself taken for"
     )?;
     writeln!(
         out,
-        "the second half. Degrees of freedom are those of the kind of noise at each octave, whatever the model."
+        "the second half's. Nothing of these has seen the second half. Beyond drift: the predictive model, where level"
     )?;
+    writeln!(
+        out,
+        "and line may have gone as far as the epochs of the first half let expect, (x/σ)² being added for it. Degrees"
+    )?;
+    writeln!(out, "of freedom are those of the kind of noise at each octave, whatever the model.")?;
     writeln!(out, "\nThe second half foretold epoch by epoch, each from those before it")?;
     writeln!(out, "{}", followed(channels))?;
     writeln!(
@@ -154,10 +159,20 @@ fn errors(channels: &[ChannelExplanation]) -> Table {
         let [declared, traced, predictive] =
             [errors.declared, errors.traced, errors.predictive].map(|both| both.map(deviance));
         let values = [declared, traced, predictive].concat();
-        [vec![channel.channel.name().to_owned()], values, vec![deviance(errors.standing_still)]].concat()
+        let last = [errors.beyond_drift, errors.standing_still].map(deviance).to_vec();
+        [vec![channel.channel.name().to_owned()], values, last].concat()
     };
-    let header =
-        ["channel", "N, B, K: fitted", "unseen", "traced: fitted", "unseen", "predictive: fitted", "unseen", "still"];
+    let header = [
+        "channel",
+        "N, B, K: fitted",
+        "unseen",
+        "traced: fitted",
+        "unseen",
+        "predictive: fitted",
+        "unseen",
+        "beyond drift",
+        "still",
+    ];
     table(header, 1, channels.iter().map(row).collect())
 }
 

@@ -7,7 +7,7 @@ use super::tracking::track;
 use allan_core::Model;
 
 /// Shortest part of an epoch, samples, whose variance is taken over as it was measured: an epoch has 64 of them.
-const LONGEST_TAKEN_OVER: u64 = 64;
+pub(super) const LONGEST_TAKEN_OVER: u64 = 64;
 
 /// Deviance per point on the unseen half of two predictions that know no effect.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@ pub const STATES: usize = 2;
 /// Farthest that a line is looked for from where it is on average, in ln f.
 const FARTHEST: f64 = 0.3;
 /// Farthest that a level is looked for, in ln s²: a factor of about 20.
-const FARTHEST_LEVEL: f64 = 3.0;
+pub(super) const FARTHEST_LEVEL: f64 = 3.0;
 /// Widest line, as a part of its frequency; what is wider is a colour of the noise.
 const WIDEST: f64 = 0.25;
 /// Largest standard deviation of ln f in an epoch of a line that can be followed.

@@ -50,6 +50,12 @@ impl Parts {
             unseen_epochs: curves(&mut epochs(half)),
         })
     }
+
+    /// Epochs of the later quarter of the fitted half.
+    #[must_use]
+    pub fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
+        &self.fitted_epochs[self.fitted_epochs.len() / 2..]
+    }
 }
 
 fn curve(series: &Series, range: Range<usize>) -> Curve<OCTAVES> {

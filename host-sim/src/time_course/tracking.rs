@@ -62,15 +62,19 @@ pub fn track<const POINTS: usize>(
     }
 }
 
+/// Variance of the step from one of the `(value, error)` to the next, the errors' own taken off.
+pub(super) fn step(measured: &[(f64, f64)]) -> f64 {
+    let squares =
+        measured.windows(2).map(|pair| (pair[1].0 - pair[0].0).powi(2) - pair[0].1.powi(2) - pair[1].1.powi(2));
+    (squares.sum::<f64>() / (measured.len().max(2) - 1) as f64).max(0.0)
+}
+
 /// What is foretold of each of the `(value, error)` from those before it.
 ///
 /// A random walk seen through noise (the local level model of structural time series): a Kalman filter with the errors as
 /// they are, and a step whose variance the first `learnt` values show.
 fn one_step_ahead(measured: &[(f64, f64)], learnt: usize) -> Vec<f64> {
-    let learnt = &measured[..learnt];
-    let steps: f64 =
-        learnt.windows(2).map(|pair| (pair[1].0 - pair[0].0).powi(2) - pair[0].1.powi(2) - pair[1].1.powi(2)).sum();
-    let step = (steps / (learnt.len().max(2) - 1) as f64).max(0.0);
+    let step = step(&measured[..learnt]);
     let (mut level, mut variance) = measured.first().map_or((0.0, 0.0), |&(value, error)| (value, error * error));
     let mut foretold = Vec::with_capacity(measured.len());
     for (at, &(value, error)) in measured.iter().enumerate() {
