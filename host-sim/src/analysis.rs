@@ -20,7 +20,7 @@ use crate::report::{
 };
 use crate::spectrum::shared;
 use crate::timeline::{Step, Timeline};
-use crate::trace::{Series, slow_cause};
+use crate::trace::{Series, level, noises::NoiseTable};
 use adis16405_driver::Channel;
 use allan_core::common_mode::common_mode;
 use allan_core::term::{CoefficientUnit, Kind, Markov};
@@ -71,13 +71,14 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     let traced: Vec<Channel> = Channel::INERTIAL.into_iter().filter(recorded).collect();
     let surroundings = [Channel::Temp, Channel::Supply].into_iter().filter(recorded);
     let coupled: Vec<Channel> = traced.iter().copied().chain(surroundings).collect();
-    let repairs = Repairs::find(recording, timeline, &traced);
+    let noises = NoiseTable::default();
+    let repairs = Repairs::find(recording, timeline, &traced, &noises);
     let parts = Parts::of(recording, timeline, &coupled, &repairs);
     let studies = in_parallel(&recording.channels, |&channel| {
         let series = |channel: Channel| repairs.series(recording, timeline, channel);
         let traced = traced.contains(&channel);
         let own = if traced { series(channel) } else { Series::of(recording, timeline, channel) };
-        let studies = Studies::of(&parts, channel, traced.then_some(&own), repairs.ramps(channel), series);
+        let studies = Studies::of(&parts, channel, traced.then_some(&own), &repairs, &noises, series);
         // What the channel follows is no noise, and is in the series: there the declared model has to do.
         let trace = &studies.first.trace;
         let model = if studies.first.following.followed.is_empty() { &trace.after } else { &trace.before };
@@ -125,7 +126,8 @@ impl Studies {
         parts: &Parts,
         channel: Channel,
         own: Option<&Series>,
-        ramps: bool,
+        repairs: &Repairs,
+        noises: &NoiseTable,
         series: impl Fn(Channel) -> Series,
     ) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
@@ -134,11 +136,16 @@ impl Studies {
             return Self { first: Study::declared(first), both: Study::declared(both), lines: Vec::new() };
         };
         let own_half = own.first_half();
-        let slow = |cause| repairs::is_slow(cause).then(|| series(cause));
-        let first = Following::of(&parts.first, position, ramps, |cause| {
-            slow_cause::find(&own_half, &slow(cause)?.first_half())
-        });
-        let both = Following::of(&parts.both, position, ramps, |cause| slow_cause::find(own, &slow(cause)?));
+        let slow: Vec<Channel> = parts.both.channels.iter().copied().filter(|&cause| repairs::is_slow(cause)).collect();
+        let courses: Vec<Series> = slow.iter().map(|&cause| series(cause).first_half()).collect();
+        let level = level::find(&own_half, &courses.iter().collect::<Vec<_>>(), noises);
+        let in_half = |cause: Channel| {
+            let of = |(number, _): &&(usize, level::Followed)| slow[*number] == cause;
+            level.followed.iter().find(of).map(|(_, followed)| *followed)
+        };
+        let ramps = repairs.ramps(channel);
+        let first = Following::of(&parts.first, position, ramps, in_half);
+        let both = Following::of(&parts.both, position, ramps, |cause| repairs.followed(channel, cause));
         let without = |following: &Following| compensated(own, following, |cause| series(parts.both.channels[cause]));
         let half = without(&first).map(|rest| rest.first_half());
         let whole = without(&both);

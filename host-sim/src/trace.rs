@@ -3,16 +3,19 @@
 //! Every detector says how likely the data are with the effect against without, and how probable so much would be
 //! by chance anywhere in the record. A [`Finding`] carries the repair that takes the effect out of the data.
 
-pub mod bias_step;
+mod bias_step;
 pub(crate) mod block;
 pub mod coarse_counts;
 pub mod deliveries;
+pub(crate) mod evidence;
+pub mod level;
+pub mod noises;
 pub(crate) mod normal;
-pub mod rate_ramp;
+mod rate_ramp;
 pub mod sample_clock;
 pub mod series;
-pub mod slow_cause;
 pub mod spikes;
+pub mod two_levels;
 
 #[cfg(test)]
 mod tests;

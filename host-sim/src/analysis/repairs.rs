@@ -6,7 +6,10 @@ use crate::recording::Recording;
 use crate::report::Effect;
 use crate::timeline::Timeline;
 use crate::trace::{
-    Finding, Repair, Series, bias_step, coarse_counts, deliveries, rate_ramp, sample_clock, slow_cause, spikes,
+    Finding, Repair, Series, coarse_counts, deliveries,
+    level::{self, Followed, Level},
+    noises::NoiseTable,
+    sample_clock, spikes,
 };
 use adis16405_driver::Channel;
 use allan_core::Kind;
@@ -20,13 +23,16 @@ pub(super) struct Repairs {
     of_channel: Vec<(Channel, Effect)>,
     left_out: BTreeSet<usize>,
     levels: Vec<(Channel, usize, f64)>,
+    /// Channels, slow causes that they follow, and how.
+    followed: Vec<(Channel, Channel, Followed)>,
     /// Counts to a step of a channel's values, where it is more than one.
     coarse: Vec<(Channel, u32)>,
 }
 
 impl Repairs {
-    /// Looks for spikes, steps and ramps in `traced`, and for what became of the samples of the whole recording.
-    pub(super) fn find(recording: &Recording, timeline: &Timeline, traced: &[Channel]) -> Self {
+    /// Looks for spikes and for what moves the level in `traced`, and for what became of the samples of the whole
+    /// recording.
+    pub(super) fn find(recording: &Recording, timeline: &Timeline, traced: &[Channel], noises: &NoiseTable) -> Self {
         let mut repairs = Self::default();
         let deliveries = [
             deliveries::dropped(timeline),
@@ -53,21 +59,16 @@ impl Repairs {
             let others: Vec<(Channel, Series)> =
                 may.map(|(of, series)| (*of, series.clone().repaired(&Repair::LeaveOut(left.clone())))).collect();
             let courses: Vec<&Series> = others.iter().map(|(_, series)| series).collect();
-            let step = bias_step::find(&cleaned, &courses);
-            let level = step.as_ref().map(|step| unit_step(&cleaned, &step.repair));
-            let known: Vec<&Series> = others
-                .iter()
-                .filter(|(cause, course)| is_slow(*cause) && slow_cause::find(&cleaned, course).is_some())
-                .map(|(_, course)| course)
-                .chain(&level)
-                .collect();
-            let ramp = rate_ramp::find(&cleaned, &courses, &known);
-            (coarse, spikes, step, ramp, left)
+            let level = level::find(&cleaned, &courses, noises);
+            let causes: Vec<Channel> = others.iter().map(|(cause, _)| *cause).collect();
+            (coarse, spikes, level, causes, left)
         });
-        for (&channel, (coarse, spikes, step, ramp, left)) in traced.iter().zip(found) {
+        for (&channel, (coarse, spikes, Level { step, ramp, followed }, causes, left)) in traced.iter().zip(found) {
             if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
                 repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
             }
+            let followed = followed.into_iter().map(|(cause, followed)| (channel, causes[cause], followed));
+            repairs.followed.extend(followed);
             repairs.left_out.extend(left);
             repairs.of_channel.extend(
                 coarse.into_iter().chain(spikes).chain(step).chain(ramp).map(|finding| (channel, finding.effect)),
@@ -105,6 +106,12 @@ impl Repairs {
         self.effects(channel).any(|effect| effect.kind == Kind::RateRamp.name())
     }
 
+    /// How a channel follows a slow cause.
+    pub(super) fn followed(&self, channel: Channel, cause: Channel) -> Option<Followed> {
+        let of = |(follower, followed, _): &&(Channel, Channel, Followed)| (*follower, *followed) == (channel, cause);
+        self.followed.iter().find(of).map(|(.., followed)| *followed)
+    }
+
     /// What was found in a channel.
     pub(super) fn effects(&self, channel: Channel) -> impl Iterator<Item = Effect> + '_ {
         let own = self.of_channel.iter().filter(move |(of, _)| *of == channel).map(|(_, effect)| effect);
@@ -139,13 +146,6 @@ fn may_cause(cause: Channel, channel: Channel) -> bool {
 /// Causes that take long to move.
 pub(super) fn is_slow(cause: Channel) -> bool {
     matches!(cause, Channel::Temp | Channel::Supply)
-}
-
-/// A step of size 1 where `repair` takes one out.
-fn unit_step(series: &Series, repair: &Repair) -> Series {
-    let from = if let Repair::Level { from, .. } = repair { *from } else { 0 };
-    let values = (0..series.values.len()).map(|at| if at < from { 0.0 } else { 1.0 }).collect();
-    Series { values, slots: series.slots.clone(), ..*series }
 }
 
 /// The position that a sample had before those at `left` were left out.

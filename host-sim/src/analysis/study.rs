@@ -2,7 +2,7 @@
 
 use super::parts::Part;
 use super::repairs::is_slow;
-use crate::trace::slow_cause::Followed;
+use crate::trace::level::Followed;
 use adis16405_driver::Channel;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
 use allan_core::trace::{Lines, Trace, trace};

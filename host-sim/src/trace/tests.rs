@@ -2,7 +2,10 @@
 
 use super::normal::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use super::{
-    Finding, Repair, Series, bias_step, coarse_counts, deliveries, rate_ramp, sample_clock, slow_cause, spikes,
+    Finding, Repair, Series, coarse_counts, deliveries,
+    level::{self, Level},
+    noises::NoiseTable,
+    sample_clock, spikes,
 };
 use crate::record::{Host, Simulation};
 use crate::recording::Recording;
@@ -46,7 +49,8 @@ impl Case {
     fn findings(&self) -> Vec<Finding> {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
-            [spikes::find(&series), bias_step::find(&series, &[]), rate_ramp::find(&series, &[], &[])]
+            let Level { step, ramp, .. } = level(&series);
+            [spikes::find(&series), step, ramp]
         });
         let common = [
             deliveries::dropped(&self.timeline),
@@ -55,6 +59,10 @@ impl Case {
         ];
         channels.chain(common).flatten().collect()
     }
+}
+
+fn level(series: &Series) -> Level {
+    level::find(series, &[], &NoiseTable::default())
 }
 
 fn assert_covers(finding: &Finding, name: &str, truth: f64) {
@@ -98,7 +106,7 @@ fn spikes_are_counted_measured_and_taken_out() {
     assert_eq!(repaired.slots.last(), series.slots.last());
     assert_eq!(spikes::find(&repaired), None);
     assert_eq!(spikes::find(&case.series(Channel::GyroX)), None);
-    assert_eq!(bias_step::find(&series, &[]), None);
+    assert_eq!(level(&series).step, None);
 }
 
 #[test]
@@ -118,57 +126,56 @@ fn a_step_is_placed_measured_and_taken_out() {
     let step = Effect::BiasStep { channel: GYRO, time_s: 333.0, size: -0.15 };
     let case = Case::hiding(vec![step], 600.0, 4);
     let series = case.series(GYRO);
-    let finding = bias_step::find(&series, &[]).unwrap();
+    let finding = level(&series).step.unwrap();
     assert_covers(&finding, "time", 333.0);
     assert_covers(&finding, "size", -0.15);
     assert!((finding.effect.parameters["size"].value / -0.15 - 1.0).abs() < 0.2);
     assert_eq!(spikes::find(&series), None);
-    assert_eq!(bias_step::find(&series.repaired(&finding.repair), &[]), None);
-    assert_eq!(bias_step::find(&case.series(Channel::GyroZ), &[]), None);
+    assert_eq!(level(&series.repaired(&finding.repair)).step, None);
+    assert_eq!(level(&case.series(Channel::GyroZ)).step, None);
 }
 
 #[test]
 fn a_level_that_moves_otherwise_is_no_step() {
     let ramp = Effect::RateRamp { channel: GYRO, slope: 1e-3 };
-    assert_eq!(bias_step::find(&Case::hiding(vec![ramp], 600.0, 5).series(GYRO), &[]), None);
+    assert_eq!(level(&Case::hiding(vec![ramp], 600.0, 5).series(GYRO)).step, None);
 
     let telegraph = Effect::Telegraph { channel: GYRO, time_constant_s: 20.0, amplitude: 0.3 };
-    assert_eq!(bias_step::find(&Case::hiding(vec![telegraph], 600.0, 6).series(GYRO), &[]), None);
+    assert_eq!(level(&Case::hiding(vec![telegraph], 600.0, 6).series(GYRO)).step, None);
 
     let mut simulation = Simulation::of_paper(600.0, 7);
     simulation.hidden.effects = vec![Effect::Temperature { channel: GYRO, sensitivity: 0.05 }];
     simulation.hidden.surroundings.temperature =
         TemperatureCourse { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureCourse::default() };
     let case = Case::of(simulation);
-    assert_eq!(bias_step::find(&case.series(GYRO), &[&case.series(Channel::Temp)]), None);
+    assert_eq!(level::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &NoiseTable::default()).step, None);
 }
 
 #[test]
 fn a_ramp_is_measured_and_told_from_a_step() {
     let case = Case::hiding(vec![Effect::RateRamp { channel: GYRO, slope: -1e-3 }], 600.0, 14);
     let series = case.series(GYRO);
-    let finding = rate_ramp::find(&series, &[], &[]).unwrap();
+    let finding = level(&series).ramp.unwrap();
     assert_covers(&finding, "slope", -1e-3);
     assert!((finding.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
-    assert_eq!(rate_ramp::find(&series.repaired(&finding.repair), &[], &[]), None);
+    assert_eq!(level(&series.repaired(&finding.repair)).ramp, None);
 
     let step = Effect::BiasStep { channel: GYRO, time_s: 300.0, size: 0.3 };
-    assert_eq!(rate_ramp::find(&Case::hiding(vec![step], 600.0, 15).series(GYRO), &[], &[]), None);
+    assert_eq!(level(&Case::hiding(vec![step], 600.0, 15).series(GYRO)).ramp, None);
 }
 
 #[test]
-fn a_ramp_shows_beside_a_step_that_is_known() {
+fn a_ramp_and_a_step_are_found_beside_each_other() {
     let effects = vec![
         Effect::RateRamp { channel: GYRO, slope: 1e-3 },
         Effect::BiasStep { channel: GYRO, time_s: 200.0, size: 0.3 },
     ];
-    let series = Case::hiding(effects, 600.0, 16).series(GYRO);
+    let Level { step, ramp, .. } = level(&Case::hiding(effects, 600.0, 16).series(GYRO));
+    assert_covers(&ramp.unwrap(), "slope", 1e-3);
+    let step = step.unwrap();
+    assert_covers(&step, "size", 0.3);
     // The part begins a little before the record.
-    let from = series.slots.partition_point(|&slot| (slot as f64) * series.period_s < 200.0);
-    let values = (0..series.values.len()).map(|at| if at < from { 0.0 } else { 1.0 }).collect();
-    let level = Series { values, slots: series.slots.clone(), ..series };
-    let finding = rate_ramp::find(&series, &[], &[&level]).unwrap();
-    assert_covers(&finding, "slope", 1e-3);
+    assert!((step.effect.parameters["time"].value - 200.0).abs() < 1.0, "{step:?}");
 }
 
 #[test]
@@ -181,13 +188,18 @@ fn a_slow_cause_is_told_from_a_ramp() {
         Case::of(simulation)
     };
     let case = warming(Effect::Temperature { channel: GYRO, sensitivity: -0.05 }, 17);
-    let followed = slow_cause::find(&case.series(GYRO), &case.series(Channel::Temp)).unwrap();
+    let follows = |case: &Case, channel: Channel| {
+        level::find(&case.series(channel), &[&case.series(Channel::Temp)], &NoiseTable::default())
+    };
+    let Level { ramp, followed, .. } = follows(&case, GYRO);
+    assert_eq!(ramp, None);
+    let (0, followed) = followed[0] else { panic!("{followed:?}") };
     assert!((followed.sensitivity + 0.05).abs() < 3.0 * followed.error, "{followed:?}");
     assert!(followed.error < 0.005, "{followed:?}");
-    assert_eq!(slow_cause::find(&case.series(Channel::GyroX), &case.series(Channel::Temp)), None);
+    assert_eq!(follows(&case, Channel::GyroX), Level::default());
 
-    let case = warming(Effect::RateRamp { channel: GYRO, slope: 1e-3 }, 18);
-    assert_eq!(slow_cause::find(&case.series(GYRO), &case.series(Channel::Temp)), None);
+    let Level { ramp, followed, .. } = follows(&warming(Effect::RateRamp { channel: GYRO, slope: 1e-3 }, 18), GYRO);
+    assert!(ramp.is_some() && followed.is_empty(), "{ramp:?} {followed:?}");
 }
 
 #[test]

@@ -2,7 +2,9 @@
 
 use super::spectrum::Record;
 use crate::sensor::ChannelNoise;
-use crate::trace::block::{BLOCKS, Whitening, dot};
+use crate::trace::block::BLOCKS;
+use crate::trace::noises::Noise;
+use nalgebra::DVector;
 
 /// Expected log likelihood ratio of `values`, one a block, against a constant level in the declared noise.
 pub(crate) fn ratio(values: &[f64], noise: &ChannelNoise, resolution: f64, record: Record) -> f64 {
@@ -13,8 +15,7 @@ pub(crate) fn ratio(values: &[f64], noise: &ChannelNoise, resolution: f64, recor
     let walk = noise.rate_random_walk.powi(2) * block_s / white;
     let numbers: Vec<usize> = (0..BLOCKS).collect();
     let fills = vec![1.0; BLOCKS];
-    Whitening::of_noise(&numbers, &fills, flicker, walk).map_or(0.0, |whitening| {
-        let shape = whitening.free(values);
-        0.5 * dot(&shape, &shape) / white
-    })
+    let values = DVector::from_column_slice(values);
+    let energy = |noise: Noise| values.dot(&noise.whitened(&values));
+    0.5 * Noise::of(&numbers, &fills, flicker, walk).map_or(0.0, energy) / white
 }

@@ -1,0 +1,135 @@
+//! Telegraph noise: a level that jumps to and fro between two values at random times.
+//!
+//! Its Allan variance and its spectrum are those of a Markov process, and over a few correlation times those of a random
+//! walk. What tells them apart is the likelihood of a hidden chain of two states (L. Baum et al., "A maximization
+//! technique occurring in the statistical analysis of probabilistic functions of Markov chains", 1970) against that of a
+//! Gaussian process of any size and correlation time.
+
+mod chain;
+mod gaussian;
+
+use super::normal::NORMAL_975;
+use super::{Finding, Repair, Series, effect, parameter};
+use crate::grid::Grid;
+use chain::Chain;
+
+/// Means of so many equal parts of the record are taken, the fewest first: long correlation times show in few.
+const PARTS: [usize; 3] = [256, 1024, 4096];
+/// Parts of a correlation time that is known.
+const RESOLVED: f64 = 20.0;
+/// By how much the two levels must be likelier, in ln likelihood: e⁻¹² is the highest probability of as much by chance.
+const CONVINCING: f64 = 12.0;
+/// Fewest jumps: one or two are steps.
+const JUMPS: f64 = 6.0;
+/// Fewest parts between two jumps, on average.
+const APART: f64 = 4.0;
+/// A level is held for at least this part of the record.
+const HELD: f64 = 0.05;
+/// Largest variance around the levels, over that of white noise: of a clipped wave it is more.
+const AROUND: f64 = 1.5;
+/// Step of the logarithm of a parameter at which the likelihood's curvature is taken.
+const NUDGE: f64 = 0.05;
+
+/// Looks for two levels in a channel. `correlated_s` are correlation times, s, that its Allan curve has shown.
+#[must_use]
+pub fn find(series: &Series, correlated_s: &[f64]) -> Option<Finding> {
+    let grid = Grid::of(series);
+    let samples = grid.values().len();
+    let known = correlated_s.iter().map(|time| ((time / RESOLVED / grid.sample_period()) as usize).max(1));
+    let coarse = PARTS.iter().map(|parts| samples / parts).filter(|&size| size > 0);
+    let mut sizes: Vec<usize> = coarse.chain(known).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    let mut found = None;
+    for size in sizes.into_iter().rev() {
+        let Some((chain, gain)) = told(&Parts::of(&grid, size)) else { continue };
+        let part_s = size as f64 * grid.sample_period();
+        let resolved = chain.correlation_time() > RESOLVED;
+        found = Some(finding(&chain, gain, part_s, series.unit));
+        if resolved {
+            break;
+        }
+    }
+    found
+}
+
+/// Means of parts of a record, less that of all; `NaN` where half of the samples are missing.
+struct Parts {
+    means: Vec<f64>,
+    /// Of white noise in a mean.
+    white: f64,
+}
+
+impl Parts {
+    fn of(grid: &Grid, size: usize) -> Self {
+        let level = grid.mean();
+        let mean = |values: &[f64]| {
+            let (sum, count) = values
+                .iter()
+                .filter(|value| value.is_finite())
+                .fold((0.0, 0), |(sum, count), value| (sum + value - level, count + 1));
+            if 2 * count > values.len() { sum / f64::from(count) } else { f64::NAN }
+        };
+        let means: Vec<f64> = grid.values().chunks_exact(size).map(mean).collect();
+        // Of halves of a part, or of neighbours: a jump between them is rare.
+        let apart: Vec<f64> = if size > 1 {
+            let halves = grid.values().chunks_exact(size).map(|part| part.split_at(size / 2));
+            halves.map(|(a, b)| 0.5 * (mean(a) - mean(b))).collect()
+        } else {
+            means.windows(2).map(|pair| (pair[1] - pair[0]) / 2f64.sqrt()).collect()
+        };
+        Self { means, white: square_of_typical(apart) }
+    }
+}
+
+/// Variance of a normal number with the median size of these.
+fn square_of_typical(values: Vec<f64>) -> f64 {
+    /// Median of the size of a standard normal number.
+    const MEDIAN: f64 = 0.674_489_75;
+    let mut sizes: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).map(f64::abs).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / MEDIAN).powi(2)
+}
+
+/// The chain, and by how much it is likelier than any Gaussian process, if it is beyond doubt.
+fn told(parts: &Parts) -> Option<(Chain, f64)> {
+    let chain = Chain::fit(&parts.means)?;
+    let around = square_of_typical(chain.residuals(&parts.means));
+    let jumps_often = chain.jumps >= JUMPS && chain.correlation_time() > APART;
+    if !jumps_often || chain.held().iter().any(|&held| held < HELD) || around > AROUND * parts.white {
+        return None;
+    }
+    let gain = chain.log_likelihood - gaussian::log_likelihood(&parts.means);
+    (gain > CONVINCING).then_some((chain.with_errors(&parts.means), gain))
+}
+
+fn finding(chain: &Chain, gain: f64, part_s: f64, unit: &str) -> Finding {
+    let bounded = |value: f64, error: f64, unit: &str| {
+        let factor = (NORMAL_975 * error).exp();
+        parameter(value, value / factor, value * factor, unit)
+    };
+    let time = part_s * chain.correlation_time();
+    let evidence = format!(
+        "two levels {:.3e} {unit} apart with {:.0} jumps between them, e^{gain:.0} times as likely as a Gaussian process of \
+         any correlation time; charges that are caught and let go in a transistor or a crystal",
+        chain.apart(),
+        chain.jumps,
+    );
+    Finding {
+        effect: effect(
+            "telegraph",
+            [
+                ("time_constant", bounded(time, chain.error_of_time, "s")),
+                ("amplitude", bounded(chain.apart(), chain.error_of_apart, unit)),
+            ],
+            evidence,
+        ),
+        deviance: 2.0 * gain,
+        p_value: (-gain).exp(),
+        repair: Repair::Impossible,
+    }
+}
