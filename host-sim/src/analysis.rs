@@ -4,6 +4,7 @@
 //! Effects are named on the whole record. The errors before and after come from the first half alone: what it shows
 //! to be missing is added, and judged on the second half.
 
+mod common;
 mod compensation;
 mod lines;
 mod naming;
@@ -18,13 +19,12 @@ use crate::recording::Recording;
 use crate::report::{
     ChannelReport, CurvePoint, Effect, ModelError, ModelReport, ReadOff, ReadOffValue, Report, SCHEMA, Term,
 };
-use crate::spectrum::shared;
 use crate::timeline::{Step, Timeline};
-use crate::trace::{Series, level, noises::NoiseTable};
+use crate::trace::{Finding, Series, level, noises::NoiseTable, two_levels};
 use adis16405_driver::Channel;
-use allan_core::common_mode::common_mode;
 use allan_core::term::{CoefficientUnit, Kind, Markov};
 use allan_core::{Cascade, Curve, Model, check, read_off, telegraph};
+use common::Common;
 use compensation::compensated;
 use firmware::{OCTAVES, OVERLAP};
 use lines::Line;
@@ -87,13 +87,15 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     });
     let (studies, practices): (Vec<Studies>, Vec<Practice>) = studies.into_iter().unzip();
     let studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
+    let commons = commons(&studies);
     let report = |(((channel, own), measured), practice): ((&(Channel, Studies), &Curve<OCTAVES>), Practice)| {
         let unit = channel.unit();
         let mut effects: Vec<Effect> = Vec::new();
         if traced.contains(channel) {
             effects.extend(repairs.effects(*channel));
             let ramps = effects.iter().any(|effect| effect.kind == Kind::RateRamp.name());
-            let named = named(&parts.both, *channel, own, &studies, |of| repairs.series(recording, timeline, of));
+            let common = commons.iter().find(|common| common.channels.contains(channel));
+            let named = named(&parts.both, *channel, own, common);
             effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != Kind::RateRamp.name()));
         }
         let whole = measured.clone().with_confidence(|point| own.first.trace.before.shares(point.n));
@@ -118,6 +120,10 @@ struct Studies {
     both: Study,
     /// Of the whole record.
     lines: Vec<Line>,
+    /// Two levels between which the whole record jumps.
+    two_levels: Option<Finding>,
+    /// The samples less what they follow, where effects are traced.
+    rest: Option<Grid>,
 }
 
 impl Studies {
@@ -133,7 +139,8 @@ impl Studies {
         let position = parts.both.position(channel).unwrap_or_default();
         let Some(own) = own else {
             let [first, both] = [&parts.first, &parts.both].map(|part| Following::of(part, position, false, |_| None));
-            return Self { first: Study::declared(first), both: Study::declared(both), lines: Vec::new() };
+            let (first, both) = (Study::declared(first), Study::declared(both));
+            return Self { first, both, lines: Vec::new(), two_levels: None, rest: None };
         };
         let own_half = own.first_half();
         let slow: Vec<Channel> = parts.both.channels.iter().copied().filter(|&cause| repairs::is_slow(cause)).collect();
@@ -151,7 +158,10 @@ impl Studies {
         let whole = without(&both);
         let (first, _) = spectral::study(first, &own_half, half.as_ref());
         let (both, lines) = spectral::study(both, own, whole.as_ref());
-        Self { first, both, lines }
+        let correlated: Vec<f64> = both.correlation_times().collect();
+        let rest = Grid::of(whole.as_ref().unwrap_or(own));
+        let two_levels = two_levels::find(&rest, channel.unit(), &correlated);
+        Self { first, both, lines, two_levels, rest: Some(rest) }
     }
 
     fn before(&self, parts: &Parts, channel: Channel, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
@@ -185,21 +195,11 @@ impl Studies {
 }
 
 /// Everything that the whole record shows in a channel beyond the declared model.
-fn named(
-    part: &Part,
-    channel: Channel,
-    own: &Studies,
-    all: &[(Channel, Studies)],
-    series: impl Fn(Channel) -> Series,
-) -> Vec<Effect> {
+fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) -> Vec<Effect> {
     let period_s = own.both.trace.after.sample_period();
     let (study, unit) = (&own.both, channel.unit());
     let causes: Vec<_> = study.causes().map(|(cause, followed)| (part.channels[cause], *followed)).collect();
     let mut effects = naming::followed_effects(&causes, unit);
-    let common = partner(part, channel, own, all).map(|(partner, common)| {
-        let [own, other] = [channel, partner].map(|channel| Grid::of(&series(channel)));
-        naming::common_effect(&common, shared::markov(&own, &other), partner, unit, period_s)
-    });
     // Where the noise does not reach from one count to the next, rounding is no noise, and the curve shows its steps.
     let step = part.position(channel).map_or(0.0, |position| part.step(position));
     let reaches = |octaves: usize| {
@@ -218,6 +218,8 @@ fn named(
             Kind::Quantization if settled_s > 0.0 => {}
             // The spectrum tells them better.
             Kind::Sinusoid(_) | Kind::Resonance(_) => {}
+            // As it shows in the curve.
+            Kind::Markov(_) | Kind::RateRamp if own.two_levels.is_some() => {}
             // What is shared needs no second name.
             Kind::Markov(_) | Kind::RateRamp if common.is_some() => {}
             Kind::Markov(markov) if is_low_pass(&study.trace.after, markov, step) => {
@@ -232,7 +234,8 @@ fn named(
             _ => effects.push(naming::term_effect(term, found, unit, period_s)),
         }
     }
-    effects.extend(common);
+    effects.extend(own.two_levels.iter().map(|found| found.effect.clone()));
+    effects.extend(common.map(|common| naming::common_effect(common, channel, unit)));
     effects.extend(own.lines.iter().map(|line| naming::line_effect(line, unit)));
     effects
 }
@@ -248,23 +251,16 @@ fn is_low_pass(model: &Model, markov: Markov, step: f64) -> bool {
     markov.time_constant < LOW_PASS * period_s && left <= rounding
 }
 
-/// The channel of the same sort that a channel most clearly shares a slow part with.
-fn partner(
-    part: &Part,
-    channel: Channel,
-    own: &Studies,
-    all: &[(Channel, Studies)],
-) -> Option<(Channel, allan_core::common_mode::CommonMode)> {
-    let sort = |channel: Channel| Channel::INERTIAL[..3].contains(&channel);
-    let others =
-        all.iter().filter(|(of, _)| *of != channel && sort(*of) == sort(channel) && Channel::INERTIAL.contains(of));
-    let shared = others.filter_map(|(of, other)| {
-        let (a, b) = (part.position(channel)?, part.position(*of)?);
-        let rest = own.both.shared_rest(part, a, &other.both, b);
-        let common = common_mode(own.both.rest(), other.both.rest(), &rest)?;
-        Some((*of, common))
-    });
-    shared.max_by(|(_, a), (_, b)| a.sigmas.abs().total_cmp(&b.sigmas.abs()))
+/// What channels of each sort share.
+fn commons(studies: &[(Channel, Studies)]) -> Vec<Common> {
+    let sorts = [&Channel::INERTIAL[..3], &Channel::INERTIAL[3..]];
+    let common = |sort: &&[Channel]| {
+        let members = studies.iter().filter(|(channel, _)| sort.contains(channel));
+        let (channels, rests): (Vec<Channel>, Vec<Grid>) =
+            members.filter_map(|(channel, own)| Some((*channel, own.rest.clone()?))).unzip();
+        common::find(&channels, &rests)
+    };
+    in_parallel(&sorts, common).into_iter().flatten().collect()
 }
 
 fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {

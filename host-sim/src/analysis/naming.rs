@@ -1,12 +1,12 @@
 //! Effects as they are reported: parameters with units and intervals, evidence that a person can check.
 
 use super::coefficient_unit;
+use super::common::Common;
 use super::lines::Line;
 use crate::report::{Effect, Parameter};
 use crate::spectrum::line::Estimate;
-use crate::spectrum::shared::{Bounded, Shared};
+use crate::spectrum::shared::Bounded;
 use adis16405_driver::Channel;
-use allan_core::common_mode::CommonMode;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::Term;
 use allan_core::regression::Sensitivity;
@@ -165,35 +165,23 @@ pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
     }
 }
 
-/// A slow part that a channel shares with `partner`; `shared` is what their spectra say of it.
-pub(super) fn common_effect(
-    common: &CommonMode,
-    shared: Option<Shared>,
-    partner: Channel,
-    unit: &str,
-    period_s: f64,
-) -> Effect {
+/// A slow part that `channel` shares with others.
+pub(super) fn common_effect(common: &Common, channel: Channel, unit: &str) -> Effect {
     let parameter =
         |of: Bounded, unit: &str| Parameter { value: of.value, low: of.low, high: of.high, unit: unit.to_owned() };
-    let (deviation, time_constant) = match shared {
-        Some(shared) => (parameter(shared.deviation, unit), parameter(shared.time_constant, "s")),
-        None => {
-            let deviation = Estimate { value: common.deviation, error: common.error };
-            let time = common.time_constant;
-            // The times that were tried are a factor of 1.3 apart, and few independent stretches tell them.
-            let time = Bounded { value: time, low: time / 2.0, high: time * 2.0 };
-            (estimated(deviation, unit), parameter(time, "s"))
-        }
-    };
+    let others: Vec<&str> =
+        common.channels.iter().filter(|other| **other != channel).map(|other| other.name()).collect();
     Effect {
         kind: "common_mode".to_owned(),
-        parameters: BTreeMap::from([("deviation".to_owned(), deviation), ("time_constant".to_owned(), time_constant)]),
+        parameters: BTreeMap::from([
+            ("deviation".to_owned(), parameter(common.shared.deviation, unit)),
+            ("time_constant".to_owned(), parameter(common.shared.time_constant, "s")),
+        ]),
         evidence: format!(
-            "moves with {} from tau = {} s on, {:+.0} sigma, and no measured cause explains it; \
-             a shared reference, supply or temperature gradient",
-            partner.name(),
-            seconds(common.from_n as f64 * period_s),
-            common.sigmas,
+            "moves with {}: their spectra are e^{:.0} times as likely as those of channels with nothing in common, and no \
+             measured cause explains it; a shared reference, supply or temperature gradient",
+            others.join(" and "),
+            common.gain,
         ),
     }
 }

@@ -139,15 +139,6 @@ impl Part {
         points.iter_mut().for_each(|point| point.covariance *= self.lsb[a] * self.lsb[b]);
         points
     }
-
-    /// Averaging factors, and what two channels have in common there; of one channel with itself, all its variance.
-    pub(super) fn common(&self, a: usize, b: usize) -> Vec<(u64, f64)> {
-        if a == b {
-            self.curve(a).points().iter().map(|point| (point.n, point.avar)).collect()
-        } else {
-            self.shared(a, b).iter().map(|point| (point.n, point.covariance)).collect()
-        }
-    }
 }
 
 /// The channels of a pair: the inverse of `i·(i−1)/2 + j`.

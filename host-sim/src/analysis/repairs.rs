@@ -67,8 +67,9 @@ impl Repairs {
             if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
                 repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
             }
+            // Motion is fast enough for the differences; its slow part is the accelerometers' own drift.
             let followed = followed.into_iter().map(|(cause, followed)| (channel, causes[cause], followed));
-            repairs.followed.extend(followed);
+            repairs.followed.extend(followed.filter(|(_, cause, _)| is_slow(*cause)));
             repairs.left_out.extend(left);
             repairs.of_channel.extend(
                 coarse.into_iter().chain(spikes).chain(step).chain(ramp).map(|finding| (channel, finding.effect)),

@@ -5,8 +5,9 @@ use super::repairs::is_slow;
 use crate::trace::level::Followed;
 use adis16405_driver::Channel;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
+use allan_core::term::Markov;
 use allan_core::trace::{Lines, Trace, trace};
-use allan_core::{Curve, Kind, Model};
+use allan_core::{Curve, Kind};
 use firmware::OCTAVES;
 
 /// Probability of the residual under a model below which another one is tried.
@@ -126,31 +127,12 @@ impl Study {
         self.following.causes()
     }
 
-    /// What two channels share beyond what both follow.
-    pub(super) fn shared_rest(&self, part: &Part, own: usize, other: &Self, others: usize) -> Shared<OCTAVES> {
-        let mut rest = part.shared(own, others);
-        let mut add = |weight: f64, a: usize, b: usize| {
-            let common = part.common(a, b);
-            for point in &mut rest {
-                let of = common.iter().find(|(n, _)| *n == point.n);
-                point.covariance += weight * of.map_or(0.0, |(_, covariance)| *covariance);
-            }
-        };
-        for (cause, followed) in self.causes() {
-            add(-followed.value, cause, others);
-            for (of, known) in other.causes() {
-                add(followed.value * known.value, cause, of);
-            }
-        }
-        for (of, known) in other.causes() {
-            add(-known.value, own, of);
-        }
-        rest
-    }
-
-    /// The channel without what it follows, and the model of that.
-    pub(super) fn rest(&self) -> (&Curve<OCTAVES>, &Model) {
-        (&self.following.curve, &self.trace.after)
+    /// Correlation times of the Markov processes that were found, s.
+    pub(super) fn correlation_times(&self) -> impl Iterator<Item = f64> {
+        self.trace.after.terms().iter().filter_map(|term| match term.kind {
+            Kind::Markov(Markov { time_constant }) => Some(time_constant),
+            _ => None,
+        })
     }
 }
 

@@ -1,7 +1,7 @@
-//! A Markov process that two channels share, from the spectra of their half sum and their half difference.
+//! A Markov process that several channels share, from the spectra of their mean and of what they are beside it.
 //!
-//! The difference has nothing of what both share alike, and as much of their own noise as the sum: it tells what the sum
-//! would be without the process.
+//! The latter has nothing of what all share alike, and as much of their own noise as the mean: it tells what the mean would
+//! be without the process, whatever their own noise is.
 
 use super::mixture;
 use super::shape::Band;
@@ -10,12 +10,14 @@ use crate::grid::Grid;
 use crate::trace::normal::NORMAL_975;
 use std::f64::consts::PI;
 
-/// White, flicker and random-walk noise, and the process.
-const TERMS: usize = 4;
+/// White, flicker and random-walk noise, a process of each channel's own, and the one that is shared.
+const TERMS: usize = 5;
 /// Time constants that are tried: the shortest in samples, the longest as part of the record, the factor between.
 const SHORTEST: f64 = 16.0;
 const LONGEST: f64 = 0.5;
 const FACTOR: f64 = 1.25;
+/// Of these, every so many are enough to tell whether anything is shared.
+const COARSE: usize = 3;
 /// Highest frequency, as part of the sample rate.
 const HIGHEST: f64 = 0.02;
 /// Information below which nothing is known of the variance.
@@ -23,7 +25,7 @@ const LEAST_INFORMATION: f64 = 1e-2;
 /// Fewest bands that tell four densities and a time.
 const FEWEST_BANDS: usize = 16;
 
-/// What two channels share: likeliest values with 95 % bounds.
+/// What channels share: likeliest values with 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shared {
     /// Standard deviation, the geometric mean of the two channels' units.
@@ -51,58 +53,128 @@ impl Bounded {
     }
 }
 
-/// The Markov process that makes the spectra of `a` and `b` likeliest; `None` if their samples differ, or are too few.
-#[must_use]
-pub fn markov(a: &Grid, b: &Grid) -> Option<Shared> {
-    let [first, second] = [a, b].map(|grid| Tapered::of(&grid.detrended()));
-    let (first, second) = (first?, second?);
-    if first.length != second.length {
-        return None;
+/// Transforms of the channels that may share something.
+pub struct Transforms {
+    sample_period: f64,
+    duration: f64,
+    channels: Vec<Tapered>,
+}
+
+impl Transforms {
+    /// `None` of nothing, or if the samples differ.
+    #[must_use]
+    pub fn of(channels: &[Grid]) -> Option<Self> {
+        let first = channels.first()?;
+        let transformed: Option<Vec<Tapered>> =
+            channels.iter().map(|channel| Tapered::of(&channel.detrended())).collect();
+        let channels = transformed?;
+        channels.iter().all(|channel| channel.length == channels[0].length).then(|| Self {
+            sample_period: first.sample_period(),
+            duration: first.duration(),
+            channels,
+        })
     }
-    let ranges: Vec<_> = ranges((HIGHEST / a.sample_period() / first.resolution()) as usize).collect();
-    let together: f64 = ranges.iter().cloned().flatten().map(|at| first.common(&second, at)).sum();
-    // One may rise as the other falls.
-    let sign = together.signum();
-    let halved = |sign: f64| -> Vec<Band> {
-        let density = |at: usize| {
-            let both = first.common(&first, at) + second.common(&second, at);
-            0.25 * (both + 2.0 * sign * first.common(&second, at))
+
+    /// Of the sets of two and more channels the one that most clearly shares something: its members, and by how much the
+    /// spectra are likelier if they do, in ln likelihood.
+    #[must_use]
+    pub fn clearest(&self) -> Option<(Vec<usize>, f64)> {
+        let sets = (1..1usize << self.channels.len()).filter(|set| set.count_ones() > 1);
+        let of = |set: usize| {
+            let members: Vec<usize> = (0..self.channels.len()).filter(|member| set >> member & 1 == 1).collect();
+            self.likeliest(&members).map(|(gain, _)| (members, gain))
         };
-        let band = |range: &std::ops::Range<usize>| Band {
-            frequency: first.resolution() * (range.start + range.end - 1) as f64 / 2.0,
-            density: range.clone().map(density).sum::<f64>() / range.len() as f64,
-            ordinates: range.len() as f64,
-        };
-        ranges.iter().map(band).collect()
-    };
-    let (sum, difference) = (halved(sign), halved(-sign));
-    let bands = [sum, difference].concat();
-    if ranges.len() < FEWEST_BANDS || bands.iter().any(|band| band.density <= 0.0) {
-        return None;
+        sets.filter_map(of).max_by(|(_, a), (_, b)| a.total_cmp(b))
     }
-    let fits: Vec<Fit> = time_constants(a).map(|time| Fit::of(&bands, a.sample_period(), time)).collect();
-    let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective))?;
-    // Every time constant as likely as the data make it: a record of few of them leaves time and variance in doubt
-    // together.
-    let weighted = |value: &dyn Fn(&Fit) -> f64| {
-        let mean = |of: &dyn Fn(f64) -> f64| {
-            let (sum, total) = fits.iter().fold((0.0, 0.0), |(sum, total), fit| {
-                let weight = (likeliest.objective - fit.objective).exp();
-                (sum + weight * of(value(fit)), total + weight)
+
+    /// The gain of `members` under the likeliest signs, and their bands: the first rises, each of the others may fall.
+    fn likeliest(&self, members: &[usize]) -> Option<(f64, Vec<Band>)> {
+        let signs = (0..1usize << members.len().saturating_sub(1)).map(|falls| falls << 1);
+        let bands = signs.filter_map(|falls| self.bands(members, falls));
+        bands.map(|bands| (self.gain(&bands), bands)).max_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+
+    /// The Markov process that makes the spectra of `members` likeliest; `None` if the samples are too few.
+    #[must_use]
+    pub fn markov(&self, members: &[usize]) -> Option<Shared> {
+        let (_, bands) = self.likeliest(members)?;
+        let fits: Vec<Fit> =
+            self.time_constants().map(|time| Fit::of(&bands, self.sample_period, time, &[SHARED])).collect();
+        Shared::of(&fits)
+    }
+
+    /// Bands of the mean, which has the process, and then of the rest. Those `members` fall that have their bit in `falls`.
+    fn bands(&self, members: &[usize], falls: usize) -> Option<Vec<Band>> {
+        let resolution = self.channels[0].resolution();
+        let ranges: Vec<_> = ranges((HIGHEST / self.sample_period / resolution) as usize).collect();
+        let signed: Vec<(&Tapered, f64)> = members
+            .iter()
+            .enumerate()
+            .map(|(at, &member)| (&self.channels[member], if falls >> at & 1 == 1 { -1.0 } else { 1.0 }))
+            .collect();
+        let count = members.len() as f64;
+        let (mut of_mean, mut of_rest) = (Vec::new(), Vec::new());
+        for range in &ranges {
+            let sum = |of: &dyn Fn(usize) -> f64| range.clone().map(of).sum::<f64>() / range.len() as f64;
+            let each = sum(&|at| signed.iter().map(|(channel, _)| channel.common(channel, at)).sum());
+            let mean = sum(&|at| {
+                let with = |(a, sign): &(&Tapered, f64)| -> f64 {
+                    signed.iter().map(|(b, other)| sign * other * a.common(b, at)).sum()
+                };
+                signed.iter().map(with).sum::<f64>() / (count * count)
             });
-            sum / total
+            let frequency = resolution * (range.start + range.end - 1) as f64 / 2.0;
+            let ordinates = range.len() as f64;
+            of_mean.push(Band { frequency, density: mean, ordinates });
+            let density = (each - count * mean) / (count * (count - 1.0));
+            of_rest.push(Band { frequency, density, ordinates: ordinates * (count - 1.0) });
+        }
+        let bands = [of_mean, of_rest].concat();
+        (ranges.len() >= FEWEST_BANDS && bands.iter().all(|band| band.density > 0.0)).then_some(bands)
+    }
+
+    /// By how much the bands are likelier with a process that is shared than without.
+    fn gain(&self, bands: &[Band]) -> f64 {
+        let least = |terms: &[usize]| {
+            let fits = self.time_constants().step_by(COARSE);
+            fits.map(|time| Fit::of(bands, self.sample_period, time, terms).objective).fold(f64::INFINITY, f64::min)
         };
-        let middle = mean(&|value| value);
-        (middle, mean(&|value| (value - middle).powi(2)).sqrt())
-    };
-    let (time, of_time) = weighted(&|fit| fit.time.ln());
-    let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.max(f64::MIN_POSITIVE).ln());
-    let (alone, _) = weighted(&|fit| 0.5 * fit.error);
-    Some(Shared {
-        deviation: Bounded::of(likeliest.variance.sqrt(), (deviation, of_deviation.hypot(alone))),
-        // Within a step of the grid any is as likely.
-        time_constant: Bounded::of(likeliest.time, (time, of_time.hypot(FACTOR.ln() / 12f64.sqrt()))),
-    })
+        least(&[OWN]) - least(&[OWN, SHARED])
+    }
+
+    /// Time constants to be tried, s.
+    fn time_constants(&self) -> impl Iterator<Item = f64> {
+        let longest = LONGEST * self.duration;
+        std::iter::successors(Some(SHORTEST * self.sample_period), |time| Some(time * FACTOR))
+            .take_while(move |&time| time < longest)
+    }
+}
+
+impl Shared {
+    fn of(fits: &[Fit]) -> Option<Self> {
+        let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective))?;
+        // Every time constant as likely as the data make it: a record of few of them leaves time and variance in doubt
+        // together.
+        let weighted = |value: &dyn Fn(&Fit) -> f64| {
+            let mean = |of: &dyn Fn(f64) -> f64| {
+                let (sum, total) = fits.iter().fold((0.0, 0.0), |(sum, total), fit| {
+                    let weight = (likeliest.objective - fit.objective).exp();
+                    (sum + weight * of(value(fit)), total + weight)
+                });
+                sum / total
+            };
+            let middle = mean(&|value| value);
+            (middle, mean(&|value| (value - middle).powi(2)).sqrt())
+        };
+        let (time, of_time) = weighted(&|fit| fit.time.ln());
+        let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.max(f64::MIN_POSITIVE).ln());
+        let (alone, _) = weighted(&|fit| 0.5 * fit.error);
+        Some(Shared {
+            deviation: Bounded::of(likeliest.variance.sqrt(), (deviation, of_deviation.hypot(alone))),
+            // Within a step of the grid any is as likely.
+            time_constant: Bounded::of(likeliest.time, (time, of_time.hypot(FACTOR.ln() / 12f64.sqrt()))),
+        })
+    }
 }
 
 /// The likeliest noise and process of a time constant.
@@ -114,12 +186,18 @@ struct Fit {
     objective: f64,
 }
 
+/// Terms that a fit may have or not.
+const OWN: usize = 3;
+const SHARED: usize = 4;
+
 impl Fit {
-    /// To the bands of the half sum, which has the process, and then of the half difference.
-    fn of(bands: &[Band], sample_period: f64, time: f64) -> Self {
+    /// To the bands of the mean and then of the rest, with N, B, K and `terms`.
+    fn of(bands: &[Band], sample_period: f64, time: f64, terms: &[usize]) -> Self {
         let basis = |(at, band): (usize, &Band)| {
             let [white, flicker, walk, process] = basis(band.frequency, sample_period, time);
-            [white, flicker, walk, if at < bands.len() / 2 { process } else { 0.0 }]
+            let own = if terms.contains(&OWN) { process } else { 0.0 };
+            let shared = if terms.contains(&SHARED) && at < bands.len() / 2 { process } else { 0.0 };
+            [white, flicker, walk, own, shared]
         };
         let bases: Vec<[f64; TERMS]> = bands.iter().enumerate().map(basis).collect();
         let mut densities = [0.0; TERMS];
@@ -138,15 +216,8 @@ impl Fit {
     }
 }
 
-/// Time constants to be tried on a record, s.
-fn time_constants(grid: &Grid) -> impl Iterator<Item = f64> {
-    let longest = LONGEST * grid.duration();
-    std::iter::successors(Some(SHORTEST * grid.sample_period()), |time| Some(time * FACTOR))
-        .take_while(move |&time| time < longest)
-}
-
 /// One-sided densities: of white noise and 1/f at 1, of a walk, and of a process of variance 1 with this time constant.
-fn basis(frequency: f64, sample_period: f64, time: f64) -> [f64; TERMS] {
+fn basis(frequency: f64, sample_period: f64, time: f64) -> [f64; 4] {
     let walk = PI * sample_period / (PI * frequency * sample_period).sin();
     let kept = (-sample_period / time).exp();
     let turn = (2.0 * PI * frequency * sample_period).cos();
@@ -176,7 +247,8 @@ mod tests {
                 a.push(process + normal());
                 b.push(process + normal());
             }
-            let shared = markov(&Grid::new(0.1, a), &Grid::new(0.1, b)).unwrap();
+            let transforms = Transforms::of(&[Grid::new(0.1, a), Grid::new(0.1, b)]).unwrap();
+            let shared = transforms.markov(&[0, 1]).unwrap();
             let covers = |of: Bounded, truth: f64| usize::from((of.low..=of.high).contains(&truth));
             inside += covers(shared.deviation, 0.5) + covers(shared.time_constant, 20.0);
             // 4,000 s are 100 correlation times: the deviation is known to some 7 %, the time to some 15 %.

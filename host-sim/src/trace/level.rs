@@ -12,7 +12,7 @@ use nalgebra::DVector;
 
 /// Highest probability of a course that is none. Three or four courses are tried in each of six channels: one recording
 /// in a hundred has a false one.
-pub(super) const SIGNIFICANCE: f64 = 5e-4;
+const SIGNIFICANCE: f64 = 5e-4;
 /// Courses that are taken.
 const MOST: usize = 4;
 
@@ -108,7 +108,8 @@ fn most_telling(
     let ramp = blocks.ramp();
     let mut rivals: Vec<(f64, Course, DVector<f64>, Claim)> = Vec::new();
     let mut add = |course: Course, shape: &DVector<f64>, (deviance, p_value, gain): (f64, f64, f64)| {
-        if p_value < SIGNIFICANCE {
+        let highest = if matches!(course, Course::Step(_)) { bias_step::SIGNIFICANCE } else { SIGNIFICANCE };
+        if p_value < highest {
             rivals.push((deviance, course, shape.clone(), Claim { gain, p_value }));
         }
     };

@@ -9,7 +9,7 @@ mod chain;
 mod gaussian;
 
 use super::normal::NORMAL_975;
-use super::{Finding, Repair, Series, effect, parameter};
+use super::{Finding, Repair, effect, parameter};
 use crate::grid::Grid;
 use chain::Chain;
 
@@ -30,10 +30,9 @@ const AROUND: f64 = 1.5;
 /// Step of the logarithm of a parameter at which the likelihood's curvature is taken.
 const NUDGE: f64 = 0.05;
 
-/// Looks for two levels in a channel. `correlated_s` are correlation times, s, that its Allan curve has shown.
+/// Looks for two levels in a channel in `unit`. `correlated_s` are correlation times, s, that its Allan curve has shown.
 #[must_use]
-pub fn find(series: &Series, correlated_s: &[f64]) -> Option<Finding> {
-    let grid = Grid::of(series);
+pub fn find(grid: &Grid, unit: &str, correlated_s: &[f64]) -> Option<Finding> {
     let samples = grid.values().len();
     let known = correlated_s.iter().map(|time| ((time / RESOLVED / grid.sample_period()) as usize).max(1));
     let coarse = PARTS.iter().map(|parts| samples / parts).filter(|&size| size > 0);
@@ -42,10 +41,10 @@ pub fn find(series: &Series, correlated_s: &[f64]) -> Option<Finding> {
     sizes.dedup();
     let mut found = None;
     for size in sizes.into_iter().rev() {
-        let Some((chain, gain)) = told(&Parts::of(&grid, size)) else { continue };
+        let Some((chain, gain)) = told(&Parts::of(grid, size)) else { continue };
         let part_s = size as f64 * grid.sample_period();
         let resolved = chain.correlation_time() > RESOLVED;
-        found = Some(finding(&chain, gain, part_s, series.unit));
+        found = Some(finding(&chain, gain, part_s, unit));
         if resolved {
             break;
         }
@@ -67,8 +66,8 @@ impl Parts {
             let (sum, count) = values
                 .iter()
                 .filter(|value| value.is_finite())
-                .fold((0.0, 0), |(sum, count), value| (sum + value - level, count + 1));
-            if 2 * count > values.len() { sum / f64::from(count) } else { f64::NAN }
+                .fold((0.0, 0_usize), |(sum, count), value| (sum + value - level, count + 1));
+            if 2 * count > values.len() { sum / count as f64 } else { f64::NAN }
         };
         let means: Vec<f64> = grid.values().chunks_exact(size).map(mean).collect();
         // Of halves of a part, or of neighbours: a jump between them is rare.

@@ -1,6 +1,7 @@
 //! A hidden chain of two states, each with a level, in white noise.
 
 use super::NUDGE;
+use std::f64::consts::PI;
 
 /// Rounds of the fit; those after a change of less than `SETTLED` in ln likelihood are left out.
 const ROUNDS: usize = 60;
@@ -113,7 +114,7 @@ impl Chain {
     }
 
     /// With standard deviations by the curvature of the likelihood.
-    pub(super) fn with_errors(mut self, values: &[f64]) -> Self {
+    pub(super) fn with_errors(self, values: &[f64]) -> Self {
         let nudged = |time: f64, apart: f64| {
             let middle = 0.5 * (self.levels[0] + self.levels[1]);
             let chain = Self {
@@ -128,34 +129,32 @@ impl Chain {
             let curvature = (2.0 * here - up - down) / (NUDGE * NUDGE);
             if curvature > 0.0 { curvature.sqrt().recip() } else { 1.0 }
         };
-        self.error_of_time = error(nudged(NUDGE, 0.0), nudged(-NUDGE, 0.0));
-        self.error_of_apart = error(nudged(0.0, NUDGE), nudged(0.0, -NUDGE));
-        self
+        let error_of_time = error(nudged(NUDGE, 0.0), nudged(-NUDGE, 0.0));
+        let error_of_apart = error(nudged(0.0, NUDGE), nudged(0.0, -NUDGE));
+        Self { error_of_time, error_of_apart, ..self }
     }
 
     /// Forward over the numbers and back again.
     fn told(&self, values: &[f64]) -> Told {
         let [up, down] = self.leave;
+        let scale = 0.5 * (2.0 * PI * self.variance).ln();
+        // Over that of the nearer level, and the logarithm of the latter: far from both, exponentials vanish.
         let density = |value: f64| {
             if value.is_nan() {
-                return [1.0; 2];
+                return ([1.0; 2], 0.0);
             }
-            // Far from both, the nearer one has it.
             let squares = self.levels.map(|level| 0.5 * (value - level).powi(2) / self.variance);
             let least = squares[0].min(squares[1]);
-            squares.map(|square| (least - square).exp())
+            (squares.map(|square| (least - square).exp()), -least - scale)
         };
         let mut told = Told::default();
         let mut forward: Vec<[f64; 2]> = Vec::with_capacity(values.len());
         let mut belief = [down / (up + down), up / (up + down)];
         for &value in values {
-            let [a, b] = density(value);
+            let ([a, b], nearer) = density(value);
             let (a, b) = (belief[0] * a, belief[1] * b);
             let sum = a + b;
-            if value.is_finite() {
-                let least = self.levels.map(|level| 0.5 * (value - level).powi(2) / self.variance);
-                told.log_likelihood += sum.ln() - least[0].min(least[1]) - 0.5 * (2.0 * std::f64::consts::PI * self.variance).ln();
-            }
+            told.log_likelihood += sum.ln() + nearer;
             let now = [a / sum, b / sum];
             forward.push(now);
             belief = [now[0] * (1.0 - up) + now[1] * down, now[0] * up + now[1] * (1.0 - down)];
@@ -175,7 +174,7 @@ impl Chain {
                 }
             }
             let Some(before) = at.checked_sub(1) else { break };
-            let [a, b] = density(value);
+            let ([a, b], _) = density(value);
             let (a, b) = (a * later[0], b * later[1]);
             let from = forward[before];
             let joint = [from[0] * (1.0 - up) * a, from[0] * up * b, from[1] * (1.0 - down) * b, from[1] * down * a];
