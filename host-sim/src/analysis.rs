@@ -12,6 +12,7 @@ mod parts;
 mod repairs;
 mod spectral;
 mod study;
+mod walk;
 
 use crate::grid::Grid;
 use crate::practice::Practice;
@@ -233,6 +234,11 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
             },
             _ => effects.push(naming::term_effect(term, found, unit, period_s)),
         }
+    }
+    let is_slow = |effect: &Effect| ["markov", "telegraph", "rate_ramp"].contains(&effect.kind.as_str());
+    if common.is_none() && own.two_levels.is_none() && !effects.iter().any(is_slow) {
+        let unbounded = walk::unbounded(&study.following.curve, &study.trace, channel);
+        effects.extend(unbounded.map(|found| naming::unbounded_effect(&found, unit)));
     }
     effects.extend(own.two_levels.iter().map(|found| found.effect.clone()));
     effects.extend(common.map(|common| naming::common_effect(common, channel, unit)));

@@ -3,6 +3,7 @@
 use super::coefficient_unit;
 use super::common::Common;
 use super::lines::Line;
+use super::walk::Unbounded;
 use crate::report::{Effect, Parameter};
 use crate::spectrum::line::Estimate;
 use crate::spectrum::shared::Bounded;
@@ -73,6 +74,18 @@ pub(super) fn telegraph_effect(term: &Term, found: &Found, verdict: &Verdict, un
         verdict.ratio, verdict.error, markov.evidence,
     );
     Effect { kind: "telegraph".to_owned(), parameters, evidence }
+}
+
+/// A process in the place of a walk that goes too far.
+pub(super) fn unbounded_effect(found: &Unbounded, unit: &str) -> Effect {
+    let evidence = format!(
+        "a random walk of {:.1e} {} would take the bias {:.0} times as far in an hour as the biases of parts differ; {}",
+        found.walk.value,
+        coefficient_unit(&found.walk.kind, unit),
+        found.too_far,
+        meaning(&found.process.kind),
+    );
+    Effect { kind: found.process.kind.name().to_owned(), parameters: parameters(&found.process, unit), evidence }
 }
 
 /// A Markov term that stands in the place of the white noise.

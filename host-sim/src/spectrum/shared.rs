@@ -258,4 +258,30 @@ mod tests {
         // 95 % of 16: 11 or fewer would be a chance of one in ten thousand.
         assert!(inside >= 12, "{inside}");
     }
+
+    #[test]
+    fn what_is_shared_is_found_among_those_that_share_it() {
+        let transforms = |seed: u64, weights: [f64; 3]| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let kept = (-0.1f64 / 20.0).exp();
+            let (mut process, mut channels) = (0.0, [const { Vec::new() }; 3]);
+            for _ in 0..8_000 {
+                let mut normal = || random.sample::<f64, _>(StandardNormal);
+                process = kept * process + 0.4 * (1.0 - kept * kept).sqrt() * normal();
+                for (channel, weight) in channels.iter_mut().zip(weights) {
+                    channel.push(weight * process + normal());
+                }
+            }
+            Transforms::of(&channels.map(|values| Grid::new(0.1, values))).unwrap()
+        };
+        let (members, gain) = transforms(1, [1.0, -1.0, 1.0]).clearest().unwrap();
+        assert!(members == [0, 1, 2] && gain > 20.0, "{members:?} {gain}");
+        let (members, gain) = transforms(2, [1.0, 0.0, 1.0]).clearest().unwrap();
+        assert!(members == [0, 2] && gain > 15.0, "{members:?} {gain}");
+        // One that has it alone shares nothing.
+        for (seed, weights) in [(3, [0.0; 3]), (4, [5.0, 0.0, 0.0])] {
+            let gain = transforms(seed, weights).clearest().unwrap().1;
+            assert!(gain < 5.0, "{seed}: {gain}");
+        }
+    }
 }

@@ -185,3 +185,68 @@ fn normal(t: f64, freedom: f64) -> f64 {
     let size = (freedom * (t * t / freedom).ln_1p()).sqrt() * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
     size.copysign(t)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Series;
+    use super::super::noises::NoiseTable;
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// White noise of deviation 1 and a walk of steps `walk`, 32 samples a block.
+    fn series(random: &mut ChaCha8Rng, walk: f64) -> Series {
+        let mut level = 0.0;
+        let mut next = || {
+            level += walk * random.sample::<f64, _>(StandardNormal);
+            level + random.sample::<f64, _>(StandardNormal)
+        };
+        let values: Vec<f64> = (0..128 * 32).map(|_| next()).collect();
+        Series { slots: (0..values.len() as u64).collect(), values, period_s: 1.0, resolution: 0.0, unit: "g" }
+    }
+
+    /// However much of the noise walks, and however few periods of it the record has.
+    #[test]
+    fn chance_does_as_much_as_often_as_it_is_said_to() {
+        let (table, runs) = (NoiseTable::default(), 1_000);
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let (mut below, mut covered) = ([0u32; 2], 0u32);
+        for _ in 0..runs {
+            let walk = 10f64.powf(random.random_range(-4.5..0.0));
+            let blocks = Blocks::of(&series(&mut random, walk)).unwrap();
+            let noises = table.of(&blocks);
+            let estimate = Evidence::of(&blocks, &noises, &[]).shape(&blocks.ramp()).unwrap();
+            for (below, level) in below.iter_mut().zip([0.1, 0.01]) {
+                *below += u32::from(estimate.p_value < level);
+            }
+            covered += u32::from(estimate.size.abs() < 1.96 * estimate.error);
+        }
+        // Expected 100 ± 9.5 and 10 ± 3.2; the walks are not spread as the grid is, nor is there any flicker noise.
+        assert!((70..150).contains(&below[0]) && below[1] < 25, "{below:?}");
+        assert!(covered > 900, "{covered}");
+    }
+
+    /// By least squares on the samples, in white noise; the mixtures can only widen it.
+    #[test]
+    fn sizes_are_those_of_least_squares_beside_what_is_known() {
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        let mut series = series(&mut random, 0.0);
+        let count = series.values.len() as f64;
+        for (at, value) in series.values.iter_mut().enumerate() {
+            *value += 0.5 * at as f64 / count + if at >= 2_048 { 1.0 } else { 0.0 };
+        }
+        let blocks = Blocks::of(&series).unwrap();
+        let (table, ramp, step) = (NoiseTable::default(), blocks.ramp(), blocks.step_at(2_048));
+        let noises = table.of(&blocks);
+        let alone = Evidence::of(&blocks, &noises, std::slice::from_ref(&ramp));
+        let beside = alone.shape(&step).unwrap();
+        // 2/√n for a step in the middle, twice that beside a ramp.
+        let error = 2.0 * 2.0 / count.sqrt();
+        assert!((beside.size - 1.0).abs() < 4.0 * error && beside.error > 0.9 * error, "{beside:?}");
+        let scanned = alone.steps()[64].unwrap();
+        assert!((scanned.size - beside.size).abs() < 1e-9 && (scanned.p_value - beside.p_value).abs() < 1e-12);
+        assert!((scanned.deviance - beside.deviance).abs() < 1e-6);
+        assert!(alone.shape(&ramp).is_none(), "a ramp beside itself is nothing new");
+    }
+}

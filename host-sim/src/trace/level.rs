@@ -121,11 +121,11 @@ fn most_telling(
             add(Course::Cause(*number), shape, claim(&estimate, 0.0));
         }
     }
-    if !taken.iter().any(|(course, ..)| matches!(course, Course::Step(_))) {
-        if let Some(step) = bias_step::find(series, blocks, noises, known, &evidence) {
-            let gain = plain - step.deviance;
-            add(Course::Step(step.place), &step.shape, (step.deviance + bias_step::AHEAD, step.p_value, gain));
-        }
+    let stepped = taken.iter().any(|(course, ..)| matches!(course, Course::Step(_)));
+    let step = if stepped { None } else { bias_step::find(series, blocks, noises, known, &evidence) };
+    if let Some(step) = step {
+        let gain = plain - step.deviance;
+        add(Course::Step(step.place), &step.shape, (step.deviance + bias_step::AHEAD, step.p_value, gain));
     }
     let (_, course, shape, claim) = rivals.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some((course, shape, claim))

@@ -25,8 +25,10 @@ const JUMPS: f64 = 6.0;
 const APART: f64 = 4.0;
 /// A level is held for at least this part of the record.
 const HELD: f64 = 0.05;
-/// Largest variance around the levels, over that of white noise: of a clipped wave it is more.
+/// Largest variance around the levels: so many times that of white noise, and this part of the square of their distance,
+/// by which slow noise moves them. Of a clipped wave it is some ten times as much.
 const AROUND: f64 = 1.5;
+const MOVED: f64 = 0.01;
 /// Step of the logarithm of a parameter at which the likelihood's curvature is taken.
 const NUDGE: f64 = 0.05;
 
@@ -99,7 +101,8 @@ fn told(parts: &Parts) -> Option<(Chain, f64)> {
     let chain = Chain::fit(&parts.means)?;
     let around = square_of_typical(chain.residuals(&parts.means));
     let jumps_often = chain.jumps >= JUMPS && chain.correlation_time() > APART;
-    if !jumps_often || chain.held().iter().any(|&held| held < HELD) || around > AROUND * parts.white {
+    let highest = AROUND * parts.white + MOVED * chain.apart().powi(2);
+    if !jumps_often || chain.held().iter().any(|&held| held < HELD) || around > highest {
         return None;
     }
     let gain = chain.log_likelihood - gaussian::log_likelihood(&parts.means);
@@ -130,5 +133,84 @@ fn finding(chain: &Chain, gain: f64, part_s: f64, unit: &str) -> Finding {
         deviance: 2.0 * gain,
         p_value: (-gain).exp(),
         repair: Repair::Impossible,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 40_000;
+    const PERIOD_S: f64 = 0.01;
+
+    /// White noise of deviation 1 with what `next` adds.
+    fn grid(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> Grid {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let value = |at| next(&mut random, at) + random.sample::<f64, _>(StandardNormal);
+        Grid::new(PERIOD_S, (0..SAMPLES).map(value).collect())
+    }
+
+    /// Levels `amplitude` apart, correlated over `time_s`.
+    fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+        let mut up = false;
+        move |random, _| {
+            up ^= random.random_bool(0.5 * PERIOD_S / time_s);
+            if up { amplitude } else { 0.0 }
+        }
+    }
+
+    #[test]
+    fn two_levels_are_found_with_their_distance_and_pace() {
+        let (mut covered, mut all) = (0, 0);
+        for (seed, (amplitude, time_s)) in [(1.0, 4.0), (0.7, 8.0), (50.0, 5.0), (1.5, 1.0)].into_iter().enumerate() {
+            let mut grid = grid(seed as u64, telegraph(amplitude, time_s));
+            if seed == 1 {
+                let values = grid.values().iter().enumerate();
+                let gap = |(at, value): (usize, &f64)| if (5_000..9_000).contains(&at) { f64::NAN } else { *value };
+                grid = Grid::new(PERIOD_S, values.map(gap).collect());
+            }
+            let finding = find(&grid, "g", &[]).unwrap_or_else(|| panic!("{amplitude} {time_s}"));
+            for (name, truth) in [("amplitude", amplitude), ("time_constant", time_s)] {
+                let parameter = &finding.effect.parameters[name];
+                assert!((parameter.value / truth).ln().abs() < 0.5, "{name} {truth}: {parameter:?}");
+                covered += usize::from((parameter.low..=parameter.high).contains(&truth));
+                all += 1;
+            }
+        }
+        // 95 % each: two misses of eight are one in twenty.
+        assert!(covered >= all - 2, "{covered} of {all}");
+    }
+
+    #[test]
+    fn short_correlation_times_are_found_where_the_curve_shows_them() {
+        let grid = grid(20, telegraph(3.0, 0.1));
+        let finding = find(&grid, "g", &[0.1]).unwrap();
+        assert!((finding.effect.parameters["time_constant"].value / 0.1 - 1.0).abs() < 0.2, "{finding:?}");
+    }
+
+    #[test]
+    fn what_jumps_once_waves_or_wanders_has_no_two_levels() {
+        let step = grid(30, |_, at| if at < 15_000 { 0.0 } else { 1.0 });
+        let wave = grid(31, |_, at| (TAU * at as f64 * PERIOD_S / 20.0).sin());
+        let mut level = 0.0;
+        let walk = grid(32, move |random, _| {
+            level += 0.02 * random.sample::<f64, _>(StandardNormal);
+            level
+        });
+        let mut state = 0.0;
+        let kept = (-PERIOD_S / 4.0f64).exp();
+        let markov = grid(33, move |random, _| {
+            state = kept * state + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+            state
+        });
+        for grid in [step, wave, walk, markov, grid(34, |_, _| 0.0)] {
+            assert_eq!(find(&grid, "g", &[1.0, 4.0]), None);
+        }
+        assert_eq!(find(&Grid::new(PERIOD_S, vec![1.0; 10]), "g", &[]), None);
+        assert_eq!(find(&Grid::new(PERIOD_S, vec![1.0; 10_000]), "g", &[]), None);
     }
 }

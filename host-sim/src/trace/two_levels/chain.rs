@@ -165,12 +165,9 @@ impl Chain {
             let now = forward[at];
             let weights = [now[0] * later[0], now[1] * later[1]];
             let sum = weights[0] + weights[1];
-            for state in 0..2 {
-                let probability = weights[state] / sum;
-                if value.is_finite() {
-                    for (moment, power) in told.moments[state].iter_mut().zip([1.0, value, value * value]) {
-                        *moment += probability * power;
-                    }
+            for (moments, weight) in told.moments.iter_mut().zip(weights).filter(|_| value.is_finite()) {
+                for (moment, power) in moments.iter_mut().zip([1.0, value, value * value]) {
+                    *moment += weight / sum * power;
                 }
             }
             let Some(before) = at.checked_sub(1) else { break };
