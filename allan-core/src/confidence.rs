@@ -72,15 +72,22 @@ pub fn edf(n: u64, count: u64, overlap: u32, shares: Shares) -> f64 {
 /// Exact for one, two and three octaves and an infinite record; beyond, the last ratio continues.
 #[must_use]
 pub fn octave_correlation(lag: usize, a: Shares, b: Shares) -> f64 {
-    const WHITE: [f64; 4] = [1.0, 0.530, 0.187, 0.066];
-    const FLICKER: [f64; 4] = [1.0, 0.689, 0.309, 0.121];
-    const RANDOM_WALK: [f64; 4] = [1.0, 0.888, 0.676, 0.488];
-    let of = |table: [f64; 4]| match table.get(lag) {
+    let (a, b) = (roots(a), roots(b));
+    (0..3).map(|noise| a[noise] * b[noise] * pure_octave_correlation(lag, noise)).sum()
+}
+
+/// Of white, flicker and random-walk noise: the roots of their shares.
+pub(crate) fn roots(shares: Shares) -> [f64; 3] {
+    // Angle quantization decorrelates faster than white noise, which bounds it from above.
+    [sqrt(shares.white + shares.quantization), sqrt(shares.flicker), sqrt(shares.random_walk)]
+}
+
+/// The same where one of these noises is alone.
+pub(crate) fn pure_octave_correlation(lag: usize, noise: usize) -> f64 {
+    const TABLE: [[f64; 4]; 3] = [[1.0, 0.530, 0.187, 0.066], [1.0, 0.689, 0.309, 0.121], [1.0, 0.888, 0.676, 0.488]];
+    let table = &TABLE[noise];
+    match table.get(lag) {
         Some(&value) => value,
         None => (4..=lag).fold(table[3], |value, _| value * table[3] / table[2]),
-    };
-    // Angle quantization decorrelates faster than white noise, which bounds it from above.
-    sqrt((a.white + a.quantization) * (b.white + b.quantization)) * of(WHITE)
-        + sqrt(a.flicker * b.flicker) * of(FLICKER)
-        + sqrt(a.random_walk * b.random_walk) * of(RANDOM_WALK)
+    }
 }

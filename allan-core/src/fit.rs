@@ -15,11 +15,12 @@ mod problem;
 mod shape;
 
 pub use goodness::Goodness;
-pub(crate) use improvement::{Baseline, Rival};
+pub(crate) use improvement::Baseline;
 pub(crate) use shape::Free;
 
 use crate::model::Model;
 use crate::{Curve, Kind};
+pub(crate) use bounds::set as set_bounds;
 use points::Points;
 use problem::Problem;
 
@@ -31,54 +32,59 @@ const EDF_ROUNDS: usize = 4;
 /// A curve without points, or of a channel that never changed, gives coefficients of 0.
 #[must_use]
 pub fn fit<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
-    fit_free_shapes(curve, kinds, Free::Nothing, &mut || true)
-}
-
-/// Whether `model`, which was fitted to `curve`, is enough to describe it.
-#[must_use]
-#[inline(never)] // so that its stack is not everybody's
-pub fn goodness<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Goodness {
-    let (mut points, mut problem) = (Points::empty(), Problem::empty());
-    points.take(curve);
-    problem.take_model(&mut points, curve, model);
-    goodness::judge(&points, &mut problem)
-}
-
-/// `Σ edf·(v/m − 1 − ln(v/m))` of `model`, which was fitted to `curve`.
-#[inline(never)]
-pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> f64 {
-    let (mut points, mut problem) = (Points::empty(), Problem::empty());
-    points.take(curve);
-    problem.take_model(&mut points, curve, model);
-    problem.deviance(&points)
+    let mut model = Model::new(0.0, []);
+    estimate(curve, kinds, Free::Nothing, &mut || true, &mut model);
+    set_bounds(curve, &mut model);
+    model
 }
 
 /// Fits the coefficients of `kinds` and also the shapes of those that have one, from the given ones on.
 #[must_use]
 pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
-    fit_free_shapes(curve, kinds, Free::AllBut(&[]), &mut || true)
+    let mut model = Model::new(0.0, []);
+    estimate(curve, kinds, Free::AllBut(&[]), &mut || true, &mut model);
+    set_bounds(curve, &mut model);
+    model
 }
 
-/// As [`fit_shapes`], of those that are `free`.
-#[inline(never)] // so that its stack is not everybody's
-pub(crate) fn fit_free_shapes<const POINTS: usize>(
+/// Whether `model`, which was fitted to `curve`, is enough to describe it.
+#[must_use]
+#[inline(never)] // here and below: so that its stack is not everybody's
+pub fn goodness<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Goodness {
+    let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
+    points.take();
+    problem.take_model(&mut points, model);
+    goodness::judge(&points, &mut problem)
+}
+
+/// `Σ edf·(v/m − 1 − ln(v/m))` of `model`, which was fitted to `curve`.
+#[inline(never)]
+pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> f32 {
+    let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
+    points.take();
+    problem.take_model(&mut points, model);
+    problem.deviance(&points)
+}
+
+/// Coefficients of `kinds`, and the shapes of those that are `free`, without bounds: into `model`.
+#[inline(never)]
+pub(crate) fn estimate<const POINTS: usize>(
     curve: &Curve<POINTS>,
     kinds: &[Kind],
     free: Free,
     keep_on: &mut dyn FnMut() -> bool,
-) -> Model {
-    let (mut points, mut problem) = (Points::empty(), Problem::empty());
-    points.take(curve);
+    model: &mut Model,
+) {
+    let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
+    points.take();
     problem.take(&points, kinds);
     let searched = problem.kinds.iter().any(|kind| free.has(kind));
-    problem.settle(&mut points, curve, if searched { 2 } else { EDF_ROUNDS });
+    problem.settle(&mut points, if searched { 2 } else { EDF_ROUNDS });
     if searched {
         for _ in 0..2 {
             shape::search(&points, &mut problem, free, keep_on);
-            problem.settle(&mut points, curve, 2);
+            problem.settle(&mut points, 2);
         }
     }
-    let mut model = problem.model(points.sample_period);
-    bounds::set(&mut points, curve, &mut problem, &mut model);
-    model
+    model.set(curve.sample_period(), problem.terms());
 }

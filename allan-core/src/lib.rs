@@ -25,7 +25,7 @@
 //! `serde` all four can be kept, sent and resumed to the bit.
 //!
 //! Everything up to the curve is integer arithmetic without rounding, so a microcontroller and a server agree to
-//! the bit. Everything from the curve on is `f64` through `libm`, so they agree there too.
+//! the bit. Everything from the curve on is floating point by the same code and `libm`, so they agree there too.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]

@@ -1,8 +1,9 @@
 //! The only place that calls a floating-point library.
 //!
 //! Always by function, never by method: `x.sqrt()` would be `std`'s on the host and another one on the target.
-//! What ends in a reported figure is `libm`'s, the same to the bit on host and target. `micromath`, small and fast
-//! without a double-precision unit, serves where a coarse answer chooses between few cases: the noise type.
+//! What ends in a reported figure is `libm`'s (sine and cosine are [`circle`]'s), the same to the bit on host and
+//! target. `micromath`, small and fast without a double-precision unit, serves where a coarse answer chooses between few
+//! cases: the noise type.
 //!
 //! Largest error (relative to the answer where that is above 1) and instructions of a call on a Cortex-M4F and a
 //! Cortex-M0+, for the arguments that the estimator meets; held by the test of `tests/instructions`:
@@ -14,14 +15,28 @@
 //! | `log2` | 0 | 3276, 8253 | 2e-1 | 50, 1725 |
 //! | `exp` | 2e-16 | 2633, 7093 | 6e-4 | 128, 2603 |
 //! | `expm1` | 0 | 3938, 9996 | — | — |
-//! | `sin` | 1e-16 | 2436, 6369 | 1e-3 | 39, 1633 |
-//! | `cos` | 1e-16 | 2530, 6541 | 1e-3 | 36, 1483 |
 //! | `floor` | 0 | 48, 78 | 0 | 21, 337 |
 //! | `abs` | 0 | 18, 20 | 0 | 13, 20 |
 //! | `ln_gamma` | 8e-15 | 4990, 13796 | — | — |
 
+mod circle;
+
+pub(crate) use circle::{cos, sin};
+
 pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
+}
+
+pub(crate) fn sqrtf(x: f32) -> f32 {
+    libm::sqrtf(x)
+}
+
+pub(crate) fn lnf(x: f32) -> f32 {
+    libm::logf(x)
+}
+
+pub(crate) fn absf(x: f32) -> f32 {
+    libm::fabsf(x)
 }
 
 pub(crate) fn ln(x: f64) -> f64 {
@@ -59,14 +74,6 @@ pub(crate) fn expm1(x: f64) -> f64 {
 
 pub(crate) fn atanh(x: f64) -> f64 {
     libm::atanh(x)
-}
-
-pub(crate) fn sin(x: f64) -> f64 {
-    libm::sin(x)
-}
-
-pub(crate) fn cos(x: f64) -> f64 {
-    libm::cos(x)
 }
 
 pub(crate) fn floor(x: f64) -> f64 {

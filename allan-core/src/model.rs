@@ -1,9 +1,11 @@
 //! A noise model: terms with their coefficients, and what they do together.
 
+pub(crate) mod freedom;
+
 use crate::Point;
 use crate::confidence::Shares;
-use crate::math::clamp;
-use crate::term::{BiasInstability, Kind, Process};
+use crate::term::Kind;
+use freedom::{Flicker, degrees_of_freedom};
 use heapless::Vec;
 
 /// Terms that a model can hold.
@@ -49,6 +51,13 @@ impl Model {
         Self { sample_period, terms: terms.into_iter().take(MAX_TERMS).collect() }
     }
 
+    /// The same in place.
+    pub(crate) fn set(&mut self, sample_period: f64, terms: impl Iterator<Item = Term>) {
+        self.sample_period = sample_period;
+        self.terms.clear();
+        self.terms.extend(terms.take(MAX_TERMS));
+    }
+
     /// Seconds between samples.
     #[must_use]
     pub fn sample_period(&self) -> f64 {
@@ -91,62 +100,16 @@ impl Model {
         if total <= 0.0 {
             return Shares::WHITE;
         }
-        let mut shares = Shares { white: 0.0, ..Shares::WHITE };
-        for (kind, avar) in self.contributions(n) {
-            let share = kind.share(avar / total, n, self.sample_period);
-            shares.white += share.white;
-            shares.flicker += share.flicker;
-            shares.random_walk += share.random_walk;
-            shares.quantization += share.quantization;
-        }
-        shares
+        shares(self.contributions(n).map(|(kind, avar)| (kind, avar / total)), n, self.sample_period)
     }
 
     /// Equivalent degrees of freedom of a measured point if the model is true.
-    ///
-    /// By the sums of Greenhall and Riley over the second differences' covariances. A deterministic term repeats in
-    /// every record, so it blurs an estimate only together with the noise; a narrow resonance remembers its
-    /// amplitude, so it blurs it more than its share says.
     #[must_use]
     pub fn edf(&self, point: &Point) -> f64 {
-        self.degrees_of_freedom(point, &FlickerCovariances::NONE).0
-    }
-
-    /// The same, and without the memory of narrow terms beyond two averaging times.
-    pub(crate) fn degrees_of_freedom(&self, point: &Point, flicker: &FlickerCovariances) -> (f64, f64) {
         let avar = self.avar(point.n);
-        let (near, far) = self.blur(point, flicker);
-        // As many as there are differences where nothing random is modelled at all.
-        let of = |blur: f64| clamp(point.count as f64 * avar * avar / blur, 1.0_f64.min(point.count as f64), 1e18);
-        (of(near + far), of(near))
-    }
-
-    /// Sums of the squared covariances: up to two averaging times (four with flicker noise), and beyond.
-    fn blur(&self, point: &Point, flicker: &FlickerCovariances) -> (f64, f64) {
-        let stride = point.n as f64 / f64::from(point.overlap);
-        let has_flicker = self.present().any(|term| term.kind == Kind::BiasInstability);
-        let reach = if has_flicker { 4 } else { 2 } * u64::from(point.overlap);
-        let count = point.count as f64;
-        let mut near = 0.0;
-        for lag in 0..=reach.min(point.count.saturating_sub(1)) {
-            let (mut noise, mut certain) = (0.0, 0.0);
-            for term in self.present() {
-                let covariance = match term.kind {
-                    Kind::BiasInstability => flicker.at(lag as u32, point.overlap),
-                    kind => kind.process().covariance(lag as f64 * stride, point.n, self.sample_period),
-                };
-                *if term.kind.is_deterministic() { &mut certain } else { &mut noise } +=
-                    term.value * term.value * covariance;
-            }
-            let weight = if lag == 0 { 1.0 } else { 2.0 * (1.0 - lag as f64 / count) };
-            near += weight * noise * (noise + 2.0 * certain);
-        }
-        // With flicker noise the near sum goes further than the memory begins; both are small there.
-        let of = |term: &Term| {
-            let square = term.value * term.value;
-            square * square * term.kind.process().memory_beyond(point.n, stride, self.sample_period)
-        };
-        (near, 2.0 * self.present().map(of).sum::<f64>())
+        let parts: Vec<(Kind, f64), MAX_TERMS> =
+            self.contributions(point.n).map(|(kind, part)| (kind, part / avar)).collect();
+        degrees_of_freedom(&parts, point, self.sample_period, &Flicker::NONE).0
     }
 
     /// The same model with the samples' unit replaced: every coefficient times `lsb`.
@@ -169,29 +132,15 @@ impl Model {
     }
 }
 
-/// Covariances of flicker noise, worked out once for all points: they depend on the distance in averaging times alone.
-pub(crate) struct FlickerCovariances {
-    overlap: u32,
-    /// Every `1/overlap` averaging times, up to 4 of them at 8-fold overlap.
-    table: Vec<f64, 33>,
-}
-
-impl FlickerCovariances {
-    /// Each worked out when it is asked for.
-    const NONE: Self = Self { overlap: 1, table: Vec::new() };
-
-    /// For points of this overlap and of those that divide it.
-    pub(crate) fn new(overlap: u32) -> Self {
-        Self { overlap, table: (0..33).map(|lag| Self::of(lag, overlap)).collect() }
+/// The power laws that terms with such shares resemble at averaging factor `n`.
+pub(crate) fn shares(parts: impl Iterator<Item = (Kind, f64)>, n: u64, sample_period: f64) -> Shares {
+    let mut shares = Shares { white: 0.0, ..Shares::WHITE };
+    for (kind, part) in parts {
+        let share = kind.share(part, n, sample_period);
+        shares.white += share.white;
+        shares.flicker += share.flicker;
+        shares.random_walk += share.random_walk;
+        shares.quantization += share.quantization;
     }
-
-    fn of(lag: u32, overlap: u32) -> f64 {
-        BiasInstability.covariance(f64::from(lag), u64::from(overlap), 1.0)
-    }
-
-    fn at(&self, lag: u32, overlap: u32) -> f64 {
-        let known = (lag * self.overlap).is_multiple_of(overlap).then(|| lag * self.overlap / overlap);
-        let known = known.and_then(|lag| self.table.get(lag as usize)).copied();
-        known.unwrap_or_else(|| Self::of(lag, overlap))
-    }
+    shares
 }

@@ -13,10 +13,8 @@ pub use covariate::Covariate;
 pub use sensitivity::Sensitivity;
 
 use crate::coupling::Covariance;
-use crate::fit::{
-    fit,
-    least_squares::{Matrix, Vector, solve},
-};
+use crate::fit::fit;
+use crate::fit::least_squares::{entry, solve, triangle};
 use crate::math::sqrt;
 use crate::{Curve, Kind, Point};
 use heapless::Vec;
@@ -104,26 +102,26 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     /// `None` where the covariates move too little, or too much alike.
     #[inline(never)]
     fn sensitivities(&self, chosen: &[usize], octaves: &[Octave]) -> Option<Sensitivities> {
-        let mut normal: Matrix<MAX_COVARIATES> = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
-        let mut right: Vector<MAX_COVARIATES> = [0.0; MAX_COVARIATES];
+        let mut normal = [0.0; triangle(MAX_COVARIATES)];
+        let mut value = [0.0; MAX_COVARIATES];
         for octave in octaves {
             for (i, &covariate) in chosen.iter().enumerate() {
                 if self.covariates[covariate].signal(octave.n).is_some() {
-                    right[i] += octave.weight * self.with_channel(covariate, octave.n);
+                    value[i] += octave.weight * self.with_channel(covariate, octave.n);
                 }
                 for (j, &other) in chosen[..=i].iter().enumerate() {
-                    normal[i][j] += octave.weight * self.shared(covariate, other, octave.n);
+                    normal[entry(i, j)] += octave.weight * self.shared(covariate, other, octave.n);
                 }
             }
         }
         let all = (1 << chosen.len()) - 1;
-        let value = solve(&normal, &right, all)?;
+        solve(&mut normal.clone(), &mut value, all)?;
         let scatter = self.scatter(chosen, octaves);
         let sensitivity = |(i, &covariate): (usize, &usize)| {
-            let mut unit = [0.0; MAX_COVARIATES];
-            unit[i] = 1.0;
-            let row = solve(&normal, &unit, all)?;
-            let along = |(entry, scatter): (f64, Vector<MAX_COVARIATES>)| {
+            let mut row = [0.0; MAX_COVARIATES];
+            row[i] = 1.0;
+            solve(&mut normal.clone(), &mut row, all)?;
+            let along = |(entry, scatter): (f64, [f64; MAX_COVARIATES])| {
                 entry * row.iter().zip(scatter).map(|(a, b)| a * b).sum::<f64>()
             };
             let error = sqrt(row.into_iter().zip(scatter).map(along).sum());
@@ -136,7 +134,7 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
 
     /// Covariance of the right side of the normal equations.
     #[inline(never)]
-    fn scatter(&self, chosen: &[usize], octaves: &[Octave]) -> Matrix<MAX_COVARIATES> {
+    fn scatter(&self, chosen: &[usize], octaves: &[Octave]) -> [[f64; MAX_COVARIATES]; MAX_COVARIATES] {
         let mut matrix = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
         for (i, &a) in chosen.iter().enumerate() {
             for (j, &b) in chosen[..=i].iter().enumerate() {

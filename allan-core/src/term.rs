@@ -4,6 +4,7 @@
 //! shortest averaging times), its power spectral density, and how its second differences hang together, which is
 //! what decides how much an estimate is worth.
 
+pub mod correlation;
 mod exponential;
 mod filter;
 mod power_law;
@@ -37,17 +38,15 @@ pub trait Process {
         (4.0 * self.structure(n, sample_period) - self.structure(2.0 * n, sample_period)) / (2.0 * n * n)
     }
 
-    /// Half the covariance of two second differences of averages over `n` samples, `lag` samples apart; the Allan
-    /// variance at a lag of 0.
-    fn covariance(&self, lag: f64, n: u64, sample_period: f64) -> f64 {
-        let width = n as f64;
-        let v = |m: f64| self.structure(crate::math::abs(m), sample_period);
-        let fourth =
-            6.0 * v(lag) - 4.0 * (v(lag - width) + v(lag + width)) + v(lag - 2.0 * width) + v(lag + 2.0 * width);
-        -fourth / (4.0 * width * width)
+    /// [`structure`](Self::structure) of 0, 1, 2 … strides of `stride` samples, up to a factor and an error that does not
+    /// matter to how second differences that far apart hang together.
+    fn structures(&self, stride: f64, sample_period: f64, structures: &mut [f64]) {
+        for (k, structure) in structures.iter_mut().enumerate() {
+            *structure = self.structure(k as f64 * stride, sample_period);
+        }
     }
 
-    /// Sum of the squares of the covariances at the lags `2n + stride, 2n + 2·stride …`; 0 for what forgets.
+    /// Sum of the squares of the halved covariances of second differences at the lags `2n + stride, 2n + 2·stride …`; 0 for what forgets.
     fn memory_beyond(&self, _n: u64, _stride: f64, _sample_period: f64) -> f64 {
         0.0
     }
@@ -97,6 +96,39 @@ pub enum CoefficientUnit {
     /// unit/s
     PerSecond,
 }
+
+/// An expression of the process of a kind. What is not called is not linked, as it would be behind a `dyn`.
+macro_rules! of {
+    ($kind:expr, $process:ident => $expression:expr) => {
+        match $kind {
+            Kind::Quantization => {
+                let $process = &Quantization;
+                $expression
+            }
+            Kind::AngleRandomWalk => {
+                let $process = &AngleRandomWalk;
+                $expression
+            }
+            Kind::BiasInstability => {
+                let $process = &BiasInstability;
+                $expression
+            }
+            Kind::RateRandomWalk => {
+                let $process = &RateRandomWalk;
+                $expression
+            }
+            Kind::RateRamp => {
+                let $process = &RateRamp;
+                $expression
+            }
+            Kind::Filtered($process) => $expression,
+            Kind::Markov($process) => $expression,
+            Kind::Resonance($process) => $expression,
+            Kind::Sinusoid($process) => $expression,
+        }
+    };
+}
+use of;
 
 impl Kind {
     /// The model that is declared before anything is known: N, B, K.
@@ -184,23 +216,24 @@ impl Kind {
     /// What it does to samples.
     #[must_use]
     pub fn process(&self) -> &dyn Process {
-        match self {
-            Self::Quantization => &Quantization,
-            Self::AngleRandomWalk => &AngleRandomWalk,
-            Self::BiasInstability => &BiasInstability,
-            Self::RateRandomWalk => &RateRandomWalk,
-            Self::RateRamp => &RateRamp,
-            Self::Filtered(filter) => filter,
-            Self::Markov(markov) => markov,
-            Self::Resonance(resonance) => resonance,
-            Self::Sinusoid(sinusoid) => sinusoid,
-        }
+        of!(self, process => process)
     }
 
     /// Allan variance at averaging factor `n` and `sample_period` seconds for a coefficient of 1.
     #[must_use]
     pub fn avar(&self, n: u64, sample_period: f64) -> f64 {
-        self.process().avar(n, sample_period)
+        of!(self, process => process.avar(n, sample_period))
+    }
+
+    /// [`Process::memory_beyond`] in units of the square of the Allan variance.
+    pub(crate) fn memory_beyond(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
+        match self {
+            Self::Markov(_) | Self::Resonance(_) => {
+                let avar = self.avar(n, sample_period);
+                of!(self, process => process.memory_beyond(n, stride, sample_period)) / (avar * avar)
+            }
+            _ => 0.0,
+        }
     }
 
     /// Whether it adds the same to every record, so that it blurs no estimate.

@@ -5,7 +5,7 @@
 
 mod candidate;
 
-use crate::fit::{Baseline, Free, Goodness, Rival, deviance, fit, fit_free_shapes, goodness};
+use crate::fit::{Baseline, Free, Goodness, deviance, estimate, goodness, set_bounds};
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind, math};
 use candidate::Families;
@@ -16,9 +16,13 @@ pub const MAX_ADDED: usize = MAX_TERMS - Kind::DECLARED.len();
 
 /// What one more parameter has to lower the deviance by, in units of its scatter, to be believed: the square of 3.7
 /// standard deviations.
-const CONVINCING: f64 = 14.0;
+const CONVINCING: f32 = 14.0;
 /// What each further parameter has to earn.
-const PER_PARAMETER: f64 = 4.0;
+const PER_PARAMETER: f32 = 4.0;
+
+/// Part of its cost that a candidate has to gain before its shape is searched for: between the shapes that are tried, the
+/// best is rarely twice as good.
+const PROMISING: f32 = 0.4;
 
 /// A term that the declared model lacked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,7 +91,8 @@ impl Trace {
     /// Makes it that of [`declared`](Self::declared).
     #[inline(never)] // so that its stack is not everybody's
     pub fn declare<const POINTS: usize>(&mut self, curve: &Curve<POINTS>) {
-        self.before = fit(curve, &Kind::DECLARED);
+        estimate(curve, &Kind::DECLARED, Free::Nothing, &mut || true, &mut self.before);
+        set_bounds(curve, &mut self.before);
         self.before_goodness = goodness(curve, &self.before);
         self.after.clone_from(&self.before);
         self.after_goodness = self.before_goodness;
@@ -138,6 +143,13 @@ struct Search<'a> {
 /// Somebody said no.
 struct Stopped;
 
+/// The terms that explain most, and how much better they do than those before.
+struct Best {
+    kinds: Vec<Kind, MAX_TERMS>,
+    gain: f32,
+    score: f64,
+}
+
 impl Search<'_> {
     /// Adds what is missing.
     fn complete<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<(), Stopped> {
@@ -146,22 +158,29 @@ impl Search<'_> {
                 self.reconsider(curve, &mut trace.after, &trace.found)?;
             }
         }
-        trace.after_goodness = goodness(curve, &trace.after);
+        if !trace.found.is_empty() {
+            set_bounds(curve, &mut trace.after);
+            trace.after_goodness = goodness(curve, &trace.after);
+        }
         Ok(())
     }
 
     /// Adds the term that is most telling; false if there is none.
     #[inline(never)] // here and below: so that stack frames do not add up
     fn extend<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<bool, Stopped> {
-        let Some(rival) = self.most_telling(curve, &trace.after)? else { return Ok(false) };
+        let mut best = Best::NONE;
+        self.most_telling(curve, &trace.after, &mut best)?;
+        if best.kinds.is_empty() {
+            return Ok(false);
+        }
         let residual = largest_residual(curve, &trace.after);
         // A filter that is read slowly has taken the place of the white noise.
         let before = trace.after.terms().len();
-        let term = if rival.kinds.len() == before { 0 } else { before };
-        trace.after = fit_free_shapes(curve, &rival.kinds, self.free, self.keep_on);
+        let term = if best.kinds.len() == before { 0 } else { before };
+        estimate(curve, &best.kinds, self.free, self.keep_on, &mut trace.after);
         self.go_on()?;
         // There is room: nothing is added to a full list.
-        let _ = trace.found.push(Found { term, score: rival.score(), residual });
+        let _ = trace.found.push(Found { term, score: best.score, residual });
         Ok(true)
     }
 
@@ -174,60 +193,66 @@ impl Search<'_> {
         model: &mut Model,
         found: &[Found],
     ) -> Result<(), Stopped> {
+        let mut other = Model::new(0.0, []);
         for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
-            let without: Vec<Kind, MAX_TERMS> =
-                model.terms().iter().enumerate().filter(|(i, _)| *i != known.term).map(|(_, term)| term.kind).collect();
+            let mut kinds = model.kinds();
+            let old = kinds.remove(known.term);
+            estimate(curve, &kinds, Free::Nothing, self.keep_on, &mut other);
+            let mut best = Best::NONE;
+            self.most_telling(curve, &other, &mut best)?;
             // A slowly read filter would change the order of the terms.
-            let rival = self.most_telling(curve, &fit(curve, &without))?;
-            let Some(rival) = rival.filter(|rival| rival.kinds.len() > without.len()) else {
-                continue;
-            };
-            let mut kinds = rival.kinds;
-            let Some(other) = kinds.pop() else { continue };
-            if other.name() == model.terms()[known.term].kind.name() {
+            if best.kinds.len() <= kinds.len() {
                 continue;
             }
+            let Some(new) = best.kinds.pop().filter(|new| new.name() != old.name()) else { continue };
             // In the place of the old one.
-            let _ = kinds.insert(known.term.min(kinds.len()), other);
-            let candidate = fit_free_shapes(curve, &kinds, self.free, self.keep_on);
+            let _ = best.kinds.insert(known.term.min(kinds.len()), new);
+            estimate(curve, &best.kinds, self.free, self.keep_on, &mut other);
             self.go_on()?;
-            if deviance(curve, &candidate) < deviance(curve, model) - CONVINCING {
-                *model = candidate;
+            if deviance(curve, &other) < deviance(curve, model) - CONVINCING {
+                core::mem::swap(model, &mut other);
             }
         }
         Ok(())
     }
 
-    /// The candidate that gains most beyond what its parameters cost; `None` if chance could do as much.
+    /// The candidate that gains most beyond what its parameters cost; none if chance could do as much.
     #[inline(never)]
     fn most_telling<const POINTS: usize>(
         &mut self,
         curve: &Curve<POINTS>,
         model: &Model,
-    ) -> Result<Option<Rival>, Stopped> {
-        let mut baseline = Baseline::empty();
-        baseline.take(curve, model);
-        let (families, kinds) = (self.families, model.kinds());
-        let mut most: Option<(f64, Rival)> = None;
+        most: &mut Best,
+    ) -> Result<(), Stopped> {
+        let mut baseline = Baseline::empty(curve);
+        baseline.take(model);
+        let families = self.families;
+        let mut kinds = model.kinds();
+        let known = kinds.len();
         for family in families.all() {
-            let mut best: Option<(f64, Vec<Kind, MAX_TERMS>)> = None;
-            for kinds in families.shapes(family).filter_map(|shape| with(&kinds, &shape)) {
+            let mut best: Option<(f32, Kind)> = None;
+            for shape in families.shapes(family) {
+                let Some(place) = place(&kinds[..known], &shape) else { continue };
                 self.go_on()?;
-                let fall = baseline.fall(&kinds);
-                if best.as_ref().is_none_or(|(other, _)| fall.total_cmp(other).is_ge()) {
-                    best = Some((fall, kinds));
+                let fall = put(&mut kinds, place, shape, |kinds| baseline.fall(kinds));
+                if best.is_none_or(|(other, _)| fall.total_cmp(&other).is_ge()) {
+                    best = Some((fall, shape));
                 }
             }
-            let Some((_, best)) = best else { continue };
+            let cost = CONVINCING + PER_PARAMETER * (family.parameters() - 1) as f32;
+            let is_promising = |(fall, _): &(f32, Kind)| family.takes_a_place() || *fall > PROMISING * cost;
+            let Some((_, shape)) = best.filter(is_promising) else { continue };
+            let Some(place) = place(&kinds[..known], &shape) else { continue };
             self.go_on()?;
-            let rival = baseline.shaped_rival(&best, self.free, self.keep_on);
-            let cost = CONVINCING + PER_PARAMETER * f64::from(family.parameters() - 1);
-            let gain = rival.gain(cost);
-            if gain > 0.0 && most.as_ref().is_none_or(|(other, _)| gain.total_cmp(other).is_ge()) {
-                most = Some((gain, rival));
+            let improvement =
+                put(&mut kinds, place, shape, |kinds| baseline.improvement(kinds, self.free, self.keep_on));
+            let gain = improvement.gain(cost);
+            if gain > 0.0 && gain >= most.gain {
+                (most.gain, most.score) = (gain, improvement.score());
+                most.kinds.clone_from(baseline.tried());
             }
         }
-        Ok(most.map(|(_, rival)| rival))
+        Ok(())
     }
 
     fn go_on(&mut self) -> Result<(), Stopped> {
@@ -235,21 +260,37 @@ impl Search<'_> {
     }
 }
 
-/// The model with one term more; `None` where it has one that would be the same.
-fn with(kinds: &[Kind], candidate: &Kind) -> Option<Vec<Kind, MAX_TERMS>> {
-    let mut with: Vec<Kind, MAX_TERMS> = kinds.iter().copied().collect();
+impl Best {
+    const NONE: Self = Self { kinds: Vec::new(), gain: 0.0, score: 0.0 };
+}
+
+/// Where a candidate belongs among the terms of a model; `None` if that has one that would be the same.
+fn place(kinds: &[Kind], candidate: &Kind) -> Option<usize> {
     let is_filter = |kind: &Kind| matches!(kind, Kind::Filtered(_));
     if kinds.contains(candidate) || (is_filter(candidate) && kinds.iter().any(is_filter)) {
         return None;
     }
     // Read slowly, what is left of a filter cannot be told from a mixture with white noise: it takes its place.
     if matches!(candidate, Kind::Filtered(filter) if filter.decimation != 1.0) {
-        let white = with.iter_mut().find(|kind| **kind == Kind::AngleRandomWalk)?;
-        *white = *candidate;
-        return Some(with);
+        return kinds.iter().position(|kind| *kind == Kind::AngleRandomWalk);
     }
-    with.push(*candidate).ok()?;
-    Some(with)
+    (kinds.len() < MAX_TERMS).then_some(kinds.len())
+}
+
+/// What `work` makes of the terms while a candidate is in its place.
+fn put<T>(kinds: &mut Vec<Kind, MAX_TERMS>, place: usize, candidate: Kind, work: impl FnOnce(&[Kind]) -> T) -> T {
+    let old = kinds.get(place).copied();
+    match old {
+        Some(_) => kinds[place] = candidate,
+        // There is room: it has a place.
+        None => _ = kinds.push(candidate),
+    }
+    let done = work(kinds);
+    match old {
+        Some(old) => kinds[place] = old,
+        None => _ = kinds.pop(),
+    }
+    done
 }
 
 fn largest_residual<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Residual {

@@ -12,8 +12,6 @@ pub mod draw;
 pub mod examine;
 pub mod kind;
 pub mod limit;
-mod place;
-mod shape;
 mod size;
 pub mod table;
 mod truth;

@@ -18,18 +18,19 @@ pub struct Goodness {
 /// The deviance is a sum of squares of correlated normal residuals from which the fit has taken the directions of its
 /// parameters. Its law is that of a scaled χ² with the same mean and variance (F. Satterthwaite, Biometrics 2, 1946).
 pub(super) fn judge<const POINTS: usize>(points: &Points<POINTS>, problem: &mut Problem<POINTS>) -> Goodness {
-    let deviance = problem.deviance(points);
+    let deviance = f64::from(problem.deviance(points));
     let count = problem.orthonormal(points);
     let (mean, square) = traces(&points.measured, &problem.columns[..count]);
+    let (mean, square) = (f64::from(mean), f64::from(square));
     let dof = mean * mean / square;
-    let p_value = if mean > 1e-9 { chi_square::upper_tail(deviance * mean / square, dof) } else { 1.0 };
+    let p_value = if mean > 1e-5 { chi_square::upper_tail(deviance * mean / square, dof) } else { 1.0 };
     Goodness { deviance, p_value }
 }
 
 /// The traces of `PR` and of its square, with the correlations `R` and the projection `P = 1 − Σ ddᵀ` that leaves the
 /// directions `d` out: `tr R − Σ dᵀRd` and `tr R² − 2 Σ |Rd|² + Σ (dᵀRe)²`.
 #[inline(never)]
-fn traces<const POINTS: usize>(measured: &[Measured], directions: &[[f64; POINTS]]) -> (f64, f64) {
+fn traces<const POINTS: usize>(measured: &[Measured], directions: &[[f32; POINTS]]) -> (f32, f32) {
     let (mut mean, mut square) = (0.0, 0.0);
     let mut between = [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS];
     for (i, a) in measured.iter().enumerate() {
@@ -43,11 +44,11 @@ fn traces<const POINTS: usize>(measured: &[Measured], directions: &[[f64; POINTS
         for (row, direction) in between.iter_mut().zip(directions) {
             row.iter_mut().zip(turned).for_each(|(entry, turned)| *entry += direction[i] * turned);
         }
-        square -= 2.0 * turned.iter().map(|entry| entry * entry).sum::<f64>();
+        square -= 2.0 * turned.iter().map(|entry| entry * entry).sum::<f32>();
     }
     for (i, row) in between.iter().enumerate() {
         mean -= row[i];
-        square += row.iter().map(|entry| entry * entry).sum::<f64>();
+        square += row.iter().map(|entry| entry * entry).sum::<f32>();
     }
     (mean, square)
 }

@@ -2,101 +2,108 @@
 
 use super::parameter::take_away;
 use super::points::Points;
-use super::problem::Problem;
+use super::problem::{MAX_PARAMETERS, Problem};
 use super::shape::{self, Free};
-use crate::math::{ln, sqrt};
+use crate::math::{lnf, sqrtf};
 use crate::model::{MAX_TERMS, Model};
 use crate::{Curve, Kind};
 use heapless::Vec;
 
 /// A fitted model, ready to be compared with others at the weights that it gives to the points.
-pub(crate) struct Baseline<const POINTS: usize> {
-    points: Points<POINTS>,
-    deviance: f64,
-    modelled: [f64; POINTS],
+pub(crate) struct Baseline<'a, const POINTS: usize> {
+    points: Points<'a, POINTS>,
+    deviance: f32,
+    modelled: [f32; POINTS],
     /// What its own parameters can explain: this many orthonormal columns.
     directions: usize,
-    explained: Problem<POINTS>,
+    explained: [[f32; POINTS]; MAX_PARAMETERS],
+    /// The terms that are tried.
+    tried: Problem<POINTS>,
 }
 
-/// Another set of terms beside a baseline.
-#[derive(Debug, Clone)]
-pub(crate) struct Rival {
-    pub(crate) kinds: Vec<Kind, MAX_TERMS>,
+/// What another set of terms does better.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Improvement {
     /// How much lower its deviance is.
-    pub(crate) fall: f64,
+    fall: f32,
     /// What the deviance falls by without a cause, on average for each parameter: points that are correlated move
     /// together.
-    pub(crate) scatter: f64,
+    scatter: f32,
 }
 
-impl Rival {
+impl Improvement {
     /// Fall of the deviance in units of its scatter: without a cause it is χ² with one degree of freedom.
     pub(crate) fn score(&self) -> f64 {
-        self.fall / self.scatter
+        f64::from(self.fall / self.scatter)
     }
 
     /// What is left of the fall when everything that is to be earned, in units of the scatter, is paid.
-    pub(crate) fn gain(&self, cost: f64) -> f64 {
+    pub(crate) fn gain(&self, cost: f32) -> f32 {
         self.fall - cost * self.scatter
     }
 }
 
-impl<const POINTS: usize> Baseline<POINTS> {
+impl<'a, const POINTS: usize> Baseline<'a, POINTS> {
     /// Of nothing yet: filled where it stands, being too large to be handed about on a small stack.
     #[inline(always)]
-    pub(crate) const fn empty() -> Self {
+    pub(crate) const fn empty(curve: &'a Curve<POINTS>) -> Self {
         Self {
-            points: Points::empty(),
+            points: Points::empty(curve),
             deviance: 0.0,
             modelled: [0.0; POINTS],
             directions: 0,
-            explained: Problem::empty(),
+            explained: [[0.0; POINTS]; MAX_PARAMETERS],
+            tried: Problem::empty(),
         }
     }
 
     #[inline(never)]
-    pub(crate) fn take(&mut self, curve: &Curve<POINTS>, model: &Model) {
-        let Self { points, deviance, modelled, directions, explained } = self;
-        points.take(curve);
-        explained.take_model(points, curve, model);
-        *deviance = explained.minimise(points);
-        modelled.iter_mut().enumerate().for_each(|(at, entry)| *entry = explained.modelled(at, &explained.squares));
-        *directions = explained.orthonormal(points);
+    pub(crate) fn take(&mut self, model: &Model) {
+        let Self { points, deviance, modelled, directions, explained, tried } = self;
+        points.take();
+        tried.take_model(points, model);
+        *deviance = tried.minimise(points);
+        modelled.iter_mut().enumerate().for_each(|(at, entry)| *entry = tried.modelled(at, &tried.amounts));
+        *directions = tried.orthonormal(points);
+        *explained = tried.columns;
+        // Its columns are used up.
+        tried.kinds.clear();
     }
 
     /// How much lower the deviance of `kinds` is with the best coefficients.
     #[inline(never)]
-    pub(crate) fn fall(&self, kinds: &[Kind]) -> f64 {
-        let mut problem = Problem::empty();
-        problem.take(&self.points, kinds);
-        self.deviance - problem.minimise(&self.points)
+    pub(crate) fn fall(&mut self, kinds: &[Kind]) -> f32 {
+        self.tried.take(&self.points, kinds);
+        self.deviance - self.tried.minimise(&self.points)
     }
 
-    /// Fits the coefficients of `kinds` and the shapes of those that are `free`.
+    /// What `kinds` do better with the best coefficients, and the best shapes of those that are `free`.
     #[inline(never)]
-    pub(crate) fn shaped_rival(&self, kinds: &[Kind], free: Free, keep_on: &mut dyn FnMut() -> bool) -> Rival {
-        let mut problem = Problem::empty();
-        problem.take(&self.points, kinds);
-        shape::search(&self.points, &mut problem, free, keep_on);
-        let deviance = problem.minimise(&self.points);
-        self.compared(&problem, deviance)
+    pub(crate) fn improvement(&mut self, kinds: &[Kind], free: Free, keep_on: &mut dyn FnMut() -> bool) -> Improvement {
+        self.tried.take(&self.points, kinds);
+        let deviance = shape::search(&self.points, &mut self.tried, free, keep_on);
+        self.compared(deviance)
+    }
+
+    /// The terms that were tried last, in the shapes that were found.
+    pub(crate) fn tried(&self) -> &Vec<Kind, MAX_TERMS> {
+        &self.tried.kinds
     }
 
     /// The variance of the residual along the change of the model says what chance would gain.
-    fn compared(&self, rival: &Problem<POINTS>, deviance: f64) -> Rival {
+    fn compared(&self, deviance: f32) -> Improvement {
         let mut change = [0.0; POINTS];
         for (at, (entry, point)) in change.iter_mut().zip(&self.points.measured).enumerate() {
-            let ratio = rival.modelled(at, &rival.squares) / self.modelled[at];
-            *entry = sqrt(point.edf / 2.0) * ln(ratio);
+            let ratio = self.tried.modelled(at, &self.tried.amounts) / self.modelled[at];
+            *entry = sqrtf(point.edf / 2.0) * lnf(ratio);
         }
-        for known in &self.explained.columns[..self.directions] {
+        for known in &self.explained[..self.directions] {
             take_away(&mut change, known);
         }
-        let length: f64 = change.iter().map(|entry| entry * entry).sum();
+        let length: f32 = change.iter().map(|entry| entry * entry).sum();
         let [variance] = self.points.variances([&change]);
         let scatter = variance / length;
         let fall = if length > 0.0 { self.deviance - deviance } else { 0.0 };
-        Rival { kinds: rival.kinds.clone(), fall, scatter: scatter.max(1.0) }
+        Improvement { fall, scatter: scatter.max(1.0) }
     }
 }

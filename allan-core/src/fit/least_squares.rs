@@ -1,45 +1,77 @@
 //! Non-negative least squares of a few unknowns, from the normal equations.
+//!
+//! Symmetric matrices are packed: of `N` unknowns the lower triangle, row by row.
 
 use crate::math::sqrt;
 
-pub(crate) type Vector<const N: usize> = [f64; N];
-pub(crate) type Matrix<const N: usize> = [[f64; N]; N];
+/// Unknowns of the largest system.
+pub(crate) const MOST: usize = 12;
 
-/// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns.
-///
-/// The active-set method of C. Lawson and R. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
-pub(crate) fn non_negative<const N: usize>(a: &Matrix<N>, b: &Vector<N>, count: usize) -> Vector<N> {
-    let mut x = [0.0; N];
-    let (mut free, mut refused) = (0_usize, 0_usize);
-    // Each round lowers the objective, so no set of free unknowns comes twice; rounding could make it seem so.
-    for _ in 0..4 * N {
-        let pull = |i: usize| (b[i] - dot(&a[i], &x)) / sqrt(a[i][i]);
-        let candidates = (0..count).filter(|i| (free | refused) >> i & 1 == 0 && a[*i][*i] > 0.0);
-        let Some(entering) = candidates.max_by(|&i, &j| pull(i).total_cmp(&pull(j))) else { break };
-        if pull(entering) <= 1e-12 * sqrt(b[entering] * b[entering] / a[entering][entering]) {
-            break;
-        }
-        let Some((next, set)) = settle(a, b, &x, free | 1 << entering) else {
-            refused |= 1 << entering;
-            continue;
-        };
-        if next[entering] <= 0.0 {
-            refused |= 1 << entering;
-        }
-        (x, free) = (next, set);
-    }
-    x
+/// Entries of a packed triangle.
+pub(crate) const fn triangle(unknowns: usize) -> usize {
+    unknowns * (unknowns + 1) / 2
 }
 
-/// Goes from `x` towards the minimum over the unknowns in `free`, and frees fewer whenever one would turn negative.
-fn settle<const N: usize>(a: &Matrix<N>, b: &Vector<N>, x: &Vector<N>, mut free: usize) -> Option<(Vector<N>, usize)> {
-    let mut x = *x;
+/// Where a packed triangle has an entry.
+pub(crate) const fn entry(i: usize, j: usize) -> usize {
+    if i < j { triangle(j) + i } else { triangle(i) + j }
+}
+
+/// A pull towards a positive value, or a part of a column that the others do not explain, that rounding could show too,
+/// relative to the whole.
+const ROUNDING: f64 = 1e-12;
+
+/// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns, from the `x ≥ 0` that is given on.
+///
+/// The active-set method of C. Lawson and R. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
+pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
+    a: &[f64; TRIANGLE],
+    b: &[f64; N],
+    count: usize,
+    x: &mut [f64; N],
+) {
+    let mut free = (0..count).filter(|&i| x[i] > 0.0).fold(0, |free, i| free | 1 << i);
+    let mut refused = 0_usize;
+    match settle(a, b, x, free) {
+        Some(set) => free = set,
+        None => (*x, free) = ([0.0; N], 0),
+    }
+    // Each round lowers the objective, so no set of free unknowns comes twice; rounding could make it seem so.
+    for _ in 0..4 * N {
+        let along = |i: usize| (0..count).map(|j| a[entry(i, j)] * x[j]).sum::<f64>();
+        let pull = |i: usize| (b[i] - along(i)) / sqrt(a[entry(i, i)]);
+        let candidates = (0..count).filter(|&i| (free | refused) >> i & 1 == 0 && a[entry(i, i)] > 0.0);
+        let Some(entering) = candidates.max_by(|&i, &j| pull(i).total_cmp(&pull(j))) else { break };
+        if pull(entering) <= ROUNDING * b[entering] / sqrt(a[entry(entering, entering)]) {
+            break;
+        }
+        let before = *x;
+        match settle(a, b, x, free | 1 << entering) {
+            Some(set) => free = set,
+            None => *x = before,
+        }
+        if x[entering] <= 0.0 {
+            refused |= 1 << entering;
+        }
+    }
+}
+
+/// Goes from `x` towards the minimum over the unknowns in `free`, and frees fewer whenever one would turn negative: those
+/// that are left. `None` if it is singular.
+fn settle<const N: usize, const TRIANGLE: usize>(
+    a: &[f64; TRIANGLE],
+    b: &[f64; N],
+    x: &mut [f64; N],
+    mut free: usize,
+) -> Option<usize> {
     while free != 0 {
-        let target = solve(a, b, free)?;
+        let (mut used, mut target) = (*a, *b);
+        solve(&mut used, &mut target, free)?;
         let blocking = |i: &usize| free >> i & 1 == 1 && target[*i] <= 0.0;
         let reach = |i: usize| if x[i] > target[i] { x[i] / (x[i] - target[i]) } else { 0.0 };
         let Some(first) = (0..N).filter(blocking).min_by(|&i, &j| reach(i).total_cmp(&reach(j))) else {
-            return Some((target, free));
+            *x = target;
+            break;
         };
         let step = reach(first);
         for (i, entry) in x.iter_mut().enumerate().filter(|(i, _)| free >> i & 1 == 1) {
@@ -48,50 +80,42 @@ fn settle<const N: usize>(a: &Matrix<N>, b: &Vector<N>, x: &Vector<N>, mut free:
         x[first] = 0.0;
         free &= !(1 << first);
     }
-    Some((x, free))
+    Some(free)
 }
 
-pub(crate) fn dot<const N: usize>(a: &Vector<N>, b: &Vector<N>) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Solves `Ax = b` for the unknowns in the bit set, the others being 0.
-pub(crate) fn solve<const N: usize>(a: &Matrix<N>, b: &Vector<N>, set: usize) -> Option<Vector<N>> {
-    let (mut a, mut x) = (*a, [0.0; N]);
-    (0..N).filter(|i| set >> i & 1 == 1).for_each(|i| x[i] = b[i]);
-    solve_in_place(&mut a, &mut x, set)?;
-    Some(x)
-}
-
-/// The same where they stand: `x` is `b` before. Of `a` the lower triangle is looked at, and used up.
+/// Solves `Ax = b` of up to [`MOST`] unknowns for those in the bit set, the others being 0. `x` is `b` before; `a` is
+/// used up.
 ///
-/// By Cholesky's decomposition of the matrix scaled to a unit diagonal (the terms' squares differ by many orders of
-/// magnitude).
-pub(crate) fn solve_in_place<const N: usize>(a: &mut Matrix<N>, x: &mut Vector<N>, set: usize) -> Option<()> {
+/// By Cholesky's decomposition of the matrix scaled to a unit diagonal: unknowns may differ by orders of magnitude.
+/// `None` if it is singular.
+#[inline(never)] // one for all sizes
+pub(crate) fn solve(a: &mut [f64], x: &mut [f64], set: usize) -> Option<()> {
     let chosen = |i: &usize| set >> i & 1 == 1;
-    let mut scale = [0.0; N];
-    (0..N).for_each(|i| scale[i] = sqrt(a[i][i]));
-    for i in (0..N).filter(chosen) {
+    let count = x.len();
+    let mut scale = [0.0; MOST];
+    for i in 0..count {
+        scale[i] = 1.0 / sqrt(a[entry(i, i)]);
+        x[i] = if chosen(&i) { x[i] * scale[i] } else { 0.0 };
+    }
+    for i in (0..count).filter(chosen) {
         for j in (0..=i).filter(chosen) {
-            let known: f64 = (0..j).filter(chosen).map(|k| a[i][k] * a[j][k]).sum();
-            let rest = a[i][j] / (scale[i] * scale[j]) - known;
+            let known: f64 = (0..j).filter(chosen).map(|k| a[entry(i, k)] * a[entry(j, k)]).sum();
+            let rest = a[entry(i, j)] * scale[i] * scale[j] - known;
             if i != j {
-                a[i][j] = rest / a[j][j];
-            } else if rest > 1e-12 {
-                a[i][i] = sqrt(rest);
+                a[entry(i, j)] = rest / a[entry(j, j)];
+            } else if rest > ROUNDING {
+                a[entry(i, i)] = sqrt(rest);
             } else {
                 return None; // singular, or not a number
             }
         }
-        let known: f64 = (0..i).filter(chosen).map(|k| a[i][k] * x[k]).sum();
-        x[i] = (x[i] / scale[i] - known) / a[i][i];
+        let known: f64 = (0..i).filter(chosen).map(|k| a[entry(i, k)] * x[k]).sum();
+        x[i] = (x[i] - known) / a[entry(i, i)];
     }
-    for i in (0..N).rev().filter(chosen) {
-        let known: f64 = (i + 1..N).filter(chosen).map(|k| a[k][i] * x[k]).sum();
-        x[i] = (x[i] - known) / a[i][i];
+    for i in (0..count).rev().filter(chosen) {
+        let known: f64 = (i + 1..count).filter(chosen).map(|k| a[entry(k, i)] * x[k]).sum();
+        x[i] = (x[i] - known) / a[entry(i, i)];
     }
-    for (i, entry) in x.iter_mut().enumerate().filter(|(i, _)| chosen(i)) {
-        *entry /= scale[i];
-    }
+    x.iter_mut().zip(scale).enumerate().filter(|(i, _)| chosen(i)).for_each(|(_, (x, scale))| *x *= scale);
     Some(())
 }

@@ -2,18 +2,20 @@
 
 use super::points::Points;
 use super::problem::{MAX_PARAMETERS, Problem};
-use crate::math::sqrt;
+use crate::math::sqrtf;
 use crate::model::MAX_SHAPE;
 use heapless::Vec;
 
 /// Relative step of the numerical derivative to a shape's parameter.
 const STEP: f64 = 1e-3;
+/// Part of a direction beyond the others that rounding could have made.
+const ROUNDING: f32 = 1e-4;
 
 /// What a column of derivatives belongs to.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Parameter {
-    /// The square of the coefficient of a term.
-    Square(usize),
+    /// The amount of a term.
+    Amount(usize),
     /// The logarithm of a parameter of a term's shape.
     Shape(usize, usize),
 }
@@ -22,17 +24,18 @@ impl<const POINTS: usize> Problem<POINTS> {
     /// Every coefficient, and the shape of every term that is there; sets their columns.
     #[inline(never)]
     pub(super) fn differentiate(&mut self, points: &Points<POINTS>) -> Vec<Parameter, MAX_PARAMETERS> {
-        let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Square).collect();
-        for (term, kind) in self.kinds.iter().enumerate().filter(|(term, _)| self.squares[*term] > 0.0) {
+        let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
+        for (term, kind) in self.kinds.iter().enumerate().filter(|(term, _)| self.amounts[*term] > 0.0) {
+            let square = self.square(term);
             for index in kind.freedom() {
                 let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
-                for (entry, point) in column.iter_mut().zip(&points.measured) {
+                for (entry, point) in column.iter_mut().zip(points.all()) {
                     let at = |factor: f64| {
                         let mut shape: [f64; MAX_SHAPE] = kind.shape().map(|(_, value)| value);
                         shape[index] *= factor;
-                        kind.with_shape(shape).avar(point.n, points.sample_period)
+                        kind.with_shape(shape).avar(point.n, points.curve.sample_period())
                     };
-                    *entry = self.squares[term] * (at(1.0 + STEP) - at(1.0 - STEP)) / (2.0 * STEP);
+                    *entry = (square * (at(1.0 + STEP) - at(1.0 - STEP)) / (2.0 * STEP) / point.avar) as f32;
                 }
                 // There was a column for it.
                 let _ = parameters.push(Parameter::Shape(term, index));
@@ -47,10 +50,10 @@ impl<const POINTS: usize> Problem<POINTS> {
         let parameters = self.differentiate(points);
         let mut scale = [0.0; POINTS];
         for (at, (scale, point)) in scale.iter_mut().zip(&points.measured).enumerate() {
-            *scale = sqrt(point.edf / 2.0) / self.modelled(at, &self.squares);
+            *scale = sqrtf(point.edf / 2.0) / self.modelled(at, &self.amounts);
         }
         let there = |parameter: &Parameter| match *parameter {
-            Parameter::Square(term) | Parameter::Shape(term, _) => self.squares[term] > 0.0,
+            Parameter::Amount(term) | Parameter::Shape(term, _) => self.amounts[term] > 0.0,
         };
         let mut count = 0;
         for column in (0..parameters.len()).filter(|&column| there(&parameters[column])) {
@@ -64,7 +67,7 @@ impl<const POINTS: usize> Problem<POINTS> {
             for known in known.iter().take(count) {
                 take_away(direction, known);
             }
-            if normalise(direction, 1e-9) {
+            if normalise(direction, ROUNDING) {
                 self.columns.swap(count, column);
                 count += 1;
             }
@@ -74,14 +77,14 @@ impl<const POINTS: usize> Problem<POINTS> {
 }
 
 /// Makes the length 1 if it is above `least`.
-fn normalise(direction: &mut [f64], least: f64) -> bool {
-    let length = sqrt(direction.iter().map(|entry| entry * entry).sum());
+fn normalise(direction: &mut [f32], least: f32) -> bool {
+    let length = sqrtf(direction.iter().map(|entry| entry * entry).sum());
     direction.iter_mut().for_each(|entry| *entry /= length);
     length > least
 }
 
 /// Takes from a vector what it has along a direction of length 1.
-pub(super) fn take_away(vector: &mut [f64], direction: &[f64]) {
-    let along: f64 = vector.iter().zip(direction).map(|(a, b)| a * b).sum();
+pub(super) fn take_away(vector: &mut [f32], direction: &[f32]) {
+    let along: f32 = vector.iter().zip(direction).map(|(a, b)| a * b).sum();
     vector.iter_mut().zip(direction).for_each(|(entry, known)| *entry -= along * known);
 }

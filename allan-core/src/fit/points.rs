@@ -1,59 +1,70 @@
 //! The points of a curve, and what each is worth under a model.
 
-use crate::confidence::{Shares, octave_correlation};
-use crate::math::{abs, log2, sqrt};
-use crate::model::{FlickerCovariances, Model};
+use crate::confidence::{Shares, pure_octave_correlation, roots};
+use crate::math::{absf, log2, sqrtf};
+use crate::model::freedom::Flicker;
 use crate::{Curve, Point};
 use heapless::Vec;
 
-/// A measured point with what is known of it before the coefficients are.
+/// What is known of a measured point beside the point itself, and what it is worth.
 pub(super) struct Measured {
-    pub(super) n: u64,
-    pub(super) avar: f64,
-    pub(super) edf: f64,
-    /// Without the memory of narrow terms, which all points share.
-    near_edf: f64,
-    octave: f64,
-    shares: Shares,
+    /// Where it stands in the curve.
+    at: u16,
+    octave: f32,
+    pub(super) edf: f32,
+    /// Part of the scatter that is not the memory of narrow terms, which all points share.
+    near: f32,
+    /// [`roots`] of the shares of the noises.
+    roots: [f32; 3],
 }
 
-/// The points with a positive variance.
-pub(super) struct Points<const POINTS: usize> {
-    pub(super) sample_period: f64,
+/// The points of a curve with a positive variance.
+pub(super) struct Points<'a, const POINTS: usize> {
+    pub(super) curve: &'a Curve<POINTS>,
     pub(super) measured: Vec<Measured, POINTS>,
+    pub(super) flicker: Flicker,
 }
 
-impl<const POINTS: usize> Points<POINTS> {
-    /// None yet.
+impl<'a, const POINTS: usize> Points<'a, POINTS> {
+    /// None yet. Filled where it stands: it is too large to be handed about on a small stack.
     #[inline(always)]
-    pub(super) const fn empty() -> Self {
-        Self { sample_period: 0.0, measured: Vec::new() }
+    pub(super) const fn empty(curve: &'a Curve<POINTS>) -> Self {
+        Self { curve, measured: Vec::new(), flicker: Flicker::NONE }
     }
 
-    /// Takes those of a curve, weighed by the noise that the curve itself names.
-    pub(super) fn take(&mut self, curve: &Curve<POINTS>) {
-        self.sample_period = curve.sample_period();
-        self.measured.extend(positive(curve).map(|point| Measured {
-            n: point.n,
-            avar: point.avar,
-            edf: point.edf,
-            near_edf: point.edf,
-            octave: log2(point.n as f64),
-            shares: Shares::WHITE,
+    /// Takes those of the curve, weighed by the noise that it names itself.
+    pub(super) fn take(&mut self) {
+        self.flicker.take(self.curve.points().last().map_or(1, |point| point.overlap));
+        let positive = self.curve.points().iter().enumerate().filter(|(_, point)| point.avar > 0.0);
+        self.measured.extend(positive.map(|(at, point)| Measured {
+            at: at as u16,
+            octave: log2(point.n as f64) as f32,
+            edf: point.edf as f32,
+            near: 1.0,
+            roots: roots(Shares::WHITE).map(|root| root as f32),
         }));
     }
 
-    /// Takes the degrees of freedom from the mixture of noises that `model` says.
-    pub(super) fn weigh(&mut self, curve: &Curve<POINTS>, model: &Model) {
-        let flicker = FlickerCovariances::new(curve.points().last().map_or(1, |point| point.overlap));
-        for (measured, point) in self.measured.iter_mut().zip(positive(curve)) {
-            measured.shares = model.shares(point.n);
-            (measured.edf, measured.near_edf) = model.degrees_of_freedom(point, &flicker);
-        }
+    /// What was measured.
+    pub(super) fn point(&self, at: usize) -> &Point {
+        &self.curve.points()[usize::from(self.measured[at].at)]
+    }
+
+    /// Every [`Point`] in turn.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Point> {
+        (0..self.measured.len()).map(|at| self.point(at))
+    }
+
+    /// Takes degrees of freedom, all and those that forget, and the shares of the noises for those of a point.
+    pub(super) fn set(&mut self, at: usize, (edf, near_edf): (f64, f64), shares: Shares) {
+        let measured = &mut self.measured[at];
+        measured.edf = edf as f32;
+        measured.near = (edf / near_edf) as f32;
+        measured.roots = roots(shares).map(|root| root as f32);
     }
 
     /// Variances of `Σ weights·residual`, of residuals in their standard deviations.
-    pub(super) fn variances<const SUMS: usize>(&self, weights: [&[f64; POINTS]; SUMS]) -> [f64; SUMS] {
+    pub(super) fn variances<const SUMS: usize>(&self, weights: [&[f32; POINTS]; SUMS]) -> [f32; SUMS] {
         let mut variances = [0.0; SUMS];
         for (i, a) in self.measured.iter().enumerate() {
             for (j, b) in self.measured.iter().enumerate().take(i + 1) {
@@ -66,13 +77,9 @@ impl<const POINTS: usize> Points<POINTS> {
 }
 
 /// Correlation of the errors of two points. What narrow terms remember raises and lowers all points together.
-pub(super) fn correlation(a: &Measured, b: &Measured) -> f64 {
-    let octaves = abs(a.octave - b.octave);
-    let (near_a, near_b) = (a.edf / a.near_edf, b.edf / b.near_edf);
-    sqrt(near_a * near_b) * octave_correlation((octaves + 0.5) as usize, a.shares, b.shares)
-        + sqrt((1.0 - near_a).max(0.0) * (1.0 - near_b).max(0.0))
-}
-
-fn positive<const POINTS: usize>(curve: &Curve<POINTS>) -> impl Iterator<Item = &Point> {
-    curve.points().iter().filter(|point| point.avar > 0.0)
+pub(super) fn correlation(a: &Measured, b: &Measured) -> f32 {
+    let octaves = (absf(a.octave - b.octave) + 0.5) as usize;
+    let of = |noise: usize| a.roots[noise] * b.roots[noise] * pure_octave_correlation(octaves, noise) as f32;
+    let near: f32 = (0..3).map(of).sum();
+    sqrtf(a.near * b.near) * near + sqrtf((1.0 - a.near).max(0.0) * (1.0 - b.near).max(0.0))
 }

@@ -80,8 +80,8 @@ impl<T: Decaying> Process for T {
         avar(self.rate(sample_period), n as f64)
     }
 
-    fn covariance(&self, lag: f64, n: u64, sample_period: f64) -> f64 {
-        covariance(self.rate(sample_period), lag, n as f64)
+    fn structures(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
+        structures(self.rate(sample_period), stride, table);
     }
 
     fn memory_beyond(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
@@ -120,21 +120,26 @@ fn slow_avar(rate: Complex, n: f64) -> f64 {
     sum.re
 }
 
-/// Half the covariance of second differences of averages over `n` samples.
-///
-/// Once the differences do not overlap, `−Re[z^(lag−2n+1)·(1−zⁿ)⁴/(1−z)²]` is left of it.
-fn covariance(rate: Complex, lag: f64, n: f64) -> f64 {
-    // Much slower than the differences it is a random walk to them, and the sums below would cancel.
-    let re = if (rate * n).magnitude() < 1e-3 { 1e-3 / n } else { rate.re };
-    let clipped = Complex { re, im: rate.im };
-    let scale = avar(rate, n);
-    if lag >= 2.0 * n {
-        let far = memory(clipped, n) * (clipped * (lag - 2.0 * n)).decay();
-        return scale / avar(clipped, n) * far.re;
+/// Structures of 0, 1, 2 … strides, the power of `z` following from stride to stride as `1 − zᵃ⁺ᵇ = u + v − uv`.
+fn structures(rate: Complex, stride: f64, table: &mut [f64]) {
+    if (rate * stride).magnitude() * (table.len() as f64) < 1e-3 {
+        // So slow it is a random walk to them, and the sums below would cancel.
+        for (k, structure) in table.iter_mut().enumerate() {
+            let m = k as f64 * stride;
+            *structure = m - m * m * m;
+        }
+        return;
     }
-    let v = |m: f64| structure(clipped, crate::math::abs(m));
-    let fourth = 6.0 * v(lag) - 4.0 * (v(lag - n) + v(lag + n)) + v(lag - 2.0 * n) + v(lag + 2.0 * n);
-    -fourth / (4.0 * n * n) * scale / avar(clipped, n)
+    let one_minus_z = rate.one_minus_exp();
+    let z = Complex::ONE - one_minus_z;
+    let line = (Complex::ONE + z) / one_minus_z;
+    let bend = z / (one_minus_z * one_minus_z) * 2.0;
+    let step = (rate * stride).one_minus_exp();
+    let mut one_minus_power = Complex { re: 0.0, im: 0.0 };
+    for (k, structure) in table.iter_mut().enumerate() {
+        *structure = (line * (k as f64 * stride) - bend * one_minus_power).re;
+        one_minus_power = one_minus_power + step - one_minus_power * step;
+    }
 }
 
 /// What the covariance at a lag of `2n` is the real part of; from there on it turns and decays as `z^lag`.

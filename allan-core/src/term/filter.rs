@@ -55,19 +55,18 @@ impl Filter {
         let taps = i64::from(self.taps);
         let boxes = 2 * i64::from(self.stages);
         let position = boxes / 2 * (taps - 1) - j.abs();
-        let (mut sum, mut sign_choose) = (0.0, 1.0);
+        let (mut sum, mut sign_choose) = (0, 1);
         for i in 0..=boxes {
             let k = position - i * taps;
             if k < 0 {
                 break;
             }
             // C(k + boxes − 1, boxes − 1)
-            let binomial: f64 = (1..boxes).map(|b| (k + b) as f64 / b as f64).product();
-            sum += sign_choose * binomial;
-            sign_choose *= -((boxes - i) as f64) / (i + 1) as f64;
+            sum += sign_choose * if boxes == 2 { k + 1 } else { (k + 1) * (k + 2) * (k + 3) / 6 };
+            sign_choose = -sign_choose * (boxes - i) / (i + 1);
         }
         let area = taps as f64;
-        sum / (if self.stages == 1 { area * area } else { area * area * area * area })
+        sum as f64 / (if boxes == 2 { area * area } else { area * area * area * area })
     }
 
     /// The sum over all lags, which makes the coefficient that of low frequencies.

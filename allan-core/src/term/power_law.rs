@@ -56,10 +56,6 @@ impl Process for AngleRandomWalk {
     fn avar(&self, n: u64, sample_period: f64) -> f64 {
         1.0 / (n as f64 * sample_period)
     }
-
-    fn covariance(&self, lag: f64, n: u64, sample_period: f64) -> f64 {
-        -fourth_difference_of_the_modulus(lag / n as f64) / (4.0 * n as f64 * sample_period)
-    }
 }
 
 impl Process for BiasInstability {
@@ -105,30 +101,6 @@ impl Process for RateRandomWalk {
         let n = n as f64;
         sample_period * (2.0 * n * n + 1.0) / (6.0 * n)
     }
-
-    fn covariance(&self, lag: f64, n: u64, sample_period: f64) -> f64 {
-        let n = n as f64;
-        let x = lag / n;
-        sample_period / 24.0 * (n * fourth_difference_of_the_cube(x) - fourth_difference_of_the_modulus(x) / n)
-    }
-}
-
-/// `6|x| − 4(|x−1| + |x+1|) + |x−2| + |x+2|` for `x ≥ 0`.
-fn fourth_difference_of_the_modulus(x: f64) -> f64 {
-    match x {
-        near if near < 1.0 => 6.0 * near - 4.0,
-        far if far < 2.0 => 4.0 - 2.0 * far,
-        _ => 0.0,
-    }
-}
-
-/// The same of `|x|³`.
-fn fourth_difference_of_the_cube(x: f64) -> f64 {
-    match x {
-        near if near < 1.0 => (6.0 * near - 12.0) * near * near + 8.0,
-        far if far < 2.0 => 2.0 * (2.0 - far) * (2.0 - far) * (2.0 - far),
-        _ => 0.0,
-    }
 }
 
 impl Process for RateRamp {
@@ -147,9 +119,5 @@ impl Process for RateRamp {
     fn avar(&self, n: u64, sample_period: f64) -> f64 {
         let tau = n as f64 * sample_period;
         tau * tau / 2.0
-    }
-
-    fn covariance(&self, _lag: f64, n: u64, sample_period: f64) -> f64 {
-        self.avar(n, sample_period)
     }
 }

@@ -1,7 +1,7 @@
 //! A pure line.
 
 use super::Process;
-use crate::math::{cos, sin};
+use crate::math::sin;
 use core::f64::consts::PI;
 
 /// A sinusoid of amplitude 1: `σ² = sin⁴(πf·n·dt)/(n²·sin²(πf·dt))`.
@@ -33,9 +33,5 @@ impl Process for Sinusoid {
         let ratio = sin(half * n as f64);
         let ratio = ratio * ratio / (n as f64 * sin(half));
         ratio * ratio
-    }
-
-    fn covariance(&self, lag: f64, n: u64, sample_period: f64) -> f64 {
-        self.avar(n, sample_period) * cos(2.0 * PI * self.frequency * sample_period * lag)
     }
 }

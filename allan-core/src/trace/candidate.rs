@@ -23,6 +23,11 @@ pub(super) enum Family {
 }
 
 impl Family {
+    /// Whether it stands for a term that is there already: in the wrong shape, however near, it is much worse.
+    pub(super) fn takes_a_place(self) -> bool {
+        matches!(self, Self::SlowlyReadFilter)
+    }
+
     /// Parameters that it adds to the model.
     pub(super) fn parameters(self) -> u32 {
         match self {

@@ -62,10 +62,10 @@ fn a_cortex_m0_plus() {
 /// Name, instructions, and a bound on the bytes of stack, an interrupt's included. A tone is found together with the
 /// terms that its distance from a sinusoid asks for: about the longest that a trace takes.
 const FITS: [(&str, f64, f64); 4] = [
-    ("fit", 47.1e6, 10_000.0),
-    ("goodness", 4.4e6, 8_000.0),
-    ("trace_nothing", 576e6, 20_000.0),
-    ("trace_tone", 22.1e9, 22_000.0),
+    ("fit", 30.1e6, 6_200.0),
+    ("goodness", 2.87e6, 4_300.0),
+    ("trace_nothing", 135e6, 12_500.0),
+    ("trace_tone", 2.6e9, 13_500.0),
 ];
 
 #[test]
