@@ -58,6 +58,8 @@ const ARMED_US: u64 = 10_000_000;
 const KEEP_US: u64 = 100_000;
 /// Lines of text that may wait for room.
 const LINES: usize = 4;
+/// Answers that may wait for one another.
+const ANSWERS: usize = 4;
 
 /// The state of the main loop.
 pub struct App {
@@ -70,7 +72,8 @@ pub struct App {
     sensor: Sensor,
     parser: Parser,
     lines: Deque<Line, LINES>,
-    answer: Option<Answer>,
+    /// The first is being given.
+    answers: Deque<Answer, ANSWERS>,
     report: Report,
     school: School,
     epoch_began_us: u64,
@@ -130,7 +133,7 @@ impl App {
             sensor: Sensor::Sought { at_us: now_us },
             parser: Parser::default(),
             lines: Deque::new(),
-            answer: None,
+            answers: Deque::new(),
             report: Report::default(),
             school: School::new(finished),
             epoch_began_us: now_us,
@@ -169,10 +172,10 @@ impl App {
     fn obey(&mut self, command: Command, board: &mut impl Board) {
         let now_us = board.now_us();
         match command {
-            Command::Help => self.answer = Some(Answer::help()),
-            Command::Table => self.answer = Some(Answer::table()),
-            Command::Faults => self.answer = Some(Answer::faults()),
-            Command::Status => self.answer = Some(Answer::status()),
+            Command::Help => self.ask(board, Answer::help()),
+            Command::Table => self.ask(board, Answer::table()),
+            Command::Faults => self.ask(board, Answer::faults()),
+            Command::Status => self.ask(board, Answer::status()),
             Command::Version => self.say(board, format_args!("{}", answer::VERSION_LINE)),
             Command::Report => self.report.start(),
             Command::ResetStatistics => {
@@ -357,7 +360,7 @@ impl App {
         }
         self.answer(board);
         self.report(board);
-        self.answer.is_some() || self.report.is_under_way()
+        !self.answers.is_empty() || self.report.is_under_way()
     }
 
     /// Sends the lines that wait. False if there is no room for more.

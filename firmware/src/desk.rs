@@ -52,6 +52,22 @@ pub struct Desk<'r, C, T, B, S, E, O> {
     locks: Locks<T, B, S, E, O>,
     received: &'r mut spsc::Consumer<'static, u8>,
     asleep_us: u64,
+    fed: Fed,
+}
+
+/// The counter's value when the watchdog was last fed: without a clock nothing that waits would ever end, so nobody feeds
+/// it then.
+#[derive(Clone, Copy)]
+struct Fed(u32);
+
+impl Fed {
+    fn feed(&mut self, chip: &mut impl Chip) {
+        let now = chip.microseconds();
+        if now != self.0 {
+            self.0 = now;
+            chip.feed();
+        }
+    }
 }
 
 /// The application, for ever.
@@ -65,7 +81,7 @@ where
     Desk<'r, C, T, B, S, E, O>: Board,
     C: Chip,
 {
-    let mut desk = Desk { chip, locks, received, asleep_us: 0 };
+    let mut desk = Desk { chip, locks, received, asleep_us: 0, fed: Fed(0) };
     let mut app = App::new(start, &mut desk);
     loop {
         if !app.turn(&mut desk) {
@@ -111,7 +127,7 @@ where
     }
 
     fn bus(&mut self) -> (Self::Bus<'_>, Self::Pause<'_>) {
-        (LockedBus(&mut self.locks.bus), Pause(&mut self.chip))
+        (LockedBus(&mut self.locks.bus), Pause { chip: &mut self.chip, fed: &mut self.fed })
     }
 
     fn sample(&mut self, on: bool) {
@@ -119,7 +135,7 @@ where
         if !on {
             // A burst takes 0.4 ms at most.
             while self.locks.sampler.lock(|sampler| sampler.is_reading()) {}
-            Pause(&mut self.chip).delay_us(STALL_US);
+            Pause { chip: &mut self.chip, fed: &mut self.fed }.delay_us(STALL_US);
         }
     }
 
@@ -142,7 +158,7 @@ where
     }
 
     fn alive(&mut self) {
-        self.chip.feed();
+        self.fed.feed(&mut self.chip);
     }
 
     fn restart(&mut self) {
@@ -150,8 +166,11 @@ where
     }
 }
 
-/// Waits by the chip's counter, and keeps the watchdog quiet meanwhile.
-pub struct Pause<'a, C>(&'a mut C);
+/// Waits by the chip's counter, and keeps the watchdog quiet as long as that counts.
+pub struct Pause<'a, C> {
+    chip: &'a mut C,
+    fed: &'a mut Fed,
+}
 
 impl<C: Chip> DelayNs for Pause<'_, C> {
     fn delay_ns(&mut self, ns: u32) {
@@ -159,9 +178,9 @@ impl<C: Chip> DelayNs for Pause<'_, C> {
     }
 
     fn delay_us(&mut self, us: u32) {
-        let start = self.0.microseconds();
-        while self.0.microseconds().wrapping_sub(start) <= us {
-            self.0.feed();
+        let start = self.chip.microseconds();
+        while self.chip.microseconds().wrapping_sub(start) <= us {
+            self.fed.feed(self.chip);
         }
     }
 }
@@ -176,5 +195,46 @@ impl<B: Mutex<T: SpiDevice<u8>>> ErrorType for LockedBus<'_, B> {
 impl<B: Mutex<T: SpiDevice<u8>>> SpiDevice<u8> for LockedBus<'_, B> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
         self.0.lock(|bus| bus.transaction(operations))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A counter that stands still for its first readings, and the feedings until then and after.
+    #[derive(Default)]
+    struct Stopped {
+        readings: u32,
+        feedings: [u32; 2],
+    }
+
+    const STILL: u32 = 10_000;
+
+    impl Chip for Stopped {
+        fn microseconds(&mut self) -> u32 {
+            self.readings += 1;
+            self.readings.saturating_sub(STILL)
+        }
+
+        fn feed(&mut self) {
+            self.feedings[usize::from(self.readings > STILL)] += 1;
+        }
+
+        fn sleep(&mut self, _: impl FnMut(u32)) {}
+        fn transmit(&mut self) {}
+        fn restart(&mut self) {}
+        fn meters(&mut self) -> Meters {
+            Meters::default()
+        }
+    }
+
+    #[test]
+    fn without_a_clock_nobody_feeds_the_watchdog() {
+        let (mut chip, mut fed) = (Stopped::default(), Fed(0));
+        Pause { chip: &mut chip, fed: &mut fed }.delay_us(50);
+        let [still, going] = chip.feedings;
+        assert_eq!(still, 0);
+        assert!(going > 20, "{going} times in 50 us");
     }
 }

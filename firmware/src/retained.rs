@@ -9,15 +9,18 @@ use crate::summary::OCTAVES;
 use crate::sums::Sums;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Words of a record: the samples, the missing ones, and for every octave a sum of 128 and a count of 64 bits.
-const PAYLOAD: usize = 4 + OCTAVES * 6;
+/// Words of a record: the samples, the missing ones, and for every octave a sum of 96 and a count of 64 bits.
+const PAYLOAD: usize = 4 + OCTAVES * OCTAVE;
+const OCTAVE: usize = 5;
 /// Payload, and before it the kind, the version and the generation, after it the checksum.
 const SLOT_WORDS: usize = PAYLOAD + 4;
+/// Largest sum that is kept.
+const MOST: u128 = (1 << 96) - 1;
 /// Records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
 /// Told from memory that holds something else; in the upper half of a slot's first word. Changes with the layout.
-const MAGIC: u32 = 0xAD16_0000;
+const MAGIC: u32 = 0xAD17_0000;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -123,12 +126,19 @@ impl Retained {
     }
 
     /// Keeps what the estimator of [`CHANNELS`]`[index]` has learnt.
+    ///
+    /// Differences of counts of 14 bits are within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum of squares
+    /// passes 2⁷¹·n ≤ 2⁹⁴.
     pub fn keep_sums(&mut self, index: usize, sums: &Sums) {
         let halves = |wide: u64| [wide as u32, (wide >> 32) as u32];
-        let octave = |&(squares, count): &(u128, u64)| [squares as u64, (squares >> 64) as u64, count];
-        let wide = [sums.samples, sums.missing].into_iter().chain(sums.octaves.iter().flat_map(octave));
+        let octave = |&(squares, count): &(u128, u64)| {
+            let squares = squares.min(MOST);
+            let [[a, b], [d, e]] = [squares as u64, count].map(halves);
+            [a, b, (squares >> 64) as u32, d, e]
+        };
+        let samples = [sums.samples, sums.missing].into_iter().flat_map(halves);
         if index < CHANNELS.len() {
-            self.write(1 + index, wide.flat_map(halves));
+            self.write(1 + index, samples.chain(sums.octaves.iter().flat_map(octave)));
         }
     }
 
@@ -182,8 +192,10 @@ fn wide(slot: &Slot, at: usize) -> u64 {
 }
 
 fn sums(slot: &Slot) -> Sums {
-    let sum = |at| u128::from(wide(slot, at)) | u128::from(wide(slot, at + 2)) << 64;
-    let octaves = core::array::from_fn(|octave| (sum(4 + 6 * octave), wide(slot, 8 + 6 * octave)));
+    let octaves = core::array::from_fn(|octave| {
+        let at = 4 + OCTAVE * octave;
+        (u128::from(wide(slot, at)) | u128::from(word(slot, 5 + at)) << 64, wide(slot, at + 3))
+    });
     Sums { samples: wide(slot, 0), missing: wide(slot, 2), octaves }
 }
 

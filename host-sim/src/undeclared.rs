@@ -12,6 +12,8 @@ pub mod draw;
 pub mod examine;
 pub mod kind;
 pub mod limit;
+mod place;
+mod shape;
 mod size;
 pub mod table;
 mod truth;

@@ -178,6 +178,26 @@ fn people_get_help_status_version_and_counters() {
     }
 }
 
+/// Keys in quick succession are all answered, in order; those that are too many are told so.
+#[test]
+fn no_key_takes_the_answer_of_another() {
+    let mut device = device();
+    after(&mut device, "", SECOND);
+    let lines = after(&mut device, "?sks", 2 * SECOND).lines;
+    let starts: Vec<usize> = ["this list", "start 1", "used ", "start 1"]
+        .iter()
+        .scan(0, |from, wanted| {
+            let at = *from + lines[*from..].iter().position(|line| line.contains(wanted))?;
+            *from = at + 1;
+            Some(at)
+        })
+        .collect();
+    assert_eq!(starts.len(), 4, "{lines:?}");
+    let lines = after(&mut device, "ssssss", 4 * SECOND).lines;
+    let count = |wanted: &str| lines.iter().filter(|line| line.contains(wanted)).count();
+    assert_eq!((count("start 1"), count("busy")), (4, 2), "{lines:?}");
+}
+
 /// Every burst of the raw stream is one that the part sent, in order and without a gap.
 #[test]
 fn the_raw_stream_is_complete() {

@@ -65,9 +65,16 @@ impl From<Option<Line>> for Next {
 }
 
 impl App {
-    /// The same, unless the answer takes a fit: that must wait.
+    /// Answers behind those that are asked for already, or says that they are too many.
+    pub(super) fn ask(&mut self, board: &mut impl Board, answer: Answer) {
+        if self.answers.push_back(answer).is_err() {
+            self.say(board, format_args!("busy with the keys before; ask again"));
+        }
+    }
+
+    /// Makes and sends the next line of the answer under way, unless that takes a fit, which must wait.
     pub(super) fn answer_briefly(&mut self, board: &mut impl Board) {
-        if self.answer.is_some_and(|answer| !matches!(answer.kind, Kind::Table)) {
+        if self.answers.front().is_some_and(|answer| !matches!(answer.kind, Kind::Table)) {
             self.answer(board);
         }
     }
@@ -75,21 +82,24 @@ impl App {
     /// Makes and sends the next line of the answer under way.
     #[inline(never)] // so that its stack is not everybody's
     pub(super) fn answer(&mut self, board: &mut impl Board) {
-        let Some(Answer { kind, next }) = self.answer else { return };
+        let Some(&Answer { kind, next }) = self.answers.front() else { return };
         let made = match kind {
             Kind::Help => HELP.get(next).map_or(Next::End, |text| Next::Line(line(format_args!("{text}")))),
             Kind::Table => self.table_line(board, next),
             Kind::Faults => faults_line(&self.health(board), next),
             Kind::Status => self.status_line(board, next),
         };
-        self.answer = match made {
-            Next::End => None,
-            Next::Nothing => Some(Answer { kind, next: next + 1 }),
-            Next::Line(line) => {
-                let sent = board.outbox(|outbox| outbox.line(&line));
-                Some(Answer { kind, next: next + usize::from(sent) })
+        let told = match made {
+            Next::End => {
+                self.answers.pop_front();
+                return;
             }
+            Next::Nothing => true,
+            Next::Line(line) => board.outbox(|outbox| outbox.line(&line)),
         };
+        if let Some(answer) = self.answers.front_mut().filter(|_| told) {
+            answer.next += 1;
+        }
     }
 
     /// Head, a row for every octave, a line of coefficients for every inertial channel; what the last epoch taught, and what

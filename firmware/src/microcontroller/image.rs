@@ -149,8 +149,26 @@ macro_rules! observatory {
             <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
 
-        #[cortex_m_rt::exception]
-        unsafe fn HardFault(frame: &cortex_m_rt::ExceptionFrame) -> ! {
+        /// With what the processor stacked, unless there was no memory for it: then on a new stack.
+        #[unsafe(naked)]
+        #[unsafe(export_name = "HardFault")]
+        unsafe extern "C" fn hard_fault() -> ! {
+            core::arch::naked_asm!(
+                "mrs r0, MSP",
+                "ldr r1, =_stack_end",
+                "cmp r0, r1",
+                "bhs 2f",
+                "ldr r1, =_stack_start",
+                "msr MSP, r1",
+                "movs r0, #0",
+                "2:",
+                "bl {faulted}",
+                ".ltorg",
+                faulted = sym faulted,
+            )
+        }
+
+        extern "C" fn faulted(frame: Option<&cortex_m_rt::ExceptionFrame>) -> ! {
             $crate::microcontroller::survivors::faulted(frame);
             <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }

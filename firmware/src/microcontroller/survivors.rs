@@ -27,7 +27,12 @@ pub fn panicked(info: &PanicInfo<'_>) {
     defmt::error!("panic at {=str}:{=u32}", file, line);
 }
 
-/// Leaves the place of a fault.
-pub fn faulted(frame: &ExceptionFrame) {
-    LAST_WORDS.leave(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()));
+/// Leaves the place of a fault; there is no frame if the stack has overflowed.
+pub fn faulted(frame: Option<&ExceptionFrame>) {
+    match frame {
+        Some(frame) => {
+            LAST_WORDS.leave(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()));
+        }
+        None => LAST_WORDS.leave(format_args!("stack overflow")),
+    }
 }

@@ -27,13 +27,18 @@ impl Noise {
     /// For blocks of these numbers and fills, in noise of white variance 1 for the mean of a whole block, of flicker with
     /// `flicker` = B², and of a walk that grows by the variance `walk` over a block.
     pub(crate) fn of(numbers: &[usize], fills: &[f64], flicker: f64, walk: f64) -> Option<Self> {
-        let by_distance: Vec<f64> = flicker_covariance().iter().map(|covariance| flicker * covariance).collect();
+        let coloured: Vec<f64> = flicker_covariance().iter().map(|covariance| flicker * covariance).collect();
+        Self::of_covariance(numbers, fills, &coloured, walk)
+    }
+
+    /// The same with noise of any covariance, `coloured` by the distance of two blocks, in the place of flicker.
+    pub(crate) fn of_covariance(numbers: &[usize], fills: &[f64], coloured: &[f64], walk: f64) -> Option<Self> {
         let entry = |row: usize, column: usize| {
             let (first, second) = (numbers[row.min(column)], numbers[row.max(column)]);
             // Means over a block of a walk from the beginning: the middle of the earlier one, a third into a shared one.
             let walked = if row == column { first as f64 + 1.0 / 3.0 } else { first as f64 + 0.5 };
             let white = if row == column { 1.0 / fills[row] } else { 0.0 };
-            white + by_distance[second - first] + walk * walked
+            white + coloured[second - first] + walk * walked
         };
         let factor = DMatrix::from_fn(numbers.len(), numbers.len(), entry).cholesky()?;
         let log_covariance = 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>();
@@ -126,21 +131,27 @@ fn mixtures((numbers, fills): &Layout) -> Noises {
 ///
 /// Flicker noise is a sum of Gauss-Markov processes an octave of correlation time apart, each of variance B²·ln 2/π. A
 /// block is 1 here; processes much faster than a block only add to the white noise.
-fn flicker_covariance() -> Vec<f64> {
+pub(crate) fn flicker_covariance() -> Vec<f64> {
     let mut covariance = vec![0.0; BLOCKS];
     let mut time = 0.125;
     while time <= 4.0 * BLOCKS as f64 {
-        for (distance, entry) in covariance.iter_mut().enumerate() {
-            let decay = |blocks: f64| (-blocks / time).exp();
-            let mean = if distance == 0 {
-                2.0 * time * (1.0 - time * (1.0 - decay(1.0)))
-            } else {
-                let distance = distance as f64;
-                time * time * (decay(distance - 1.0) - 2.0 * decay(distance) + decay(distance + 1.0))
-            };
+        for (entry, mean) in covariance.iter_mut().zip(markov_covariance(time)) {
             *entry += LN_2 / PI * mean;
         }
         time *= 2.0;
     }
     covariance
+}
+
+/// The same of a Gauss-Markov process of variance 1 whose correlation time is `time` blocks.
+pub(crate) fn markov_covariance(time: f64) -> impl Iterator<Item = f64> {
+    let decay = move |blocks: f64| (-blocks / time).exp();
+    (0..BLOCKS).map(move |distance| {
+        if distance == 0 {
+            2.0 * time * (1.0 - time * (1.0 - decay(1.0)))
+        } else {
+            let distance = distance as f64;
+            time * time * (decay(distance - 1.0) - 2.0 * decay(distance) + decay(distance + 1.0))
+        }
+    })
 }

@@ -5,7 +5,8 @@
 
 use super::kind::Kind;
 use super::limit::spectrum::Record;
-use super::size::{Scene, hide};
+use super::place::Scene;
+use super::size::hide;
 use crate::record::{Host, SAMPLE_RATE_HZ, Simulation};
 use crate::sensor::effect::surroundings::{Motion, SupplyCourse, TemperatureCourse};
 use crate::sensor::{Hidden, NoiseModel, Surroundings};
@@ -55,14 +56,9 @@ impl Case {
         let channel = |random: &mut ChaCha8Rng| channels.choose(random).copied().unwrap_or(Channel::GyroX);
         // Two effects meet in one channel as often as not.
         let shared = random.random_bool(0.5).then(|| channel(&mut random));
-        let range = if kinds.len() > 1 { STRENGTH_OF_PAIR } else { STRENGTH };
-        let (effects, strengths) = kinds
-            .iter()
-            .map(|&kind| {
-                let channel = shared.unwrap_or_else(|| channel(&mut random));
-                hide(kind, channel, log_uniform(&mut random, range.0, range.1), &scene, &mut random)
-            })
-            .unzip();
+        let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
+        let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
+        let (effects, strengths) = hide(kinds, range, at_least, &scene, channel, &mut random);
         let hidden = Hidden { surroundings, effects };
         Self { seed, kinds: kinds.to_vec(), strengths, simulation: Simulation { seconds, seed, noise, hidden, host } }
     }

@@ -1,15 +1,21 @@
 //! The generator against itself and against theory; how well the analysis does is the benchmark's question.
 
 use super::examine::score;
+use super::limit::chain::telegraph_from_markov;
 use super::limit::spectrum::{self, Record};
-use super::limit::{events, needed, size, telegraph_from_markov, waveform};
+use super::limit::{events, needed, size, smallest, waveform};
+use super::place::{Place, Scene};
+use super::shape;
 use super::{Case, Group, Kind, Plan, case, truth};
 use crate::report::{ChannelReport, Effect as Reported, ModelError, ModelReport, Parameter, ReadOff, Report, SCHEMA};
-use crate::sensor::{ChannelNoise, Effect, NoiseModel};
+use crate::sensor::{ChannelNoise, Effect, NoiseModel, Surroundings};
 use adis16405_driver::Channel;
 use allan_core::Kind as Term;
 use allan_core::term::{Filter, Markov, Resonance};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 const PERIOD_S: f64 = 1.0 / 204.8;
 const RECORD: Record = Record { seconds: 1800.0, period_s: PERIOD_S };
@@ -28,7 +34,7 @@ fn densities_are_those_of_the_terms() {
         ..ChannelNoise::default()
     };
     for frequency in [0.01, 0.3, 5.0, 40.0, 99.0] {
-        let declared = |n, b, k| spectrum::declared(&one(n, b, k), 0.0, PERIOD_S, frequency);
+        let declared = |n, b, k| spectrum::declared(&one(n, b, k), PERIOD_S, frequency);
         let pairs = [
             (declared(1.0, 0.0, 0.0), Term::AngleRandomWalk),
             (declared(0.0, 0.0, 1.0), Term::RateRandomWalk),
@@ -46,20 +52,26 @@ fn densities_are_those_of_the_terms() {
         }
     }
     // Flicker aliases differently in each; far below the sample rate both are B²/(2πf).
-    let flicker = spectrum::declared(&one(0.0, 1.0, 0.0), 0.0, PERIOD_S, 0.01);
+    let flicker = spectrum::declared(&one(0.0, 1.0, 0.0), PERIOD_S, 0.01);
     assert!((flicker / Term::BiasInstability.process().density(0.01, PERIOD_S) - 1.0).abs() < 0.01);
 }
 
 #[test]
 fn what_noise_can_explain_is_no_effect() {
     let noise = gyro();
-    let declared = |frequency: f64| spectrum::declared(&noise, 0.05, PERIOD_S, frequency);
+    let declared = |frequency: f64| spectrum::declared(&noise, PERIOD_S, frequency);
     let stronger = |frequency: f64| 2.0 * declared(frequency);
-    assert!(RECORD.against_declared(&noise, 0.05, None, stronger) < 1e-3);
+    let (unfiltered, nothing) = (|_: f64| 1.0, |_: f64| 0.0);
+    assert!(RECORD.against_declared(&noise, (unfiltered, nothing), None, stronger) < 1e-3);
+    // Nor is what is known: here noise behind a filter, with something on top.
+    let filter = |frequency: f64| spectrum::filter(3, PERIOD_S, frequency);
+    let known = |frequency: f64| 0.01 * spectrum::markov(1.0, PERIOD_S, frequency);
+    let truth = |frequency: f64| 2.0 * declared(frequency) * filter(frequency) + known(frequency);
+    assert!(RECORD.against_declared(&noise, (filter, known), None, truth) < 1e-3);
     // A Markov process that forgets within a sample is white; one of a second is not.
     let markov = |time_s: f64| {
         let truth = |frequency: f64| declared(frequency) + 0.01 * spectrum::markov(time_s, PERIOD_S, frequency);
-        RECORD.against_declared(&noise, 0.05, None, truth)
+        RECORD.against_declared(&noise, (unfiltered, nothing), None, truth)
     };
     assert!(markov(1e-4) < 1e-3, "{}", markov(1e-4));
     assert!(markov(1.0) > 10.0, "{}", markov(1.0));
@@ -76,13 +88,69 @@ fn limits_in_white_noise_are_those_of_the_textbook() {
     // A step in the middle of M samples of deviation σ: half of s²·M/4/σ².
     let step: Vec<f64> = (0..128).map(|block| if block < 64 { 0.0 } else { 1.0 }).collect();
     let expected = 0.5 * 1800.0 / 4.0 / 0.25;
-    assert!((waveform::ratio(&step, &white, 0.0, RECORD) / expected - 1.0).abs() < 1e-3);
+    let mut model = NoiseModel::paper();
+    *model.channel_mut(Channel::GyroX) = white;
+    let scene = Scene { noise: &model, surroundings: Surroundings::default(), record: RECORD, seed: 1 };
+    // Rounding adds a thousandth of the noise.
+    let rounding = 0.05f64.powi(2) / 12.0 * PERIOD_S / 0.25;
+    let place = Place::of(&scene, Channel::GyroX, &[]);
+    assert!((waveform::ratio(&step, &place) / expected - 1.0).abs() < 1e-3 + rounding);
     // A sinusoid of M samples: half of A²·M/2/σ².
-    let density = spectrum::declared(&white, 0.0, PERIOD_S, 10.0);
+    let density = spectrum::declared(&white, PERIOD_S, 10.0);
     assert!((RECORD.line(density) / (0.5 * 0.5 * 1800.0 / 0.25) - 1.0).abs() < 1e-9);
     // A white waveform of deviation 0.1 matched in white noise.
     let matched = RECORD.matched(|_| 0.01 * PERIOD_S, |_| density);
     assert!((matched / (0.5 * 0.01 * 1800.0 / PERIOD_S / (0.25 / PERIOD_S)) - 1.0).abs() < 0.01, "{matched}");
+}
+
+/// What the other effect of a pair does to a limit, where that can be written down.
+#[test]
+fn a_limit_knows_the_other_effect() {
+    let mut noise = NoiseModel::paper();
+    *noise.channel_mut(Channel::GyroX) = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
+    let scene = Scene { noise: &noise, surroundings: Surroundings::default(), record: RECORD, seed: 1 };
+    let channel = Channel::GyroX;
+    let near = |ratio: f64, expected: f64| assert!((ratio / expected - 1.0).abs() < 0.01, "{ratio}, {expected}");
+    let larger = |shape: &Effect, other: Effect| smallest(shape, &scene, &[other]) / smallest(shape, &scene, &[]);
+
+    // A line in the middle of a resonance stands in both densities.
+    let line = Effect::Sinusoid { channel, frequency_hz: 20.0, amplitude: 1.0, phase_rad: 0.0 };
+    let resonance = Effect::Resonance { channel, frequency_hz: 20.0, bandwidth_hz: 1.0, deviation: 2.0 };
+    near(larger(&line, resonance), ((0.25 + 0.5 * 4.0 * 2.0 / (PI * 1.0)) / 0.25f64).sqrt());
+    // A filter takes as much off the noise as off the line: only rounding, 1 % of the noise here and there, is left.
+    let rounding = |gain: f64| (0.25 + 0.05f64.powi(2) / 12.0 * PERIOD_S / gain) / 0.25;
+    let gain = spectrum::filter(2, PERIOD_S, 20.0);
+    near(larger(&line, Effect::FilterBandwidth { taps_log2: 2 }), (rounding(gain) / rounding(1.0)).sqrt());
+    // For a ramp, a process that forgets within a block is white noise of the density 2·σ²·T.
+    let ramp = Effect::RateRamp { channel, slope: 1.0 };
+    let markov = Effect::Markov { channel, time_constant_s: 0.5, deviation: 1.0 };
+    near(larger(&ramp, markov), ((0.25 + 2.0 * 0.5) / 0.25f64).sqrt());
+    // Spikes are more white noise, and a known waveform is nothing.
+    let spikes = Effect::Spikes { channel, rate_per_hour: 3600.0, size: 10.0 };
+    near(larger(&ramp, spikes.clone()), ((0.25 + 100.0 * PERIOD_S * PERIOD_S) / 0.25f64).sqrt());
+    near(larger(&spikes, ramp), 1.0);
+    // What shows elsewhere is nothing either.
+    near(larger(&line, Effect::Markov { channel: Channel::GyroY, time_constant_s: 1.0, deviation: 9.0 }), 1.0);
+}
+
+#[test]
+fn sizes_scale() {
+    let scene = Scene { noise: &NoiseModel::paper(), surroundings: Surroundings::default(), record: RECORD, seed: 1 };
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    for kind in Kind::ALL {
+        let unit = shape::draw(kind, Channel::GyroY, &scene, &mut random);
+        assert!((shape::size(&unit) - 1.0).abs() < 1e-12, "{unit:?}");
+        let expected = if kind == Kind::FilterBandwidth { 1.0 } else { 0.25 };
+        assert!((shape::size(&shape::scaled(unit, 0.25)) - expected).abs() < 1e-12, "{kind:?}");
+    }
+}
+
+#[test]
+fn effects_of_a_pair_are_strong_beside_each_other() {
+    for seed in 0..40 {
+        let pair = case(Group::Pair, 450.0, seed);
+        assert!(pair.strengths.iter().all(|strength| *strength >= 2.0), "{seed}: {:?}", pair.strengths);
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod exti;
 mod faults;
 mod full_speed;
 mod memory;
+mod overflow;
 mod restart;
 mod sensor;
 mod size;
@@ -28,8 +29,8 @@ const SCK_HZ: u32 = 84_000_000 / 128;
 
 /// What interrupts may add to the deepest stack that was seen, if none came then: four, one above the other, each with the
 /// 104 bytes that the processor stacks (with floating point) and the frames of its functions, which disassembled are
-/// 5.3 kB of the estimators (a full message of the raw stream is framed there) and 160 bytes of the others together.
-const INTERRUPTS_STACK: u32 = 4 * 104 + 6 * 1024 + 256;
+/// 1.1 kB of the estimators (a full message of the raw stream is framed there) and 160 bytes of the others together.
+const INTERRUPTS_STACK: u32 = 4 * 104 + 1280 + 256;
 
 /// The stack that was left over takes what interrupts may add.
 fn stack_suffices(health: &Health) {

@@ -15,11 +15,10 @@ pub(crate) struct Record {
     pub(crate) period_s: f64,
 }
 
-/// Density of the declared noise and of rounding to `resolution`.
-pub(crate) fn declared(noise: &ChannelNoise, resolution: f64, period_s: f64, frequency: f64) -> f64 {
+/// Density of the declared noise.
+pub(crate) fn declared(noise: &ChannelNoise, period_s: f64, frequency: f64) -> f64 {
     let [white, flicker, walk] = shapes(period_s, frequency);
-    let rounding = resolution * resolution / 12.0 * period_s;
-    (noise.angle_random_walk.powi(2) + rounding) * white
+    noise.angle_random_walk.powi(2) * white
         + noise.bias_instability.powi(2) * flicker
         + noise.rate_random_walk.powi(2) * walk
 }
@@ -54,6 +53,20 @@ pub(crate) fn filter(taps_log2: u8, period_s: f64, frequency: f64) -> f64 {
     ((taps * half).sin() / (taps * half.sin())).powi(4)
 }
 
+/// At one frequency.
+struct Densities {
+    /// Of N, B and K of 1.
+    shapes: [f64; 3],
+    known: f64,
+    truth: f64,
+}
+
+impl Densities {
+    fn modelled(&self, squares: &[f64; 3]) -> f64 {
+        self.known + squares.iter().zip(&self.shapes).map(|(square, shape)| square * shape).sum::<f64>()
+    }
+}
+
 impl Record {
     /// Frequencies with the number of Fourier frequencies that each stands for: logarithmic over all, and finer around
     /// `centre_hz` where the density has a peak `width_hz` wide.
@@ -71,31 +84,33 @@ impl Record {
     }
 
     /// Expected log likelihood ratio of noise of density `truth` against the best N, B and K, which start at those of
-    /// `noise`.
+    /// `noise`. They pass a filter that lets the power `gain` through, and noise of density `known` is added.
     pub(crate) fn against_declared(
         self,
         noise: &ChannelNoise,
-        resolution: f64,
+        (gain, known): (impl Fn(f64) -> f64, impl Fn(f64) -> f64),
         peak: Option<(f64, f64)>,
         truth: impl Fn(f64) -> f64,
     ) -> f64 {
         let grid = self.grid(peak);
-        let basis: Vec<[f64; 3]> = grid.iter().map(|&(frequency, _)| shapes(self.period_s, frequency)).collect();
-        let truth: Vec<f64> = grid.iter().map(|&(frequency, _)| truth(frequency)).collect();
-        let rounding = resolution * resolution / 12.0 * self.period_s;
+        let at = |&(frequency, _): &(f64, f64)| {
+            let gain = gain(frequency);
+            let shapes = shapes(self.period_s, frequency).map(|shape| gain * shape);
+            Densities { shapes, known: known(frequency), truth: truth(frequency) }
+        };
+        let densities: Vec<Densities> = grid.iter().map(at).collect();
         let mut squares = [
-            noise.angle_random_walk.powi(2) + rounding,
+            noise.angle_random_walk.powi(2),
             noise.bias_instability.powi(2).max(1e-12),
             noise.rate_random_walk.powi(2).max(1e-15),
         ];
-        let model = |squares: &[f64; 3], basis: &[f64; 3]| squares.iter().zip(basis).map(|(s, b)| s * b).sum::<f64>();
         for _ in 0..ROUNDS {
             // The multiplicative step that never raises the deviance and never leaves the positive numbers.
             let (mut over, mut under) = ([0.0; 3], [0.0; 3]);
-            for ((basis, truth), (_, count)) in basis.iter().zip(&truth).zip(&grid) {
-                let modelled = model(&squares, basis);
-                for ((over, under), shape) in over.iter_mut().zip(&mut under).zip(basis) {
-                    *over += count * shape * truth / (modelled * modelled);
+            for (densities, (_, count)) in densities.iter().zip(&grid) {
+                let modelled = densities.modelled(&squares);
+                for ((over, under), shape) in over.iter_mut().zip(&mut under).zip(&densities.shapes) {
+                    *over += count * shape * densities.truth / (modelled * modelled);
                     *under += count * shape / modelled;
                 }
             }
@@ -103,11 +118,11 @@ impl Record {
                 *square *= (over / under).sqrt();
             }
         }
-        let deviance = |((basis, truth), (_, count)): ((&[f64; 3], &f64), &(f64, f64))| {
-            let ratio = truth / model(&squares, basis);
+        let deviance = |(densities, (_, count)): (&Densities, &(f64, f64))| {
+            let ratio = densities.truth / densities.modelled(&squares);
             count * (ratio - 1.0 - ratio.ln())
         };
-        basis.iter().zip(&truth).zip(&grid).map(deviance).sum()
+        densities.iter().zip(&grid).map(deviance).sum()
     }
 
     /// Expected log likelihood ratio of processes of density `shared` that channels with the densities `alone` have in
@@ -125,6 +140,15 @@ impl Record {
     /// The same for a waveform that is known up to its size: half its energy over the density of the noise.
     pub(crate) fn matched(self, waveform: impl Fn(f64) -> f64, noise: impl Fn(f64) -> f64) -> f64 {
         self.grid(None).iter().map(|&(frequency, count)| count * waveform(frequency) / noise(frequency)).sum()
+    }
+
+    /// Mean over all frequencies up to half the sample rate.
+    pub(crate) fn mean(self, of: impl Fn(f64) -> f64) -> f64 {
+        let (sum, counts) = self
+            .grid(None)
+            .iter()
+            .fold((0.0, 0.0), |(sum, counts), &(frequency, count)| (sum + count * of(frequency), counts + count));
+        sum / counts
     }
 
     /// A sinusoid of amplitude 1 in noise of density `noise` at its frequency: `T/(4S)`.
