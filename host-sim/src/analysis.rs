@@ -39,6 +39,8 @@ const DITHERED: f64 = 0.2;
 /// Behind a filter neighbouring samples are alike, and the noise shows at a few samples only.
 const DITHERED_OCTAVES: usize = 7;
 
+/// Levels that are as near to each other as this, in counts, may be two neighbouring counts.
+const TWO_COUNTS: f64 = 1.5;
 /// Lengths of a filter after which its rounded output is that of white noise again.
 const SETTLED: f64 = 20.0;
 /// Slowest filter, in samples to its time constant, that is told from a process of its own.
@@ -208,6 +210,9 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
         shortest.fold(0.0, f64::max) > DITHERED * step * step
     };
     let dithered = reaches(DITHERED_OCTAVES);
+    // So much apart are two counts between which the noise decides.
+    let steps_only = |found: &&Finding| !reaches(1) && found.effect.parameters["amplitude"].value < TWO_COUNTS * step;
+    let two_levels = own.two_levels.as_ref().filter(|found| !steps_only(found));
     // Behind a filter, what rounding adds is alike over as many samples as the noise is.
     let settled_s = if reaches(1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
     for found in &study.trace.found {
@@ -220,7 +225,7 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
             // The spectrum tells them better.
             Kind::Sinusoid(_) | Kind::Resonance(_) => {}
             // As it shows in the curve.
-            Kind::Markov(_) | Kind::RateRamp if own.two_levels.is_some() => {}
+            Kind::Markov(_) | Kind::RateRamp if two_levels.is_some() => {}
             // What is shared needs no second name.
             Kind::Markov(_) | Kind::RateRamp if common.is_some() => {}
             Kind::Markov(markov) if is_low_pass(&study.trace.after, markov, step) => {
@@ -236,11 +241,11 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
         }
     }
     let is_slow = |effect: &Effect| ["markov", "telegraph", "rate_ramp"].contains(&effect.kind.as_str());
-    if common.is_none() && own.two_levels.is_none() && !effects.iter().any(is_slow) {
+    if common.is_none() && two_levels.is_none() && !effects.iter().any(is_slow) {
         let unbounded = walk::unbounded(&study.following.curve, &study.trace, channel);
         effects.extend(unbounded.map(|found| naming::unbounded_effect(&found, unit)));
     }
-    effects.extend(own.two_levels.iter().map(|found| found.effect.clone()));
+    effects.extend(two_levels.iter().map(|found| found.effect.clone()));
     effects.extend(common.map(|common| naming::common_effect(common, channel, unit)));
     effects.extend(own.lines.iter().map(|line| naming::line_effect(line, unit)));
     effects

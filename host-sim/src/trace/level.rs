@@ -12,7 +12,7 @@ use nalgebra::DVector;
 
 /// Highest probability of a course that is none. Three or four courses are tried in each of six channels: one recording
 /// in a hundred has a false one.
-const SIGNIFICANCE: f64 = 5e-4;
+pub(crate) const SIGNIFICANCE: f64 = 5e-4;
 /// Courses that are taken.
 const MOST: usize = 4;
 

@@ -2,6 +2,7 @@
 
 use super::draw::Case;
 use super::kind::Kind;
+use super::limit::unknown_noise;
 use super::truth;
 use crate::analysis::analyze;
 use crate::record::RecordError;
@@ -73,6 +74,9 @@ pub struct Answer {
     pub strength: f64,
     /// Whether the report lists it where it is.
     pub named: bool,
+    /// Whether a test that knows its channel and shape, but not the noise, sees it; absent in pairs, and where an effect
+    /// is no course of the level.
+    pub shape_known: Option<bool>,
     /// What the report lists in its channels, when it does not.
     pub instead: Option<String>,
 }
@@ -119,6 +123,9 @@ pub fn examine(case: &Case) -> Result<Outcome, ExamineError> {
     let begin_s = recording.samples.first().and_then(|sample| sample.clock.time_s).unwrap_or(0.0);
     let mut outcome = score(case, &report, begin_s);
     let effects = &case.simulation.hidden.effects;
+    if let ([answer], [effect]) = (&mut outcome.answers[..], &effects[..]) {
+        answer.shape_known = unknown_noise::sees(effect, &recording, &timeline, begin_s);
+    }
     if let Some(channel) = effects.first().map(|effect| effect.channels().first().copied().unwrap_or(Channel::GyroX)) {
         let truth = truth::unseen_error(case, channel).map_err(failed)?;
         let of = report.channels.iter().find(|report| report.name == channel.name());
@@ -180,7 +187,13 @@ fn answer(kind: Kind, effect: &Effect, strength: f64, scored: &[(Channel, &Chann
     let once = matches!(kind, Kind::DroppedSamples | Kind::RepeatedSamples | Kind::SampleClock);
     let named = listing >= if once { 1 } else { affected.len().div_ceil(2).max(1) };
     let other = affected.iter().flat_map(|report| &report.effects).find(|found| found.kind != kind.name());
-    Answer { kind, strength, named, instead: other.filter(|_| !named).map(|found| found.kind.clone()) }
+    Answer {
+        kind,
+        strength,
+        named,
+        shape_known: None,
+        instead: other.filter(|_| !named).map(|found| found.kind.clone()),
+    }
 }
 
 /// The parameters of `effect` in the first channel that lists it.

@@ -21,6 +21,7 @@
 pub(super) mod chain;
 pub(super) mod events;
 pub(super) mod spectrum;
+pub(super) mod unknown_noise;
 pub(super) mod waveform;
 
 use super::place::{Place, Scene};

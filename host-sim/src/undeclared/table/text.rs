@@ -24,12 +24,16 @@ impl Table {
     }
 
     fn write_rates(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "Named, by strength over the smallest effect that any test could see\n")?;
+        writeln!(
+            out,
+            "Named, by strength over the smallest effect that any test could see; \"course told\": seen by a test"
+        )?;
+        writeln!(out, "that is told channel and course of the effect, and has to estimate the noise as well\n")?;
         write!(out, "{:<18}", "")?;
         for name in CLASS_NAMES {
             write!(out, "{name:>12}")?;
         }
-        writeln!(out)?;
+        writeln!(out, "{:>26}", "≥ 2, course told")?;
         for kind in self.kinds() {
             write!(out, "{:<18}", kind.name())?;
             let mut from = 0.0;
@@ -40,7 +44,11 @@ impl Table {
                 write!(out, "{cell:>12}")?;
                 from = to;
             }
-            writeln!(out)?;
+            // Its course and channel told, and the noise not.
+            let strong = self.answers(kind).filter(|answer| answer.strength >= STRONG);
+            let share = Share::of(strong.filter_map(|answer| answer.shape_known));
+            let cell = if share.all == 0 { String::new() } else { format!("{}/{}", share.yes, share.all) };
+            writeln!(out, "{cell:>26}")?;
         }
         Ok(())
     }
