@@ -124,10 +124,7 @@ pub(super) fn followed_effects(followed: &[(Channel, Sensitivity)], unit: &str) 
         Some(Effect {
             kind: kind.to_owned(),
             parameters: BTreeMap::from([("sensitivity".to_owned(), parameter(followed, of))]),
-            evidence: format!(
-                "follows the measured {kind} in the same differences, {:.0} sigma; {meaning}",
-                followed.sigmas()
-            ),
+            evidence: format!("follows the measured {kind}, {:.0} sigma; {meaning}", followed.sigmas()),
         })
     };
     let axes: Vec<_> = followed.iter().filter(|(channel, _)| Channel::INERTIAL[3..].contains(channel)).collect();
