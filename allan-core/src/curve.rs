@@ -143,6 +143,13 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
+    /// Takes what another curve has.
+    pub(crate) fn copy(&mut self, other: &Self) {
+        (self.sample_period, self.samples) = (other.sample_period, other.samples);
+        self.points.clear();
+        self.points.extend(other.points.iter().copied());
+    }
+
     /// Gives the points whose variance is not 0 another one, with bounds in proportion and the same degrees of freedom.
     pub fn change_avar(&mut self, avar: impl Fn(&Point) -> f64) {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {

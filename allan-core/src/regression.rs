@@ -13,10 +13,10 @@ pub use covariate::Covariate;
 pub use sensitivity::Sensitivity;
 
 use crate::coupling::Covariance;
-use crate::fit::fit;
 use crate::fit::least_squares::{entry, solve, triangle};
+use crate::fit::{Free, estimate};
 use crate::math::sqrt;
-use crate::{Curve, Kind, Point};
+use crate::{Curve, Kind, Model, Point};
 use heapless::Vec;
 use octave::{Octave, freedom, scatter};
 
@@ -57,8 +57,9 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
     #[inline(never)] // here and below: so that stack frames do not add up
     pub fn followed_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
         let mut followed = Sensitivities::new();
+        let (mut octaves, mut reweighed) = (Vec::new(), Vec::new());
         while followed.len() < self.covariates.len() {
-            let octaves = self.octaves(&followed);
+            self.weigh(&followed, &mut octaves);
             let mut best = Sensitivities::new();
             let clarity = |tried: &Sensitivities| tried.last().map_or(0.0, Sensitivity::sigmas);
             for next in (0..self.covariates.len()).filter(|i| followed.iter().all(|known| known.covariate != *i)) {
@@ -68,10 +69,11 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
                 let chosen: Vec<usize, MAX_COVARIATES> =
                     followed.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
                 // What is left is smaller when it is subtracted: weigh the octaves by that.
-                let tried = self
-                    .sensitivities(&chosen, &octaves)
-                    .and_then(|first| self.sensitivities(&chosen, &self.octaves(&first)))
-                    .unwrap_or_default();
+                let tried = self.sensitivities(&chosen, &octaves).and_then(|first| {
+                    self.weigh(&first, &mut reweighed);
+                    self.sensitivities(&chosen, &reweighed)
+                });
+                let tried = tried.unwrap_or_default();
                 if clarity(&tried).total_cmp(&clarity(&best)).is_ge() {
                     best = tried;
                 }
@@ -84,17 +86,19 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         Some(followed)
     }
 
-    /// What each octave that is known of a covariate is worth, as far as N, B and K describe the channel without what
-    /// it follows.
+    /// Finds what each octave that is known of a covariate is worth, as far as N, B and K describe the channel without
+    /// what it follows.
     #[inline(never)]
-    fn octaves(&self, followed: &[Sensitivity]) -> Vec<Octave, COUPLED> {
-        let mut rest = self.channel.clone();
-        self.subtract(&mut rest, followed, |covariate, n| {
-            self.covariates[covariate].signal(n).map_or(0.0, |(_, measured)| measured)
-        });
-        let model = fit(&rest, &Kind::DECLARED);
+    fn weigh(&self, followed: &[Sensitivity], octaves: &mut Vec<Octave, COUPLED>) {
+        let mut rest = Curve::empty();
+        rest.copy(self.channel);
+        self.subtract(&mut rest, followed, |covariate, n| self.measured(covariate, n));
+        let mut model = Model::new(0.0, []);
+        estimate(&rest, &Kind::DECLARED, Free::Nothing, &mut || true, &mut model);
         let is_known = |point: &&Point| self.covariates.iter().any(|covariate| covariate.avar(point.n).is_some());
-        rest.points().iter().filter(is_known).filter_map(|point| Octave::of(point, &model)).take(COUPLED).collect()
+        octaves.clear();
+        let known = rest.points().iter().filter(is_known).filter_map(|point| Octave::of(point, &model));
+        octaves.extend(known.take(COUPLED));
     }
 
     /// Sensitivities to the covariates in `chosen`.

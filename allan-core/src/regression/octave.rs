@@ -1,16 +1,17 @@
 //! What the octaves are worth to the regression, and how much of that they repeat of each other.
 
-use crate::confidence::{Shares, octave_correlation};
+use crate::confidence::{pure_octave_correlation, roots};
 use crate::math::{abs, sqrt};
 use crate::{Model, Point};
 
 /// What one octave is worth.
 pub(super) struct Octave {
     pub(super) n: u64,
-    edf: f64,
+    edf: f32,
     /// Degrees of freedom over the variance of the channel without what it follows.
     pub(super) weight: f64,
-    shares: Shares,
+    /// [`roots`] of the shares of the noises.
+    roots: [f32; 3],
 }
 
 impl Octave {
@@ -19,7 +20,18 @@ impl Octave {
         // What the model lacks is noise to the regression too.
         let variance = model.avar(point.n).max(point.avar);
         let edf = model.edf(point);
-        (variance > 0.0).then(|| Self { n: point.n, edf, weight: edf / variance, shares: model.shares(point.n) })
+        (variance > 0.0).then(|| Self {
+            n: point.n,
+            edf: edf as f32,
+            weight: edf / variance,
+            roots: roots(model.shares(point.n)).map(|root| root as f32),
+        })
+    }
+
+    /// Correlation of the variances of two octaves, `lag` apart.
+    fn correlation(&self, other: &Self, lag: usize) -> f64 {
+        let of = |noise: usize| f64::from(self.roots[noise] * other.roots[noise]) * pure_octave_correlation(lag, noise);
+        (0..3).map(of).sum()
     }
 }
 
@@ -40,7 +52,7 @@ pub(super) fn scatter<const COUPLED: usize>(octaves: &[Octave], common: impl Fn(
 pub(super) fn freedom(octaves: &[Octave], measured: impl Fn(u64) -> f64) -> f64 {
     let counts = |octave: &Octave| octave.weight * measured(octave.n);
     let sum: f64 = octaves.iter().map(counts).sum();
-    let square = correlated(octaves, |k| counts(&octaves[k]) / sqrt(octaves[k].edf));
+    let square = correlated(octaves, |k| counts(&octaves[k]) / sqrt(f64::from(octaves[k].edf)));
     if square > 0.0 { sum * sum / square } else { 0.0 }
 }
 
@@ -50,7 +62,7 @@ fn correlated(octaves: &[Octave], factor: impl Fn(usize) -> f64) -> f64 {
     for (k, a) in octaves.iter().enumerate() {
         let mut along = factor(k) / 2.0;
         for (l, b) in octaves.iter().enumerate().take(k) {
-            along += octave_correlation(k - l, a.shares, b.shares) * factor(l);
+            along += a.correlation(b, k - l) * factor(l);
         }
         sum += 2.0 * factor(k) * along;
     }

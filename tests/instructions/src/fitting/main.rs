@@ -1,5 +1,5 @@
-//! What it takes to get from a curve to coefficients, and to the terms that are missing: instructions and stack, said
-//! over semihosting, a line each.
+//! What it takes to get from a curve to coefficients, to the terms that are missing, and to what a channel follows:
+//! instructions and stack, said over semihosting, a line each.
 #![no_std]
 #![no_main]
 
@@ -10,8 +10,9 @@ mod stack;
 mod timer;
 
 use allan_core::fit::{fit, goodness};
-use allan_core::trace::{Lines, trace};
-use allan_core::{Cascade, Curve, Kind};
+use allan_core::regression::{Beside, Covariate};
+use allan_core::trace::{Lines, Trace, trace_while};
+use allan_core::{Cascade, Coupling, Curve, Kind, Model};
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
@@ -20,6 +21,8 @@ const OCTAVES: usize = 24;
 /// An hour and a half at 204.8 samples a second: 20 points.
 const SAMPLES: u32 = 1 << 20;
 const SAMPLE_PERIOD: f64 = 1.0 / 204.8;
+/// Of a channel and two covariates.
+const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 /// A gyro at rest: white noise and a random walk, and, if asked for, a square wave of half a second.
 fn record(tone: i32) -> Curve<OCTAVES> {
@@ -43,14 +46,56 @@ fn main() -> ! {
     timer::start();
     let quiet = black_box(record(0));
     let toned = black_box(record(100));
-    measure("fit", || drop(black_box(fit(&quiet, &Kind::DECLARED))));
-    let model = fit(&quiet, &Kind::DECLARED);
+    let mut model = Model::new(SAMPLE_PERIOD, []);
+    measure("fit", || model = black_box(fit(&quiet, &Kind::DECLARED)));
     measure("goodness", || _ = black_box(goodness(&quiet, &model)));
-    measure("trace_nothing", || drop(black_box(trace(&quiet, Lines::InTheCurve))));
-    let mut found = 0;
-    measure("trace_tone", || found = black_box(trace(&toned, Lines::InTheCurve)).found.len());
-    hprintln!("count found_tone {}", found);
+    // Where it stands, as on a device: its result is none of its stack.
+    let mut result = Trace::empty();
+    let mut traced = |curve| {
+        result.declare(curve);
+        assert!(trace_while(&mut result, curve, Lines::InTheCurve, &mut || true), "nobody says no");
+        result.found.len()
+    };
+    let mut found = [0; 2];
+    measure("trace_nothing", || found[0] = black_box(traced(&quiet)));
+    measure("trace_tone", || found[1] = black_box(traced(&toned)));
+    assert!(found == [0, 2], "{found:?} terms are found");
+    sensitivities();
     end::success()
+}
+
+/// A channel that follows one of two walks, and what they have in common.
+fn sensitivities() {
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state * 16_807 % 2_147_483_647;
+        (state % 41) as i32 - 20
+    };
+    let mut cascades = [const { Cascade::<OCTAVES, 8>::new() }; 3];
+    let mut couplings = [const { Coupling::<OCTAVES>::new() }; 3];
+    let mut walks = [0; 2];
+    for _ in 0..SAMPLES / 4 {
+        walks.iter_mut().for_each(|walk| *walk += uniform());
+        let [first, second] = walks;
+        cascades[0].push((uniform() + uniform() + uniform()) * 10 + first / 4);
+        cascades[1].push(first / 2);
+        cascades[2].push(second / 2);
+        for (coupling, (a, b)) in couplings.iter_mut().zip(PAIRS) {
+            coupling.observe(&cascades[a], &cascades[b]);
+        }
+    }
+    let [channel, first, second] = cascades.each_ref().map(|cascade| cascade.curve(SAMPLE_PERIOD));
+    let covariates: [Covariate<OCTAVES>; 2] = [&first, &second].map(|curve| Covariate::new(curve, 1.0, 1));
+    let points = couplings.each_ref().map(Coupling::points);
+    let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+        let (a, b) = (with.map_or(0, |other| other + 1), covariate + 1);
+        let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
+        points[pair].iter().find(|point| point.n == n).map(|point| point.covariance)
+    };
+    let beside = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
+    let mut followed = Default::default();
+    measure("sensitivities", || followed = black_box(beside.followed()));
+    assert!(followed.iter().map(|of| of.covariate).eq([0]), "{followed:?}");
 }
 
 fn measure(name: &str, work: impl FnOnce()) {
