@@ -114,19 +114,23 @@ fn finding(chain: &Chain, gain: f64, part_s: f64, unit: &str) -> Finding {
         let factor = (NORMAL_975 * error).exp();
         parameter(value, value / factor, value * factor, unit)
     };
-    let time = part_s * chain.correlation_time();
+    let steps = chain.correlation_time();
+    let time = part_s * steps;
+    // One part in 2·steps holds a jump and is a quarter of the distance off its level on average, at either level.
+    let blurred = 0.25 / steps;
+    let apart = chain.apart() / (1.0 - blurred);
+    let error_of_apart = chain.error_of_apart.hypot(0.5 * blurred);
     let evidence = format!(
         "two levels {:.3e} {unit} apart with {:.0} jumps between them, e^{gain:.0} times as likely as a Gaussian process of \
          any correlation time; charges that are caught and let go in a transistor or a crystal",
-        chain.apart(),
-        chain.jumps,
+        apart, chain.jumps,
     );
     Finding {
         effect: effect(
             "telegraph",
             [
                 ("time_constant", bounded(time, chain.error_of_time, "s")),
-                ("amplitude", bounded(chain.apart(), chain.error_of_apart, unit)),
+                ("amplitude", bounded(apart, error_of_apart, unit)),
             ],
             evidence,
         ),
