@@ -17,6 +17,7 @@ fn with_stack(bytes: u32) -> PathBuf {
     let table = headers.find(|&header| word(header + 12) == FLASH && word(header + 16) > 0).expect("a vector table");
     let at = word(table + 4) as usize;
     elf[at..at + 4].copy_from_slice(&(RAM + bytes).to_le_bytes());
+    std::fs::create_dir_all(build::folder()).expect("a folder");
     let shallow = build::folder().join(format!("observatory-f405-stack-{bytes}"));
     std::fs::write(&shallow, elf).expect("room");
     shallow
