@@ -6,6 +6,7 @@
 
 mod common;
 mod compensation;
+mod filter;
 mod lines;
 mod naming;
 mod parts;
@@ -89,7 +90,13 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
         (studies, practice)
     });
     let (studies, practices): (Vec<Studies>, Vec<Practice>) = studies.into_iter().unzip();
-    let studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
+    let mut studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
+    let inertial = studies.iter_mut().filter(|(channel, _)| traced.contains(channel)).map(|(channel, own)| {
+        let step = parts.both.position(*channel).map_or(0.0, |position| parts.both.step(position));
+        let study = &mut own.both;
+        filter::Channel { dithered: reaches(study, step, DITHERED_OCTAVES), study }
+    });
+    filter::agree(&mut inertial.collect::<Vec<_>>());
     let commons = commons(&studies);
     let report = |(((channel, own), measured), practice): ((&(Channel, Studies), &Curve<OCTAVES>), Practice)| {
         let unit = channel.unit();
@@ -205,16 +212,13 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
     let mut effects = naming::followed_effects(&causes, unit);
     // Where the noise does not reach from one count to the next, rounding is no noise, and the curve shows its steps.
     let step = part.position(channel).map_or(0.0, |position| part.step(position));
-    let reaches = |octaves: usize| {
-        let shortest = study.following.curve.points().iter().take(octaves).map(|point| point.avar);
-        shortest.fold(0.0, f64::max) > DITHERED * step * step
-    };
-    let dithered = reaches(DITHERED_OCTAVES);
+    let dithered = reaches(study, step, DITHERED_OCTAVES);
     // So much apart are two counts between which the noise decides.
-    let steps_only = |found: &&Finding| !reaches(1) && found.effect.parameters["amplitude"].value < TWO_COUNTS * step;
+    let steps_only =
+        |found: &&Finding| !reaches(study, step, 1) && found.effect.parameters["amplitude"].value < TWO_COUNTS * step;
     let two_levels = own.two_levels.as_ref().filter(|found| !steps_only(found));
     // Behind a filter, what rounding adds is alike over as many samples as the noise is.
-    let settled_s = if reaches(1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
+    let settled_s = if reaches(study, step, 1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
     for found in &study.trace.found {
         let term = &study.trace.after.terms()[found.term];
         match term.kind {
@@ -249,6 +253,12 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
     effects.extend(common.map(|common| naming::common_effect(common, channel, unit)));
     effects.extend(own.lines.iter().map(|line| naming::line_effect(line, unit)));
     effects
+}
+
+/// Whether the noise of a channel reaches from one count, `step`, to the next within the first `octaves`.
+fn reaches(study: &Study, step: f64, octaves: usize) -> bool {
+    let shortest = study.following.curve.points().iter().take(octaves).map(|point| point.avar);
+    shortest.fold(0.0, f64::max) > DITHERED * step * step
 }
 
 /// Whether a Markov term is what a first-order low-pass filter makes of white noise: it forgets within some samples, and

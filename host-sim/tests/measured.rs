@@ -213,20 +213,28 @@ fn the_parts_own_filter() {
     assert!(clock.contains("816.4") && clock.contains("819.2"), "{clock}");
 }
 
-#[test]
-fn the_parts_own_filter_is_the_only_one() {
-    let Some(path) = common::recording("the_parts_own_filter_is_the_only_one", "adis16405-burst/launch10.csv.gz")
-    else {
-        return;
-    };
+/// A part has one filter: `analyze` names it once in every channel, with the same taps.
+fn one_filter(test: &str, file: &str, rate: Option<f64>, taps: f64) {
+    let Some(path) = common::recording(test, file) else { return };
     let recording = csv::read(&path, GyroRange::Dps300).expect("a recording");
-    let report = analyze(&recording, &Timeline::of(&recording, None).expect("a timeline"));
+    let report = analyze(&recording, &Timeline::of(&recording, rate).expect("a timeline"));
     for channel in Channel::INERTIAL {
         let of = report.channels.iter().find(|of| of.name == channel.name()).expect("the channel");
         let filters: Vec<_> = of.effects.iter().filter(|effect| effect.kind == "filter_bandwidth").collect();
         let [filter] = &filters[..] else { panic!("{}: {filters:?}", channel.name()) };
-        assert_eq!(filter.parameters["taps"].value, 4.0, "{}", channel.name());
+        assert_eq!(filter.parameters["taps"].value, taps, "{}", channel.name());
     }
+}
+
+#[test]
+fn one_filter_read_at_its_own_rate() {
+    one_filter("one_filter_read_at_its_own_rate", "adis16405-burst/launch10.csv.gz", None, 4.0);
+}
+
+#[test]
+fn one_filter_read_at_a_slower_rate() {
+    // Accelerometer Z by itself would be two averages over two samples as they are read.
+    one_filter("one_filter_read_at_a_slower_rate", "adis16405-static/run3.csv.gz", Some(100.0), 8.0);
 }
 
 #[test]
