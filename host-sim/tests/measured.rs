@@ -223,6 +223,9 @@ fn one_filter(test: &str, file: &str, rate: Option<f64>, taps: f64) {
         let filters: Vec<_> = of.effects.iter().filter(|effect| effect.kind == "filter_bandwidth").collect();
         let [filter] = &filters[..] else { panic!("{}: {filters:?}", channel.name()) };
         assert_eq!(filter.parameters["taps"].value, taps, "{}", channel.name());
+        // Where they are recorded, supply and temperature stay within a count: nothing can be said to follow them.
+        let followed = of.effects.iter().find(|effect| ["supply", "temperature"].contains(&effect.kind.as_str()));
+        assert_eq!(followed, None, "{}", channel.name());
     }
 }
 

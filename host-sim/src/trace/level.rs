@@ -52,7 +52,7 @@ pub fn find(series: &Series, causes: &[&Series], noises: &NoiseTable) -> Level {
         .iter()
         .enumerate()
         .filter(|(_, cause)| cause.slots == series.slots)
-        .filter_map(|(number, cause)| Some((number, Blocks::of(cause)?.means)))
+        .filter_map(|(number, cause)| Some((number, Blocks::of(cause)?.means)).filter(|(_, means)| moves(means, cause)))
         .collect();
     let mut taken: Vec<(Course, DVector<f64>, Claim)> = Vec::new();
     while taken.len() < MOST {
@@ -81,6 +81,11 @@ pub fn find(series: &Series, causes: &[&Series], noises: &NoiseTable) -> Level {
         }
     }
     level
+}
+
+/// Whether a cause has moved by a count at all: within one, its means tell how its rounding came out, not where it went.
+fn moves(means: &DVector<f64>, cause: &Series) -> bool {
+    means.max() - means.min() >= cause.resolution
 }
 
 /// Why a course was taken.

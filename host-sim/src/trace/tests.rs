@@ -180,14 +180,14 @@ fn a_ramp_and_a_step_are_found_beside_each_other() {
 
 #[test]
 fn a_slow_cause_is_told_from_a_ramp() {
-    let warming = |effect: Effect, seed: u64| {
+    let warming = |effect: Effect, rise_c: f64, seed: u64| {
         let mut simulation = Simulation::of_paper(600.0, seed);
         simulation.hidden.effects = vec![effect];
         simulation.hidden.surroundings.temperature =
-            TemperatureCourse { rise_c: 8.0, time_constant_s: 100.0, ..TemperatureCourse::default() };
+            TemperatureCourse { rise_c, time_constant_s: 100.0, ..TemperatureCourse::default() };
         Case::of(simulation)
     };
-    let case = warming(Effect::Temperature { channel: GYRO, sensitivity: -0.05 }, 17);
+    let case = warming(Effect::Temperature { channel: GYRO, sensitivity: -0.05 }, 8.0, 17);
     let follows = |case: &Case, channel: Channel| {
         level::find(&case.series(channel), &[&case.series(Channel::Temp)], &NoiseTable::default())
     };
@@ -197,8 +197,12 @@ fn a_slow_cause_is_told_from_a_ramp() {
     assert!((followed.sensitivity + 0.05).abs() < 3.0 * followed.error, "{followed:?}");
     assert!(followed.error < 0.005, "{followed:?}");
     assert_eq!(follows(&case, Channel::GyroX), Level::default());
+    // A temperature that stays within half a count of 0.14 °C has not been seen to move.
+    let still = warming(Effect::Temperature { channel: GYRO, sensitivity: -5.0 }, 0.07, 17);
+    assert_eq!(follows(&still, GYRO).followed, []);
 
-    let Level { ramp, followed, .. } = follows(&warming(Effect::RateRamp { channel: GYRO, slope: 1e-3 }, 18), GYRO);
+    let Level { ramp, followed, .. } =
+        follows(&warming(Effect::RateRamp { channel: GYRO, slope: 1e-3 }, 8.0, 18), GYRO);
     assert!(ramp.is_some() && followed.is_empty(), "{ramp:?} {followed:?}");
 }
 
