@@ -18,7 +18,7 @@ use crate::fit::{Free, estimate};
 use crate::math::sqrt;
 use crate::{Curve, Kind, Model, Point};
 use heapless::Vec;
-use octave::{Octave, freedom, scatter};
+use octave::{Octave, freedom, is_poor, scatter};
 
 /// Covariates that can be taken at once.
 pub const MAX_COVARIATES: usize = 6;
@@ -97,7 +97,8 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         estimate(&rest, &Kind::DECLARED, Free::Nothing, &mut || true, &mut model);
         let is_known = |point: &&Point| self.covariates.iter().any(|covariate| covariate.avar(point.n).is_some());
         octaves.clear();
-        let known = rest.points().iter().filter(is_known).filter_map(|point| Octave::of(point, &model));
+        let is_poor = is_poor(&model, rest.points());
+        let known = rest.points().iter().filter(is_known).filter_map(|point| Octave::of(point, &model, is_poor));
         octaves.extend(known.take(COUPLED));
     }
 

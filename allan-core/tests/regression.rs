@@ -125,6 +125,28 @@ fn sensitivities_to_noisy_covariates_are_unbiased() {
     assert!((0.5..1.5).contains(&deviation), "{deviation}");
 }
 
+/// N, B and K describe noise behind a filter badly: what it follows is weighed by what is measured instead. A matched
+/// filter would know the sensitivity to 0.0195: the root of N²/PERIOD over the sum of the squares of the force.
+#[test]
+fn a_filter_hides_nothing_that_the_channel_follows() {
+    let truth = 0.25;
+    for seed in 0..20 {
+        let mut noise = Noise::new(1300 + seed);
+        let force = noise.sum(SAMPLES, &[(Kind::Markov(Markov { time_constant: 4.0 }), 0.1)]);
+        let seen: Vec<f64> = force.iter().map(|force| force + 0.003 * noise.normal()).collect();
+        let own = rest(&mut noise);
+        let channel: Vec<f64> = own.iter().zip(&force).map(|(own, force)| own + truth * force).collect();
+        let found = followed(&[averaged(&averaged(&channel)), averaged(&averaged(&seen))]);
+        let [of] = found[..] else { panic!("seed {seed}: {found:?}") };
+        assert!((of.value - truth).abs() < 4.0 * of.error && of.error < 3.0 * 0.0195, "seed {seed}: {of:?}");
+    }
+}
+
+/// Means of each value and the three before it.
+fn averaged(values: &[f64]) -> Vec<f64> {
+    (0..values.len()).map(|at| (0..4).map(|lag| values[at.saturating_sub(lag)]).sum::<f64>() / 4.0).collect()
+}
+
 /// Two walks that are alike by chance; a covariate that moves no more than its converter's noise.
 #[test]
 fn channels_that_go_by_themselves_do_not_follow_each_other() {

@@ -14,12 +14,28 @@ pub(super) struct Octave {
     roots: [f32; 3],
 }
 
+/// Degrees of freedom from which on an octave's own variance is known better than by a poor model: to 25 %.
+const WELL_KNOWN: f64 = 30.0;
+/// Octaves to which noise behind a filter, or a line, gives a form that N, B and K cannot have.
+const SHORT: usize = 6;
+/// Standard deviations by which one of them tells a poor model.
+const MISFIT: f64 = 6.0;
+
+/// Whether `model` misses the shortest octaves of the curve, each worth thousands of degrees of freedom, that it was fitted
+/// to: what it does to come near them, it does to the long ones too.
+pub(super) fn is_poor(model: &Model, points: &[Point]) -> bool {
+    points.iter().take(SHORT).any(|point| {
+        let sigmas = (point.avar / model.avar(point.n) - 1.0) * sqrt(model.edf(point) / 2.0);
+        abs(sigmas) > MISFIT
+    })
+}
+
 impl Octave {
-    /// Of a point of the channel's curve under the model of it; `None` where nothing moves.
-    pub(super) fn of(point: &Point, model: &Model) -> Option<Self> {
-        // What the model lacks is noise to the regression too.
-        let variance = model.avar(point.n).max(point.avar);
+    /// Of a point of the channel's curve under the model of it, which may be poor; `None` where nothing moves.
+    pub(super) fn of(point: &Point, model: &Model, is_poor: bool) -> Option<Self> {
         let edf = model.edf(point);
+        // What a good model lacks is noise to the regression too.
+        let variance = if is_poor && edf >= WELL_KNOWN { point.avar } else { model.avar(point.n).max(point.avar) };
         (variance > 0.0).then(|| Self {
             n: point.n,
             edf: edf as f32,
