@@ -32,6 +32,7 @@ use firmware::{OCTAVES, OVERLAP};
 use lines::Line;
 use parts::{Part, Parts};
 use repairs::{Repairs, in_parallel};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use study::{Following, Study};
 
@@ -78,11 +79,11 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     let noises = NoiseTable::default();
     let repairs = Repairs::find(recording, timeline, &traced, &noises);
     let parts = Parts::of(recording, timeline, &coupled, &repairs);
+    let repaired = in_parallel(&coupled, |&channel| repairs.series(recording, timeline, channel));
     let studies = in_parallel(&recording.channels, |&channel| {
-        let series = |channel: Channel| repairs.series(recording, timeline, channel);
-        let traced = traced.contains(&channel);
-        let own = if traced { series(channel) } else { Series::of(recording, timeline, channel) };
-        let studies = Studies::of(&parts, channel, traced.then_some(&own), &repairs, &noises, series);
+        let traced = traced.iter().position(|of| *of == channel).map(|position| &repaired[position]);
+        let studies = Studies::of(&parts, channel, traced, &repairs, &noises, &repaired);
+        let own = traced.map_or_else(|| Cow::Owned(Series::of(recording, timeline, channel)), Cow::Borrowed);
         // What the channel follows is no noise, and is in the series: there the declared model has to do.
         let trace = &studies.first.trace;
         let model = if studies.first.following.followed.is_empty() { &trace.after } else { &trace.before };
@@ -92,9 +93,8 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
     let (studies, practices): (Vec<Studies>, Vec<Practice>) = studies.into_iter().unzip();
     let mut studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
     let inertial = studies.iter_mut().filter(|(channel, _)| traced.contains(channel)).map(|(channel, own)| {
-        let step = parts.both.position(*channel).map_or(0.0, |position| parts.both.step(position));
         let study = &mut own.both;
-        filter::Channel { dithered: reaches(study, step, DITHERED_OCTAVES), study }
+        filter::Channel { dithered: reaches(study, parts.both.step_of(*channel), DITHERED_OCTAVES), study }
     });
     filter::agree(&mut inertial.collect::<Vec<_>>());
     let commons = commons(&studies);
@@ -103,7 +103,7 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
         let mut effects: Vec<Effect> = Vec::new();
         if traced.contains(channel) {
             effects.extend(repairs.effects(*channel));
-            let ramps = effects.iter().any(|effect| effect.kind == Kind::RateRamp.name());
+            let ramps = repairs.ramps(*channel);
             let common = commons.iter().find(|common| common.channels.contains(channel));
             let named = named(&parts.both, *channel, own, common);
             effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != Kind::RateRamp.name()));
@@ -137,14 +137,14 @@ struct Studies {
 }
 
 impl Studies {
-    /// `own` are the samples of a channel that is traced, `series` gives those of others.
+    /// `own` are the samples of a channel that is traced, `repaired` those of all that the parts hold.
     fn of(
         parts: &Parts,
         channel: Channel,
         own: Option<&Series>,
         repairs: &Repairs,
         noises: &NoiseTable,
-        series: impl Fn(Channel) -> Series,
+        repaired: &[Series],
     ) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
         let Some(own) = own else {
@@ -153,8 +153,9 @@ impl Studies {
             return Self { first, both, lines: Vec::new(), two_levels: None, rest: None };
         };
         let own_half = own.first_half();
-        let slow: Vec<Channel> = parts.both.channels.iter().copied().filter(|&cause| repairs::is_slow(cause)).collect();
-        let courses: Vec<Series> = slow.iter().map(|&cause| series(cause).first_half()).collect();
+        let causes = parts.both.channels.iter().copied().zip(repaired).filter(|(cause, _)| repairs::is_slow(*cause));
+        let (slow, courses): (Vec<Channel>, Vec<Series>) =
+            causes.map(|(cause, series)| (cause, series.first_half())).unzip();
         let level = level::find(&own_half, &courses.iter().collect::<Vec<_>>(), noises);
         let in_half = |cause: Channel| {
             let of = |(number, _): &&(usize, level::Followed)| slow[*number] == cause;
@@ -163,7 +164,7 @@ impl Studies {
         let ramps = repairs.ramps(channel);
         let first = Following::of(&parts.first, position, ramps, in_half);
         let both = Following::of(&parts.both, position, ramps, |cause| repairs.followed(channel, cause));
-        let without = |following: &Following| compensated(own, following, |cause| series(parts.both.channels[cause]));
+        let without = |following: &Following| compensated(own, following, repaired);
         let half = without(&first).map(|rest| rest.first_half());
         let whole = without(&both);
         let (first, _) = spectral::study(first, &own_half, half.as_ref());
@@ -211,7 +212,7 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
     let causes: Vec<_> = study.causes().map(|(cause, followed)| (part.channels[cause], *followed)).collect();
     let mut effects = naming::followed_effects(&causes, unit);
     // Where the noise does not reach from one count to the next, rounding is no noise, and the curve shows its steps.
-    let step = part.position(channel).map_or(0.0, |position| part.step(position));
+    let step = part.step_of(channel);
     let dithered = reaches(study, step, DITHERED_OCTAVES);
     // So much apart are two counts between which the noise decides.
     let steps_only =

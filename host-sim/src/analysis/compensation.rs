@@ -3,14 +3,14 @@
 use super::study::Following;
 use crate::trace::Series;
 
-/// `series` less the covariates of `following`: `cause` gives the samples of one by its place in the part.
+/// `series` less the covariates of `following`: `causes` are the samples of all that the part holds.
 ///
 /// The covariates' own noise comes along. `None` where the channel follows nothing, or a covariate has other samples.
-pub(super) fn compensated(series: &Series, following: &Following, cause: impl Fn(usize) -> Series) -> Option<Series> {
+pub(super) fn compensated(series: &Series, following: &Following, causes: &[Series]) -> Option<Series> {
     let mut rest = series.clone();
     let mut followed = 0;
     for (place, sensitivity) in following.causes() {
-        let cause = cause(place);
+        let cause = &causes[place];
         if cause.slots != series.slots {
             return None;
         }

@@ -132,6 +132,11 @@ impl Part {
         self.steps[channel]
     }
 
+    /// The same by the channel's name; 0 of one that the part does not hold.
+    pub(super) fn step_of(&self, channel: Channel) -> f64 {
+        self.position(channel).map_or(0.0, |position| self.step(position))
+    }
+
     /// What two channels have in common, in the product of their units.
     pub(super) fn shared(&self, a: usize, b: usize) -> Shared<OCTAVES> {
         let (high, low) = (a.max(b), a.min(b));

@@ -58,15 +58,19 @@ impl<'a> Place<'a> {
         })
     }
 
-    /// Density of what is white before the filter.
-    pub(super) fn white(&self) -> f64 {
+    /// Density of the spikes among the others.
+    fn spikes(&self) -> f64 {
+        let period_s = self.record.period_s;
         let spikes = |effect: &Effect| match *effect {
-            Effect::Spikes { rate_per_hour, size, .. } => {
-                size * size * rate_per_hour * self.record.period_s / 3600.0 * self.record.period_s
-            }
+            Effect::Spikes { rate_per_hour, size, .. } => size * size * rate_per_hour * period_s / 3600.0 * period_s,
             _ => 0.0,
         };
-        self.noise.angle_random_walk.powi(2) + self.others().map(spikes).sum::<f64>()
+        self.others().map(spikes).sum()
+    }
+
+    /// Density of what is white before the filter.
+    pub(super) fn white(&self) -> f64 {
+        self.noise.angle_random_walk.powi(2) + self.spikes()
     }
 
     /// Density of what the others add before the filter.
@@ -80,7 +84,7 @@ impl<'a> Place<'a> {
             }
             _ => 0.0,
         });
-        slow + resonances.sum::<f64>() + self.white() - self.noise.angle_random_walk.powi(2)
+        slow + resonances.sum::<f64>() + self.spikes()
     }
 
     /// Density of what comes on top behind the filter: the rounding to counts, and to coarser steps of an angle.
