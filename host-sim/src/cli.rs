@@ -1,10 +1,10 @@
 //! What can be said on the command line.
 
-use crate::monitor;
-use crate::record::Simulation;
-use crate::undeclared::{self, Kind, Plan};
 use adis16405_driver::GyroRange;
+use benchmarks::undeclared::{self, Kind, Plan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use recordings::serial;
+use simulation::record::Simulation;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -43,7 +43,7 @@ pub enum Command {
         #[arg(long, conflicts_with = "seed")]
         port: Option<String>,
         /// Baud rate of the port.
-        #[arg(long, default_value_t = monitor::BAUD, requires = "port")]
+        #[arg(long, default_value_t = serial::BAUD, requires = "port")]
         baud: u32,
         /// What to simulate.
         #[command(flatten)]
@@ -54,7 +54,7 @@ pub enum Command {
         /// Its serial port, such as /dev/ttyUSB0.
         port: String,
         /// Baud rate of the port.
-        #[arg(long, default_value_t = monitor::BAUD)]
+        #[arg(long, default_value_t = serial::BAUD)]
         baud: u32,
         /// Command to send first, such as "f 819.2"; may be repeated.
         #[arg(long, value_name = "COMMAND")]

@@ -2,22 +2,24 @@
 
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
+use benchmarks::paper::Experiment;
+use benchmarks::undeclared::Plan;
 use clap::Parser;
-use host_sim::analysis::analyze;
 use host_sim::cli::{Cli, Command, Explain, Input, Output};
-use host_sim::explain::{self, Explanation};
-use host_sim::monitor::{self, Cable};
-use host_sim::paper::Experiment;
-use host_sim::record::{self, Simulation};
-use host_sim::recording::Recording;
-use host_sim::replay::replay;
-use host_sim::report::Report;
-use host_sim::source::{csv, folder};
-use host_sim::timeline::Timeline;
-use host_sim::undeclared::Plan;
-use host_sim::{export, page, terminal, uf2};
+use host_sim::monitor;
+use host_sim::uf2;
 use indicatif::{ProgressBar, ProgressStyle};
+use noise_analysis::analysis::analyze;
+use noise_analysis::explain::{self, Explanation};
+use noise_analysis::report::Report;
+use recordings::recording::Recording;
+use recordings::serial::{self, Cable};
+use recordings::timeline::Timeline;
+use recordings::{csv, folder};
+use reports::{export, page, terminal};
 use serde::Serialize;
+use simulation::record::Simulation;
+use simulation::replay::replay;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -100,8 +102,8 @@ fn simulate(simulation: Simulation, log: Option<&Path>) -> Result<Recording> {
 }
 
 fn record_port(out: &Path, port: &str, baud: u32, seconds: f64) -> Result<Recording> {
-    let mut cable = Cable::new(monitor::open(port, baud).with_context(|| port.to_owned())?);
-    let recorded = record::port::record(&mut cable, out, seconds).with_context(|| port.to_owned())?;
+    let mut cable = Cable::new(serial::open(port, baud).with_context(|| port.to_owned())?);
+    let recorded = serial::record(&mut cable, out, seconds).with_context(|| port.to_owned())?;
     note(format_args!(
         "{} bursts, {} missing between them; {}",
         recorded.bursts,
@@ -113,7 +115,7 @@ fn record_port(out: &Path, port: &str, baud: u32, seconds: f64) -> Result<Record
 
 fn watch(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Result<()> {
     let deadline = seconds.map(Duration::try_from_secs_f64).transpose()?.map(|time| Instant::now() + time);
-    let mut cable = Cable::new(monitor::open(port, baud)?);
+    let mut cable = Cable::new(serial::open(port, baud)?);
     for command in commands {
         cable.command(command)?;
     }
@@ -132,7 +134,7 @@ fn explain_all(arguments: &Explain, output: &Output) -> Result<()> {
             let mut out = BufWriter::new(io::stdout().lock());
             writeln!(out, "\n══ {}", file.display())?;
             let explanation = explain::explain(&recording, &timeline);
-            explain::text::write(&explanation, &mut out)?;
+            reports::explain::text::write(&explanation, &mut out)?;
             out.flush()?;
             if let Some(folder) = &arguments.pictures {
                 draw(&explanation, &file, folder)?;
@@ -149,7 +151,7 @@ fn draw(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for channel in &explanation.channels {
         let file = folder.join(format!("{stem}-{}.svg", channel.channel.name()));
-        std::fs::write(&file, explain::picture(channel)?).with_context(|| file.display().to_string())?;
+        std::fs::write(&file, reports::explain::picture(channel)?).with_context(|| file.display().to_string())?;
     }
     Ok(())
 }

@@ -1,14 +1,14 @@
 //! The command line at the end of a cable: a pseudo-terminal with the firmware's application behind it.
 
-use host_sim::device::Device;
-use host_sim::sensor::{NoiseModel, VirtualAdis16405};
 use serialport::{SerialPort, TTYPort};
+use simulation::device::Device;
 use std::io::{ErrorKind, Read, Write};
 use std::process::{Command, Output};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
 /// Runs `host-sim` with these arguments, `PORT` replaced by that of a device whose time goes ten times as fast and whose
 /// line has noise on it now and then.

@@ -8,12 +8,12 @@ mod common;
 
 use adis16405_driver::{Channel, GyroRange};
 use allan_core::{Kind, term::Filter};
-use host_sim::analysis::analyze;
-use host_sim::explain::{ChannelExplanation, Explanation, explain};
-use host_sim::source::csv;
-use host_sim::time_course::moving::Free;
-use host_sim::time_course::stationarity::Part;
-use host_sim::timeline::Timeline;
+use noise_analysis::analysis::analyze;
+use noise_analysis::explain::{ChannelExplanation, Explanation, explain};
+use noise_analysis::time_course::moving::Free;
+use noise_analysis::time_course::stationarity::Part;
+use recordings::csv;
+use recordings::timeline::Timeline;
 
 /// Deviance per point on the unseen half that the project wants to reach.
 fn target(channel: Channel) -> f64 {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{gzip, host_sim, json_of, write};
-use host_sim::source::frame_log::{Frame, FrameLog, Frames};
+use recordings::frame_log::{Frame, FrameLog, Frames};
 use std::fmt::Write;
 use std::path::Path;
 use tempfile::tempdir;

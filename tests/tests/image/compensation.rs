@@ -8,10 +8,10 @@ use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
 use firmware::compensation::learn;
 use firmware::lesson::{Taught, check};
 use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Retained, Statistics};
-use host_sim::device::Device;
-use host_sim::sensor::effect::surroundings::TemperatureCourse;
-use host_sim::sensor::{Effect, Hidden, NoiseModel, Surroundings, VirtualAdis16405};
 use link::{Bounded, Checked, Decoder, Drift, Learnt, Message, Received, Term};
+use simulation::device::Device;
+use virtual_sensor::effect::surroundings::TemperatureCourse;
+use virtual_sensor::{Effect, Hidden, NoiseModel, Surroundings, VirtualAdis16405};
 
 const EPOCH_S: f64 = 60.0;
 const RATE_HZ: f64 = 204.8;

@@ -4,12 +4,12 @@ use crate::bench::{Outcome, Scenario, Work, run};
 use crate::decoded::{Decoded, on_host};
 use crate::{image, sensor, stack_suffices};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
-use host_sim::analysis::analyze;
-use host_sim::record::port::Tape;
-use host_sim::replay::replay_log;
-use host_sim::source::frame_log::{Frame, FrameLog};
-use host_sim::timeline::Timeline;
 use link::Message;
+use noise_analysis::analysis::analyze;
+use recordings::frame_log::{Frame, FrameLog};
+use recordings::serial::Tape;
+use recordings::timeline::Timeline;
+use simulation::replay::replay_log;
 use std::path::Path;
 
 const RATE_HZ: f64 = 819.2;

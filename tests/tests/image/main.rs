@@ -18,11 +18,11 @@ mod terminal;
 use bench::{Outcome, Scenario, run};
 use decoded::{Decoded, on_host};
 use firmware::CHANNELS;
-use host_sim::sensor::{NoiseModel, VirtualAdis16405};
 use link::{Boot, BootCause, Counters, Health, Hello, Message};
 use sensor::Sensor;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
 /// The bus clock of the board (84 MHz) over the first power of two that brings it to 1 MHz or less.
 const SCK_HZ: u32 = 84_000_000 / 128;

@@ -1,9 +1,9 @@
 //! The virtual sensor behind the chip select of the emulated bus, in the emulator's time.
 
 use adis16405_driver::BURST_BYTES;
-use host_sim::sensor::VirtualAdis16405;
 use rigless::chip::{Timeline, spi::Peer};
 use rigless::snapshot::Store;
+use virtual_sensor::VirtualAdis16405;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Sensor {

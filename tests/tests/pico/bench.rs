@@ -2,13 +2,13 @@
 
 use crate::build;
 use adis16405_driver::BURST_BYTES;
-use host_sim::sensor::VirtualAdis16405;
 use host_sim::uf2;
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use virtual_sensor::VirtualAdis16405;
 
 /// rp2040js and the image, as ELF and as UF2.
 struct Bench {

@@ -11,7 +11,7 @@ mod decoded;
 use adis16405_driver::Burst;
 use bench::{Event, Outcome, run};
 use decoded::{Decoded, on_host};
-use host_sim::sensor::{NoiseModel, VirtualAdis16405};
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
 const RATE_HZ: f64 = 204.8;
 

@@ -1,8 +1,8 @@
 //! The three cases: series whose noise is known.
 
 use adis16405_driver::Channel;
-use host_sim::sensor::NoiseModel;
-use host_sim::sensor::noise::NoiseSource;
+use virtual_sensor::NoiseModel;
+use virtual_sensor::noise::NoiseSource;
 
 /// Samples of a series.
 pub(crate) const SAMPLES: usize = 1_000_000;

@@ -3,7 +3,7 @@
 use crate::case::{Case, Coefficients, SAMPLE_PERIOD, SAMPLES};
 use allan_core::model::Term;
 use allan_core::{Cascade, Kind, Model, fit::fit};
-use host_sim::record_length::relative_error;
+use noise_analysis::record_length::relative_error;
 
 /// Counts in the standard deviation of the white noise: rounding adds 1/12 count², a part in 10⁷.
 const COUNTS: f64 = 1000.0;

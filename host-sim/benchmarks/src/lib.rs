@@ -1,0 +1,4 @@
+//! Yardsticks of the noise analysis.
+
+pub mod paper;
+pub mod undeclared;

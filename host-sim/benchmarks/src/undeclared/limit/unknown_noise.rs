@@ -1,0 +1,58 @@
+//! The limit of a test that knows an effect's channel and shape, as that behind the strength does, but not the noise.
+//!
+//! The slowest noise goes through few periods in a record, and a test has to see both its size and the effect in them:
+//! Student's distribution with few degrees of freedom. A method that also has to find out channel and shape sees no more.
+
+use adis16405_driver::Channel;
+use noise_analysis::trace::Series;
+use noise_analysis::trace::block::Blocks;
+use noise_analysis::trace::evidence::Evidence;
+use noise_analysis::trace::level::SIGNIFICANCE;
+use noise_analysis::trace::noises::NoiseTable;
+use recordings::recording::Recording;
+use recordings::timeline::Timeline;
+use virtual_sensor::Effect;
+
+/// Whether such a test sees `effect` at the probability of chance that the analysis asks for; `None` for effects that are
+/// not a known course of the level. `begin_s` is when the recording begins, counted from the part's start.
+pub(crate) fn sees(effect: &Effect, recording: &Recording, timeline: &Timeline, begin_s: f64) -> Option<bool> {
+    let series = |channel: Channel| Series::of(recording, timeline, channel);
+    let own = series(*effect.channels().first()?);
+    let blocks = Blocks::of(&own)?;
+    let shape = match effect {
+        Effect::RateRamp { .. } => blocks.ramp(),
+        Effect::BiasStep { time_s, .. } => blocks.step_at(((time_s - begin_s) / own.period_s).max(0.0) as u64),
+        Effect::Temperature { .. } => Blocks::of(&series(Channel::Temp))?.means,
+        Effect::Supply { .. } => Blocks::of(&series(Channel::Supply))?.means,
+        _ => return None,
+    };
+    let noises = NoiseTable::default().of(&blocks);
+    let estimate = Evidence::of(&blocks, &noises, &[]).shape(&shape)?;
+    Some(estimate.p_value < SIGNIFICANCE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Group, case};
+    use super::*;
+
+    /// Far above the limit it sees what is there; of what is no course it says nothing.
+    #[test]
+    fn a_gross_course_is_seen_and_an_absent_one_is_not() {
+        let seen = |effect: &Effect| {
+            let mut simulation = case(Group::Nothing, 100.0, 3).simulation;
+            simulation.hidden.effects = vec![effect.clone()];
+            let recording = simulation.run(|_| ()).unwrap();
+            let timeline = Timeline::of(&recording, None).unwrap();
+            sees(effect, &recording, &timeline, 0.2)
+        };
+        let channel = Channel::GyroX;
+        let step = |size: f64| Effect::BiasStep { channel, time_s: 50.0, size };
+        assert_eq!([seen(&step(1.0)), seen(&step(0.0))], [Some(true), Some(false)]);
+        let ramp = |slope: f64| Effect::RateRamp { channel, slope };
+        assert_eq!([seen(&ramp(0.05)), seen(&ramp(0.0))], [Some(true), Some(false)]);
+        assert_eq!(seen(&Effect::Supply { channel, sensitivity: 100.0 }), Some(true));
+        assert_eq!(seen(&Effect::Temperature { channel, sensitivity: 10.0 }), Some(true));
+        assert_eq!(seen(&Effect::FilterBandwidth { taps_log2: 2 }), None);
+    }
+}

@@ -1,0 +1,143 @@
+//! What the truth knows: the parameters of an effect, and the error of the true model on data that it has not seen.
+
+use super::draw::Case;
+use adis16405_driver::{Channel, GyroRange};
+use allan_core::check::ModelError;
+use allan_core::fit::fit_shapes;
+use allan_core::model::Term;
+use allan_core::term::{Filter, Markov, Resonance, Sinusoid};
+use allan_core::{Cascade, Kind, Model};
+use firmware::{OCTAVES, OVERLAP};
+use recordings::recording::Sample;
+use simulation::record::{RecordError, SAMPLE_RATE_HZ, Simulation};
+use virtual_sensor::{ChannelNoise, Effect, Hidden};
+
+/// Names and values of the parameters of `effect` as a report calls them; times count from the part's start.
+pub(super) fn parameters(effect: &Effect) -> Vec<(&'static str, f64)> {
+    match *effect {
+        Effect::Sinusoid { frequency_hz, amplitude, .. } => {
+            vec![("frequency", frequency_hz), ("amplitude", amplitude)]
+        }
+        Effect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+            vec![("frequency", frequency_hz), ("bandwidth", bandwidth_hz), ("deviation", deviation)]
+        }
+        Effect::Markov { time_constant_s, deviation, .. } | Effect::CommonMode { time_constant_s, deviation, .. } => {
+            vec![("time_constant", time_constant_s), ("deviation", deviation)]
+        }
+        Effect::Telegraph { time_constant_s, amplitude, .. } => {
+            vec![("time_constant", time_constant_s), ("amplitude", amplitude)]
+        }
+        Effect::Quantization { coefficient, .. } => vec![("value", coefficient)],
+        Effect::RateRamp { slope, .. } => vec![("slope", slope)],
+        Effect::FilterBandwidth { taps_log2 } => vec![("taps", f64::from(1u32 << taps_log2))],
+        Effect::Temperature { sensitivity, .. } | Effect::Supply { sensitivity, .. } => {
+            vec![("sensitivity", sensitivity)]
+        }
+        Effect::Acceleration { sensitivity: [x, y, z], .. } => {
+            vec![("sensitivity_x", x), ("sensitivity_y", y), ("sensitivity_z", z)]
+        }
+        Effect::Spikes { rate_per_hour, size, .. } => vec![("rate", rate_per_hour), ("size", size)],
+        Effect::BiasStep { time_s, size, .. } => vec![("time", time_s), ("size", size)],
+        Effect::DroppedSamples { fraction } | Effect::RepeatedSamples { fraction } => vec![("fraction", fraction)],
+        Effect::SampleClock { ratio } => vec![("rate_hz", SAMPLE_RATE_HZ * ratio)],
+    }
+}
+
+/// Whether the effect can be taken out of the data; else it is a term of the true model.
+fn can_be_taken_out(effect: &Effect) -> bool {
+    !matches!(
+        effect,
+        Effect::Sinusoid { .. }
+            | Effect::Resonance { .. }
+            | Effect::Markov { .. }
+            | Effect::Telegraph { .. }
+            | Effect::Quantization { .. }
+            | Effect::RateRamp { .. }
+            | Effect::FilterBandwidth { .. }
+    )
+}
+
+/// What the truth reaches as `deviance_per_point` on the second half of a record, from which a true estimator would
+/// have taken out what can be. A common mode counts as taken out: the channels tell it from what they do not share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UnseenError {
+    /// Of the true model.
+    pub(super) model: f64,
+    /// Of the true terms, their coefficients and shapes fitted to the first half, as those of any model must be.
+    pub(super) fitted: f64,
+}
+
+/// Of `channel`; `None` where there is too little data.
+///
+/// # Errors
+/// The recording without the effects cannot be made.
+pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<UnseenError>, RecordError> {
+    let effects: Vec<Effect> =
+        case.simulation.hidden.effects.iter().filter(|effect| !can_be_taken_out(effect)).cloned().collect();
+    let model = model(case.simulation.noise.channel(channel), channel, &effects);
+    // Random streams go by the order of the effects, so the place of those that are taken out is kept by size 0.
+    let hidden = Hidden {
+        effects: case.simulation.hidden.effects.iter().map(nothing_if_taken_out).collect(),
+        ..case.simulation.hidden.clone()
+    };
+    let recording = Simulation { hidden, ..case.simulation.clone() }.run(|_| ())?;
+    let (first, second) = recording.samples.split_at(recording.samples.len() / 2);
+    let curve = |samples: &[Sample]| curve(samples, channel, recording.range);
+    let mut kinds: Vec<Kind> = model.terms().iter().map(|term| term.kind).collect();
+    kinds.dedup();
+    let fitted = fit_shapes(&curve(first), &kinds);
+    let error = |model: &Model| Some(ModelError::between(model, &curve(second))?.deviance_per_point);
+    Ok(error(&model).zip(error(&fitted)).map(|(model, fitted)| UnseenError { model, fitted }))
+}
+
+fn nothing_if_taken_out(effect: &Effect) -> Effect {
+    let channel = effect.channels().first().copied().unwrap_or(Channel::AuxAdc);
+    if can_be_taken_out(effect) { Effect::RateRamp { channel, slope: 0.0 } } else { effect.clone() }
+}
+
+fn model(noise: &ChannelNoise, channel: Channel, effects: &[Effect]) -> Model {
+    let period_s = 1.0 / SAMPLE_RATE_HZ;
+    let rounding = channel.lsb(GyroRange::Dps300) * (period_s / 12.0).sqrt();
+    let taps = effects.iter().find_map(|effect| match effect {
+        Effect::FilterBandwidth { taps_log2 } => Some(1u16 << taps_log2),
+        _ => None,
+    });
+    let white = taps.map_or(Kind::AngleRandomWalk, |taps| Kind::Filtered(Filter::bartlett(taps)));
+    let declared = [
+        Term::exact(white, noise.angle_random_walk),
+        Term::exact(Kind::AngleRandomWalk, rounding),
+        Term::exact(Kind::BiasInstability, noise.bias_instability),
+        Term::exact(Kind::RateRandomWalk, noise.rate_random_walk),
+    ];
+    let own = effects.iter().filter(|effect| effect.channels().contains(&channel));
+    Model::new(period_s, declared.into_iter().chain(own.filter_map(term)))
+}
+
+fn term(effect: &Effect) -> Option<Term> {
+    let (kind, value) = match *effect {
+        Effect::Sinusoid { frequency_hz, amplitude, .. } => {
+            (Kind::Sinusoid(Sinusoid { frequency: frequency_hz }), amplitude)
+        }
+        Effect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+            (Kind::Resonance(Resonance { frequency: frequency_hz, bandwidth: bandwidth_hz }), deviation)
+        }
+        Effect::Markov { time_constant_s, deviation, .. } => {
+            (Kind::Markov(Markov { time_constant: time_constant_s }), deviation)
+        }
+        Effect::Telegraph { time_constant_s, amplitude, .. } => {
+            (Kind::Markov(Markov { time_constant: time_constant_s }), 0.5 * amplitude)
+        }
+        Effect::Quantization { coefficient, .. } => (Kind::Quantization, coefficient),
+        Effect::RateRamp { slope, .. } => (Kind::RateRamp, slope.abs()),
+        _ => return None,
+    };
+    Some(Term::exact(kind, value))
+}
+
+fn curve(samples: &[Sample], channel: Channel, range: GyroRange) -> allan_core::Curve<OCTAVES> {
+    let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
+    for sample in samples {
+        cascade.push(i32::from(sample.counts.get(channel)));
+    }
+    cascade.curve(1.0 / SAMPLE_RATE_HZ).scaled(channel.lsb(range))
+}

@@ -1,0 +1,155 @@
+//! What was found in the samples themselves, and how the series become whole again without it.
+//!
+//! A ramp is named here, where it is clearest, and left in the samples: the model has a term for it.
+
+use crate::report::Effect;
+use crate::trace::{
+    Finding, Repair, Series, coarse_counts, deliveries,
+    level::{self, Followed, Level},
+    noises::NoiseTable,
+    sample_clock, spikes,
+};
+use adis16405_driver::Channel;
+use allan_core::Kind;
+use recordings::recording::Recording;
+use recordings::timeline::Timeline;
+use std::collections::BTreeSet;
+
+/// Effects in the samples, and their repairs.
+#[derive(Default)]
+pub(super) struct Repairs {
+    /// What concerns every channel: how the samples were taken and delivered.
+    everywhere: Vec<Effect>,
+    of_channel: Vec<(Channel, Effect)>,
+    left_out: BTreeSet<usize>,
+    levels: Vec<(Channel, usize, f64)>,
+    /// Channels, slow causes that they follow, and how.
+    followed: Vec<(Channel, Channel, Followed)>,
+    /// Counts to a step of a channel's values, where it is more than one.
+    coarse: Vec<(Channel, u32)>,
+}
+
+impl Repairs {
+    /// Looks for spikes and for what moves the level in `traced`, and for what became of the samples of the whole
+    /// recording.
+    pub(super) fn find(recording: &Recording, timeline: &Timeline, traced: &[Channel], noises: &NoiseTable) -> Self {
+        let mut repairs = Self::default();
+        let deliveries = [
+            deliveries::dropped(timeline),
+            deliveries::repeated(recording, timeline),
+            sample_clock::find(recording, timeline),
+        ];
+        for finding in deliveries.into_iter().flatten() {
+            repairs.left_out.extend(left_out(&finding.repair));
+            repairs.everywhere.push(finding.effect);
+        }
+        let measured = |channel: Channel| Series::of(recording, timeline, channel);
+        let coarse = in_parallel(&recording.channels, |&channel| coarse_counts::step(&measured(channel)));
+        repairs.coarse = recording.channels.iter().copied().zip(coarse).filter(|(_, counts)| *counts > 1).collect();
+        let of = |channel: Channel| measured(channel).with_steps(repairs.step(channel));
+        let causes: Vec<(Channel, Series)> = recording.channels.iter().map(|&channel| (channel, of(channel))).collect();
+        let found = in_parallel(traced, |&channel| {
+            let series = of(channel);
+            let coarse = coarse_counts::find(&measured(channel));
+            let spikes = spikes::find(&series);
+            let left = spikes.as_ref().map(|finding| left_out(&finding.repair)).unwrap_or_default();
+            let cleaned = series.repaired(&Repair::LeaveOut(left.clone()));
+            let may = causes.iter().filter(|(of, _)| may_cause(*of, channel));
+            // A cause must have the same samples.
+            let others: Vec<(Channel, Series)> =
+                may.map(|(of, series)| (*of, series.clone().repaired(&Repair::LeaveOut(left.clone())))).collect();
+            let courses: Vec<&Series> = others.iter().map(|(_, series)| series).collect();
+            let level = level::find(&cleaned, &courses, noises);
+            let causes: Vec<Channel> = others.iter().map(|(cause, _)| *cause).collect();
+            (coarse, spikes, level, causes, left)
+        });
+        for (&channel, (coarse, spikes, Level { step, ramp, followed }, causes, left)) in traced.iter().zip(found) {
+            if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
+                repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
+            }
+            // Motion is fast enough for the differences; its slow part is the accelerometers' own drift.
+            let followed = followed.into_iter().map(|(cause, followed)| (channel, causes[cause], followed));
+            repairs.followed.extend(followed.filter(|(_, cause, _)| is_slow(*cause)));
+            repairs.left_out.extend(left);
+            repairs.of_channel.extend(
+                coarse.into_iter().chain(spikes).chain(step).chain(ramp).map(|finding| (channel, finding.effect)),
+            );
+        }
+        repairs
+    }
+
+    /// Counts to a step of the channel's values.
+    pub(super) fn step(&self, channel: Channel) -> u32 {
+        self.coarse.iter().find(|(of, _)| *of == channel).map_or(1, |(_, counts)| *counts)
+    }
+
+    /// Whether the sample at `position` of the timeline is not to be used.
+    pub(super) fn leaves_out(&self, position: usize) -> bool {
+        self.left_out.contains(&position)
+    }
+
+    /// What is to be taken from a sample, in the channel's unit.
+    pub(super) fn level(&self, channel: Channel, position: usize) -> f64 {
+        self.levels.iter().filter(|(of, from, _)| *of == channel && position >= *from).map(|(.., size)| size).sum()
+    }
+
+    /// A channel's series without what was found in it.
+    pub(super) fn series(&self, recording: &Recording, timeline: &Timeline, channel: Channel) -> Series {
+        let mut series = Series::of(recording, timeline, channel).with_steps(self.step(channel));
+        for &(_, from, size) in self.levels.iter().filter(|(of, ..)| *of == channel) {
+            series = series.repaired(&Repair::Level { from, size });
+        }
+        series.repaired(&Repair::LeaveOut(self.left_out.iter().copied().collect()))
+    }
+
+    /// Whether a channel has a ramp.
+    pub(super) fn ramps(&self, channel: Channel) -> bool {
+        self.effects(channel).any(|effect| effect.kind == Kind::RateRamp.name())
+    }
+
+    /// How a channel follows a slow cause.
+    pub(super) fn followed(&self, channel: Channel, cause: Channel) -> Option<Followed> {
+        let of = |(follower, followed, _): &&(Channel, Channel, Followed)| (*follower, *followed) == (channel, cause);
+        self.followed.iter().find(of).map(|(.., followed)| *followed)
+    }
+
+    /// What was found in a channel.
+    pub(super) fn effects(&self, channel: Channel) -> impl Iterator<Item = Effect> + '_ {
+        let own = self.of_channel.iter().filter(move |(of, _)| *of == channel).map(|(_, effect)| effect);
+        self.everywhere.iter().chain(own).cloned()
+    }
+}
+
+/// Runs a task for each of `items`, each on a thread of its own.
+pub(super) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    std::thread::scope(|scope| {
+        let tasks: Vec<_> = items.iter().map(|item| scope.spawn(|| task(item))).collect();
+        // A panic of a task is this thread's too.
+        tasks.into_iter().map(|task| task.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    })
+}
+
+fn left_out(repair: &Repair) -> Vec<usize> {
+    match repair {
+        Repair::LeaveOut(positions) => positions.clone(),
+        _ => Vec::new(),
+    }
+}
+
+/// Surroundings and motion may step and take a channel along.
+fn may_cause(cause: Channel, channel: Channel) -> bool {
+    let surroundings = is_slow(cause);
+    let is_gyro = |of: Channel| Channel::INERTIAL[..3].contains(&of);
+    let motion = Channel::INERTIAL[3..].contains(&cause) && is_gyro(channel);
+    surroundings || motion
+}
+
+/// Causes that take long to move.
+pub(super) fn is_slow(cause: Channel) -> bool {
+    matches!(cause, Channel::Temp | Channel::Supply)
+}
+
+/// The position that a sample had before those at `left` were left out.
+fn before_leaving_out(position: usize, left: &[usize]) -> usize {
+    left.iter().fold(position, |position, &left| if left <= position { position + 1 } else { position })
+}

@@ -1,0 +1,105 @@
+//! Samples that never arrived, and samples that arrived twice as if they were new.
+
+use super::normal::{poisson_bounds, poisson_tail};
+use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
+use recordings::recording::Recording;
+use recordings::timeline::{Step, Timeline};
+
+/// By how much equal neighbours by chance may be more frequent than if the channels were independent.
+const DEPENDENCE: f64 = 3.0;
+
+/// Samples that the timeline misses: the indices or time stamps leave room for them.
+///
+/// Nothing but loss leaves such room, so one is enough.
+#[must_use]
+pub fn dropped(timeline: &Timeline) -> Option<Finding> {
+    let gaps = timeline.steps.iter().filter(|step| matches!(step, Step::Gap(_))).count();
+    let used = timeline.steps.len() - gaps;
+    let missing = timeline.dropped.get("gap").copied().unwrap_or(0);
+    if missing == 0 {
+        return None;
+    }
+    let all = (used as u64 + timeline.dropped.values().sum::<u64>()) as f64;
+    let missing = missing as f64;
+    // Losses come in gaps: the gaps are what is counted.
+    let per_gap = missing / (gaps.max(1) as f64);
+    let (low, high) = poisson_bounds(gaps.max(1) as f64);
+    let fraction = |count: f64| (count / all).min(1.0);
+    let evidence = format!(
+        "{missing} of {all} samples never arrived, in {gaps} gaps; a reader that comes too late, or a full queue"
+    );
+    Some(Finding {
+        effect: effect(
+            "dropped_samples",
+            [("fraction", parameter(fraction(missing), fraction(low * per_gap), fraction(high * per_gap), ""))],
+            evidence,
+        ),
+        deviance: f64::INFINITY,
+        p_value: 0.0,
+        repair: Repair::Done,
+    })
+}
+
+/// Samples all of whose channels equal the sample before, more often than by chance.
+///
+/// The repair holds positions in the [`Series`](super::Series) of any channel.
+#[must_use]
+pub fn repeated(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
+    let used: Vec<usize> = timeline
+        .steps
+        .iter()
+        .filter_map(|step| match step {
+            Step::Sample(position) => Some(*position),
+            Step::Gap(_) => None,
+        })
+        .collect();
+    let mut equal = vec![0u64; recording.channels.len()];
+    let mut positions = Vec::new();
+    for (at, pair) in used.windows(2).enumerate() {
+        let [before, now] = [pair[0], pair[1]].map(|position| recording.samples[position].counts);
+        let mut all = true;
+        for (channel, equal) in recording.channels.iter().zip(&mut equal) {
+            let same = before.get(*channel) == now.get(*channel);
+            *equal += u64::from(same);
+            all &= same;
+        }
+        if all {
+            positions.push(at + 1);
+        }
+    }
+    let refused = timeline.dropped.get("repeated").copied().unwrap_or(0);
+    let (pairs, seen) = (used.len().saturating_sub(1) as f64, positions.len() as f64);
+    let shares: Vec<f64> = equal.iter().map(|&equal| equal as f64 / pairs.max(1.0)).collect();
+    let expected = DEPENDENCE * pairs * shares.iter().product::<f64>();
+    let p_value = poisson_tail(positions.len() as u64 + refused, expected);
+    if p_value > SIGNIFICANCE {
+        return None;
+    }
+    let count = pairs * repeated_share(seen / pairs.max(1.0), &shares) + refused as f64;
+    let (low, high) = poisson_bounds(count);
+    let all = pairs + 1.0 + refused as f64;
+    let evidence = format!(
+        "{} of {all} samples equal the one before in all {} channels, {expected:.1} at most by chance; \
+         a register that is read before it is renewed",
+        positions.len() as u64 + refused,
+        recording.channels.len(),
+    );
+    Some(Finding {
+        effect: effect("repeated_samples", [("fraction", parameter(count / all, low / all, high / all, ""))], evidence),
+        deviance: -2.0 * p_value.max(f64::MIN_POSITIVE).ln(),
+        p_value,
+        repair: Repair::LeaveOut(positions),
+    })
+}
+
+/// The part f of the samples that are repeated, where the part `all` of them equals the one before in all channels and the
+/// parts `shares` in each: `all = f + (1 − f)·Π (share − f)/(1 − f)`.
+fn repeated_share(all: f64, shares: &[f64]) -> f64 {
+    let (mut low, mut high) = (0.0, all);
+    for _ in 0..50 {
+        let repeated = 0.5 * (low + high);
+        let by_chance: f64 = shares.iter().map(|share| ((share - repeated) / (1.0 - repeated)).max(0.0)).product();
+        if repeated + (1.0 - repeated) * by_chance < all { low = repeated } else { high = repeated }
+    }
+    0.5 * (low + high)
+}

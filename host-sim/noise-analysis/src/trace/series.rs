@@ -1,0 +1,105 @@
+//! One channel along its timeline.
+
+use adis16405_driver::Channel;
+use recordings::recording::Recording;
+use recordings::timeline::{Step, Timeline};
+
+/// The samples of one channel in its unit, each with the period in which it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Periods from the first sample; a step of more than 1 is a gap.
+    pub slots: Vec<u64>,
+    /// One a slot, in the channel's unit.
+    pub values: Vec<f64>,
+    /// s.
+    pub period_s: f64,
+    /// One step of the values, in the channel's unit: a count, if nothing else is known.
+    pub resolution: f64,
+    /// Of the values.
+    pub unit: &'static str,
+}
+
+/// What takes an effect out of a [`Series`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum Repair {
+    /// Nothing can.
+    Impossible,
+    /// Nothing has to: the timeline knows of it.
+    Done,
+    /// These samples are to be left out, as a gap: positions in the series, in order.
+    LeaveOut(Vec<usize>),
+    /// This much is to be taken from the sample at `from` and from all after it.
+    Level {
+        /// Position in the series.
+        from: usize,
+        /// In the unit of the series.
+        size: f64,
+    },
+    /// This much, times the sample's slot, is to be taken from every sample, in the unit of the series.
+    Slope(f64),
+}
+
+impl Series {
+    /// The samples of `channel` that `timeline` uses.
+    #[must_use]
+    pub fn of(recording: &Recording, timeline: &Timeline, channel: Channel) -> Self {
+        let resolution = channel.lsb(recording.range);
+        let (mut slots, mut values, mut slot) = (Vec::new(), Vec::new(), 0u64);
+        for step in &timeline.steps {
+            match *step {
+                Step::Gap(missing) => slot = slot.saturating_add(u64::from(missing)),
+                Step::Sample(position) => {
+                    slots.push(slot);
+                    values.push(f64::from(recording.samples[position].counts.get(channel)) * resolution);
+                    slot = slot.saturating_add(1);
+                }
+            }
+        }
+        Self { slots, values, period_s: 1.0 / timeline.sample_rate_hz, resolution, unit: channel.unit() }
+    }
+
+    /// The same values, known to be steps of so many counts.
+    #[must_use]
+    pub fn with_steps(self, counts: u32) -> Self {
+        Self { resolution: self.resolution * f64::from(counts), ..self }
+    }
+
+    /// Time from the first sample to the last, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.slots.last().map_or(0.0, |&slot| slot as f64 * self.period_s)
+    }
+
+    /// The first half of the samples.
+    #[must_use]
+    pub fn first_half(&self) -> Self {
+        let half = self.values.len() / 2;
+        Self { slots: self.slots[..half].to_vec(), values: self.values[..half].to_vec(), ..*self }
+    }
+
+    /// The series without the effect.
+    #[must_use]
+    pub fn repaired(mut self, repair: &Repair) -> Self {
+        match repair {
+            Repair::Impossible | Repair::Done => {}
+            Repair::LeaveOut(positions) => {
+                let kept = |position: &usize| positions.binary_search(position).is_err();
+                let positions: Vec<usize> = (0..self.values.len()).filter(kept).collect();
+                self.slots = positions.iter().map(|&position| self.slots[position]).collect();
+                self.values = positions.iter().map(|&position| self.values[position]).collect();
+            }
+            &Repair::Level { from, size } => {
+                self.values.iter_mut().skip(from).for_each(|value| *value -= size);
+            }
+            &Repair::Slope(slope) => {
+                self.values.iter_mut().zip(&self.slots).for_each(|(value, &slot)| *value -= slope * slot as f64);
+            }
+        }
+        self
+    }
+
+    /// Whether the samples from `first` to `last` follow each other without a gap.
+    pub fn is_gapless(&self, first: usize, last: usize) -> bool {
+        self.slots[last] - self.slots[first] == (last - first) as u64
+    }
+}

@@ -1,0 +1,277 @@
+//! An explanation as tables for a terminal.
+
+use crate::wording::{NONE, count, duration, interval, number, words};
+use allan_core::Kind;
+use allan_core::model::Term;
+use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use noise_analysis::explain::slow_part::SlowPart;
+use noise_analysis::explain::{ChannelExplanation, Explanation};
+use noise_analysis::time_course::companion::Companion;
+use noise_analysis::time_course::moving::Free;
+use noise_analysis::time_course::stationarity::Part;
+use std::io::{self, Write};
+
+/// Writes all tables.
+///
+/// # Errors
+/// As `out`.
+pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> {
+    let Explanation { sample_rate_hz, samples, deliveries, channels, slow_part, .. } = explanation;
+    let length = duration(*samples as f64 / sample_rate_hz);
+    writeln!(out, "{} samples at {} Hz, {length}", count(*samples), number(*sample_rate_hz))?;
+    for sentence in deliveries {
+        writeln!(out, "• {sentence}")?;
+    }
+    if channels.is_empty() {
+        return writeln!(out, "No inertial channel has enough samples to be cut into epochs.");
+    }
+    writeln!(out, "\nWhat the declared model lacks, by the first half")?;
+    writeln!(out, "{}", found(channels))?;
+    writeln!(out, "\nWhether the noise stands still: the two quarters of the first half, where they differ most")?;
+    writeln!(out, "{}", quarters(channels))?;
+    writeln!(out, "\nDeviance per point (1: a true model on its own data)")?;
+    writeln!(out, "{}", errors(channels))?;
+    writeln!(
+        out,
+        "N, B, K and traced: fitted to the first half. Predictive: the traced terms fitted to the part named"
+    )?;
+    writeln!(
+        out,
+        "above, to the median of its epochs if it is the later quarter. Still: the first half's curve itself taken for"
+    )?;
+    writeln!(
+        out,
+        "the second half's. Nothing of these has seen the second half. Beyond drift: the predictive model, where level"
+    )?;
+    writeln!(
+        out,
+        "and line may have gone as far as the epochs of the first half let expect, (x/σ)² being added for it. Degrees"
+    )?;
+    writeln!(out, "of freedom are those of the kind of noise at each octave, whatever the model.")?;
+    writeln!(out, "\nThe second half foretold epoch by epoch, each from those before it")?;
+    writeln!(out, "{}", followed(channels))?;
+    writeln!(
+        out,
+        "Shapes and gains by the first half; what moves is corrected by each epoch after it was foretold. All"
+    )?;
+    writeln!(
+        out,
+        "epochs: the mean of what was foretold, against the curve of the second half. One epoch: the mean of"
+    )?;
+    writeln!(out, "every epoch's own deviance, with what moves followed and with the predictive model as it stands.")?;
+    for of in channels {
+        if let Some(companion) = &of.companion {
+            writeln!(out, "{}", beside(explanation, of, companion))?;
+        }
+    }
+    writeln!(out, "\nWhite noise (change of its variance, %) and moving line (Hz), epoch by epoch")?;
+    writeln!(out, "{}", courses(*sample_rate_hz, channels))?;
+    writeln!(
+        out,
+        "By the curves alone: how a line moves, they show well; where it is, octaves tell to some ten percent."
+    )?;
+    if let Some(slow_part) = slow_part {
+        writeln!(out, "\nShare of each channel's variance that the others foretell, %, first half")?;
+        writeln!(out, "{}", shares(slow_part))?;
+        let learnt = number(slow_part.learnt_at as f64 / sample_rate_hz);
+        writeln!(out, "\nBias drift after over before, second half; weights learnt in the first at τ = {learnt} s")?;
+        writeln!(out, "{}", bought(slow_part))?;
+        writeln!(out, "Trusted: weights of the first quarter made the second quarter better.")?;
+    }
+    Ok(())
+}
+
+fn table<H: Into<String>>(header: impl IntoIterator<Item = H>, left: usize, rows: Vec<Vec<String>>) -> Table {
+    let mut table = Table::new();
+    table
+        .load_preset(presets::UTF8_FULL_CONDENSED)
+        .apply_modifier(modifiers::UTF8_ROUND_CORNERS)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(header.into_iter().map(Into::into).collect::<Vec<String>>())
+        .add_rows(rows);
+    for column in table.column_iter_mut().skip(left) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// What was added, in the order in which it was found, as it is in the final model.
+fn found(channels: &[ChannelExplanation]) -> Table {
+    let of = |channel: &ChannelExplanation| {
+        let row = |found: &allan_core::trace::Found| {
+            let term = &channel.trace.after.terms()[found.term];
+            vec![
+                channel.channel.name().to_owned(),
+                words(term.kind.name()),
+                shape(term),
+                format!("{} [{}]", number(term.value), interval(term.low, term.high)),
+                format!("{:.0}", found.score),
+                format!(
+                    "{} σ at {} s",
+                    number(found.residual.sigmas),
+                    number(found.residual.n as f64 * channel.trace.after.sample_period())
+                ),
+            ]
+        };
+        channel.trace.found.iter().map(row).collect::<Vec<_>>()
+    };
+    let header = ["channel", "term", "shape", "coefficient", "score", "residual before"];
+    table(header, 3, channels.iter().flat_map(of).collect())
+}
+
+fn shape(term: &Term) -> String {
+    let parameters = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
+    let of = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
+        let bounds = if low < high { format!(" [{}]", interval(low, high)) } else { String::new() };
+        format!("{} {}{bounds}", words(name), number(value))
+    };
+    let stages = match term.kind {
+        Kind::Filtered(filter) => Some(format!("stages {}", filter.stages)),
+        _ => None,
+    };
+    stages.into_iter().chain(parameters.map(of)).collect::<Vec<_>>().join(", ")
+}
+
+fn quarters(channels: &[ChannelExplanation]) -> Table {
+    let row = |channel: &ChannelExplanation| {
+        let mut row = vec![channel.channel.name().to_owned()];
+        match channel.stationarity {
+            Some(found) => row.extend([
+                number(found.n as f64 * channel.parts.fitted.sample_period()),
+                format!("{:+.2} %", 100.0 * (found.ratio - 1.0)),
+                format!("{:.1e}", found.p_value),
+            ]),
+            None => row.extend([NONE, NONE, NONE].map(str::to_owned)),
+        }
+        row.push(match channel.part {
+            Part::FittedHalf => "the first half".to_owned(),
+            Part::LatestQuarter => "its later quarter".to_owned(),
+        });
+        row
+    };
+    let header = ["channel", "at τ, s", "σ² later/earlier", "chance", "predictive model from"];
+    table(header, 1, channels.iter().map(row).collect())
+}
+
+fn errors(channels: &[ChannelExplanation]) -> Table {
+    let row = |channel: &ChannelExplanation| {
+        let errors = &channel.errors;
+        let [declared, traced, predictive] =
+            [errors.declared, errors.traced, errors.predictive].map(|both| both.map(deviance));
+        let values = [declared, traced, predictive].concat();
+        let last = [errors.beyond_drift, errors.standing_still].map(deviance).to_vec();
+        [vec![channel.channel.name().to_owned()], values, last].concat()
+    };
+    let header = [
+        "channel",
+        "N, B, K: fitted",
+        "unseen",
+        "traced: fitted",
+        "unseen",
+        "predictive: fitted",
+        "unseen",
+        "beyond drift",
+        "still",
+    ];
+    table(header, 1, channels.iter().map(row).collect())
+}
+
+fn deviance(value: f64) -> String {
+    if value < 100.0 { format!("{value:.2}") } else { format!("{value:.0}") }
+}
+
+fn followed(channels: &[ChannelExplanation]) -> Table {
+    let row = |channel: &ChannelExplanation| {
+        let (tracked, controls) = (&channel.tracked, &channel.controls);
+        let what = match channel.free {
+            Free::Nothing => "nothing",
+            Free::Level => "level",
+            Free::LevelAndLine => "level, line",
+        };
+        let values = [
+            tracked.pooled,
+            tracked.one_step,
+            tracked.one_step_static,
+            controls.declared_followed,
+            controls.persistence,
+        ];
+        [vec![channel.channel.name().to_owned(), what.to_owned()], values.map(deviance).to_vec()].concat()
+    };
+    let header = [
+        "channel",
+        "what moves",
+        "all epochs",
+        "one epoch",
+        "… as it stands",
+        "control: N, B, K",
+        "control: epoch before",
+    ];
+    table(header, 2, channels.iter().map(row).collect())
+}
+
+fn beside(explanation: &Explanation, of: &ChannelExplanation, companion: &Companion) -> String {
+    let (name, other) = (of.channel.name(), explanation.searched[companion.channel].name());
+    let (mean, deviation) = companion.measured_ratio;
+    let ((above, below), path) = (companion.ratio, [&companion.line, &companion.companion[0], &companion.companion[1]]);
+    let [line, seen, unseen] = path.map(|path| path.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" "));
+    format!(
+        "\nThe line of {name} shows in {other} at {above}/{below} of its frequency: ratio {mean:.4} ± {deviation:.4} epoch by\n\
+         epoch, correlation of the steps {:.3}, chance {:.0e} (first half). Where {other} has it in the second half\n\
+         foretells {name} with a deviance per point of {:.2}; {name} itself is not looked at there. Hz, by the spectra:\n\
+         {name}, first half: {line}\n{other}, first half: {seen}\n{other}, second half: {unseen}",
+        companion.correlation, companion.p_value, companion.unseen,
+    )
+}
+
+fn courses(rate: f64, channels: &[ChannelExplanation]) -> Table {
+    let mut header = vec!["half".to_owned(), "from, min".to_owned()];
+    for channel in channels {
+        header.push(channel.channel.name().to_owned());
+        if channel.moving.line_frequency().is_some() {
+            header.push("Hz".to_owned());
+        }
+    }
+    let Some(first) = channels.first() else { return table(header, 0, Vec::new()) };
+    let half = first.parts.fitted.samples() as usize;
+    let starts = [half % first.parts.epoch, half];
+    let rows = ["first", "second"].iter().enumerate().flat_map(|(at, name)| {
+        (0..first.course[at].len()).map(move |epoch| {
+            let from = (starts[at] + epoch * first.parts.epoch) as f64 / rate / 60.0;
+            let mut row = vec![(*name).to_owned(), format!("{from:.1}")];
+            for channel in channels {
+                let estimate = channel.course[at][epoch];
+                let [level, line] = estimate.state;
+                row.push(format!("{:+.1} ± {:.1}", 100.0 * level.exp_m1(), 100.0 * estimate.error[0]));
+                if let Some(frequency) = channel.moving.line_frequency() {
+                    let f = frequency * line.exp();
+                    row.push(format!("{f:.2} ± {:.2}", f * estimate.error[1]));
+                }
+            }
+            row
+        })
+    });
+    table(header, 1, rows.collect())
+}
+
+fn by_channel(slow_part: &SlowPart) -> Vec<String> {
+    let names = slow_part.channels.iter().map(|channel| channel.name().to_owned());
+    ["τ, s".to_owned()].into_iter().chain(names).collect()
+}
+
+fn shares(slow_part: &SlowPart) -> Table {
+    let rows = slow_part.shared.iter().map(|octave| {
+        let shares = octave.share.iter().map(|share| format!("{:.0}", 100.0 * share));
+        [number(octave.tau)].into_iter().chain(shares).collect()
+    });
+    table(by_channel(slow_part), 0, rows.collect())
+}
+
+fn bought(slow_part: &SlowPart) -> Table {
+    let rows = slow_part.bought.iter().map(|octave| {
+        let ratios = octave.ratio.iter().map(|ratio| format!("{ratio:.2}"));
+        [number(octave.tau)].into_iter().chain(ratios).collect()
+    });
+    let trusted = slow_part.trusted.iter().map(|&trusted| if trusted { "yes" } else { "no" }.to_owned());
+    let last = ["trusted".to_owned()].into_iter().chain(trusted).collect();
+    table(by_channel(slow_part), 0, rows.chain([last]).collect())
+}

@@ -1,0 +1,204 @@
+//! How numbers, units and names read in the terminal, in the picture and on the page.
+
+use noise_analysis::practice::Innovations;
+
+/// What stands where there is no number.
+pub const NONE: &str = "–";
+
+/// `value` with four significant digits: plain from 0.001 to 999,900, else with an exponent that is a multiple
+/// of three. [`NONE`] for what is not finite.
+pub fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return NONE.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // `{:.3e}` rounds, and carries: 9999.6 becomes 1.000e4.
+    let rounded = format!("{value:.3e}");
+    let Some((mantissa, exponent)) = rounded.split_once('e') else {
+        return rounded;
+    };
+    let (Ok(mantissa), Ok(exponent)) = (mantissa.parse::<f64>(), exponent.parse::<i32>()) else {
+        return rounded;
+    };
+    let shift = if (-3..6).contains(&exponent) { exponent } else { exponent.rem_euclid(3) };
+    let decimals = usize::try_from(3 - shift).unwrap_or(0);
+    let digits = format!("{:.decimals$}", mantissa * 10f64.powi(shift));
+    match exponent - shift {
+        0 => digits,
+        power => format!("{digits}e{power}"),
+    }
+}
+
+/// `value`, or [`NONE`].
+pub fn optional(value: Option<f64>) -> String {
+    value.map_or_else(|| NONE.to_owned(), number)
+}
+
+/// A percentage with its sign, or [`NONE`].
+pub fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| NONE.to_owned(), |value| format!("{} %", number(value)))
+}
+
+/// A whole number with its thousands apart: `1,000,000`.
+pub fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Seconds as a person says them, such as `2 h 46 min 40 s`; below a minute with four digits.
+pub fn duration(seconds: f64) -> String {
+    // Beyond 2^53 s the whole seconds are no longer exact.
+    if !(59.5..9.0e15).contains(&seconds) {
+        return match number(seconds) {
+            text if text == NONE => text,
+            text => format!("{text} s"),
+        };
+    }
+    let whole = seconds.round() as u64;
+    let parts = [(whole / 86_400, "d"), (whole / 3600 % 24, "h"), (whole / 60 % 60, "min"), (whole % 60, "s")];
+    let told: Vec<String> = parts
+        .iter()
+        .filter(|(amount, _)| *amount > 0)
+        .map(|(amount, unit)| format!("{} {unit}", count(*amount)))
+        .collect();
+    told.join(" ")
+}
+
+/// A range of numbers, such as `0.03890 … 0.03910`.
+pub fn interval(low: f64, high: f64) -> String {
+    format!("{} … {}", number(low), number(high))
+}
+
+/// A name of the JSON schema as words: `angle_random_walk` becomes `angle random walk`.
+pub fn words(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// A parameter's name as words, without the unit that stands beside it: `frequency_hz` becomes `frequency`, and
+/// `value` becomes nothing.
+pub fn parameter_name(name: &str) -> String {
+    let bare = name.strip_suffix("_hz").or(name.strip_suffix("_s")).unwrap_or(name);
+    match bare {
+        "value" => String::new(),
+        "at" => "time".to_owned(),
+        name => words(name),
+    }
+}
+
+/// A unit of the JSON schema as it is printed: `deg/sqrt(s)` becomes `°/√s`.
+pub fn unit(name: &str) -> String {
+    let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
+    let powers = [("^2", "²"), ("^3", "³")];
+    let spelled = symbols.iter().chain(&powers).fold(name.to_owned(), |name, (plain, sign)| name.replace(plain, sign));
+    if spelled.starts_with("ug") { spelled.replacen("ug", "µg", 1) } else { spelled }
+}
+
+/// What the innovations say of a model, in a sentence.
+pub fn verdict(innovations: &Innovations) -> &'static str {
+    let size = if innovations.normalised > innovations.high {
+        -1
+    } else {
+        i32::from(innovations.normalised >= innovations.low)
+    };
+    match (size, innovations.whiteness_p >= WHITE) {
+        (1, true) => "white and as large as the model says: enough for a filter",
+        (1, false) => "as large as the model says, but not white: something with a memory is missing",
+        (0, true) => "white, but smaller than the model says: a filter would be too cautious",
+        (0, false) => "smaller than the model says, and not white",
+        (_, true) => "white, but larger than the model says: a filter would be too sure",
+        (_, false) => "larger than the model says, and not white: the model is not enough for a filter",
+    }
+}
+
+/// Innovations whose correlation has a smaller chance are not called white.
+const WHITE: f64 = 0.01;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_significant_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (1.0, "1.000"),
+            (0.0368, "0.03680"),
+            (0.001_234_4, "0.001234"),
+            (0.000_123_44, "123.4e-6"),
+            (0.000_099_994, "99.99e-6"),
+            (0.000_099_996, "100.0e-6"),
+            (1.234_56e-5, "12.35e-6"),
+            (1.234_56e-7, "123.5e-9"),
+            (9.999_6, "10.00"),
+            (-273.149, "-273.1"),
+            (9_999.6, "10000"),
+            (163.84, "163.8"),
+            (524_288.0, "524300"),
+            (999_960.0, "1.000e6"),
+            (1.5e6, "1.500e6"),
+            (1.5e8, "150.0e6"),
+            (f64::MAX, "179.8e306"),
+            (f64::MIN_POSITIVE, "22.25e-309"),
+            (f64::NAN, NONE),
+            (f64::INFINITY, NONE),
+        ] {
+            assert_eq!(number(value), text, "{value:e}");
+        }
+    }
+
+    #[test]
+    fn counts_have_their_thousands_apart() {
+        for (value, text) in [
+            (0, "0"),
+            (999, "999"),
+            (1000, "1,000"),
+            (49_425, "49,425"),
+            (1_000_000, "1,000,000"),
+            (u64::MAX, "18,446,744,073,709,551,615"),
+        ] {
+            assert_eq!(count(value), text);
+        }
+    }
+
+    #[test]
+    fn durations_read_like_a_clock() {
+        for (value, text) in [
+            (0.01, "0.01000 s"),
+            (59.4, "59.40 s"),
+            (59.7, "1 min"),
+            (3600.0, "1 h"),
+            (10_000.0, "2 h 46 min 40 s"),
+            (90_061.0, "1 d 1 h 1 min 1 s"),
+            (f64::NAN, NONE),
+            (f64::INFINITY, NONE),
+        ] {
+            assert_eq!(duration(value), text);
+        }
+    }
+
+    #[test]
+    fn names_and_units_become_readable() {
+        assert_eq!(words("angle_random_walk"), "angle random walk");
+        assert_eq!(parameter_name("value"), "");
+        assert_eq!(parameter_name("frequency_hz"), "frequency");
+        assert_eq!(parameter_name("correlation_time_s"), "correlation time");
+        assert_eq!(parameter_name("at_s"), "time");
+        assert_eq!(unit("deg/sqrt(s)"), "°/√s");
+        assert_eq!(unit("deg/s/sqrt(s)"), "°/s/√s");
+        assert_eq!(unit("degC"), "°C");
+        assert_eq!(unit("gauss"), "gauss");
+        assert_eq!(unit("ug/sqrt(Hz)"), "µg/√Hz");
+        assert_eq!(unit("deg/h/sqrt(h)"), "°/h/√h");
+        assert_eq!(unit("m/s^3/sqrt(Hz)"), "m/s³/√Hz");
+    }
+}

@@ -1,0 +1,186 @@
+//! The firmware's application on the host: the very code of the image, over the virtual sensor, in virtual time.
+
+use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::SpiDevice;
+use firmware::retained::{Memory, blank};
+use firmware::{
+    App, Arrival, Arrivals, Board, Epoch, Estimators, FIRST_CONFIG, Meters, Outbox, Outgoing, Retained, Sampler, Start,
+    Statistics, estimate,
+};
+use heapless::spsc::Consumer;
+use link::Boot;
+use std::collections::VecDeque;
+use virtual_sensor::{EmulatedBus, VirtualAdis16405};
+
+/// Serial clock of the sensor's bus, Hz.
+pub const SCK_HZ: u32 = 1_000_000;
+
+/// The main loop goes round at least so often.
+const WAKE_US: u64 = 100_000;
+
+/// A device that is not there: the application, its sensor, and both ends of its serial line, which takes no time.
+pub struct Device {
+    app: App,
+    desk: Desk,
+}
+
+/// Everything but the application.
+struct Desk {
+    bus: EmulatedBus,
+    now_us: u64,
+    sampler: Sampler<'static>,
+    estimators: Estimators<'static>,
+    arrivals: Consumer<'static, Arrival>,
+    outbox: Outbox<'static>,
+    outgoing: Consumer<'static, u8>,
+    sent: Vec<u8>,
+    received: VecDeque<u8>,
+    restarts: u32,
+}
+
+impl Device {
+    /// Starts the application with a sensor, and with what `memory` retains.
+    ///
+    /// The queues and statistics, 50 kB, are never given back: on the target they are statics.
+    pub fn new(part: VirtualAdis16405, memory: &'static Memory) -> Self {
+        let (to_estimators, arrivals) = Box::leak(Box::new(Arrivals::new())).split();
+        let (to_port, outgoing) = Box::leak(Box::new(Outgoing::new())).split();
+        let statistics = Box::leak(Box::new(Statistics::new()));
+        let mut desk = Desk {
+            now_us: part.now() / 1000,
+            bus: EmulatedBus::with_sck_hz(part, SCK_HZ),
+            sampler: Sampler::new(to_estimators),
+            estimators: Estimators::new(statistics, FIRST_CONFIG),
+            arrivals,
+            outbox: Outbox::new(to_port),
+            outgoing,
+            sent: Vec::new(),
+            received: VecDeque::new(),
+            restarts: 0,
+        };
+        let start = Start {
+            spi_clock_hz: SCK_HZ,
+            boot: Boot::default(),
+            retained: Retained::open(memory),
+            finished: Box::leak(Box::new(Epoch::EMPTY)),
+        };
+        Self { app: App::new(start, &mut desk), desk }
+    }
+
+    /// Memory in which nothing is retained.
+    pub fn blank_memory() -> &'static Memory {
+        Box::leak(Box::new(blank()))
+    }
+
+    /// What is typed at the far end of the line.
+    pub fn press(&mut self, keys: &[u8]) {
+        self.desk.received.extend(keys);
+    }
+
+    /// Lets virtual time pass until `until_us` and returns the bytes that the device sent meanwhile.
+    pub fn run_until(&mut self, until_us: u64) -> Vec<u8> {
+        self.turn();
+        while self.desk.now_us < until_us {
+            let ready_us = self.desk.bus.part().next_data_ready() / 1000 + 1;
+            let next_us = ready_us.min(self.desk.now_us + WAKE_US).min(until_us);
+            let before = self.desk.bus.part().samples();
+            self.desk.advance_to(next_us);
+            if self.desk.bus.part().samples() > before {
+                self.desk.data_ready();
+            }
+            self.turn();
+        }
+        std::mem::take(&mut self.desk.sent)
+    }
+
+    /// The bus and the part on it.
+    pub fn bus(&self) -> &EmulatedBus {
+        &self.desk.bus
+    }
+
+    /// How often the application asked to be restarted.
+    pub fn restarts(&self) -> u32 {
+        self.desk.restarts
+    }
+
+    fn turn(&mut self) {
+        while self.app.turn(&mut self.desk) {
+            self.desk.transmit();
+        }
+        self.desk.transmit();
+    }
+}
+
+impl Desk {
+    fn advance_to(&mut self, us: u64) {
+        self.bus.advance_to(us * 1000);
+        self.now_us = us;
+    }
+
+    /// What the two sampling interrupts and the one of the estimators do.
+    fn data_ready(&mut self) {
+        if self.sampler.edge(self.now_us) {
+            let mut answer = [0; BURST_BYTES];
+            let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
+            self.sampler.burst(Some(&answer));
+            self.now_us = self.now_us.max(self.bus.part().now() / 1000);
+        }
+        estimate(&mut self.estimators, &mut self.outbox, &mut self.arrivals);
+    }
+
+    fn transmit(&mut self) {
+        self.sent.extend(std::iter::from_fn(|| self.outgoing.dequeue()));
+    }
+}
+
+impl Board for Desk {
+    type Bus<'a> = EmulatedBus;
+    type Pause<'a> = Pause;
+
+    fn now_us(&mut self) -> u64 {
+        // Frames on the bus take virtual time.
+        self.now_us = self.now_us.max(self.bus.part().now() / 1000);
+        self.now_us
+    }
+
+    fn bus(&mut self) -> (EmulatedBus, Pause) {
+        (self.bus.clone(), Pause(self.bus.clone()))
+    }
+
+    fn sample(&mut self, on: bool) {
+        self.sampler.run(on);
+    }
+
+    fn estimators<R>(&mut self, look: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
+        look(&mut self.estimators)
+    }
+
+    fn outbox<R>(&mut self, send: impl FnOnce(&mut Outbox<'static>) -> R) -> R {
+        send(&mut self.outbox)
+    }
+
+    fn received(&mut self) -> Option<u8> {
+        self.received.pop_front()
+    }
+
+    fn meters(&mut self) -> Meters {
+        Meters::default()
+    }
+
+    fn alive(&mut self) {}
+
+    fn restart(&mut self) {
+        self.restarts += 1;
+    }
+}
+
+/// Lets virtual time pass.
+struct Pause(EmulatedBus);
+
+impl DelayNs for Pause {
+    fn delay_ns(&mut self, ns: u32) {
+        let until = self.0.part().now() + u64::from(ns);
+        self.0.advance_to(until);
+    }
+}

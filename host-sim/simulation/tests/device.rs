@@ -1,0 +1,308 @@
+//! The firmware's application on the host: commands, reports, epochs, recovery, what is kept over a restart.
+
+use adis16405_driver::{Channel, OutputWord};
+use embedded_hal::spi::SpiDevice;
+use firmware::CHANNELS;
+use firmware::table::Short;
+use link::{Decoder, Health, Hello, Message, Raw, Received};
+use simulation::device::Device;
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
+
+const SECOND: u64 = 1_000_000;
+
+fn device() -> Device {
+    Device::new(VirtualAdis16405::new(NoiseModel::paper(), 1), Device::blank_memory())
+}
+
+struct Heard {
+    messages: Vec<Message>,
+    lines: Vec<String>,
+}
+
+fn hear(bytes: &[u8]) -> Heard {
+    let mut decoder = Decoder::new();
+    let mut heard = Heard { messages: Vec::new(), lines: Vec::new() };
+    for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
+        match received {
+            Received::Message { message, .. } => heard.messages.push(message),
+            Received::Line(line) => heard.lines.push(line.as_str().to_owned()),
+        }
+    }
+    let counters = decoder.counters();
+    assert_eq!((counters.bad_frames, counters.missing, counters.discarded_bytes), (0, 0, 0));
+    heard
+}
+
+impl Heard {
+    fn logs(&self) -> Vec<&str> {
+        self.messages
+            .iter()
+            .filter_map(|message| if let Message::Log(line) = message { Some(line.as_str()) } else { None })
+            .collect()
+    }
+
+    fn hellos(&self) -> Vec<&Hello> {
+        self.messages
+            .iter()
+            .filter_map(|message| if let Message::Hello(hello) = message { Some(hello) } else { None })
+            .collect()
+    }
+
+    fn health(&self) -> &Health {
+        self.messages
+            .iter()
+            .filter_map(|message| if let Message::Health(health) = message { Some(health) } else { None })
+            .next_back()
+            .expect("a report")
+    }
+
+    /// Splits reports: hello, eight channels, health; what an epoch adds is left out.
+    fn reports(&self) -> usize {
+        let extra = |message: &&Message| {
+            matches!(message, Message::Log(_) | Message::Raw(_) | Message::Checked(_) | Message::Learnt(_))
+        };
+        let frames: Vec<&Message> = self.messages.iter().filter(|message| !extra(message)).collect();
+        for report in frames.chunks(10) {
+            let [Message::Hello(_), channels @ .., Message::Health(_)] = report else { panic!("{report:?}") };
+            let numbers = channels.iter().map(|message| match message {
+                Message::Channel(report) => usize::from(report.channel),
+                _ => 0,
+            });
+            assert!(numbers.eq(CHANNELS.map(|channel| channel as usize)), "{report:?}");
+        }
+        frames.len() / 10
+    }
+}
+
+/// Runs on to `until_us`, pressing `keys` first.
+fn after(device: &mut Device, keys: &str, until_us: u64) -> Heard {
+    device.press(keys.as_bytes());
+    hear(&device.run_until(until_us))
+}
+
+#[test]
+fn a_report_is_due_every_ten_seconds_and_on_request() {
+    let mut device = device();
+    assert_eq!(after(&mut device, "", 10 * SECOND - 1).reports(), 0);
+    assert_eq!(after(&mut device, "", 10 * SECOND + SECOND / 2).reports(), 1);
+    let asked = after(&mut device, "rr", 11 * SECOND);
+    assert_eq!(asked.reports(), 1, "one at a time");
+    assert_eq!(after(&mut device, "i 2\r", 21 * SECOND + SECOND / 2).reports(), 5);
+    assert_eq!(after(&mut device, "i0\r", 60 * SECOND).reports(), 0);
+}
+
+#[test]
+fn the_sensor_is_named_and_its_rate_measured() {
+    let mut device = device();
+    let heard = after(&mut device, "", 10 * SECOND + SECOND / 2);
+    assert_eq!(heard.logs().len(), 1, "{:?}", heard.logs());
+    assert!(heard.logs()[0].starts_with("sensor: ADIS16405, self-test"), "{:?}", heard.logs());
+    let hello = heard.hellos()[0];
+    assert_eq!((hello.product_id, hello.gyro_full_scale, hello.sample_rate_hz), (16405, 300, 204.8));
+    assert!((hello.measured_rate_hz.unwrap() - 204.8).abs() < 1e-3, "{hello:?}");
+    assert_eq!((heard.health().used, heard.health().bursts), (heard.health().bursts, heard.health().bursts));
+    assert!(heard.health().used > 2000);
+}
+
+#[test]
+fn rate_range_and_filter_are_set_and_refused_by_name() {
+    let mut device = device();
+    after(&mut device, "", SECOND);
+    after(&mut device, "f 819.2\rn 5\rg 75\r", 2 * SECOND);
+    let heard = after(&mut device, "r", 3 * SECOND);
+    let hello = heard.hellos()[0];
+    assert_eq!((hello.gyro_full_scale, hello.filter_taps_log2, hello.sample_rate_hz), (75, 5, 819.2));
+    assert!((hello.measured_rate_hz.unwrap() / 819.2 - 1.0).abs() < 1e-4, "{hello:?}");
+    for (keys, answer) in [
+        ("n 2\r", "filter taps 2^2 are outside 2^4 to 2^6"),
+        ("f 50\r", "below 182 SPS the sensor takes a serial clock of 300000 Hz, not 1000000 Hz"),
+        ("f 0\r", "the sample rate must be a finite number above 0"),
+        ("g 100\r", "no such g command; ? lists them"),
+        ("null\r", "not armed"),
+        ("x", "x is no command; ? lists them"),
+    ] {
+        let until = (device.bus().part().now() / 1000) + SECOND / 10;
+        let lines = after(&mut device, keys, until).lines;
+        assert!(lines.iter().any(|line| line.contains(answer)), "{keys}: {lines:?}");
+    }
+    assert_eq!(device.bus().part().violations(), []);
+    let until = (device.bus().part().now() / 1000) + SECOND / 10;
+    assert_eq!(after(&mut device, "\rr", until).health().bad_commands, 2);
+}
+
+/// The numbers of the table are those of the frames.
+#[test]
+fn the_table_shows_what_the_report_says() {
+    let mut device = device();
+    after(&mut device, "", 9 * SECOND);
+    let heard = after(&mut device, "tr", 9 * SECOND + 1);
+    let Some(Message::Channel(gyro_x)) = heard.messages.iter().find(|message| matches!(message, Message::Channel(_)))
+    else {
+        panic!("{:?}", heard.messages);
+    };
+    assert!(heard.lines[0].starts_with("Allan deviation"));
+    for (line, point) in heard.lines[2..].iter().zip(&gyro_x.points) {
+        let n = point.n as f64;
+        let tau = n / 204.8;
+        let deviation = 0.05 * (point.sum as f64 / (2.0 * n * n * point.count as f64)).sqrt();
+        let cells: Vec<&str> = line.split_whitespace().collect();
+        assert_eq!(
+            (cells.len(), cells[0], cells[1]),
+            (7, &*format!("{}", Short(tau)), &*format!("{}", Short(deviation)))
+        );
+    }
+    let coefficients: Vec<&String> = heard.lines.iter().filter(|line| line.starts_with("gyro_x")).collect();
+    let value = format!("{}", Short(gyro_x.coefficients[0].value));
+    assert!(coefficients.len() == 1 && coefficients[0].contains(&value), "{coefficients:?}, {value}");
+}
+
+#[test]
+fn people_get_help_status_version_and_counters() {
+    let mut device = device();
+    after(&mut device, "", SECOND);
+    let lines = after(&mut device, "?", 2 * SECOND).lines;
+    for expected in firmware::command::HELP {
+        assert!(lines.iter().any(|line| line == expected), "{expected}: {lines:?}");
+    }
+    let lines =
+        [after(&mut device, "s", 3 * SECOND), after(&mut device, "k", 4 * SECOND), after(&mut device, "v", 5 * SECOND)];
+    let lines: Vec<String> = lines.into_iter().flat_map(|heard| heard.lines).collect();
+    for expected in [
+        "sensor sampled",
+        "measured 2.048e2 Hz",
+        "start 1",
+        "used ",
+        concat!("observatory ", env!("CARGO_PKG_VERSION")),
+    ] {
+        assert!(lines.iter().any(|line| line.contains(expected)), "{expected}: {lines:?}");
+    }
+}
+
+/// Keys in quick succession are all answered, in order; those that are too many are told so.
+#[test]
+fn no_key_takes_the_answer_of_another() {
+    let mut device = device();
+    after(&mut device, "", SECOND);
+    let lines = after(&mut device, "?sks", 2 * SECOND).lines;
+    let starts: Vec<usize> = ["this list", "start 1", "used ", "start 1"]
+        .iter()
+        .scan(0, |from, wanted| {
+            let at = *from + lines[*from..].iter().position(|line| line.contains(wanted))?;
+            *from = at + 1;
+            Some(at)
+        })
+        .collect();
+    assert_eq!(starts.len(), 4, "{lines:?}");
+    let lines = after(&mut device, "ssssss", 4 * SECOND).lines;
+    let count = |wanted: &str| lines.iter().filter(|line| line.contains(wanted)).count();
+    assert_eq!((count("start 1"), count("busy")), (4, 2), "{lines:?}");
+}
+
+/// Every burst of the raw stream is one that the part sent, in order and without a gap.
+#[test]
+fn the_raw_stream_is_complete() {
+    let mut device = device();
+    after(&mut device, "i0\r", SECOND);
+    let heard = after(&mut device, "w1\r", 5 * SECOND);
+    let raw = |message: &Message| if let Message::Raw(raw) = message { Some(raw.clone()) } else { None };
+    let raws: Vec<Raw> = heard.messages.iter().filter_map(raw).collect();
+    let counts: Vec<i16> = raws
+        .iter()
+        .flat_map(|raw| &raw.bursts)
+        .map(|burst| OutputWord(u16::from_be_bytes(burst.words[1])).counts(Channel::GyroX))
+        .collect();
+    // What the part handed out itself, sample by sample.
+    let mut twin = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 1), Device::blank_memory());
+    after(&mut twin, "", SECOND);
+    let mut expected = Vec::new();
+    while expected.len() < counts.len() {
+        let samples = twin.bus().part().samples();
+        let now_us = twin.bus().part().now() / 1000;
+        after(&mut twin, "", now_us + 100);
+        if twin.bus().part().samples() > samples {
+            expected.push(twin.bus().part().counts().get(Channel::GyroX));
+        }
+    }
+    assert!(counts.len() > 800);
+    assert_eq!(counts, expected);
+    assert!(raws.windows(2).all(|pair| pair[1].first == pair[0].first + 16));
+    assert!(after(&mut device, "w0\r", 6 * SECOND).messages.len() <= 1, "the stream ends");
+}
+
+/// The sensor is reset behind the firmware's back: what it sends with other settings is not used, it is configured
+/// again, and the statistics go on with a gap.
+#[test]
+fn a_sensor_that_was_reset_is_configured_again() {
+    let mut device = device();
+    after(&mut device, "", 4 * SECOND);
+    let mut bus = device.bus().clone();
+    let Ok(()) = bus.write(&[0xBE, 0x80]); // GLOB_CMD bit 7
+    let heard = after(&mut device, "", 6 * SECOND);
+    assert_eq!(heard.logs().len(), 2, "{:?}", heard.logs());
+    assert!(heard.logs()[0].contains("no data-ready edges"));
+    let health = *after(&mut device, "r", 8 * SECOND).health();
+    assert_eq!(health.recoveries, 1);
+    assert_eq!(health.used, health.bursts);
+    let lost = health.lost_edges + health.unchecked;
+    assert!((20..250).contains(&lost), "{health:?}");
+    assert!(u64::from(health.used + lost).abs_diff((6.0 * 204.8) as u64) < 10, "{health:?}");
+}
+
+/// Epochs: accumulate, report, learn, begin again. From the second on the model of the one before is checked.
+#[test]
+fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
+    let mut device = device();
+    let heard = after(&mut device, "i0\re20\r", 61 * SECOND);
+    assert_eq!(heard.reports(), 3);
+    let epochs: Vec<u32> = heard.hellos().iter().map(|hello| hello.epoch).collect();
+    assert_eq!(epochs, [0, 1, 2]);
+    let channels: Vec<_> = heard
+        .messages
+        .iter()
+        .filter_map(|message| if let Message::Channel(report) = message { Some(report) } else { None })
+        .collect();
+    for (index, report) in channels.iter().enumerate() {
+        let inertial = index % 8 < 6;
+        assert_eq!(report.unseen.is_some(), index >= 8 && inertial, "{report:?}");
+        assert!(report.samples.abs_diff(20 * 2048 / 10) < 40, "{}", report.samples);
+        if let Some(error) = report.unseen {
+            // 1 is expected of a true model, with a spread of the same size: 10 octaves that hang together.
+            assert!((0.0..5.0).contains(&error.deviance_per_point), "{error:?}");
+            assert!((0.0..30.0).contains(&error.rms_percent), "{error:?}");
+        }
+    }
+}
+
+#[test]
+fn forgetting_begins_again() {
+    let mut device = device();
+    after(&mut device, "", 5 * SECOND);
+    assert_eq!(after(&mut device, "zero\r", 6 * SECOND).lines, ["statistics forgotten"]);
+    let health = *after(&mut device, "r", 6 * SECOND + 1).health();
+    assert!((190..=210).contains(&health.used), "{health:?}");
+}
+
+/// A restart keeps settings and statistics: the samples go on, and the configuration is that which was set.
+#[test]
+fn a_restart_keeps_statistics_and_settings() {
+    let memory = Device::blank_memory();
+    let mut first = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 1), memory);
+    after(&mut first, "f 819.2\ri 3\re 100\r", SECOND);
+    let used = after(&mut first, "", 9 * SECOND).health().used;
+    assert_eq!(first.restarts(), 0);
+    after(&mut first, "boot\r", 9 * SECOND + 1000);
+    assert_eq!(first.restarts(), 1);
+
+    let part = first.bus().part().clone();
+    let start = part.now() / 1000;
+    let mut second = Device::new(part, memory);
+    let heard = after(&mut second, "r", start + SECOND / 2);
+    let hello = heard.hellos()[0];
+    assert_eq!((hello.boot.starts, hello.boot.kept_channels), (2, 8));
+    assert_eq!((hello.sample_rate_hz, hello.epoch_s), (819.2, 100));
+    let samples = heard.messages.iter().filter_map(|message| match message {
+        Message::Channel(report) => Some(report.samples),
+        _ => None,
+    });
+    assert!(samples.clone().count() == 8 && samples.clone().all(|samples| samples >= u64::from(used)), "{used}");
+}

@@ -1,0 +1,329 @@
+//! Whole procedures of the real driver on the virtual part: their outcome, their side effects, and a silent bus where the
+//! part wants one. Every script runs through the blocking and through the asynchronous shell.
+
+use std::num::NonZeroU8;
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+use adis16405_driver::{
+    Adis16405, Alarm, AlarmNumber, Channel, Compensation, Config, DacLevel, Diagnosis, Dio, Error, FactoryRestore,
+    Faults, Gpio, GyroBias, Judge, Line, Polarity, Product, Register, Signal, Sleep, Stimulus, Threshold, Watch,
+};
+
+use crate::{EmulatedBus, NoiseModel, VirtualAdis16405};
+
+/// Nothing in virtual time is ever pending.
+fn block_on<T>(future: impl Future<Output = T>) -> T {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(output) => output,
+        Poll::Pending => panic!("a future of virtual time is pending"),
+    }
+}
+
+/// Runs a script through both shells. `$imu` has started up on the part behind `$bus`, `$delay` is in its time. Lines are
+/// `expect call => value;` or `take name = call;`, where the call is awaited in the asynchronous run, `given
+/// name = value;` or `then action;`.
+macro_rules! both_shells {
+    ($model:expr, |$bus:ident, $imu:ident, $delay:ident| $($script:tt)*) => {{
+        {
+            let $bus = EmulatedBus::new(VirtualAdis16405::new($model, 1));
+            let mut $delay = $bus.delay();
+            let mut $imu = Adis16405::new($bus.clone(), Config::default());
+            both_shells!(@run [] expect $imu.start_up(&mut $delay) => Ok(Product::Adis16405); $($script)*);
+            assert_eq!($bus.part().violations(), []);
+        }
+        block_on(async {
+            let $bus = EmulatedBus::new(VirtualAdis16405::new($model, 1));
+            let mut $delay = $bus.delay();
+            let mut $imu = Adis16405::new_async($bus.clone(), Config::default());
+            both_shells!(@run [.await] expect $imu.start_up(&mut $delay) => Ok(Product::Adis16405); $($script)*);
+            assert_eq!($bus.part().violations(), []);
+        });
+    }};
+    (@run [$($wait:tt)*]) => {};
+    (@run [$($wait:tt)*] expect $call:expr => $value:expr; $($rest:tt)*) => {
+        assert_eq!($call $($wait)*, $value);
+        both_shells!(@run [$($wait)*] $($rest)*);
+    };
+    (@run [$($wait:tt)*] take $name:ident = $call:expr; $($rest:tt)*) => {
+        let $name = $call $($wait)*.unwrap();
+        both_shells!(@run [$($wait)*] $($rest)*);
+    };
+    (@run [$($wait:tt)*] given $name:ident = $value:expr; $($rest:tt)*) => {
+        let $name = $value;
+        both_shells!(@run [$($wait)*] $($rest)*);
+    };
+    (@run [$($wait:tt)*] then $action:expr; $($rest:tt)*) => {
+        $action;
+        both_shells!(@run [$($wait)*] $($rest)*);
+    };
+}
+
+fn with_rates(rates: [f64; 3]) -> NoiseModel {
+    let mut model = NoiseModel::still();
+    for (channel, rate) in [Channel::GyroX, Channel::GyroY, Channel::GyroZ].into_iter().zip(rates) {
+        model.channel_mut(channel).bias = rate;
+    }
+    model
+}
+
+#[test]
+fn self_tests_name_the_sensor_that_fails_and_leave_the_configuration() {
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.set_data_ready(None) => Ok(());
+        expect imu.set_compensation(Compensation { linear_acceleration: true, origin_alignment: false }) => Ok(());
+        // Compensation, polarity and no data ready: bit 2 and with it bit 1 and 0 are cleared.
+        expect imu.read_register(Register::MscCtrl) => Ok(0x0080);
+        take test = imu.self_test(&mut delay);
+        then assert!(test.passed() && test.ran && test.before.is_empty());
+        take flash = imu.flash_test(&mut delay);
+        then assert!(flash.passed() && flash.ran);
+
+        then bus.part_mut().break_sensor(Channel::GyroX);
+        then bus.part_mut().break_sensor(Channel::AcclZ);
+        then bus.part_mut().damage_flash();
+        take test = imu.self_test(&mut delay);
+        then assert!(!test.passed());
+        // DIAG_STAT 0x8420: bit 15 z accelerometer, bit 10 x gyro, bit 5 self-test.
+        then assert_eq!(test.diagnosis.bits(), 0x8420);
+        then assert!(test.diagnosis.failed_sensors().eq([Channel::GyroX, Channel::AcclZ]));
+        take flash = imu.flash_test(&mut delay);
+        then assert_eq!((flash.passed(), flash.diagnosis), (false, Diagnosis::FLASH_CHECKSUM));
+        expect imu.diagnosis() => Ok(Diagnosis::empty());
+        expect imu.read_register(Register::MscCtrl) => Ok(0x0080);
+    );
+}
+
+#[test]
+fn what_was_diagnosed_before_a_test_is_not_lost_in_it() {
+    let mut model = NoiseModel::still();
+    model.channel_mut(Channel::Supply).bias = 5.5;
+    both_shells!(model.clone(), |bus, imu, delay|
+        take test = imu.self_test(&mut delay);
+        then assert_eq!(test.before, Diagnosis::SUPPLY_HIGH);
+        then assert!(test.passed());
+        // It persists, so it comes back with the next sample.
+        then bus.wait_for_data();
+        expect imu.diagnosis() => Ok(Diagnosis::SUPPLY_HIGH);
+    );
+}
+
+#[test]
+fn a_stimulus_moves_every_inertial_sensor_both_ways() {
+    // The virtual part moves by 40 °/s and 0.5 g: 800 and 150.15 counts.
+    let expected = [800, 800, 800, 150, 150, 150];
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.stimulus_response(Stimulus::Positive, &mut delay) => Ok(expected);
+        expect imu.stimulus_response(Stimulus::Negative, &mut delay) => Ok(expected.map(|counts| -counts));
+        expect imu.read_register(Register::MscCtrl) => Ok(0x0006);
+    );
+}
+
+#[test]
+fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
+    // 0.5 °/s is 40 counts of 0.0125 °/s.
+    both_shells!(with_rates([0.5, 0.5, -0.5]), |bus, imu, delay|
+        expect imu.auto_null(&mut delay) => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
+        then assert!(!imu.x_sign_at_risk());
+        then bus.wait_for_data();
+        take sample = imu.sample();
+        then assert_eq!(sample.counts().gyro(), [10, 0, 0]);
+        then assert_eq!(sample.gyro_udps(), [0, 0, 0]);
+        then assert_eq!(sample.accl_ug(), [0, 0, -999_000]);
+        expect imu.gyro_offsets() => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
+    );
+}
+
+#[test]
+fn the_precision_null_averages_for_thirty_silent_seconds() {
+    let mut model = with_rates([-0.5, 0.25, 0.0]);
+    for channel in [Channel::GyroX, Channel::GyroY, Channel::GyroZ] {
+        model.channel_mut(channel).angle_random_walk = 0.05;
+    }
+    both_shells!(model.clone(), |bus, imu, delay|
+        given before = bus.part().now();
+        take bias = imu.precision_auto_null(&mut delay);
+        then assert!(bus.part().now() - before >= 30_000_000_000);
+        // White noise of 0.05 °/√s over 30 s leaves 0.0091 °/s, 0.73 counts; five of these.
+        then for (offset, expected) in bias.total().into_iter().zip([40, -20, 0]) { assert!((offset - expected).abs() <= 4) };
+    );
+}
+
+#[test]
+fn a_factory_restore_says_what_it_took() {
+    let lost = FactoryRestore {
+        gyro: GyroBias { part: [0, 1, -2], host_x: -3 },
+        accl: [4, -5, 6],
+        hard_iron: [-7, 8, -9],
+        soft_iron: [0x0801, 0x0000, 0x0FFF],
+    };
+    let restored =
+        FactoryRestore { gyro: GyroBias::default(), accl: [0; 3], hard_iron: [0; 3], soft_iron: [0x0800; 3] };
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.set_gyro_offsets([-3, 1, -2]) => Ok(lost.gyro);
+        expect imu.set_accl_offsets(lost.accl) => Ok(());
+        expect imu.set_hard_iron(lost.hard_iron) => Ok(());
+        expect imu.set_soft_iron(lost.soft_iron) => Ok(());
+        expect imu.factory_restore(&mut delay) => Ok(lost);
+        expect imu.factory_restore(&mut delay) => Ok(restored);
+    );
+}
+
+#[test]
+fn flash_and_reset() {
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.flash_writes() => Ok(0);
+        expect imu.set_accl_offsets([1, 2, 3]) => Ok(());
+        expect imu.flash_update(&mut delay) => Ok(1);
+        expect imu.set_accl_offsets([0, 0, 0]) => Ok(());
+        expect imu.set_filter_taps_log2(5) => Ok(());
+        expect imu.set_sample_rate(200.0) => Ok(204.8);
+        expect imu.software_reset(&mut delay) => Ok(Product::Adis16405);
+        expect imu.accl_offsets() => Ok([1, 2, 3]);
+        expect imu.read_registers([Register::SmplPrd, Register::SensAvg]) => Ok([0x0007, 0x0405]);
+
+        then bus.part_mut().damage_flash();
+        expect imu.flash_update(&mut delay)
+            => Err(Error::FlashUpdate { before: 1, after: 1, diagnosis: Diagnosis::FLASH_UPDATE });
+    );
+}
+
+#[test]
+fn sleep_and_wake() {
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.sleep(Sleep::HalfSeconds(NonZeroU8::new(3).unwrap())) => Ok(());
+        given slept = bus.part().now();
+        // Asleep for 1.5 s, 4 ms to recover, one period to the first sample.
+        then assert_eq!(bus.wait_for_data(), None);
+        then bus.advance_to(slept + 1_504_500_000);
+        then assert!(bus.wait_for_data().unwrap() <= slept + 1_506_000_000);
+
+        expect imu.sleep(Sleep::Indefinite) => Ok(());
+        given now = bus.part().now();
+        then bus.advance_to(now + 3_600_000_000_000);
+        then assert_eq!(bus.wait_for_data(), None);
+        expect imu.wake(&mut delay) => Ok(Product::Adis16405);
+        then assert!(bus.wait_for_data().is_some());
+    );
+}
+
+#[test]
+fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
+    let above = Alarm { source: Channel::AcclZ, watch: Watch::Level, threshold: Threshold::Above(-301) };
+    let cold = Alarm { source: Channel::Temp, watch: Watch::Level, threshold: Threshold::Below(-10) };
+    let change = Alarm { source: Channel::GyroY, watch: Watch::RateOfChange(4), threshold: Threshold::Above(99) };
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.set_alarm_output(Some(Signal { line: Line::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
+        expect imu.set_alarm(AlarmNumber::One, Some(above)) => Ok(());
+        expect imu.set_alarm(AlarmNumber::Two, Some(cold)) => Ok(());
+        expect imu.alarm(AlarmNumber::One) => Ok(Some(above));
+        expect imu.alarm(AlarmNumber::Two) => Ok(Some(cold));
+        then assert!(bus.part().pin(2));
+        then bus.wait_for_data();
+        then assert!(!bus.part().pin(2));
+        take burst = imu.burst();
+        then assert_eq!(burst.faults(), Faults::ERROR_ALARM);
+        expect imu.diagnosis() => Ok(Diagnosis::ALARM_1);
+
+        expect imu.set_alarm(AlarmNumber::One, None) => Ok(());
+        expect imu.alarm(AlarmNumber::One) => Ok(None);
+        expect imu.set_alarm(AlarmNumber::Two, Some(change)) => Ok(());
+        expect imu.diagnosis() => Ok(Diagnosis::empty());
+        then for _ in 0..8 { bus.wait_for_data(); };
+        expect imu.diagnosis() => Ok(Diagnosis::empty());
+        // A step of 100 counts of 0.05 °/s, by way of the offset: 400 counts of 0.0125 °/s.
+        expect imu.set_gyro_offsets([0, 400, 0]) => Ok(GyroBias { part: [0, 400, 0], host_x: 0 });
+        then for _ in 0..2 { bus.wait_for_data(); };
+        expect imu.diagnosis() => Ok(Diagnosis::ALARM_2);
+        then for _ in 0..8 { bus.wait_for_data(); };
+        expect imu.diagnosis() => Ok(Diagnosis::ALARM_2);
+        expect imu.diagnosis() => Ok(Diagnosis::empty());
+
+        given beyond = Alarm { threshold: Threshold::Above(2048), ..cold };
+        expect imu.set_alarm(AlarmNumber::One, Some(beyond))
+            => Err(Error::Value { register: Register::AlmMag1, value: 2048 });
+    );
+}
+
+#[test]
+fn lines_and_levels() {
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.data_ready() => Ok(Some(Signal { line: Line::Dio1, polarity: Polarity::ActiveHigh }));
+        then bus.wait_for_data();
+        then assert!(bus.part().pin(1));
+        given now = bus.part().now();
+        then bus.advance_to(now + 200_000);
+        then assert!(!bus.part().pin(1));
+        expect imu.set_data_ready(None) => Ok(());
+        then assert_eq!(bus.wait_for_data(), None);
+
+        then bus.part_mut().drive_pin(4, true);
+        expect imu.set_gpio(Gpio { outputs: Dio::DIO1 | Dio::DIO3, high: Dio::DIO3 }) => Ok(());
+        then assert_eq!([1, 2, 3, 4].map(|line| bus.part().pin(line)), [false, false, true, true]);
+        expect imu.gpio() => Ok(Gpio { outputs: Dio::DIO1 | Dio::DIO3, high: Dio::DIO3 | Dio::DIO4 });
+
+        expect imu.set_aux_dac(DacLevel::from_millivolts(1650).unwrap()) => Ok(());
+        then assert!((bus.part().aux_output_v() - 1.65).abs() < 0.5e-3);
+    );
+}
+
+#[test]
+fn an_external_clock_is_obeyed() {
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        expect imu.configure(Config::default().with_external_clock()) => Ok(());
+        given taken = bus.part().samples();
+        given now = bus.part().now();
+        then bus.advance_to(now + 1_000_000_000);
+        then assert_eq!(bus.part().samples(), taken);
+        then bus.part_mut().external_clock_edge();
+        then assert_eq!(bus.part().samples(), taken + 1);
+        take burst = imu.burst();
+        then assert_eq!(burst.faults(), Faults::empty());
+    );
+}
+
+#[test]
+fn another_part_or_none_is_told_from_this_one() {
+    both_shells!(NoiseModel::still(), |bus, imu, delay|
+        then bus.part_mut().set_prod_id(16400);
+        expect imu.identity() => Ok(Product::Adis16400);
+        then bus.part_mut().set_prod_id(16448);
+        expect imu.init() => Err(Error::Product { answer: 16448 });
+        then bus.part_mut().set_prod_id(16405);
+        then bus.part_mut().power_off();
+        expect imu.init() => Err(Error::Product { answer: 0xFFFF });
+        expect imu.self_test(&mut delay) => Err(Error::Product { answer: 0xFFFF });
+        take burst = imu.burst();
+        then assert_eq!(burst.faults().cause(), Some("stuck_high"));
+        then bus.part_mut().power_on();
+        expect imu.start_up(&mut delay) => Ok(Product::Adis16405);
+    );
+}
+
+/// EngineerZone, thread 81805: −8 read as 0x9FF8 instead of 0xBFF8, by burst and then by single reads.
+#[test]
+fn the_x_gyro_erratum_strikes_and_is_avoided() {
+    both_shells!(with_rates([-0.2, -0.2, -0.2]), |bus, imu, delay|
+        // −16 counts of 0.0125 °/s: with −0.2 °/s the rate is −0.4 °/s, −8 counts.
+        expect imu.write_register(Register::XgyroOff, 0xFFF0) => Ok(());
+        then bus.wait_for_data();
+        expect imu.read_register(Register::XgyroOut) => Ok(0xBFF8);
+        take _struck = imu.burst();
+        then bus.wait_for_data();
+        expect imu.read_register(Register::XgyroOut) => Ok(0x9FF8);
+        then bus.wait_for_data();
+        take burst = imu.burst();
+        then assert_eq!(burst.words[1].0, 0x9FF8);
+        then assert_eq!(burst.words[2].0, 0xBFFC);
+        then assert!(Judge::default().judge(&burst).faults.contains(Faults::IMPOSSIBLE_RATE));
+        take _bias = imu.gyro_offsets();
+        then assert!(imu.x_sign_at_risk());
+
+        expect imu.keep_negative_x_bias_on_host() => Ok(GyroBias { part: [0; 3], host_x: -16 });
+        then assert!(!imu.x_sign_at_risk());
+        then for _ in 0..8 { bus.wait_for_data(); };
+        take sample = imu.sample();
+        then assert_eq!(sample.counts().gyro(), [-4, -4, -4]);
+        then assert_eq!(sample.gyro_udps(), [-400_000, -200_000, -200_000]);
+    );
+}
