@@ -14,7 +14,7 @@ use noise_analysis::explain::{self, Explanation};
 use noise_analysis::report::Report;
 use recordings::recording::Recording;
 use recordings::serial::{self, Cable};
-use recordings::timeline::Timeline;
+use recordings::timeline::measurement;
 use recordings::{csv, folder};
 use reports::{export, page, terminal};
 use serde::Serialize;
@@ -130,10 +130,10 @@ fn explain_all(arguments: &Explain, output: &Output) -> Result<()> {
     for path in &arguments.recordings {
         for file in folder::tables(path)? {
             let recording = csv::read(&file, arguments.range.into())?;
-            let timeline = Timeline::of(&recording, arguments.rate).with_context(|| file.display().to_string())?;
+            let measurement = measurement(&recording, arguments.rate).with_context(|| file.display().to_string())?;
             let mut out = BufWriter::new(io::stdout().lock());
             writeln!(out, "\n══ {}", file.display())?;
-            let explanation = explain::explain(&recording, &timeline);
+            let explanation = explain::explain(&measurement);
             reports::explain::text::write(&explanation, &mut out)?;
             out.flush()?;
             if let Some(folder) = &arguments.pictures {
@@ -150,7 +150,7 @@ fn draw(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()
     let stem = name.split('.').next().unwrap_or_default();
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for channel in &explanation.channels {
-        let file = folder.join(format!("{stem}-{}.svg", channel.channel.name()));
+        let file = folder.join(format!("{stem}-{}.svg", channel.channel.name));
         std::fs::write(&file, reports::explain::picture(channel)?).with_context(|| file.display().to_string())?;
     }
     Ok(())
@@ -199,8 +199,7 @@ fn report_of(input: &Input, recording: &Recording) -> Result<Report> {
 }
 
 fn report(recording: &Recording, rate: Option<f64>) -> Result<Report> {
-    let timeline = Timeline::of(recording, rate)?;
-    Ok(analyze(recording, &timeline))
+    Ok(analyze(&measurement(recording, rate)?))
 }
 
 fn write(report: &Report, output: &Output) -> Result<()> {

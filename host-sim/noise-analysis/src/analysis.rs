@@ -21,23 +21,19 @@ use crate::report::{
     ChannelReport, CurvePoint, Effect, ModelError, ModelReport, ReadOff, ReadOffValue, Report, SCHEMA, Term,
 };
 use crate::trace::{Finding, Series, level, noises::NoiseTable, two_levels};
-use adis16405_driver::Channel;
+use crate::{OCTAVES, OVERLAP};
 use allan_core::term::{CoefficientUnit, Kind, Markov};
 use allan_core::{Cascade, Curve, Model, check, read_off, telegraph};
 use common::Common;
 use compensation::compensated;
-use firmware::{OCTAVES, OVERLAP};
 use lines::Line;
+use measurement::{ChannelProfile, Measurement, Quantity, SensorProfile};
 use parts::{Part, Parts};
-use recordings::recording::Recording;
-use recordings::timeline::{Step, Timeline};
 use repairs::{Repairs, in_parallel};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use study::{Following, Study};
 
-/// Allan variance in counts², at the shortest octaves, from which on rounding adds white noise and nothing else.
-const DITHERED: f64 = 0.2;
 /// Behind a filter neighbouring samples are alike, and the noise shows at a few samples only.
 const DITHERED_OCTAVES: usize = 7;
 
@@ -53,17 +49,16 @@ const ROUNDING: f64 = 1.0 / 12.0;
 /// The target's own.
 type Estimator = Cascade<OCTAVES, OVERLAP>;
 
-/// Analyses every channel of a recording along its timeline. What a model lacks is traced in the inertial channels.
+/// Analyses every channel of a measurement. What a model lacks is traced in the inertial channels.
 #[must_use]
-pub fn analyze(recording: &Recording, timeline: &Timeline) -> Report {
-    let used = timeline.steps.iter().filter(|step| matches!(step, Step::Sample(_))).count();
+pub fn analyze(measurement: &Measurement) -> Report {
     Report {
         schema: SCHEMA,
-        sample_rate_hz: timeline.sample_rate_hz,
-        samples: used as u64,
-        dropped: by_cause(&timeline.dropped),
-        flagged: by_cause(&timeline.flagged),
-        channels: analyze_channels(recording, timeline, used as u64),
+        sample_rate_hz: measurement.sample_rate_hz,
+        samples: measurement.len() as u64,
+        dropped: by_cause(&measurement.dropped),
+        flagged: by_cause(&measurement.flagged),
+        channels: analyze_channels(measurement),
     }
 }
 
@@ -71,19 +66,22 @@ fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
     counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
-fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) -> Vec<ChannelReport> {
-    let recorded = |channel: &Channel| recording.channels.contains(channel);
-    let traced: Vec<Channel> = Channel::INERTIAL.into_iter().filter(recorded).collect();
-    let surroundings = [Channel::Temp, Channel::Supply].into_iter().filter(recorded);
-    let coupled: Vec<Channel> = traced.iter().copied().chain(surroundings).collect();
+fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
+    let of = |quantities: [Quantity; 2]| {
+        quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
+    };
+    let traced = of([Quantity::AngularRate, Quantity::SpecificForce]);
+    let coupled = [traced.clone(), of([Quantity::Temperature, Quantity::SupplyVoltage])].concat();
+    let profile = &measurement.profile;
     let noises = NoiseTable::default();
-    let repairs = Repairs::find(recording, timeline, &traced, &noises);
-    let parts = Parts::of(recording, timeline, &coupled, &repairs);
-    let repaired = in_parallel(&coupled, |&channel| repairs.series(recording, timeline, channel));
-    let studies = in_parallel(&recording.channels, |&channel| {
+    let repairs = Repairs::find(measurement, &traced, &noises);
+    let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
+    let parts = Parts::of(measurement, &coupled, &repairs);
+    let repaired = in_parallel(&coupled, |&channel| repairs.series(measurement, channel));
+    let studies = in_parallel(&recorded, |&channel| {
         let traced = traced.iter().position(|of| *of == channel).map(|position| &repaired[position]);
         let studies = Studies::of(&parts, channel, traced, &repairs, &noises, &repaired);
-        let own = traced.map_or_else(|| Cow::Owned(Series::of(recording, timeline, channel)), Cow::Borrowed);
+        let own = traced.map_or_else(|| Cow::Owned(Series::of(measurement, &channel)), Cow::Borrowed);
         // What the channel follows is no noise, and is in the series: there the declared model has to do.
         let trace = &studies.first.trace;
         let model = if studies.first.following.followed.is_empty() { &trace.after } else { &trace.before };
@@ -91,28 +89,28 @@ fn analyze_channels(recording: &Recording, timeline: &Timeline, samples: u64) ->
         (studies, practice)
     });
     let (studies, practices): (Vec<Studies>, Vec<Practice>) = studies.into_iter().unzip();
-    let mut studies: Vec<(Channel, Studies)> = recording.channels.iter().copied().zip(studies).collect();
+    let mut studies: Vec<(ChannelProfile, Studies)> = recorded.into_iter().zip(studies).collect();
     let inertial = studies.iter_mut().filter(|(channel, _)| traced.contains(channel)).map(|(channel, own)| {
         let study = &mut own.both;
-        filter::Channel { dithered: reaches(study, parts.both.step_of(*channel), DITHERED_OCTAVES), study }
+        filter::Channel { dithered: reaches(profile, study, parts.both.step_of(*channel), DITHERED_OCTAVES), study }
     });
     filter::agree(&mut inertial.collect::<Vec<_>>());
     let commons = commons(&studies);
-    let report = |(((channel, own), measured), practice): ((&(Channel, Studies), &Curve<OCTAVES>), Practice)| {
-        let unit = channel.unit();
+    let report = |(((channel, own), measured), practice): ((&(ChannelProfile, Studies), &Curve<OCTAVES>), Practice)| {
+        let unit = channel.unit;
         let mut effects: Vec<Effect> = Vec::new();
         if traced.contains(channel) {
             effects.extend(repairs.effects(*channel));
             let ramps = repairs.ramps(*channel);
             let common = commons.iter().find(|common| common.channels.contains(channel));
-            let named = named(&parts.both, *channel, own, common);
+            let named = named(profile, &parts.both, *channel, own, common);
             effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != Kind::RateRamp.name()));
         }
         let whole = measured.clone().with_confidence(|point| own.first.trace.before.shares(point.n));
         ChannelReport {
-            name: channel.name().to_owned(),
+            name: channel.name.to_owned(),
             unit: unit.to_owned(),
-            samples,
+            samples: measurement.len() as u64,
             curve: curve_points(&whole),
             read_off: read_off(&whole, unit),
             before: own.before(&parts, *channel, unit, &whole),
@@ -140,7 +138,7 @@ impl Studies {
     /// `own` are the samples of a channel that is traced, `repaired` those of all that the parts hold.
     fn of(
         parts: &Parts,
-        channel: Channel,
+        channel: ChannelProfile,
         own: Option<&Series>,
         repairs: &Repairs,
         noises: &NoiseTable,
@@ -154,10 +152,10 @@ impl Studies {
         };
         let own_half = own.first_half();
         let causes = parts.both.channels.iter().copied().zip(repaired).filter(|(cause, _)| repairs::is_slow(*cause));
-        let (slow, courses): (Vec<Channel>, Vec<Series>) =
+        let (slow, courses): (Vec<ChannelProfile>, Vec<Series>) =
             causes.map(|(cause, series)| (cause, series.first_half())).unzip();
         let level = level::find(&own_half, &courses.iter().collect::<Vec<_>>(), noises);
-        let in_half = |cause: Channel| {
+        let in_half = |cause: ChannelProfile| {
             let of = |(number, _): &&(usize, level::Followed)| slow[*number] == cause;
             level.followed.iter().find(of).map(|(_, followed)| *followed)
         };
@@ -171,11 +169,11 @@ impl Studies {
         let (both, lines) = spectral::study(both, own, whole.as_ref());
         let correlated: Vec<f64> = both.correlation_times().collect();
         let rest = Grid::of(whole.as_ref().unwrap_or(own));
-        let two_levels = two_levels::find(&rest, channel.unit(), &correlated);
+        let two_levels = two_levels::find(&rest, channel.unit, &correlated);
         Self { first, both, lines, two_levels, rest: Some(rest) }
     }
 
-    fn before(&self, parts: &Parts, channel: Channel, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
+    fn before(&self, parts: &Parts, channel: ChannelProfile, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
         let position = parts.first.position(channel).unwrap_or_default();
         let model = &self.first.trace.before;
         ModelReport {
@@ -186,7 +184,7 @@ impl Studies {
         }
     }
 
-    fn after(&self, parts: &Parts, channel: Channel, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
+    fn after(&self, parts: &Parts, channel: ChannelProfile, unit: &str, whole: &Curve<OCTAVES>) -> ModelReport {
         let position = parts.first.position(channel).unwrap_or_default();
         let model = &self.first.trace.after;
         // What the channel follows is in the measured curve, not in the model of the rest.
@@ -206,24 +204,35 @@ impl Studies {
 }
 
 /// Everything that the whole record shows in a channel beyond the declared model.
-fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) -> Vec<Effect> {
+fn named(
+    profile: &SensorProfile,
+    part: &Part,
+    channel: ChannelProfile,
+    own: &Studies,
+    common: Option<&Common>,
+) -> Vec<Effect> {
+    let internal_rate_hz = profile.internal_rate_hz;
     let period_s = own.both.trace.after.sample_period();
-    let (study, unit) = (&own.both, channel.unit());
+    let (study, unit) = (&own.both, channel.unit);
     let causes: Vec<_> = study.causes().map(|(cause, followed)| (part.channels[cause], *followed)).collect();
     let mut effects = naming::followed_effects(&causes, unit);
     // Where the noise does not reach from one count to the next, rounding is no noise, and the curve shows its steps.
     let step = part.step_of(channel);
-    let dithered = reaches(study, step, DITHERED_OCTAVES);
+    let dithered = reaches(profile, study, step, DITHERED_OCTAVES);
     // So much apart are two counts between which the noise decides.
-    let steps_only =
-        |found: &&Finding| !reaches(study, step, 1) && found.effect.parameters["amplitude"].value < TWO_COUNTS * step;
+    let steps_only = |found: &&Finding| {
+        !reaches(profile, study, step, 1) && found.effect.parameters["amplitude"].value < TWO_COUNTS * step
+    };
     let two_levels = own.two_levels.as_ref().filter(|found| !steps_only(found));
     // Behind a filter, what rounding adds is alike over as many samples as the noise is.
-    let settled_s = if reaches(study, step, 1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
+    let settled_s =
+        if reaches(profile, study, step, 1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
     for found in &study.trace.found {
         let term = &study.trace.after.terms()[found.term];
         match term.kind {
-            Kind::Filtered(_) => effects.push(naming::term_effect(term, found, unit, period_s)),
+            Kind::Filtered(filter) => {
+                effects.push(naming::filter_effect((term, &filter), found, unit, period_s, internal_rate_hz))
+            }
             _ if !dithered => {}
             Kind::Markov(Markov { time_constant }) if time_constant < settled_s => {}
             Kind::Quantization if settled_s > 0.0 => {}
@@ -257,9 +266,9 @@ fn named(part: &Part, channel: Channel, own: &Studies, common: Option<&Common>) 
 }
 
 /// Whether the noise of a channel reaches from one count, `step`, to the next within the first `octaves`.
-fn reaches(study: &Study, step: f64, octaves: usize) -> bool {
+fn reaches(profile: &SensorProfile, study: &Study, step: f64, octaves: usize) -> bool {
     let shortest = study.following.curve.points().iter().take(octaves).map(|point| point.avar);
-    shortest.fold(0.0, f64::max) > DITHERED * step * step
+    shortest.fold(0.0, f64::max) > profile.dithered_avar_counts2 * step * step
 }
 
 /// Whether a Markov term is what a first-order low-pass filter makes of white noise: it forgets within some samples, and
@@ -274,15 +283,14 @@ fn is_low_pass(model: &Model, markov: Markov, step: f64) -> bool {
 }
 
 /// What channels of each sort share.
-fn commons(studies: &[(Channel, Studies)]) -> Vec<Common> {
-    let sorts = [&Channel::INERTIAL[..3], &Channel::INERTIAL[3..]];
-    let common = |sort: &&[Channel]| {
-        let members = studies.iter().filter(|(channel, _)| sort.contains(channel));
-        let (channels, rests): (Vec<Channel>, Vec<Grid>) =
+fn commons(studies: &[(ChannelProfile, Studies)]) -> Vec<Common> {
+    let common = |quantity: &Quantity| {
+        let members = studies.iter().filter(|(channel, _)| channel.quantity == *quantity);
+        let (channels, rests): (Vec<ChannelProfile>, Vec<Grid>) =
             members.filter_map(|(channel, own)| Some((*channel, own.rest.clone()?))).unzip();
         common::find(&channels, &rests)
     };
-    in_parallel(&sorts, common).into_iter().flatten().collect()
+    in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], common).into_iter().flatten().collect()
 }
 
 fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {

@@ -9,6 +9,7 @@
 
 pub mod slow_part;
 
+use crate::OCTAVES;
 use crate::time_course::companion::Companion;
 use crate::time_course::control::Controls;
 use crate::time_course::drift::{beyond_drift, expected};
@@ -18,13 +19,10 @@ use crate::time_course::tracking::{Tracked, track, what_moves};
 use crate::time_course::typical::typical;
 use crate::time_course::{Parts, deviance_per_point};
 use crate::trace::{Series, deliveries, sample_clock};
-use adis16405_driver::Channel;
 use allan_core::fit::fit_shapes;
 use allan_core::trace::{Lines, Trace, trace};
 use allan_core::{Curve, Kind, Model};
-use firmware::OCTAVES;
-use recordings::recording::Recording;
-use recordings::timeline::Timeline;
+use measurement::{ChannelProfile, Measurement};
 use slow_part::SlowPart;
 
 /// What was found in a recording.
@@ -37,7 +35,7 @@ pub struct Explanation {
     /// What the samples' arrival shows, a sentence each.
     pub deliveries: Vec<String>,
     /// Inertial channels that were recorded; what [`Companion::channel`] counts.
-    pub searched: Vec<Channel>,
+    pub searched: Vec<ChannelProfile>,
     /// Those whose counts change.
     pub channels: Vec<ChannelExplanation>,
     /// What they share.
@@ -48,7 +46,7 @@ pub struct Explanation {
 #[derive(Debug, Clone)]
 pub struct ChannelExplanation {
     /// Which.
-    pub channel: Channel,
+    pub channel: ChannelProfile,
     /// The curves that everything below comes from.
     pub parts: Parts,
     /// The declared model, and that with what it lacks, fitted to the first half.
@@ -95,34 +93,30 @@ pub struct Errors {
 
 /// Explains the inertial channels of a recording; those that never change, or are too short to be cut up, are left out.
 #[must_use]
-pub fn explain(recording: &Recording, timeline: &Timeline) -> Explanation {
-    let inertial = recording.channels.iter().copied().filter(|channel| Channel::INERTIAL.contains(channel));
-    let (searched, series): (Vec<Channel>, Vec<Series>) =
-        inertial.map(|channel| (channel, Series::of(recording, timeline, channel))).unzip();
+pub fn explain(measurement: &Measurement) -> Explanation {
+    let inertial = measurement.profiles().filter(|channel| channel.quantity.is_inertial());
+    let (searched, series): (Vec<ChannelProfile>, Vec<Series>) =
+        inertial.map(|channel| (channel, Series::of(measurement, &channel))).unzip();
     let explained = |position: usize| {
         let mut explained = explain_channel(searched[position], &series[position])?;
         explained.companion = Companion::of(&series, position, &explained.moving, &explained.parts);
         Some(explained)
     };
     let channels: Vec<ChannelExplanation> = (0..series.len()).filter_map(explained).collect();
-    let names: Vec<Channel> = channels.iter().map(|of| of.channel).collect();
-    let findings = [
-        deliveries::dropped(timeline),
-        deliveries::repeated(recording, timeline),
-        sample_clock::find(recording, timeline),
-    ];
+    let names: Vec<ChannelProfile> = channels.iter().map(|of| of.channel).collect();
+    let findings =
+        [deliveries::dropped(measurement), deliveries::repeated(measurement), sample_clock::find(measurement)];
     Explanation {
-        sample_rate_hz: timeline.sample_rate_hz,
-        samples: timeline.steps.iter().filter(|step| matches!(step, recordings::timeline::Step::Sample(_))).count()
-            as u64,
+        sample_rate_hz: measurement.sample_rate_hz,
+        samples: measurement.len() as u64,
         deliveries: findings.into_iter().flatten().map(|finding| finding.effect.evidence).collect(),
-        slow_part: SlowPart::of(recording, timeline, &names),
+        slow_part: SlowPart::of(measurement, &names),
         searched,
         channels,
     }
 }
 
-fn explain_channel(channel: Channel, series: &Series) -> Option<ChannelExplanation> {
+fn explain_channel(channel: ChannelProfile, series: &Series) -> Option<ChannelExplanation> {
     let parts = Parts::of(series)?;
     if parts.quarters.iter().chain([&parts.unseen]).any(|part| part.points().iter().all(|point| point.avar == 0.0)) {
         return None;

@@ -12,3 +12,8 @@ pub mod spectrum;
 pub mod time_course;
 pub mod trace;
 pub mod units;
+
+/// Octaves of every estimator of the analysis: averaging factors up to 2²³ samples. The device uses as many.
+pub const OCTAVES: usize = 24;
+/// Overlap of the second differences of every estimator of the analysis. The device uses the same.
+pub const OVERLAP: usize = 8;

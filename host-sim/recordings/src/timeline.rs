@@ -8,8 +8,9 @@
 mod deliveries;
 
 use crate::recording::{Recording, Sample};
-use adis16405_driver::Faults;
+use adis16405_driver::{Channel, Faults};
 use deliveries::Deliveries;
+use measurement::{MeasuredChannel, Measurement, adis16405};
 use std::collections::BTreeMap;
 
 /// Fewest samples that give an octave: two adjacent windows of one sample in each half of the record.
@@ -107,6 +108,40 @@ impl Timeline {
         let sample_rate_hz = rate.or(measured).ok_or(TimelineError::NoRate)?;
         Ok(Self { sample_rate_hz, stated_rate_hz: rate, steps, dropped, flagged })
     }
+}
+
+/// The samples of `recording` that can be used, on their time base. `rate`, in Hz, overrides what the time stamps say.
+///
+/// # Errors
+/// As [`Timeline::of`].
+pub fn measurement(recording: &Recording, rate: Option<f64>) -> Result<Measurement, TimelineError> {
+    let timeline = Timeline::of(recording, rate)?;
+    let (mut slots, mut used, mut slot) = (Vec::new(), Vec::new(), 0_u64);
+    for step in &timeline.steps {
+        match *step {
+            Step::Gap(missing) => slot = slot.saturating_add(u64::from(missing)),
+            Step::Sample(position) => {
+                slots.push(slot);
+                used.push(&recording.samples[position]);
+                slot = slot.saturating_add(1);
+            }
+        }
+    }
+    let profile = adis16405::profile(recording.range.lsb());
+    let channel = |channel: &Channel| MeasuredChannel {
+        profile: profile.channels[*channel as usize],
+        counts: used.iter().map(|sample| i32::from(sample.counts.get(*channel))).collect(),
+    };
+    Ok(Measurement {
+        channels: recording.channels.iter().map(channel).collect(),
+        profile,
+        sample_rate_hz: timeline.sample_rate_hz,
+        stated_rate_hz: timeline.stated_rate_hz,
+        times_s: used.iter().map(|sample| sample.clock.time_s).collect(),
+        slots,
+        dropped: timeline.dropped,
+        flagged: timeline.flagged,
+    })
 }
 
 /// What tells a sample that was read twice from two that are equal by chance: it comes too soon.

@@ -8,7 +8,7 @@ use link::Message;
 use noise_analysis::analysis::analyze;
 use recordings::frame_log::{Frame, FrameLog};
 use recordings::serial::Tape;
-use recordings::timeline::Timeline;
+use recordings::timeline::measurement;
 use simulation::replay::replay_log;
 use std::path::Path;
 
@@ -98,8 +98,8 @@ fn a_recording_off_the_cable_analyses_to_the_identical_report(decoded: &Decoded,
     let folder = tempfile::tempdir().expect("a folder");
     let report = |file: &Path| {
         let recording = replay_log(file, GyroRange::Dps300).expect("a log").recording;
-        let timeline = Timeline::of(&recording, Some(RATE_HZ)).expect("a timeline");
-        serde_json::to_string(&analyze(&recording, &timeline)).expect("a report")
+        let measurement = measurement(&recording, Some(RATE_HZ)).expect("a time base");
+        serde_json::to_string(&analyze(&measurement)).expect("a report")
     };
     let cable = folder.path().join("cable.csv");
     let mut tape = Tape::create(&cable).expect("a log");

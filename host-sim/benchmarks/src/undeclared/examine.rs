@@ -7,7 +7,7 @@ use super::truth;
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, Report};
-use recordings::timeline::{Timeline, TimelineError};
+use recordings::timeline::{TimelineError, measurement};
 use serde::Serialize;
 use simulation::record::RecordError;
 use virtual_sensor::Effect;
@@ -118,13 +118,13 @@ pub fn examine(case: &Case) -> Result<Outcome, ExamineError> {
     let failed = |reason| ExamineError::Record { seed, reason };
     let mut recording = case.simulation.run(|_| ()).map_err(failed)?;
     recording.channels.retain(|channel| RECORDED.contains(channel));
-    let timeline = Timeline::of(&recording, None).map_err(|reason| ExamineError::Timeline { seed, reason })?;
-    let report = analyze(&recording, &timeline);
+    let measurement = measurement(&recording, None).map_err(|reason| ExamineError::Timeline { seed, reason })?;
+    let report = analyze(&measurement);
     let begin_s = recording.samples.first().and_then(|sample| sample.clock.time_s).unwrap_or(0.0);
     let mut outcome = score(case, &report, begin_s);
     let effects = &case.simulation.hidden.effects;
     if let ([answer], [effect]) = (&mut outcome.answers[..], &effects[..]) {
-        answer.shape_known = unknown_noise::sees(effect, &recording, &timeline, begin_s);
+        answer.shape_known = unknown_noise::sees(effect, &measurement, begin_s);
     }
     if let Some(channel) = effects.first().map(|effect| effect.channels().first().copied().unwrap_or(Channel::GyroX)) {
         let truth = truth::unseen_error(case, channel).map_err(failed)?;

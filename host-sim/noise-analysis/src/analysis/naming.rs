@@ -7,18 +7,15 @@ use super::walk::Unbounded;
 use crate::report::{Effect, Parameter};
 use crate::spectrum::line::Estimate;
 use crate::spectrum::shared::Bounded;
-use adis16405_driver::Channel;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::Term;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::Verdict;
 use allan_core::term::{Filter, Kind, Markov};
 use allan_core::trace::Found;
+use measurement::{ChannelProfile, Quantity};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-
-/// Rate of the part's own filter, Hz (data sheet: internal sample clock).
-const INTERNAL_RATE_HZ: f64 = 819.2;
 
 /// A term's parameters by name.
 pub(super) fn parameters(term: &Term, unit: &str) -> BTreeMap<String, Parameter> {
@@ -41,14 +38,28 @@ fn shape_unit(name: &str) -> &'static str {
 
 /// A term that the declared model lacks.
 pub(super) fn term_effect(term: &Term, found: &Found, unit: &str, period_s: f64) -> Effect {
+    added_effect(term, found, unit, period_s, &meaning(&term.kind))
+}
+
+/// A filter that the declared model lacks, in a sensor whose own samples come at `internal_rate_hz`.
+pub(super) fn filter_effect(
+    (term, filter): (&Term, &Filter),
+    found: &Found,
+    unit: &str,
+    period_s: f64,
+    internal_rate_hz: f64,
+) -> Effect {
+    added_effect(term, found, unit, period_s, &filter_meaning(filter, internal_rate_hz))
+}
+
+fn added_effect(term: &Term, found: &Found, unit: &str, period_s: f64, meaning: &str) -> Effect {
     let residual = found.residual;
     let evidence = format!(
-        "{:+.1} % at tau = {} s ({:.0} sigma) before it was added, which takes {:.0} sigma off the fit; {}",
+        "{:+.1} % at tau = {} s ({:.0} sigma) before it was added, which takes {:.0} sigma off the fit; {meaning}",
         100.0 * residual.excess,
         seconds(residual.n as f64 * period_s),
         residual.sigmas.abs(),
         found.score.sqrt(),
-        meaning(&term.kind),
     );
     Effect { kind: term.kind.name().to_owned(), parameters: parameters(term, unit), evidence }
 }
@@ -114,34 +125,33 @@ pub(super) fn low_pass_effect(term: &Term, markov: Markov, found: &Found, period
 }
 
 /// What a channel follows: temperature, supply, and the specific force on its axes as one effect.
-pub(super) fn followed_effects(followed: &[(Channel, Sensitivity)], unit: &str) -> Vec<Effect> {
+pub(super) fn followed_effects(followed: &[(ChannelProfile, Sensitivity)], unit: &str) -> Vec<Effect> {
     let parameter = |followed: &Sensitivity, of: &str| {
         let (low, high) = followed.bounds();
         Parameter { value: followed.value, low, high, unit: format!("{unit}/{of}") }
     };
-    let single = |cause: Channel, kind: &str, of: &str, meaning: &str| {
-        let (_, followed) = followed.iter().find(|(channel, _)| *channel == cause)?;
+    let single = |cause: Quantity, kind: &str, of: &str, meaning: &str| {
+        let (_, followed) = followed.iter().find(|(channel, _)| channel.quantity == cause)?;
         Some(Effect {
             kind: kind.to_owned(),
             parameters: BTreeMap::from([("sensitivity".to_owned(), parameter(followed, of))]),
             evidence: format!("follows the measured {kind}, {:.0} sigma; {meaning}", followed.sigmas()),
         })
     };
-    let axes: Vec<_> = followed.iter().filter(|(channel, _)| Channel::INERTIAL[3..].contains(channel)).collect();
+    let axes: Vec<_> = followed.iter().filter(|(channel, _)| channel.quantity == Quantity::SpecificForce).collect();
     let acceleration = (!axes.is_empty()).then(|| {
-        let axis = |channel: Channel| channel.name().trim_start_matches("accl_").to_owned();
         let clearest = axes.iter().map(|(_, followed)| followed.sigmas()).fold(0.0, f64::max);
         Effect {
             kind: "acceleration".to_owned(),
             parameters: axes
                 .iter()
-                .map(|(channel, followed)| (format!("sensitivity_{}", axis(*channel)), parameter(followed, "g")))
+                .map(|(channel, followed)| (format!("sensitivity_{}", channel.axis), parameter(followed, "g")))
                 .collect(),
             evidence: format!("follows the measured specific force, {clearest:.0} sigma; g-sensitivity of the gyro"),
         }
     });
-    let temperature = single(Channel::Temp, "temperature", "degC", "a bias that drifts with temperature");
-    let supply = single(Channel::Supply, "supply", "V", "a bias that is not regulated");
+    let temperature = single(Quantity::Temperature, "temperature", "degC", "a bias that drifts with temperature");
+    let supply = single(Quantity::SupplyVoltage, "supply", "V", "a bias that is not regulated");
     temperature.into_iter().chain(supply).chain(acceleration).collect()
 }
 
@@ -176,11 +186,10 @@ pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
 }
 
 /// A slow part that `channel` shares with others.
-pub(super) fn common_effect(common: &Common, channel: Channel, unit: &str) -> Effect {
+pub(super) fn common_effect(common: &Common, channel: ChannelProfile, unit: &str) -> Effect {
     let parameter =
         |of: Bounded, unit: &str| Parameter { value: of.value, low: of.low, high: of.high, unit: unit.to_owned() };
-    let others: Vec<&str> =
-        common.channels.iter().filter(|other| **other != channel).map(|other| other.name()).collect();
+    let others: Vec<&str> = common.channels.iter().filter(|other| **other != channel).map(|other| other.name).collect();
     Effect {
         kind: "common_mode".to_owned(),
         parameters: BTreeMap::from([
@@ -205,7 +214,7 @@ fn meaning(kind: &Kind) -> String {
     match kind {
         Kind::Quantization => "steps of the angle: a counter or an integrator before the output".to_owned(),
         Kind::RateRamp => "a steady drift: warming up, or ageing".to_owned(),
-        Kind::Filtered(filter) => filter_meaning(filter),
+        Kind::Filtered(_) => "a low-pass filter before the sampling".to_owned(),
         Kind::Markov(_) => "a correlated fluctuation: thermal or electronic".to_owned(),
         Kind::Resonance(_) => "a narrow band: a mechanical resonance or an unsteady vibration".to_owned(),
         Kind::Sinusoid(_) => "a steady line: a vibration, or an interference folded into the band".to_owned(),
@@ -213,16 +222,16 @@ fn meaning(kind: &Kind) -> String {
     }
 }
 
-fn filter_meaning(filter: &Filter) -> String {
+fn filter_meaning(filter: &Filter, internal_rate_hz: f64) -> String {
     let window = if filter.stages == 2 { "Bartlett window" } else { "moving average" };
     if filter.decimation == 1.0 {
         return format!("neighbours correlate as behind a {window} of {} taps a stage", filter.taps);
     }
     format!(
         "neighbours correlate as behind a {window} of {} taps a stage that is read every {:.2} values; \
-         at the part's own {INTERNAL_RATE_HZ} Hz that is a sample rate of {:.1} Hz",
+         at the part's own {internal_rate_hz} Hz that is a sample rate of {:.1} Hz",
         filter.taps,
         filter.decimation,
-        INTERNAL_RATE_HZ / filter.decimation,
+        internal_rate_hz / filter.decimation,
     )
 }

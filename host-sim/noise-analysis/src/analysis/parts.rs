@@ -2,12 +2,10 @@
 //! pair of channels has in common.
 
 use super::{Estimator, repairs::Repairs};
-use adis16405_driver::Channel;
+use crate::OCTAVES;
 use allan_core::regression::Shared;
 use allan_core::{Cascade, Coupling, Curve};
-use firmware::OCTAVES;
-use recordings::recording::Recording;
-use recordings::timeline::{Step, Timeline};
+use measurement::{ChannelProfile, Measurement};
 
 /// Parts of a count: a repair need not be a whole number of them.
 const PARTS_OF_COUNT: f64 = 16.0;
@@ -15,14 +13,14 @@ const PARTS_OF_COUNT: f64 = 16.0;
 /// Estimators of some channels that take their samples in step.
 #[derive(Clone)]
 pub(super) struct Part {
-    pub channels: Vec<Channel>,
+    pub channels: Vec<ChannelProfile>,
     /// Physical unit of a number that was pushed, by channel.
     lsb: Vec<f64>,
     /// Physical unit of one step of the values, by channel.
     steps: Vec<f64>,
     period_s: f64,
     cascades: Vec<Estimator>,
-    /// Channel `i` with `j < i` at `i·(i−1)/2 + j`.
+    /// ChannelProfile `i` with `j < i` at `i·(i−1)/2 + j`.
     couplings: Vec<Coupling<OCTAVES>>,
 }
 
@@ -36,44 +34,39 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    pub(super) fn of(recording: &Recording, timeline: &Timeline, coupled: &[Channel], repairs: &Repairs) -> Self {
-        let lsb = |channel: &Channel| channel.lsb(recording.range);
-        let mut measured: Vec<Estimator> = recording.channels.iter().map(|_| Cascade::new()).collect();
-        let used = timeline.steps.iter().filter(|step| matches!(step, Step::Sample(_))).count();
-        let others: Vec<Channel> =
-            recording.channels.iter().copied().filter(|channel| !coupled.contains(channel)).collect();
-        let channels: Vec<Channel> = coupled.iter().copied().chain(others).collect();
-        let steps = channels.iter().map(|channel| f64::from(repairs.step(*channel)) * lsb(channel)).collect();
-        let part = Part::new(channels, coupled.len(), 1.0 / timeline.sample_rate_hz, lsb, steps);
+    pub(super) fn of(measurement: &Measurement, coupled: &[ChannelProfile], repairs: &Repairs) -> Self {
+        let period_s = measurement.period_s();
+        let mut measured: Vec<Estimator> = measurement.channels.iter().map(|_| Cascade::new()).collect();
+        let others = measurement.profiles().filter(|channel| !coupled.contains(channel));
+        let channels: Vec<ChannelProfile> = coupled.iter().copied().chain(others).collect();
+        let counts: Vec<&[i32]> =
+            channels.iter().filter_map(|channel| Some(measurement.channel(channel)?.counts.as_slice())).collect();
+        let steps = channels.iter().map(|channel| f64::from(repairs.step(*channel)) * channel.lsb).collect();
+        let part = Part::new(channels.clone(), coupled.len(), period_s, steps);
         let mut halves = [part.clone(), part];
-        let mut position = 0;
-        for &step in &timeline.steps {
-            let half = &mut halves[usize::from(position >= used / 2)];
-            match step {
-                Step::Gap(missing) => {
-                    measured.iter_mut().for_each(|estimator| estimator.gap(missing));
-                    half.gap(missing);
-                }
-                Step::Sample(index) => {
-                    let counts = recording.samples[index].counts;
-                    for (estimator, &channel) in measured.iter_mut().zip(&recording.channels) {
-                        estimator.push(i32::from(counts.get(channel)));
-                    }
-                    if repairs.leaves_out(position) {
-                        half.gap(1);
-                    } else {
-                        half.push(|channel| {
-                            let parts = f64::from(counts.get(channel)) * PARTS_OF_COUNT;
-                            (parts - PARTS_OF_COUNT * repairs.level(channel, position) / lsb(&channel)).round() as i32
-                        });
-                    }
-                    position += 1;
-                }
+        for position in 0..measurement.len() {
+            let half = &mut halves[usize::from(position >= measurement.len() / 2)];
+            let missing = measurement.missing_before(position);
+            if missing > 0 {
+                measured.iter_mut().for_each(|estimator| estimator.gap(missing));
+                half.gap(missing);
+            }
+            for (estimator, channel) in measured.iter_mut().zip(&measurement.channels) {
+                estimator.push(channel.counts[position]);
+            }
+            if repairs.leaves_out(position) {
+                half.gap(1);
+            } else {
+                half.push(|place| {
+                    let (channel, count) = (channels[place], counts[place][position]);
+                    let parts = f64::from(count) * PARTS_OF_COUNT;
+                    (parts - PARTS_OF_COUNT * repairs.level(channel, position) / channel.lsb).round() as i32
+                });
             }
         }
-        let period_s = 1.0 / timeline.sample_rate_hz;
-        let curves = measured.iter().zip(&recording.channels);
-        let measured = curves.map(|(estimator, channel)| estimator.curve(period_s).scaled(lsb(channel))).collect();
+        let curves = measured.iter().zip(&measurement.channels);
+        let measured =
+            curves.map(|(estimator, channel)| estimator.curve(period_s).scaled(channel.profile.lsb)).collect();
         let [first, second] = halves;
         let both = first.clone().followed_by(&second);
         Self { measured, first, second, both }
@@ -81,16 +74,10 @@ impl Parts {
 }
 
 impl Part {
-    fn new(
-        channels: Vec<Channel>,
-        coupled: usize,
-        period_s: f64,
-        lsb: impl Fn(&Channel) -> f64,
-        steps: Vec<f64>,
-    ) -> Self {
+    fn new(channels: Vec<ChannelProfile>, coupled: usize, period_s: f64, steps: Vec<f64>) -> Self {
         Self {
             steps,
-            lsb: channels.iter().map(|channel| lsb(channel) / PARTS_OF_COUNT).collect(),
+            lsb: channels.iter().map(|channel| channel.lsb / PARTS_OF_COUNT).collect(),
             cascades: channels.iter().map(|_| Cascade::new()).collect(),
             couplings: vec![Coupling::new(); coupled * coupled.saturating_sub(1) / 2],
             period_s,
@@ -98,9 +85,9 @@ impl Part {
         }
     }
 
-    fn push(&mut self, value: impl Fn(Channel) -> i32) {
-        for (cascade, &channel) in self.cascades.iter_mut().zip(&self.channels) {
-            cascade.push(value(channel));
+    fn push(&mut self, value: impl Fn(usize) -> i32) {
+        for (place, cascade) in self.cascades.iter_mut().enumerate() {
+            cascade.push(value(place));
         }
         for (pair, coupling) in self.couplings.iter_mut().enumerate() {
             let (high, low) = members(pair);
@@ -119,7 +106,7 @@ impl Part {
     }
 
     /// Where a channel stands in the part.
-    pub(super) fn position(&self, channel: Channel) -> Option<usize> {
+    pub(super) fn position(&self, channel: ChannelProfile) -> Option<usize> {
         self.channels.iter().position(|of| *of == channel)
     }
 
@@ -133,7 +120,7 @@ impl Part {
     }
 
     /// The same by the channel's name; 0 of one that the part does not hold.
-    pub(super) fn step_of(&self, channel: Channel) -> f64 {
+    pub(super) fn step_of(&self, channel: ChannelProfile) -> f64 {
         self.position(channel).map_or(0.0, |position| self.step(position))
     }
 

@@ -9,10 +9,8 @@ use crate::trace::{
     noises::NoiseTable,
     sample_clock, spikes,
 };
-use adis16405_driver::Channel;
 use allan_core::Kind;
-use recordings::recording::Recording;
-use recordings::timeline::Timeline;
+use measurement::{ChannelProfile, Measurement, Quantity};
 use std::collections::BTreeSet;
 
 /// Effects in the samples, and their repairs.
@@ -20,34 +18,32 @@ use std::collections::BTreeSet;
 pub(super) struct Repairs {
     /// What concerns every channel: how the samples were taken and delivered.
     everywhere: Vec<Effect>,
-    of_channel: Vec<(Channel, Effect)>,
+    of_channel: Vec<(ChannelProfile, Effect)>,
     left_out: BTreeSet<usize>,
-    levels: Vec<(Channel, usize, f64)>,
+    levels: Vec<(ChannelProfile, usize, f64)>,
     /// Channels, slow causes that they follow, and how.
-    followed: Vec<(Channel, Channel, Followed)>,
+    followed: Vec<(ChannelProfile, ChannelProfile, Followed)>,
     /// Counts to a step of a channel's values, where it is more than one.
-    coarse: Vec<(Channel, u32)>,
+    coarse: Vec<(ChannelProfile, u32)>,
 }
 
 impl Repairs {
     /// Looks for spikes and for what moves the level in `traced`, and for what became of the samples of the whole
     /// recording.
-    pub(super) fn find(recording: &Recording, timeline: &Timeline, traced: &[Channel], noises: &NoiseTable) -> Self {
+    pub(super) fn find(measurement: &Measurement, traced: &[ChannelProfile], noises: &NoiseTable) -> Self {
         let mut repairs = Self::default();
-        let deliveries = [
-            deliveries::dropped(timeline),
-            deliveries::repeated(recording, timeline),
-            sample_clock::find(recording, timeline),
-        ];
+        let deliveries =
+            [deliveries::dropped(measurement), deliveries::repeated(measurement), sample_clock::find(measurement)];
         for finding in deliveries.into_iter().flatten() {
             repairs.left_out.extend(left_out(&finding.repair));
             repairs.everywhere.push(finding.effect);
         }
-        let measured = |channel: Channel| Series::of(recording, timeline, channel);
-        let coarse = in_parallel(&recording.channels, |&channel| coarse_counts::step(&measured(channel)));
-        repairs.coarse = recording.channels.iter().copied().zip(coarse).filter(|(_, counts)| *counts > 1).collect();
-        let of = |channel: Channel| measured(channel).with_steps(repairs.step(channel));
-        let causes: Vec<(Channel, Series)> = recording.channels.iter().map(|&channel| (channel, of(channel))).collect();
+        let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
+        let measured = |channel: ChannelProfile| Series::of(measurement, &channel);
+        let coarse = in_parallel(&recorded, |&channel| coarse_counts::step(&measured(channel)));
+        repairs.coarse = recorded.iter().copied().zip(coarse).filter(|(_, counts)| *counts > 1).collect();
+        let of = |channel: ChannelProfile| measured(channel).with_steps(repairs.step(channel));
+        let causes: Vec<(ChannelProfile, Series)> = recorded.iter().map(|&channel| (channel, of(channel))).collect();
         let found = in_parallel(traced, |&channel| {
             let series = of(channel);
             let coarse = coarse_counts::find(&measured(channel));
@@ -56,11 +52,11 @@ impl Repairs {
             let cleaned = series.repaired(&Repair::LeaveOut(left.clone()));
             let may = causes.iter().filter(|(of, _)| may_cause(*of, channel));
             // A cause must have the same samples.
-            let others: Vec<(Channel, Series)> =
+            let others: Vec<(ChannelProfile, Series)> =
                 may.map(|(of, series)| (*of, series.clone().repaired(&Repair::LeaveOut(left.clone())))).collect();
             let courses: Vec<&Series> = others.iter().map(|(_, series)| series).collect();
             let level = level::find(&cleaned, &courses, noises);
-            let causes: Vec<Channel> = others.iter().map(|(cause, _)| *cause).collect();
+            let causes: Vec<ChannelProfile> = others.iter().map(|(cause, _)| *cause).collect();
             (coarse, spikes, level, causes, left)
         });
         for (&channel, (coarse, spikes, Level { step, ramp, followed }, causes, left)) in traced.iter().zip(found) {
@@ -79,7 +75,7 @@ impl Repairs {
     }
 
     /// Counts to a step of the channel's values.
-    pub(super) fn step(&self, channel: Channel) -> u32 {
+    pub(super) fn step(&self, channel: ChannelProfile) -> u32 {
         self.coarse.iter().find(|(of, _)| *of == channel).map_or(1, |(_, counts)| *counts)
     }
 
@@ -89,13 +85,13 @@ impl Repairs {
     }
 
     /// What is to be taken from a sample, in the channel's unit.
-    pub(super) fn level(&self, channel: Channel, position: usize) -> f64 {
+    pub(super) fn level(&self, channel: ChannelProfile, position: usize) -> f64 {
         self.levels.iter().filter(|(of, from, _)| *of == channel && position >= *from).map(|(.., size)| size).sum()
     }
 
     /// A channel's series without what was found in it.
-    pub(super) fn series(&self, recording: &Recording, timeline: &Timeline, channel: Channel) -> Series {
-        let mut series = Series::of(recording, timeline, channel).with_steps(self.step(channel));
+    pub(super) fn series(&self, measurement: &Measurement, channel: ChannelProfile) -> Series {
+        let mut series = Series::of(measurement, &channel).with_steps(self.step(channel));
         for &(_, from, size) in self.levels.iter().filter(|(of, ..)| *of == channel) {
             series = series.repaired(&Repair::Level { from, size });
         }
@@ -103,18 +99,20 @@ impl Repairs {
     }
 
     /// Whether a channel has a ramp.
-    pub(super) fn ramps(&self, channel: Channel) -> bool {
+    pub(super) fn ramps(&self, channel: ChannelProfile) -> bool {
         self.effects(channel).any(|effect| effect.kind == Kind::RateRamp.name())
     }
 
     /// How a channel follows a slow cause.
-    pub(super) fn followed(&self, channel: Channel, cause: Channel) -> Option<Followed> {
-        let of = |(follower, followed, _): &&(Channel, Channel, Followed)| (*follower, *followed) == (channel, cause);
+    pub(super) fn followed(&self, channel: ChannelProfile, cause: ChannelProfile) -> Option<Followed> {
+        let of = |(follower, followed, _): &&(ChannelProfile, ChannelProfile, Followed)| {
+            (*follower, *followed) == (channel, cause)
+        };
         self.followed.iter().find(of).map(|(.., followed)| *followed)
     }
 
     /// What was found in a channel.
-    pub(super) fn effects(&self, channel: Channel) -> impl Iterator<Item = Effect> + '_ {
+    pub(super) fn effects(&self, channel: ChannelProfile) -> impl Iterator<Item = Effect> + '_ {
         let own = self.of_channel.iter().filter(move |(of, _)| *of == channel).map(|(_, effect)| effect);
         self.everywhere.iter().chain(own).cloned()
     }
@@ -137,16 +135,14 @@ fn left_out(repair: &Repair) -> Vec<usize> {
 }
 
 /// Surroundings and motion may step and take a channel along.
-fn may_cause(cause: Channel, channel: Channel) -> bool {
-    let surroundings = is_slow(cause);
-    let is_gyro = |of: Channel| Channel::INERTIAL[..3].contains(&of);
-    let motion = Channel::INERTIAL[3..].contains(&cause) && is_gyro(channel);
-    surroundings || motion
+fn may_cause(cause: ChannelProfile, channel: ChannelProfile) -> bool {
+    let motion = cause.quantity == Quantity::SpecificForce && channel.quantity == Quantity::AngularRate;
+    is_slow(cause) || motion
 }
 
 /// Causes that take long to move.
-pub(super) fn is_slow(cause: Channel) -> bool {
-    matches!(cause, Channel::Temp | Channel::Supply)
+pub(super) fn is_slow(cause: ChannelProfile) -> bool {
+    cause.quantity.is_environment()
 }
 
 /// The position that a sample had before those at `left` were left out.

@@ -2,13 +2,13 @@
 
 use super::parts::Part;
 use super::repairs::is_slow;
+use crate::OCTAVES;
 use crate::trace::level::Followed;
-use adis16405_driver::Channel;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
 use allan_core::term::Markov;
 use allan_core::trace::{Lines, Trace, trace};
 use allan_core::{Curve, Kind};
-use firmware::OCTAVES;
+use measurement::{ChannelProfile, Quantity};
 
 /// Probability of the residual under a model below which another one is tried.
 const UNEXPLAINED: f64 = 1e-3;
@@ -43,7 +43,7 @@ pub(super) struct Study {
 
 impl Surroundings {
     fn of(part: &Part, channel: usize, known: Option<&Self>) -> Self {
-        let members: Vec<usize> = causes(part.channels[channel]).filter_map(|cause| part.position(cause)).collect();
+        let members: Vec<usize> = causes(part.channels[channel], part).collect();
         let covariate = |(index, &member): (usize, &usize)| match known {
             Some(known) => known.covariates[index].continued(&part.curve(member), 1),
             None => Covariate::new(&part.curve(member), part.step(member), 1),
@@ -78,7 +78,12 @@ impl Following {
     /// From the differences that `part` has summed, and from the courses of slow causes: `slow` tells how the channel
     /// follows one of them. Of the two the one counts that is clearer. Where the channel `ramps`, the differences follow
     /// whatever else drifts, and the course alone counts.
-    pub(super) fn of(part: &Part, channel: usize, ramps: bool, slow: impl Fn(Channel) -> Option<Followed>) -> Self {
+    pub(super) fn of(
+        part: &Part,
+        channel: usize,
+        ramps: bool,
+        slow: impl Fn(ChannelProfile) -> Option<Followed>,
+    ) -> Self {
         let surroundings = Surroundings::of(part, channel, None);
         let mut followed: Vec<Sensitivity> = surroundings.beside(|beside| beside.followed()).into_iter().collect();
         for (covariate, &member) in surroundings.members.iter().enumerate() {
@@ -147,9 +152,15 @@ fn traced(curve: &Curve<OCTAVES>, lines: &[Kind]) -> Trace {
     if own.after_goodness.deviance < known.after_goodness.deviance { own } else { known }
 }
 
-/// What a channel may follow, as far as it is measured.
-fn causes(channel: Channel) -> impl Iterator<Item = Channel> {
-    let motion = if Channel::INERTIAL[..3].contains(&channel) { &Channel::INERTIAL[3..] } else { &[] };
-    let surroundings = Channel::INERTIAL.contains(&channel).then_some([Channel::Temp, Channel::Supply]);
-    surroundings.into_iter().flatten().chain(motion.iter().copied())
+/// Channels of `part` that `channel` may follow: temperature, supply, and for a gyroscope the specific force.
+fn causes(channel: ChannelProfile, part: &Part) -> impl Iterator<Item = usize> {
+    let quantities: &[Quantity] = match channel.quantity {
+        Quantity::AngularRate => &[Quantity::Temperature, Quantity::SupplyVoltage, Quantity::SpecificForce],
+        Quantity::SpecificForce => &[Quantity::Temperature, Quantity::SupplyVoltage],
+        _ => &[],
+    };
+    let of = move |&quantity: &Quantity| {
+        (0..part.channels.len()).filter(move |&place| part.channels[place].quantity == quantity)
+    };
+    quantities.iter().flat_map(of)
 }

@@ -3,17 +3,14 @@
 //! Over a few correlation times a strong Markov process is a random walk: no curve tells them apart. The data sheet does:
 //! a walk that in an hour goes farther than the bias of one part differs from that of another is bounded by something.
 
-use adis16405_driver::Channel;
+use crate::OCTAVES;
 use allan_core::Curve;
 use allan_core::fit::{fit_shapes, goodness};
 use allan_core::model::Term;
 use allan_core::term::{Kind, Markov};
 use allan_core::trace::Trace;
-use firmware::OCTAVES;
+use measurement::ChannelProfile;
 
-/// Initial bias error (data sheet, 1 σ): deg/s, g.
-const GYRO_BIAS: f64 = 3.0;
-const ACCELEROMETER_BIAS: f64 = 0.05;
 const HOUR_S: f64 = 3600.0;
 /// Part of the longest averaging time at which a correlation time is looked for first.
 const FIRST: f64 = 0.25;
@@ -31,10 +28,10 @@ pub(super) struct Unbounded {
 }
 
 /// The process that is in the place of a walk in `channel`, if that walk goes too far.
-pub(super) fn unbounded(curve: &Curve<OCTAVES>, trace: &Trace, channel: Channel) -> Option<Unbounded> {
+pub(super) fn unbounded(curve: &Curve<OCTAVES>, trace: &Trace, channel: ChannelProfile) -> Option<Unbounded> {
     let model = &trace.after;
     let walk = *model.terms().iter().find(|term| term.kind == Kind::RateRandomWalk)?;
-    let bias = if Channel::INERTIAL[..3].contains(&channel) { GYRO_BIAS } else { ACCELEROMETER_BIAS };
+    let bias = channel.initial_bias_error?;
     let too_far = walk.low * HOUR_S.sqrt() / bias;
     if too_far <= 1.0 {
         return None;
@@ -64,7 +61,7 @@ mod tests {
     /// White noise of 1 deg/s and a process that forgets over `time_s` with steps of K = `walk` deg/s^1.5.
     fn found(walk: f64, time_s: f64) -> Option<Unbounded> {
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut cascade = Cascade::<OCTAVES, { firmware::OVERLAP }>::new();
+        let mut cascade = Cascade::<OCTAVES, { crate::OVERLAP }>::new();
         let (mut state, kept) = (0.0, (-PERIOD_S / time_s).exp());
         for _ in 0..40_000 {
             let mut normal = || random.sample::<f64, _>(StandardNormal);
@@ -72,7 +69,11 @@ mod tests {
             cascade.push((1000.0 * (state + normal())) as i32);
         }
         let curve = cascade.curve(PERIOD_S).scaled(1e-3);
-        unbounded(&curve, &trace(&curve, Lines::Known(&[])), Channel::GyroZ)
+        unbounded(
+            &curve,
+            &trace(&curve, Lines::Known(&[])),
+            measurement::adis16405::profile(0.05).channel("gyro_z").unwrap(),
+        )
     }
 
     #[test]

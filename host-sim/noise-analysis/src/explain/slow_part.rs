@@ -3,12 +3,10 @@
 //! In the second differences of an octave a channel is regressed on all others, by the covariances alone. The weights are
 //! learnt in the fitted half at one octave and applied to the unseen half at all.
 
-use adis16405_driver::Channel;
+use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Coupling, Noise};
-use firmware::{OCTAVES, OVERLAP};
+use measurement::{ChannelProfile, Measurement};
 use nalgebra::{DMatrix, DVector};
-use recordings::recording::Recording;
-use recordings::timeline::{Step, Timeline};
 
 /// Degrees of freedom that the octave of the weights has for each of them.
 const FREEDOM_PER_WEIGHT: f64 = 10.0;
@@ -17,7 +15,7 @@ const FREEDOM_PER_WEIGHT: f64 = 10.0;
 #[derive(Clone)]
 struct Together {
     cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
-    /// Channel `i` with `j < i` at `i·(i−1)/2 + j`.
+    /// ChannelProfile `i` with `j < i` at `i·(i−1)/2 + j`.
     couplings: Vec<Coupling<OCTAVES>>,
 }
 
@@ -49,7 +47,7 @@ pub struct Bought {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlowPart {
     /// In the order of all lists by channel.
-    pub channels: Vec<Channel>,
+    pub channels: Vec<ChannelProfile>,
     /// Averaging factor at which the weights were learnt, samples.
     pub learnt_at: u64,
     /// By channel, whether weights learnt in the first quarter made the second quarter better at `learnt_at`: what the
@@ -64,10 +62,10 @@ pub struct SlowPart {
 impl SlowPart {
     /// Of `channels` of a recording; `None` where there are fewer than two, or too few samples for an octave to regress at.
     #[must_use]
-    pub fn of(recording: &Recording, timeline: &Timeline, channels: &[Channel]) -> Option<Self> {
+    pub fn of(measurement: &Measurement, channels: &[ChannelProfile]) -> Option<Self> {
         let others = channels.len().checked_sub(1).filter(|&others| others > 0)?;
-        let period = 1.0 / timeline.sample_rate_hz;
-        let [first, second, unseen] = parts(recording, timeline, channels);
+        let period = measurement.period_s();
+        let [first, second, unseen] = parts(measurement, channels);
         let fitted = first.clone().followed_by(&second);
         let longest = fitted.cascades.first()?.len() / 8;
         let matrices = |part: &Together, n: u64| part.covariances(n.ilog2() as usize);
@@ -110,20 +108,17 @@ impl SlowPart {
 }
 
 /// The quarters of the fitted half, and the unseen half.
-fn parts(recording: &Recording, timeline: &Timeline, channels: &[Channel]) -> [Together; 3] {
-    let used = timeline.steps.iter().filter(|step| matches!(step, Step::Sample(_))).count();
+fn parts(measurement: &Measurement, channels: &[ChannelProfile]) -> [Together; 3] {
+    let counts: Vec<&[i32]> =
+        channels.iter().filter_map(|channel| Some(measurement.channel(channel)?.counts.as_slice())).collect();
     let mut parts = [(); 3].map(|()| Together::new(channels.len()));
-    let mut position = 0;
-    for &step in &timeline.steps {
-        let part = &mut parts[(4 * position / used.max(1)).min(2)];
-        match step {
-            Step::Gap(missing) => part.cascades.iter_mut().for_each(|cascade| cascade.gap(missing)),
-            Step::Sample(index) => {
-                let counts = recording.samples[index].counts;
-                part.push(channels.iter().map(|&channel| i32::from(counts.get(channel))));
-                position += 1;
-            }
+    for position in 0..measurement.len() {
+        let part = &mut parts[(4 * position / measurement.len()).min(2)];
+        let missing = measurement.missing_before(position);
+        if missing > 0 {
+            part.cascades.iter_mut().for_each(|cascade| cascade.gap(missing));
         }
+        part.push(counts.iter().map(|counts| counts[position]));
     }
     parts
 }
@@ -187,35 +182,49 @@ fn remaining(covariances: &DMatrix<f64>, of: usize, weights: &DVector<f64>) -> O
 #[cfg(test)]
 mod tests {
     use super::SlowPart;
-    use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+    use measurement::{ChannelProfile, MeasuredChannel, Measurement, adis16405};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
-    use recordings::recording::{Clock, Recorder};
-    use recordings::timeline::Timeline;
+    use std::collections::BTreeMap;
+
+    /// `columns` of counts at 100 Hz without a gap.
+    fn measurement(columns: Vec<(&str, Vec<i32>)>) -> Measurement {
+        let profile = adis16405::profile(0.05);
+        let samples = columns[0].1.len() as u64;
+        let channel = |(name, counts)| MeasuredChannel { profile: profile.channel(name).expect("a channel"), counts };
+        Measurement {
+            sample_rate_hz: 100.0,
+            stated_rate_hz: Some(100.0),
+            slots: (0..samples).collect(),
+            times_s: None,
+            channels: columns.into_iter().map(channel).collect(),
+            dropped: BTreeMap::new(),
+            flagged: BTreeMap::new(),
+            profile,
+        }
+    }
+
+    fn profiles(measurement: &Measurement) -> Vec<ChannelProfile> {
+        measurement.profiles().collect()
+    }
 
     #[test]
     fn a_common_walk_is_shared_as_much_as_its_variance_says_and_taken_away() {
-        const CHANNELS: [Channel; 3] = [Channel::GyroX, Channel::AcclX, Channel::AcclY];
         /// White noise of every channel and step of the walk, counts.
         const WHITE: f64 = 20.0;
         const STEP: f64 = 1.0;
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut walk = 0.0;
-        let mut recorder = Recorder::new(CHANNELS.to_vec(), GyroRange::Dps300);
+        let mut columns = [("gyro_x", vec![]), ("accl_x", vec![]), ("accl_y", vec![])];
         for _ in 0..1 << 16 {
             let [step, a, b, c]: [f64; 4] = [(); 4].map(|()| StandardNormal.sample(&mut random));
             walk += STEP * step;
-            let mut counts = [0; 12];
-            counts[Channel::Supply as usize] = 2068;
-            counts[Channel::GyroX as usize] = (WHITE * a).round() as i16;
-            counts[Channel::AcclX as usize] = (WHITE * b + walk).round() as i16;
-            counts[Channel::AcclY as usize] = (WHITE * c + walk).round() as i16;
-            recorder.push(Clock::default(), &Burst::fresh(&Counts::new(counts)));
+            let values = [WHITE * a, WHITE * b + walk, WHITE * c + walk];
+            columns.iter_mut().zip(values).for_each(|((_, counts), value)| counts.push(value.round() as i32));
         }
-        let recording = recorder.finish();
-        let timeline = Timeline::of(&recording, Some(100.0)).expect("a timeline");
-        let found = SlowPart::of(&recording, &timeline, &CHANNELS).expect("three channels");
+        let measurement = measurement(columns.to_vec());
+        let found = SlowPart::of(&measurement, &profiles(&measurement)).expect("three channels");
         // Of a sampled walk, and of white noise.
         let (walk, white) = (|n: f64| STEP * STEP * (2.0 * n * n + 1.0) / (6.0 * n), |n: f64| WHITE * WHITE / n);
         for octave in found.shared.iter().filter(|octave| octave.edf > 100.0) {
@@ -236,14 +245,7 @@ mod tests {
 
     #[test]
     fn one_channel_shares_nothing() {
-        let mut recorder = Recorder::new(vec![Channel::GyroX], GyroRange::Dps300);
-        for at in 0..100 {
-            let mut counts = [0; 12];
-            counts[Channel::GyroX as usize] = at % 7;
-            recorder.push(Clock::default(), &Burst::fresh(&Counts::new(counts)));
-        }
-        let recording = recorder.finish();
-        let timeline = Timeline::of(&recording, Some(100.0)).expect("a timeline");
-        assert_eq!(SlowPart::of(&recording, &timeline, &[Channel::GyroX]), None);
+        let measurement = measurement(vec![("gyro_x", (0..100).map(|at| at % 7).collect())]);
+        assert_eq!(SlowPart::of(&measurement, &profiles(&measurement)), None);
     }
 }

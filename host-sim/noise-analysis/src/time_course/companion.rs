@@ -7,11 +7,11 @@
 use super::moving::{Moving, least};
 use super::parts::Parts;
 use super::{SIGNIFICANCE, deviance_per_point};
+use crate::OCTAVES;
 use crate::grid::Grid;
 use crate::spectrum::Welch;
 use crate::trace::Series;
 use allan_core::Curve;
-use firmware::OCTAVES;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
 

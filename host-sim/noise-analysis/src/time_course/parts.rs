@@ -1,8 +1,8 @@
 //! The parts of a channel's record that are compared with each other.
 
 use crate::trace::Series;
+use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
-use firmware::{OCTAVES, OVERLAP};
 use std::ops::Range;
 
 /// Longest epoch, samples: five minutes at 100 Hz.

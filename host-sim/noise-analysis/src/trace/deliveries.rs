@@ -2,8 +2,7 @@
 
 use super::normal::{poisson_bounds, poisson_tail};
 use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
-use recordings::recording::Recording;
-use recordings::timeline::{Step, Timeline};
+use measurement::Measurement;
 
 /// By how much equal neighbours by chance may be more frequent than if the channels were independent.
 const DEPENDENCE: f64 = 3.0;
@@ -12,14 +11,13 @@ const DEPENDENCE: f64 = 3.0;
 ///
 /// Nothing but loss leaves such room, so one is enough.
 #[must_use]
-pub fn dropped(timeline: &Timeline) -> Option<Finding> {
-    let gaps = timeline.steps.iter().filter(|step| matches!(step, Step::Gap(_))).count();
-    let used = timeline.steps.len() - gaps;
-    let missing = timeline.dropped.get("gap").copied().unwrap_or(0);
+pub fn dropped(measurement: &Measurement) -> Option<Finding> {
+    let (gaps, used) = (measurement.gaps(), measurement.len());
+    let missing = measurement.dropped.get("gap").copied().unwrap_or(0);
     if missing == 0 {
         return None;
     }
-    let all = (used as u64 + timeline.dropped.values().sum::<u64>()) as f64;
+    let all = (used as u64 + measurement.dropped.values().sum::<u64>()) as f64;
     let missing = missing as f64;
     // Losses come in gaps: the gaps are what is counted.
     let per_gap = missing / (gaps.max(1) as f64);
@@ -44,31 +42,23 @@ pub fn dropped(timeline: &Timeline) -> Option<Finding> {
 ///
 /// The repair holds positions in the [`Series`](super::Series) of any channel.
 #[must_use]
-pub fn repeated(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
-    let used: Vec<usize> = timeline
-        .steps
-        .iter()
-        .filter_map(|step| match step {
-            Step::Sample(position) => Some(*position),
-            Step::Gap(_) => None,
-        })
-        .collect();
-    let mut equal = vec![0u64; recording.channels.len()];
+pub fn repeated(measurement: &Measurement) -> Option<Finding> {
+    let channels = &measurement.channels;
+    let mut equal = vec![0u64; channels.len()];
     let mut positions = Vec::new();
-    for (at, pair) in used.windows(2).enumerate() {
-        let [before, now] = [pair[0], pair[1]].map(|position| recording.samples[position].counts);
+    for at in 1..measurement.len() {
         let mut all = true;
-        for (channel, equal) in recording.channels.iter().zip(&mut equal) {
-            let same = before.get(*channel) == now.get(*channel);
+        for (channel, equal) in channels.iter().zip(&mut equal) {
+            let same = channel.counts[at] == channel.counts[at - 1];
             *equal += u64::from(same);
             all &= same;
         }
         if all {
-            positions.push(at + 1);
+            positions.push(at);
         }
     }
-    let refused = timeline.dropped.get("repeated").copied().unwrap_or(0);
-    let (pairs, seen) = (used.len().saturating_sub(1) as f64, positions.len() as f64);
+    let refused = measurement.dropped.get("repeated").copied().unwrap_or(0);
+    let (pairs, seen) = (measurement.len().saturating_sub(1) as f64, positions.len() as f64);
     let shares: Vec<f64> = equal.iter().map(|&equal| equal as f64 / pairs.max(1.0)).collect();
     let expected = DEPENDENCE * pairs * shares.iter().product::<f64>();
     let p_value = poisson_tail(positions.len() as u64 + refused, expected);
@@ -82,7 +72,7 @@ pub fn repeated(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
         "{} of {all} samples equal the one before in all {} channels, {expected:.1} at most by chance; \
          a register that is read before it is renewed",
         positions.len() as u64 + refused,
-        recording.channels.len(),
+        channels.len(),
     );
     Some(Finding {
         effect: effect("repeated_samples", [("fraction", parameter(count / all, low / all, high / all, ""))], evidence),

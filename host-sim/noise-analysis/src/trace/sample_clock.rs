@@ -2,9 +2,7 @@
 
 use super::normal::{NORMAL_975, upper_tail};
 use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
-use adis16405_driver::SamplePeriod;
-use recordings::recording::Recording;
-use recordings::timeline::{Step, Timeline};
+use measurement::{Measurement, SensorProfile};
 
 /// Standard deviation of the clock of an ordinary host, which the rate is measured by: 20 parts in a million, as of a
 /// crystal that nobody has trimmed.
@@ -21,8 +19,9 @@ const FEWEST_SAMPLES: usize = 100 * STRETCHES;
 /// Compares the rate that the time stamps show with the one that is stated, or else with the nearest at which the part
 /// samples or a host reads.
 #[must_use]
-pub fn find(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
-    let (slots, times) = stamps(recording, timeline)?;
+pub fn find(measurement: &Measurement) -> Option<Finding> {
+    let times = measurement.times_s.as_ref()?;
+    let slots: Vec<f64> = measurement.slots.iter().map(|&slot| slot as f64).collect();
     if slots.len() < FEWEST_SAMPLES {
         return None;
     }
@@ -33,15 +32,15 @@ pub fn find(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
         })
         .collect();
     let rates = rates?;
-    let measured = rate(&slots, &times)?;
+    let measured = rate(&slots, times)?;
     let mean = rates.iter().sum::<f64>() / STRETCHES as f64;
     let scatter = rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>() / (STRETCHES * (STRETCHES - 1)) as f64;
-    let nominal = timeline.stated_rate_hz.unwrap_or_else(|| nearest_usual(measured));
+    let nominal = measurement.stated_rate_hz.unwrap_or_else(|| nearest_usual(&measurement.profile, measured));
     let error = (scatter / (measured * measured) + HOST_CLOCK * HOST_CLOCK).sqrt();
     let off = measured / nominal - 1.0;
     let z = off.abs() / error;
     let p_value = 2.0 * upper_tail(z);
-    let other = timeline.stated_rate_hz.is_none() && off.abs() > FARTHEST;
+    let other = measurement.stated_rate_hz.is_none() && off.abs() > FARTHEST;
     if other || p_value > SIGNIFICANCE {
         return None;
     }
@@ -64,28 +63,12 @@ pub fn find(recording: &Recording, timeline: &Timeline) -> Option<Finding> {
 }
 
 /// The nearest rate, in Hz, that the part can be set to or that is round.
-fn nearest_usual(measured: f64) -> f64 {
-    let part = SamplePeriod::nearest(measured).ok().map(SamplePeriod::hz);
+fn nearest_usual(profile: &SensorProfile, measured: f64) -> f64 {
+    let part = profile.nearest_native_rate_hz(measured);
     let decade = |power: i32| DOUBLINGS.map(move |doublings| 10f64.powi(power) * 2f64.powi(doublings));
     let round = (-1..=3).flat_map(decade).chain((0..=10).map(|power| 2f64.powi(power)));
     let distance = |rate: &f64| (rate / measured - 1.0).abs();
     part.into_iter().chain(round).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(measured)
-}
-
-/// Periods and time stamps of the used samples; `None` where some have no time stamp.
-fn stamps(recording: &Recording, timeline: &Timeline) -> Option<(Vec<f64>, Vec<f64>)> {
-    let (mut slots, mut times, mut slot) = (Vec::new(), Vec::new(), 0.0);
-    for step in &timeline.steps {
-        match *step {
-            Step::Gap(missing) => slot += f64::from(missing),
-            Step::Sample(position) => {
-                slots.push(slot);
-                times.push(recording.samples[position].clock.time_s?);
-                slot += 1.0;
-            }
-        }
-    }
-    Some((slots, times))
 }
 
 /// Hz; one over the slope of the least-squares line of time over period.
@@ -108,7 +91,7 @@ mod tests {
     #[test]
     fn a_rate_belongs_to_the_part_or_to_a_host() {
         for (measured, usual) in [(816.43, 819.2), (204.1, 204.8), (100.02, 100.0), (101.9, 102.4), (199.5, 200.0)] {
-            let nearest = nearest_usual(measured);
+            let nearest = nearest_usual(&measurement::adis16405::profile(0.05), measured);
             assert!((nearest / usual - 1.0).abs() < 1e-4, "{measured}: {nearest}");
         }
     }

@@ -1,8 +1,6 @@
 //! One channel along its timeline.
 
-use adis16405_driver::Channel;
-use recordings::recording::Recording;
-use recordings::timeline::{Step, Timeline};
+use measurement::{ChannelProfile, Measurement};
 
 /// The samples of one channel in its unit, each with the period in which it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,22 +38,17 @@ pub enum Repair {
 }
 
 impl Series {
-    /// The samples of `channel` that `timeline` uses.
+    /// The samples of `channel`; none where it was not recorded.
     #[must_use]
-    pub fn of(recording: &Recording, timeline: &Timeline, channel: Channel) -> Self {
-        let resolution = channel.lsb(recording.range);
-        let (mut slots, mut values, mut slot) = (Vec::new(), Vec::new(), 0u64);
-        for step in &timeline.steps {
-            match *step {
-                Step::Gap(missing) => slot = slot.saturating_add(u64::from(missing)),
-                Step::Sample(position) => {
-                    slots.push(slot);
-                    values.push(f64::from(recording.samples[position].counts.get(channel)) * resolution);
-                    slot = slot.saturating_add(1);
-                }
-            }
+    pub fn of(measurement: &Measurement, channel: &ChannelProfile) -> Self {
+        let counts = measurement.channel(channel).map(|channel| channel.counts.as_slice()).unwrap_or_default();
+        Self {
+            slots: measurement.slots[..counts.len()].to_vec(),
+            values: counts.iter().map(|&count| f64::from(count) * channel.lsb).collect(),
+            period_s: measurement.period_s(),
+            resolution: channel.lsb,
+            unit: channel.unit,
         }
-        Self { slots, values, period_s: 1.0 / timeline.sample_rate_hz, resolution, unit: channel.unit() }
     }
 
     /// The same values, known to be steps of so many counts.

@@ -8,8 +8,7 @@ use super::{
     sample_clock, spikes,
 };
 use adis16405_driver::Channel;
-use recordings::recording::Recording;
-use recordings::timeline::Timeline;
+use measurement::Measurement;
 use simulation::record::{Host, Simulation};
 use virtual_sensor::effect::surroundings::TemperatureCourse;
 use virtual_sensor::{Effect, Hidden, Surroundings};
@@ -22,8 +21,7 @@ fn white() -> f64 {
 }
 
 struct Case {
-    recording: Recording,
-    timeline: Timeline,
+    measurement: Measurement,
 }
 
 impl Case {
@@ -37,12 +35,11 @@ impl Case {
 
     fn of(simulation: Simulation) -> Self {
         let recording = simulation.run(|_| ()).unwrap();
-        let timeline = Timeline::of(&recording, None).unwrap();
-        Self { recording, timeline }
+        Self { measurement: recordings::timeline::measurement(&recording, None).unwrap() }
     }
 
     fn series(&self, channel: Channel) -> Series {
-        Series::of(&self.recording, &self.timeline, channel)
+        Series::of(&self.measurement, &self.measurement.profile.channels[channel as usize])
     }
 
     /// Everything that any detector finds.
@@ -53,9 +50,9 @@ impl Case {
             [spikes::find(&series), step, ramp]
         });
         let common = [
-            deliveries::dropped(&self.timeline),
-            deliveries::repeated(&self.recording, &self.timeline),
-            sample_clock::find(&self.recording, &self.timeline),
+            deliveries::dropped(&self.measurement),
+            deliveries::repeated(&self.measurement),
+            sample_clock::find(&self.measurement),
         ];
         channels.chain(common).flatten().collect()
     }
@@ -225,18 +222,18 @@ fn values_that_skip_counts_have_a_coarser_step() {
 #[test]
 fn lost_and_repeated_samples_are_counted() {
     let lossy = Case::hiding(vec![Effect::DroppedSamples { fraction: 2e-3 }], 200.0, 8);
-    let finding = deliveries::dropped(&lossy.timeline).unwrap();
+    let finding = deliveries::dropped(&lossy.measurement).unwrap();
     assert_covers(&finding, "fraction", 2e-3);
-    assert_eq!(deliveries::repeated(&lossy.recording, &lossy.timeline), None);
+    assert_eq!(deliveries::repeated(&lossy.measurement), None);
 
     // Neighbours are equal all the time behind a long filter, and none is repeated.
     let slow = Case::hiding(vec![Effect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
-    assert_eq!(deliveries::repeated(&slow.recording, &slow.timeline), None);
+    assert_eq!(deliveries::repeated(&slow.measurement), None);
 
     let stale = Case::hiding(vec![Effect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
-    let finding = deliveries::repeated(&stale.recording, &stale.timeline).unwrap();
+    let finding = deliveries::repeated(&stale.measurement).unwrap();
     assert_covers(&finding, "fraction", 2e-3);
-    assert_eq!(deliveries::dropped(&stale.timeline), None);
+    assert_eq!(deliveries::dropped(&stale.measurement), None);
     let Repair::LeaveOut(positions) = &finding.repair else { panic!("{:?}", finding.repair) };
     let values = stale.series(GYRO).values;
     assert!(positions.iter().all(|&position| values[position] == values[position - 1]));
@@ -249,7 +246,7 @@ fn a_clock_that_is_off_is_told_from_a_host_that_is() {
         host: Host { latency_s: 30e-6, clock_ratio },
         ..Simulation::of_paper(100.0, 10)
     };
-    let find = |case: Case| sample_clock::find(&case.recording, &case.timeline);
+    let find = |case: Case| sample_clock::find(&case.measurement);
     // The data sheet's tolerance is parts in a hundred, a host's parts in a hundred thousand.
     let off = find(Case::of(simulation(vec![Effect::SampleClock { ratio: 0.997 }], 1.0 + 20e-6))).unwrap();
     assert_covers(&off, "rate_hz", 204.8 * 0.997);

@@ -18,8 +18,8 @@ pub fn picture(of: &ChannelExplanation) -> Result<String, PlotError> {
         unseen: ModelError { deviance_per_point: Some(error), rms_percent: None },
     };
     allan(&ChannelReport {
-        name: format!("{}, second half; models of the first", of.channel.name()),
-        unit: of.channel.unit().to_owned(),
+        name: format!("{}, second half; models of the first", of.channel.name),
+        unit: of.channel.unit.to_owned(),
         samples: unseen.samples(),
         // The same degrees of freedom as in the tables.
         curve: unseen.points().iter().map(|point| CurvePoint::of(point, unseen.samples())).collect(),

@@ -101,7 +101,7 @@ fn found(channels: &[ChannelExplanation]) -> Table {
         let row = |found: &allan_core::trace::Found| {
             let term = &channel.trace.after.terms()[found.term];
             vec![
-                channel.channel.name().to_owned(),
+                channel.channel.name.to_owned(),
                 words(term.kind.name()),
                 shape(term),
                 format!("{} [{}]", number(term.value), interval(term.low, term.high)),
@@ -134,7 +134,7 @@ fn shape(term: &Term) -> String {
 
 fn quarters(channels: &[ChannelExplanation]) -> Table {
     let row = |channel: &ChannelExplanation| {
-        let mut row = vec![channel.channel.name().to_owned()];
+        let mut row = vec![channel.channel.name.to_owned()];
         match channel.stationarity {
             Some(found) => row.extend([
                 number(found.n as f64 * channel.parts.fitted.sample_period()),
@@ -160,7 +160,7 @@ fn errors(channels: &[ChannelExplanation]) -> Table {
             [errors.declared, errors.traced, errors.predictive].map(|both| both.map(deviance));
         let values = [declared, traced, predictive].concat();
         let last = [errors.beyond_drift, errors.standing_still].map(deviance).to_vec();
-        [vec![channel.channel.name().to_owned()], values, last].concat()
+        [vec![channel.channel.name.to_owned()], values, last].concat()
     };
     let header = [
         "channel",
@@ -195,7 +195,7 @@ fn followed(channels: &[ChannelExplanation]) -> Table {
             controls.declared_followed,
             controls.persistence,
         ];
-        [vec![channel.channel.name().to_owned(), what.to_owned()], values.map(deviance).to_vec()].concat()
+        [vec![channel.channel.name.to_owned(), what.to_owned()], values.map(deviance).to_vec()].concat()
     };
     let header = [
         "channel",
@@ -210,7 +210,7 @@ fn followed(channels: &[ChannelExplanation]) -> Table {
 }
 
 fn beside(explanation: &Explanation, of: &ChannelExplanation, companion: &Companion) -> String {
-    let (name, other) = (of.channel.name(), explanation.searched[companion.channel].name());
+    let (name, other) = (of.channel.name, explanation.searched[companion.channel].name);
     let (mean, deviation) = companion.measured_ratio;
     let ((above, below), path) = (companion.ratio, [&companion.line, &companion.companion[0], &companion.companion[1]]);
     let [line, seen, unseen] = path.map(|path| path.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" "));
@@ -226,7 +226,7 @@ fn beside(explanation: &Explanation, of: &ChannelExplanation, companion: &Compan
 fn courses(rate: f64, channels: &[ChannelExplanation]) -> Table {
     let mut header = vec!["half".to_owned(), "from, min".to_owned()];
     for channel in channels {
-        header.push(channel.channel.name().to_owned());
+        header.push(channel.channel.name.to_owned());
         if channel.moving.line_frequency().is_some() {
             header.push("Hz".to_owned());
         }
@@ -254,7 +254,7 @@ fn courses(rate: f64, channels: &[ChannelExplanation]) -> Table {
 }
 
 fn by_channel(slow_part: &SlowPart) -> Vec<String> {
-    let names = slow_part.channels.iter().map(|channel| channel.name().to_owned());
+    let names = slow_part.channels.iter().map(|channel| channel.name.to_owned());
     ["τ, s".to_owned()].into_iter().chain(names).collect()
 }
 

@@ -4,19 +4,18 @@
 //! Student's distribution with few degrees of freedom. A method that also has to find out channel and shape sees no more.
 
 use adis16405_driver::Channel;
+use measurement::Measurement;
 use noise_analysis::trace::Series;
 use noise_analysis::trace::block::Blocks;
 use noise_analysis::trace::evidence::Evidence;
 use noise_analysis::trace::level::SIGNIFICANCE;
 use noise_analysis::trace::noises::NoiseTable;
-use recordings::recording::Recording;
-use recordings::timeline::Timeline;
 use virtual_sensor::Effect;
 
 /// Whether such a test sees `effect` at the probability of chance that the analysis asks for; `None` for effects that are
 /// not a known course of the level. `begin_s` is when the recording begins, counted from the part's start.
-pub(crate) fn sees(effect: &Effect, recording: &Recording, timeline: &Timeline, begin_s: f64) -> Option<bool> {
-    let series = |channel: Channel| Series::of(recording, timeline, channel);
+pub(crate) fn sees(effect: &Effect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
+    let series = |channel: Channel| Series::of(measurement, &measurement.profile.channels[channel as usize]);
     let own = series(*effect.channels().first()?);
     let blocks = Blocks::of(&own)?;
     let shape = match effect {
@@ -43,8 +42,7 @@ mod tests {
             let mut simulation = case(Group::Nothing, 100.0, 3).simulation;
             simulation.hidden.effects = vec![effect.clone()];
             let recording = simulation.run(|_| ()).unwrap();
-            let timeline = Timeline::of(&recording, None).unwrap();
-            sees(effect, &recording, &timeline, 0.2)
+            sees(effect, &recordings::timeline::measurement(&recording, None).unwrap(), 0.2)
         };
         let channel = Channel::GyroX;
         let step = |size: f64| Effect::BiasStep { channel, time_s: 50.0, size };

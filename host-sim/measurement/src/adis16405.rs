@@ -1,0 +1,91 @@
+//! The Analog Devices ADIS16405, from its data sheet (Rev. B).
+
+use crate::profile::{ChannelProfile, Quantity, SensorProfile};
+
+/// Rate of the sample clock with SMPL_PRD = 0x0001, which the part has after reset, Hz.
+const INTERNAL_RATE_HZ: f64 = 819.2;
+/// Time base of the sample period, 1/0.61035 ms, Hz. The slow time base, 18.921 ms, is 31 of these periods.
+const TIME_BASE_HZ: f64 = 1638.4;
+const SLOW_TIME_BASE: u32 = 31;
+/// Initial bias error (1 σ): deg/s, g.
+const GYRO_BIAS: f64 = 3.0;
+const ACCELEROMETER_BIAS: f64 = 0.05;
+
+/// The profile of the part; `gyro_lsb` is the size of a gyroscope's count in deg/s in the range that was set: 0.05, 0.025
+/// or 0.0125.
+#[must_use]
+pub fn profile(gyro_lsb: f64) -> SensorProfile {
+    let channel = |name, quantity, axis, unit, lsb, initial_bias_error| ChannelProfile {
+        name,
+        quantity,
+        axis,
+        unit,
+        lsb,
+        initial_bias_error,
+    };
+    let gyro = |name, axis| channel(name, Quantity::AngularRate, axis, "deg/s", gyro_lsb, Some(GYRO_BIAS));
+    let accelerometer =
+        |name, axis| channel(name, Quantity::SpecificForce, axis, "g", 3.33e-3, Some(ACCELEROMETER_BIAS));
+    let magnetometer = |name, axis| channel(name, Quantity::MagneticField, axis, "gauss", 0.5e-3, None);
+    SensorProfile {
+        name: "ADIS16405",
+        channels: vec![
+            channel("supply", Quantity::SupplyVoltage, "", "V", 2.418e-3, None),
+            gyro("gyro_x", "x"),
+            gyro("gyro_y", "y"),
+            gyro("gyro_z", "z"),
+            accelerometer("accl_x", "x"),
+            accelerometer("accl_y", "y"),
+            accelerometer("accl_z", "z"),
+            magnetometer("magn_x", "x"),
+            magnetometer("magn_y", "y"),
+            magnetometer("magn_z", "z"),
+            // Sources give 0.14 °C and 0.1357 °C; most drivers use 0.14 °C.
+            channel("temp", Quantity::Temperature, "", "degC", 0.14, None),
+            channel("aux_adc", Quantity::AuxiliaryVoltage, "", "V", 0.806e-3, None),
+        ],
+        internal_rate_hz: INTERNAL_RATE_HZ,
+        native_rates_hz: native_rates_hz(),
+        dithered_avar_counts2: 0.2,
+    }
+}
+
+/// Every rate that SMPL_PRD can set: its lower seven bits are a divisor less one, bit 7 selects the slow time base; 0x00
+/// would be an external clock.
+fn native_rates_hz() -> Vec<f64> {
+    let fast = (2..=128).map(|divisor| TIME_BASE_HZ / f64::from(divisor));
+    let slow = (1..=128).map(|divisor| TIME_BASE_HZ / f64::from(SLOW_TIME_BASE * divisor));
+    fast.chain(slow).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::profile;
+    use adis16405_driver::{Channel, GyroRange, SamplePeriod};
+
+    #[test]
+    fn names_units_and_scales_are_the_drivers() {
+        for range in [GyroRange::Dps300, GyroRange::Dps150, GyroRange::Dps75] {
+            let profile = profile(range.lsb());
+            assert_eq!(profile.channels.len(), Channel::ALL.len());
+            for (channel, known) in Channel::ALL.into_iter().zip(&profile.channels) {
+                assert_eq!((known.name, known.unit, known.lsb), (channel.name(), channel.unit(), channel.lsb(range)));
+                assert_eq!(known.quantity.is_inertial(), Channel::INERTIAL.contains(&channel));
+            }
+        }
+    }
+
+    #[test]
+    fn native_rates_are_those_that_the_driver_can_set() {
+        let profile = profile(0.05);
+        assert_eq!(profile.native_rates_hz.len(), 255);
+        for smpl_prd in 1..=255 {
+            let rate = SamplePeriod::from_register(smpl_prd).expect("not the external clock").hz();
+            assert!(profile.native_rates_hz.contains(&rate), "SMPL_PRD = {smpl_prd:#04x}: {rate} Hz");
+        }
+        for rate in [816.43, 204.1, 101.9, 53.0, 1.0, 0.1] {
+            let nearest = SamplePeriod::nearest(rate).expect("a rate").hz();
+            assert_eq!(profile.nearest_native_rate_hz(rate), Some(nearest));
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! What flows from a recording into its analysis: the samples of a sensor on a uniform time base, and the profile of the
+//! sensor.
+//!
+//! A reader of recordings produces a [`Measurement`], the noise analysis consumes it; neither knows the other. Everything
+//! that is specific to one sensor lies in its [`SensorProfile`]; [`adis16405`] is one.
+
+pub mod adis16405;
+mod profile;
+
+pub use profile::{ChannelProfile, Quantity, SensorProfile};
+
+use std::collections::BTreeMap;
+
+/// The samples of a sensor, all channels taken at the same times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// What is known of the sensor.
+    pub profile: SensorProfile,
+    /// Sample rate in Hz, as the user states it or as the time stamps show it.
+    pub sample_rate_hz: f64,
+    /// Sample rate in Hz that the user states, if any.
+    pub stated_rate_hz: Option<f64>,
+    /// Sample period in which each sample was taken, counted from the first; strictly increasing. A step of more than 1 is
+    /// a gap.
+    pub slots: Vec<u64>,
+    /// Time stamp of each sample in s, where every sample has one.
+    pub times_s: Option<Vec<f64>>,
+    /// The channels that were recorded, in the order of the sensor's burst.
+    pub channels: Vec<MeasuredChannel>,
+    /// Samples that are missing or were refused, by cause; `gap` counts those that never arrived.
+    pub dropped: BTreeMap<&'static str, u64>,
+    /// Samples that are used although a warning was raised, by cause.
+    pub flagged: BTreeMap<&'static str, u64>,
+}
+
+/// The samples of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredChannel {
+    /// Name, unit and scale.
+    pub profile: ChannelProfile,
+    /// One register count for each slot.
+    pub counts: Vec<i32>,
+}
+
+impl Measurement {
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
+    /// Sample period, s.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.sample_rate_hz
+    }
+
+    /// Sample periods without a sample just before the sample at `position`; 0 for the first sample.
+    #[must_use]
+    pub fn missing_before(&self, position: usize) -> u32 {
+        let previous = position.checked_sub(1).map(|previous| self.slots[previous]);
+        previous.map_or(0, |previous| u32::try_from(self.slots[position] - previous - 1).unwrap_or(u32::MAX))
+    }
+
+    /// Number of gaps between the samples.
+    #[must_use]
+    pub fn gaps(&self) -> usize {
+        self.slots.windows(2).filter(|pair| pair[1] - pair[0] > 1).count()
+    }
+
+    /// The recorded channels' profiles, in the order of [`Measurement::channels`].
+    pub fn profiles(&self) -> impl Iterator<Item = ChannelProfile> {
+        self.channels.iter().map(|channel| channel.profile)
+    }
+
+    /// The recorded channels of one quantity.
+    pub fn of_quantity(&self, quantity: Quantity) -> impl Iterator<Item = ChannelProfile> {
+        self.profiles().filter(move |profile| profile.quantity == quantity)
+    }
+
+    /// The samples of a recorded channel; `None` where it was not recorded.
+    #[must_use]
+    pub fn channel(&self, profile: &ChannelProfile) -> Option<&MeasuredChannel> {
+        self.channels.iter().find(|channel| channel.profile.name == profile.name)
+    }
+}
