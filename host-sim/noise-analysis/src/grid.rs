@@ -1,6 +1,6 @@
 //! A channel on the grid of its sample periods, as transforms and filters take it.
 
-use crate::trace::Series;
+use crate::series::Series;
 
 /// Samples one period apart; `NaN` where a sample is missing.
 #[derive(Debug, Clone, PartialEq)]

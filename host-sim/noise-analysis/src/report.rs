@@ -3,6 +3,7 @@
 //! A report says nothing of where its samples came from, so that a recording read from a file and the same
 //! recording replayed over the bus give the same bytes.
 
+pub use crate::findings::{Effect, Parameter};
 use crate::practice::Practice;
 use allan_core::Point;
 use allan_core::read_off::percentage_accuracy;
@@ -131,30 +132,6 @@ pub struct Term {
     pub kind: String,
     /// By name; a term with a single parameter calls it `value`.
     pub parameters: BTreeMap<String, Parameter>,
-}
-
-/// A fitted number with its 95 % bounds. A term that the data does not show has the value and the lower bound 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Parameter {
-    /// Estimate.
-    pub value: f64,
-    /// Lower 95 % bound.
-    pub low: f64,
-    /// Upper 95 % bound.
-    pub high: f64,
-    /// Unit of all three.
-    pub unit: String,
-}
-
-/// An effect that was traced.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Effect {
-    /// Such as `sinusoid`.
-    pub kind: String,
-    /// By name, with intervals.
-    pub parameters: BTreeMap<String, Parameter>,
-    /// A sentence that a person can check.
-    pub evidence: String,
 }
 
 /// How wrong a model is, over the octaves with `n ≤ M/8` of a part of `M` samples; absent when there are none.

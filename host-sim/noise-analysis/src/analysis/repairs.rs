@@ -60,7 +60,7 @@ impl Repairs {
             (coarse, spikes, level, causes, left)
         });
         for (&channel, (coarse, spikes, Level { step, ramp, followed }, causes, left)) in traced.iter().zip(found) {
-            if let Some(Finding { repair: Repair::Level { from, size }, .. }) = &step {
+            if let Some(Finding { repair: Some(Repair::Level { from, size }), .. }) = &step {
                 repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
             }
             // Motion is fast enough for the differences; its slow part is the accelerometers' own drift.
@@ -127,9 +127,9 @@ pub(super) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R 
     })
 }
 
-fn left_out(repair: &Repair) -> Vec<usize> {
+fn left_out(repair: &Option<Repair>) -> Vec<usize> {
     match repair {
-        Repair::LeaveOut(positions) => positions.clone(),
+        Some(Repair::LeaveOut(positions)) => positions.clone(),
         _ => Vec::new(),
     }
 }

@@ -7,8 +7,9 @@ use super::block::Blocks;
 use super::evidence::{Estimate, Evidence};
 use super::level::Claim;
 use super::noises::Noises;
-use super::normal::{NORMAL_975, quantile};
-use super::{Finding, Repair, Series, effect, parameter};
+use crate::distributions::{NORMAL_975, quantile};
+use crate::findings::{Effect, Finding, Parameter, Repair};
+use crate::series::Series;
 use nalgebra::DVector;
 
 /// Highest probability of a step that is none. The level of a real part at rest moves less evenly than any mixture of
@@ -89,17 +90,15 @@ pub(super) fn finding(series: &Series, place: &Place, estimate: &Estimate, claim
         claim.p_value,
     );
     Finding {
-        effect: effect(
+        effect: Effect::new(
             "bias_step",
             [
-                ("time", parameter(time(at), time(place.low), time(place.high), "s")),
-                ("size", parameter(size, size - half, size + half, series.unit)),
+                ("time", Parameter::new(time(at), time(place.low), time(place.high), "s")),
+                ("size", Parameter::new(size, size - half, size + half, series.unit)),
             ],
             evidence,
         ),
-        deviance: claim.gain,
-        p_value: claim.p_value,
-        repair: Repair::Level { from: place.position, size },
+        repair: Some(Repair::Level { from: place.position, size }),
     }
 }
 

@@ -3,7 +3,8 @@
 //! Where noise is larger than the step this adds no more than white noise of step²/12, which no curve and no spectrum
 //! tells from any other; the values themselves do.
 
-use super::{Finding, Repair, Series, effect, parameter};
+use crate::findings::{Effect, Finding, Parameter};
+use crate::series::Series;
 
 /// Changes of the value that must all be multiples of the step: of a smooth density every other one would be odd.
 const FEWEST_CHANGES: usize = 50;
@@ -32,13 +33,9 @@ pub fn find(series: &Series) -> Option<Finding> {
          a converter of fewer bits, or rounding on the way",
         series.values.len(),
     );
-    // Each change would be a multiple by chance in one of `counts` cases.
-    let log_likelihood = changes * f64::from(counts).ln();
     Some(Finding {
-        effect: effect("quantization", [("step", parameter(step, step, step, series.unit))], evidence),
-        deviance: 2.0 * log_likelihood,
-        p_value: (-log_likelihood).exp(),
-        repair: Repair::Impossible,
+        effect: Effect::new("quantization", [("step", Parameter::new(step, step, step, series.unit))], evidence),
+        repair: None,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Samples that never arrived, and samples that arrived twice as if they were new.
 
-use super::normal::{poisson_bounds, poisson_tail};
-use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
+use crate::distributions::{poisson_bounds, poisson_tail};
+use crate::findings::{Effect, Finding, Parameter, Repair, SIGNIFICANCE};
 use measurement::Measurement;
 
 /// By how much equal neighbours by chance may be more frequent than if the channels were independent.
@@ -27,14 +27,12 @@ pub fn dropped(measurement: &Measurement) -> Option<Finding> {
         "{missing} of {all} samples never arrived, in {gaps} gaps; a reader that comes too late, or a full queue"
     );
     Some(Finding {
-        effect: effect(
+        effect: Effect::new(
             "dropped_samples",
-            [("fraction", parameter(fraction(missing), fraction(low * per_gap), fraction(high * per_gap), ""))],
+            [("fraction", Parameter::new(fraction(missing), fraction(low * per_gap), fraction(high * per_gap), ""))],
             evidence,
         ),
-        deviance: f64::INFINITY,
-        p_value: 0.0,
-        repair: Repair::Done,
+        repair: None,
     })
 }
 
@@ -75,10 +73,12 @@ pub fn repeated(measurement: &Measurement) -> Option<Finding> {
         channels.len(),
     );
     Some(Finding {
-        effect: effect("repeated_samples", [("fraction", parameter(count / all, low / all, high / all, ""))], evidence),
-        deviance: -2.0 * p_value.max(f64::MIN_POSITIVE).ln(),
-        p_value,
-        repair: Repair::LeaveOut(positions),
+        effect: Effect::new(
+            "repeated_samples",
+            [("fraction", Parameter::new(count / all, low / all, high / all, ""))],
+            evidence,
+        ),
+        repair: Some(Repair::LeaveOut(positions)),
     })
 }
 

@@ -8,7 +8,7 @@
 
 use super::block::Blocks;
 use super::noises::{Noise, Noises};
-use super::normal::upper_tail;
+use crate::distributions::upper_tail;
 use nalgebra::{DMatrix, DVector};
 
 /// Part of a shape's information below which it is made of those that are known.

@@ -3,8 +3,9 @@
 use super::block::Blocks;
 use super::evidence::Estimate;
 use super::level::Claim;
-use super::normal::NORMAL_975;
-use super::{Finding, Repair, Series, effect, parameter};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Effect, Finding, Parameter};
+use crate::series::Series;
 
 /// A ramp as it is reported; `estimate` is by block.
 pub(super) fn finding(series: &Series, blocks: &Blocks, estimate: &Estimate, claim: &Claim) -> Finding {
@@ -17,9 +18,11 @@ pub(super) fn finding(series: &Series, blocks: &Blocks, estimate: &Estimate, cla
     );
     let unit = format!("{}/s", series.unit);
     Finding {
-        effect: effect("rate_ramp", [("slope", parameter(slope, slope - half, slope + half, &unit))], evidence),
-        deviance: claim.gain,
-        p_value: claim.p_value,
-        repair: Repair::Slope(slope * series.period_s),
+        effect: Effect::new(
+            "rate_ramp",
+            [("slope", Parameter::new(slope, slope - half, slope + half, &unit))],
+            evidence,
+        ),
+        repair: None,
     }
 }

@@ -1,7 +1,7 @@
 //! A sample clock that does not run at the nominal rate.
 
-use super::normal::{NORMAL_975, upper_tail};
-use super::{Finding, Repair, SIGNIFICANCE, effect, parameter};
+use crate::distributions::{NORMAL_975, upper_tail};
+use crate::findings::{Effect, Finding, Parameter, SIGNIFICANCE};
 use measurement::{Measurement, SensorProfile};
 
 /// Standard deviation of the clock of an ordinary host, which the rate is measured by: 20 parts in a million, as of a
@@ -51,14 +51,12 @@ pub fn find(measurement: &Measurement) -> Option<Finding> {
         1e6 * off,
     );
     Some(Finding {
-        effect: effect(
+        effect: Effect::new(
             "sample_clock",
-            [("rate_hz", parameter(measured, measured - half, measured + half, "Hz"))],
+            [("rate_hz", Parameter::new(measured, measured - half, measured + half, "Hz"))],
             evidence,
         ),
-        deviance: z * z,
-        p_value,
-        repair: Repair::Done,
+        repair: None,
     })
 }
 

@@ -4,8 +4,9 @@
 //! covariance of the data. In white noise that is the mean; in filtered noise, a line or a drift it is much better. The
 //! error is normal, so the largest of N is judged by N times the normal tail.
 
-use super::normal::{NORMAL_975, any_of, density, poisson_bounds, quantile, upper_tail};
-use super::{Finding, Repair, SIGNIFICANCE, Series, effect, parameter};
+use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
+use crate::findings::{Effect, Finding, Parameter, Repair, SIGNIFICANCE};
+use crate::series::Series;
 
 /// Neighbours on each side.
 const REACH: usize = 6;
@@ -48,20 +49,23 @@ pub fn find(series: &Series) -> Option<Finding> {
     let mut positions: Vec<usize> = spikes.iter().map(|spike| spike.position).collect();
     positions.sort_unstable();
     Some(Finding {
-        effect: effect(
+        effect: Effect::new(
             "spikes",
             [
                 (
                     "rate",
-                    parameter(rate(count, size.seen), rate(fewest, size.seen_most), rate(most, size.seen_least), "1/h"),
+                    Parameter::new(
+                        rate(count, size.seen),
+                        rate(fewest, size.seen_most),
+                        rate(most, size.seen_least),
+                        "1/h",
+                    ),
                 ),
-                ("size", parameter(size.value, size.low, size.high, series.unit)),
+                ("size", Parameter::new(size.value, size.low, size.high, series.unit)),
             ],
             evidence,
         ),
-        deviance: sizes.iter().map(|size| (size / interpolation.deviation).powi(2)).sum(),
-        p_value: any_of(2.0 * upper_tail(z), series.values.len() as f64),
-        repair: Repair::LeaveOut(positions),
+        repair: Some(Repair::LeaveOut(positions)),
     })
 }
 

@@ -1,12 +1,12 @@
 //! Every detector on recordings of the virtual sensor: silent where there is nothing, right where there is something.
 
-use super::normal::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use super::{
     Finding, Repair, Series, coarse_counts, deliveries,
     level::{self, Level},
     noises::NoiseTable,
     sample_clock, spikes,
 };
+use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use adis16405_driver::Channel;
 use measurement::Measurement;
 use simulation::record::{Host, Simulation};
@@ -97,8 +97,8 @@ fn spikes_are_counted_measured_and_taken_out() {
     assert_covers(&finding, "size", size);
     assert!((finding.effect.parameters["size"].value / size - 1.0).abs() < 0.05);
 
-    let repaired = series.clone().repaired(&finding.repair);
-    let Repair::LeaveOut(positions) = &finding.repair else { panic!("{:?}", finding.repair) };
+    let repaired = series.clone().repaired(finding.repair.as_ref().unwrap());
+    let Some(Repair::LeaveOut(positions)) = &finding.repair else { panic!("{:?}", finding.repair) };
     assert_eq!(repaired.values.len(), series.values.len() - positions.len());
     assert_eq!(repaired.slots.last(), series.slots.last());
     assert_eq!(spikes::find(&repaired), None);
@@ -115,7 +115,7 @@ fn spikes_show_in_filtered_noise_where_a_difference_would_drown_them() {
     // Two averages of 8 leave 0.29 of the white noise: 1.7 of its σ, but much more beside such like neighbours.
     series.values[20_000] += 0.5 * white();
     let finding = spikes::find(&series).unwrap();
-    assert_eq!(finding.repair, Repair::LeaveOut(vec![20_000]));
+    assert_eq!(finding.repair, Some(Repair::LeaveOut(vec![20_000])));
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn a_step_is_placed_measured_and_taken_out() {
     assert_covers(&finding, "size", -0.15);
     assert!((finding.effect.parameters["size"].value / -0.15 - 1.0).abs() < 0.2);
     assert_eq!(spikes::find(&series), None);
-    assert_eq!(level(&series.repaired(&finding.repair)).step, None);
+    assert_eq!(level(&series.repaired(finding.repair.as_ref().unwrap())).step, None);
     assert_eq!(level(&case.series(Channel::GyroZ)).step, None);
 }
 
@@ -155,7 +155,12 @@ fn a_ramp_is_measured_and_told_from_a_step() {
     let finding = level(&series).ramp.unwrap();
     assert_covers(&finding, "slope", -1e-3);
     assert!((finding.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
-    assert_eq!(level(&series.repaired(&finding.repair)).ramp, None);
+    let per_slot = finding.effect.parameters["slope"].value * series.period_s;
+    let mut levelled = series;
+    for (value, &slot) in levelled.values.iter_mut().zip(&levelled.slots) {
+        *value -= per_slot * slot as f64;
+    }
+    assert_eq!(level(&levelled).ramp, None);
 
     let step = Effect::BiasStep { channel: GYRO, time_s: 300.0, size: 0.3 };
     assert_eq!(level(&Case::hiding(vec![step], 600.0, 15).series(GYRO)).ramp, None);
@@ -234,7 +239,7 @@ fn lost_and_repeated_samples_are_counted() {
     let finding = deliveries::repeated(&stale.measurement).unwrap();
     assert_covers(&finding, "fraction", 2e-3);
     assert_eq!(deliveries::dropped(&stale.measurement), None);
-    let Repair::LeaveOut(positions) = &finding.repair else { panic!("{:?}", finding.repair) };
+    let Some(Repair::LeaveOut(positions)) = &finding.repair else { panic!("{:?}", finding.repair) };
     let values = stale.series(GYRO).values;
     assert!(positions.iter().all(|&position| values[position] == values[position - 1]));
 }

@@ -8,8 +8,8 @@
 mod chain;
 mod gaussian;
 
-use super::normal::NORMAL_975;
-use super::{Finding, Repair, effect, parameter};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Effect, Finding, Parameter};
 use crate::grid::Grid;
 use chain::Chain;
 
@@ -112,7 +112,7 @@ fn told(parts: &Parts) -> Option<(Chain, f64)> {
 fn finding(chain: &Chain, gain: f64, part_s: f64, unit: &str) -> Finding {
     let bounded = |value: f64, error: f64, unit: &str| {
         let factor = (NORMAL_975 * error).exp();
-        parameter(value, value / factor, value * factor, unit)
+        Parameter::new(value, value / factor, value * factor, unit)
     };
     let steps = chain.correlation_time();
     let time = part_s * steps;
@@ -126,7 +126,7 @@ fn finding(chain: &Chain, gain: f64, part_s: f64, unit: &str) -> Finding {
         apart, chain.jumps,
     );
     Finding {
-        effect: effect(
+        effect: Effect::new(
             "telegraph",
             [
                 ("time_constant", bounded(time, chain.error_of_time, "s")),
@@ -134,9 +134,7 @@ fn finding(chain: &Chain, gain: f64, part_s: f64, unit: &str) -> Finding {
             ],
             evidence,
         ),
-        deviance: 2.0 * gain,
-        p_value: (-gain).exp(),
-        repair: Repair::Impossible,
+        repair: None,
     }
 }
 

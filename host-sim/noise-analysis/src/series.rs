@@ -1,5 +1,6 @@
 //! One channel along its timeline.
 
+use crate::findings::Repair;
 use measurement::{ChannelProfile, Measurement};
 
 /// The samples of one channel in its unit, each with the period in which it was taken.
@@ -15,26 +16,6 @@ pub struct Series {
     pub resolution: f64,
     /// Of the values.
     pub unit: &'static str,
-}
-
-/// What takes an effect out of a [`Series`].
-#[derive(Debug, Clone, PartialEq)]
-pub enum Repair {
-    /// Nothing can.
-    Impossible,
-    /// Nothing has to: the timeline knows of it.
-    Done,
-    /// These samples are to be left out, as a gap: positions in the series, in order.
-    LeaveOut(Vec<usize>),
-    /// This much is to be taken from the sample at `from` and from all after it.
-    Level {
-        /// Position in the series.
-        from: usize,
-        /// In the unit of the series.
-        size: f64,
-    },
-    /// This much, times the sample's slot, is to be taken from every sample, in the unit of the series.
-    Slope(f64),
 }
 
 impl Series {
@@ -74,7 +55,6 @@ impl Series {
     #[must_use]
     pub fn repaired(mut self, repair: &Repair) -> Self {
         match repair {
-            Repair::Impossible | Repair::Done => {}
             Repair::LeaveOut(positions) => {
                 let kept = |position: &usize| positions.binary_search(position).is_err();
                 let positions: Vec<usize> = (0..self.values.len()).filter(kept).collect();
@@ -83,9 +63,6 @@ impl Series {
             }
             &Repair::Level { from, size } => {
                 self.values.iter_mut().skip(from).for_each(|value| *value -= size);
-            }
-            &Repair::Slope(slope) => {
-                self.values.iter_mut().zip(&self.slots).for_each(|(value, &slot)| *value -= slope * slot as f64);
             }
         }
         self

@@ -24,11 +24,6 @@ pub fn quantile(probability: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Probability that one of `trials` independent ones succeeds, each with `probability`.
-pub fn any_of(probability: f64, trials: f64) -> f64 {
-    -(trials * (-probability).ln_1p()).exp_m1()
-}
-
 /// Probability that a Poisson number of the given mean is `count` or more.
 pub fn poisson_tail(count: u64, mean: f64) -> f64 {
     if count == 0 {

@@ -1,0 +1,70 @@
+//! Plain data that every later stage passes on: a number with its bounds, an effect that was found, and the correction that
+//! removes an effect from the samples.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Highest probability that chance alone produces a [`Finding`] anywhere in the record of one channel.
+pub const SIGNIFICANCE: f64 = 2e-4;
+
+/// An estimated number with its 95 % bounds. A term that the data does not show has the value and the lower bound 0.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Estimate.
+    pub value: f64,
+    /// Lower 95 % bound.
+    pub low: f64,
+    /// Upper 95 % bound.
+    pub high: f64,
+    /// Unit of all three.
+    pub unit: String,
+}
+
+impl Parameter {
+    /// `value` between `low` and `high`, all three in `unit`.
+    pub fn new(value: f64, low: f64, high: f64, unit: impl Into<String>) -> Self {
+        Self { value, low, high, unit: unit.into() }
+    }
+}
+
+/// An effect beyond the baseline noise model, as it is reported.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    /// Such as `sinusoid`.
+    pub kind: String,
+    /// By name, with intervals.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// One sentence for the reader: what was measured, against which threshold, and the usual causes.
+    pub evidence: String,
+}
+
+impl Effect {
+    /// An effect of this kind with its parameters by name.
+    pub fn new<'a>(kind: &str, parameters: impl IntoIterator<Item = (&'a str, Parameter)>, evidence: String) -> Self {
+        let parameters = parameters.into_iter().map(|(name, parameter)| (name.to_owned(), parameter)).collect();
+        Self { kind: kind.to_owned(), parameters, evidence }
+    }
+}
+
+/// An effect that a detector found in the samples of one channel or in their time base.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// As reported.
+    pub effect: Effect,
+    /// What removes the effect from the samples; `None` where nothing can, or where the noise model has a term for it.
+    pub repair: Option<Repair>,
+}
+
+/// What removes an effect from a channel's samples.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Repair {
+    /// These samples become a gap: positions in the series, in ascending order.
+    LeaveOut(Vec<usize>),
+    /// `size` is subtracted from the sample at `from` and from all after it.
+    Level {
+        /// Position in the series.
+        from: usize,
+        /// In the unit of the series.
+        size: f64,
+    },
+}
