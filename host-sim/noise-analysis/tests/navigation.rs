@@ -1,14 +1,13 @@
 //! What a model says of the future, beside simulated data that it has not seen.
 
-use adis16405_driver::Channel;
 use allan_core::model::Term;
 use allan_core::term::Markov;
 use allan_core::{Kind, Model};
 use noise_analysis::grid::Grid;
 use noise_analysis::innovation::{Innovations, innovations};
 use noise_analysis::navigation::drifts;
-use virtual_sensor::NoiseModel;
 use virtual_sensor::noise::NoiseSource;
+use virtual_sensor::{NoiseModel, OutputRegister};
 
 const PERIOD: f64 = 0.02;
 const SAMPLES: usize = 150_000;
@@ -17,11 +16,11 @@ const NOISE: [f64; 3] = [0.0368, 0.0093, 0.0013];
 
 fn simulated(noise: [f64; 3], seed: u64) -> Vec<f64> {
     let mut model = NoiseModel::still();
-    let gyro = model.channel_mut(Channel::GyroZ);
+    let gyro = model.channel_mut(OutputRegister::GyroZ);
     gyro.bias = 3.0;
     [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = noise;
     let mut source = NoiseSource::new(&model, seed, PERIOD);
-    (0..SAMPLES).map(|_| source.sample()[Channel::GyroZ as usize]).collect()
+    (0..SAMPLES).map(|_| source.sample()[OutputRegister::GyroZ as usize]).collect()
 }
 
 fn model(extra: Option<Term>) -> Model {
@@ -83,13 +82,13 @@ fn the_innovations_of_a_wrong_model_are_not() {
     // A Markov process that the model lacks: of 0.03 deg/s, over 2 s.
     let time_constant = 2.0;
     let mut source = NoiseModel::still();
-    source.channel_mut(Channel::GyroX).angle_random_walk = 1.0;
+    source.channel_mut(OutputRegister::GyroX).angle_random_walk = 1.0;
     let mut white = NoiseSource::new(&source, 5, 1.0);
     let decay = f64::exp(-PERIOD / time_constant);
     let mut state = 0.0;
     let mut values = simulated(NOISE, 7);
     for value in &mut values {
-        state = decay * state + 0.03 * (1.0 - decay * decay).sqrt() * white.sample()[Channel::GyroX as usize];
+        state = decay * state + 0.03 * (1.0 - decay * decay).sqrt() * white.sample()[OutputRegister::GyroX as usize];
         *value += state;
     }
     let lacking = of(values.clone(), &model(None));

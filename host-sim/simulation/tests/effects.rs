@@ -1,16 +1,16 @@
 //! Each effect against its definition: moments and covariances from the textbook formulas, at seeds fixed in advance.
 
-use adis16405_driver::{Channel, Faults};
+use adis16405_driver::Faults;
 use recordings::recording::Recording;
 use simulation::record::Simulation;
 use virtual_sensor::NoiseModel;
 use virtual_sensor::effect::EffectSource;
 use virtual_sensor::effect::surroundings::{Motion, SupplyCourse, TemperatureCourse};
 use virtual_sensor::noise::NoiseSource;
-use virtual_sensor::{Effect, Hidden, Surroundings};
+use virtual_sensor::{Effect, Hidden, OutputRegister, Surroundings};
 
 const PERIOD_S: f64 = 0.01;
-const GYRO: Channel = Channel::GyroX;
+const GYRO: OutputRegister = OutputRegister::GyroX;
 
 /// `count` values of gyro X with `effect` and nothing else.
 fn values(effect: Effect, surroundings: Surroundings, seed: u64, count: usize) -> Vec<[f64; 12]> {
@@ -38,8 +38,8 @@ fn record(noise: NoiseModel, effects: Vec<Effect>, seconds: f64) -> Recording {
     Simulation { noise, hidden, ..Simulation::of_paper(seconds, 5) }.run(|_| ()).unwrap()
 }
 
-fn counts(recording: &Recording, channel: Channel) -> Vec<f64> {
-    recording.samples.iter().map(|sample| f64::from(sample.counts.get(channel))).collect()
+fn counts(recording: &Recording, channel: OutputRegister) -> Vec<f64> {
+    recording.samples.iter().map(|sample| f64::from(sample.counts.get(simulation::channel(channel)))).collect()
 }
 
 #[test]
@@ -103,24 +103,24 @@ fn measured_causes_act_in_proportion_to_what_the_outputs_show() {
     let moved = values(Effect::Acceleration { channel: GYRO, sensitivity }, surroundings, 2, 50_000);
     for ((warm, fed), moved) in warm.iter().zip(&fed).zip(&moved) {
         let gyro = GYRO as usize;
-        assert!((warm[gyro] - 0.03 * warm[Channel::Temp as usize]).abs() < 1e-12);
-        assert!((fed[gyro] + 2.0 * fed[Channel::Supply as usize]).abs() < 1e-12);
-        let force = &moved[Channel::AcclX as usize..=Channel::AcclZ as usize];
+        assert!((warm[gyro] - 0.03 * warm[OutputRegister::Temp as usize]).abs() < 1e-12);
+        assert!((fed[gyro] + 2.0 * fed[OutputRegister::Supply as usize]).abs() < 1e-12);
+        let force = &moved[OutputRegister::AcclX as usize..=OutputRegister::AcclZ as usize];
         let expected: f64 = force.iter().zip(sensitivity).map(|(force, per_g)| force * per_g).sum();
         assert!((moved[gyro] - expected).abs() < 1e-12);
     }
     // 500 s of the warm-up of 600 s, and 5/9 of the room's cycle of 900 s.
     let expected = 6.0 * (1.0 - (-499.99f64 / 600.0).exp()) + (2.0 * std::f64::consts::PI * 499.99 / 900.0).sin();
-    assert!((warm[49_999][Channel::Temp as usize] - expected).abs() < 1e-9);
+    assert!((warm[49_999][OutputRegister::Temp as usize] - expected).abs() < 1e-9);
 }
 
 #[test]
 fn a_common_mode_is_the_same_in_every_channel() {
-    let channels = vec![Channel::GyroX, Channel::GyroZ];
+    let channels = vec![OutputRegister::GyroX, OutputRegister::GyroZ];
     let effect = Effect::CommonMode { channels, time_constant_s: 1.0, deviation: 0.5 };
     for all in values(effect, Surroundings::default(), 3, 1000) {
-        assert_eq!(all[Channel::GyroX as usize], all[Channel::GyroZ as usize]);
-        assert_eq!(all[Channel::GyroY as usize], 0.0);
+        assert_eq!(all[OutputRegister::GyroX as usize], all[OutputRegister::GyroZ as usize]);
+        assert_eq!(all[OutputRegister::GyroY as usize], 0.0);
     }
 }
 
@@ -142,7 +142,7 @@ fn a_quantized_angle_has_the_allan_variance_of_quantization_noise() {
         let shown = hidden.digitize(GYRO, rate, PERIOD_S);
         let angle = shown * PERIOD_S / quantum;
         assert!((angle - angle.round()).abs() < 1e-9, "whole steps");
-        assert_eq!(hidden.digitize(Channel::GyroY, rate, PERIOD_S), rate);
+        assert_eq!(hidden.digitize(OutputRegister::GyroY, rate, PERIOD_S), rate);
         error += (shown - rate) * PERIOD_S;
         errors.push(error);
     }
@@ -159,7 +159,7 @@ fn the_noise_underneath_is_the_same() {
     let plain = record(NoiseModel::paper(), Vec::new(), 10.0);
     let stepped = record(NoiseModel::paper(), vec![step.clone()], 10.0);
     assert_eq!(stepped, record(NoiseModel::paper(), vec![step], 10.0));
-    assert_eq!(counts(&plain, Channel::GyroY), counts(&stepped, Channel::GyroY));
+    assert_eq!(counts(&plain, OutputRegister::GyroY), counts(&stepped, OutputRegister::GyroY));
     let moved: Vec<f64> =
         counts(&stepped, GYRO).iter().zip(counts(&plain, GYRO)).map(|(stepped, plain)| stepped - plain).collect();
     // 10 deg/s are 200 counts of 0.05 deg/s.

@@ -8,15 +8,14 @@ pub mod bus;
 pub mod effect;
 pub mod filter;
 pub mod noise;
+pub mod output;
 pub mod part;
 pub mod police;
 pub mod registers;
 
-#[cfg(test)]
-mod tests;
-
 pub use bus::{EmulatedBus, VirtualDelay};
 pub use effect::{Effect, Hidden, Surroundings};
 pub use noise::{ChannelNoise, NoiseModel};
+pub use output::OutputRegister;
 pub use part::{Activity, VirtualAdis16405};
 pub use police::{Violation, ViolationKind};

@@ -1,6 +1,6 @@
 //! Noise with declared coefficients: white noise, flicker noise, random walk and a constant, per channel.
 
-use adis16405_driver::Channel;
+use crate::output::OutputRegister;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -32,12 +32,12 @@ impl NoiseModel {
     pub fn still() -> Self {
         let mut model = Self { channels: [ChannelNoise::default(); 12], longest_tau_s: 10_000.0 };
         for (channel, bias) in [
-            (Channel::Supply, 5.0),
-            (Channel::AcclZ, -1.0),
-            (Channel::MagnX, 0.2),
-            (Channel::MagnZ, 0.43),
-            (Channel::Temp, 36.0),
-            (Channel::AuxAdc, 0.5),
+            (OutputRegister::Supply, 5.0),
+            (OutputRegister::AcclZ, -1.0),
+            (OutputRegister::MagnX, 0.2),
+            (OutputRegister::MagnZ, 0.43),
+            (OutputRegister::Temp, 36.0),
+            (OutputRegister::AuxAdc, 0.5),
         ] {
             model.channel_mut(channel).bias = bias;
         }
@@ -51,36 +51,36 @@ impl NoiseModel {
     /// magnetometers its density (0.066 mgauss/√Hz); the rest are plausible values without a source.
     pub fn paper() -> Self {
         let mut model = Self::still();
-        for channel in [Channel::GyroX, Channel::GyroY, Channel::GyroZ] {
+        for channel in [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ] {
             let noise = model.channel_mut(channel);
             noise.angle_random_walk = 0.0368;
             noise.bias_instability = 0.0093;
             noise.rate_random_walk = 0.0013;
         }
-        for channel in [Channel::AcclX, Channel::AcclY, Channel::AcclZ] {
+        for channel in [OutputRegister::AcclX, OutputRegister::AcclY, OutputRegister::AcclZ] {
             let noise = model.channel_mut(channel);
             noise.angle_random_walk = 0.2 / 60.0 / 9.80665;
             noise.bias_instability = 0.2e-3;
             noise.rate_random_walk = 1e-5;
         }
-        for channel in [Channel::MagnX, Channel::MagnY, Channel::MagnZ] {
+        for channel in [OutputRegister::MagnX, OutputRegister::MagnY, OutputRegister::MagnZ] {
             // A one-sided density is √2·N.
             model.channel_mut(channel).angle_random_walk = 0.066e-3 / std::f64::consts::SQRT_2;
         }
-        model.channel_mut(Channel::Supply).angle_random_walk = 1e-4;
-        model.channel_mut(Channel::AuxAdc).angle_random_walk = 5e-5;
-        model.channel_mut(Channel::Temp).angle_random_walk = 2e-3;
-        model.channel_mut(Channel::Temp).rate_random_walk = 2e-3;
+        model.channel_mut(OutputRegister::Supply).angle_random_walk = 1e-4;
+        model.channel_mut(OutputRegister::AuxAdc).angle_random_walk = 5e-5;
+        model.channel_mut(OutputRegister::Temp).angle_random_walk = 2e-3;
+        model.channel_mut(OutputRegister::Temp).rate_random_walk = 2e-3;
         model
     }
 
     /// The noise of one channel.
-    pub fn channel(&self, channel: Channel) -> &ChannelNoise {
+    pub fn channel(&self, channel: OutputRegister) -> &ChannelNoise {
         &self.channels[channel as usize]
     }
 
     /// The noise of one channel, to be changed.
-    pub fn channel_mut(&mut self, channel: Channel) -> &mut ChannelNoise {
+    pub fn channel_mut(&mut self, channel: OutputRegister) -> &mut ChannelNoise {
         &mut self.channels[channel as usize]
     }
 }
@@ -200,7 +200,7 @@ pub(super) fn gauss(random: &mut ChaCha8Rng) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Channel, NoiseModel, NoiseSource};
+    use super::{NoiseModel, NoiseSource, OutputRegister};
 
     const SAMPLES: usize = 1 << 14;
     const SEEDS: u64 = 60;
@@ -217,7 +217,7 @@ mod tests {
         let variances: Vec<f64> = (0..SEEDS)
             .map(|seed| {
                 let mut source = NoiseSource::new(model, seed, 1.0);
-                let values: Vec<f64> = (0..SAMPLES).map(|_| source.sample()[Channel::GyroX as usize]).collect();
+                let values: Vec<f64> = (0..SAMPLES).map(|_| source.sample()[OutputRegister::GyroX as usize]).collect();
                 allan_variance(&values, n)
             })
             .collect();
@@ -237,14 +237,14 @@ mod tests {
     #[test]
     fn each_coefficient_is_what_it_says() {
         let mut model = NoiseModel::still();
-        let gyro = model.channel_mut(Channel::GyroX);
+        let gyro = model.channel_mut(OutputRegister::GyroX);
         gyro.angle_random_walk = 2.0;
         for n in [1, 16, 128] {
             check(&model, n, 4.0 / n as f64, 0.0);
         }
 
         let mut model = NoiseModel::still();
-        model.channel_mut(Channel::GyroX).rate_random_walk = 0.5;
+        model.channel_mut(OutputRegister::GyroX).rate_random_walk = 0.5;
         for n in [1, 16, 128] {
             // K²τ/3 for a continuous walk; sampled at n points a factor 1 + 1/(2n²).
             let tau = n as f64;
@@ -252,7 +252,7 @@ mod tests {
         }
 
         let mut model = NoiseModel::still();
-        model.channel_mut(Channel::GyroX).bias_instability = 3.0;
+        model.channel_mut(OutputRegister::GyroX).bias_instability = 3.0;
         for n in [32, 256] {
             // Processes an octave apart ripple by less than 1 %; those shorter than the sample period are missing, as
             // is aliasing: about 1/n each.
@@ -267,11 +267,11 @@ mod tests {
         let first: Vec<_> = (0..3).map(|seed| NoiseSource::new(&model, seed, 1.0).sample()).collect();
         assert_eq!(first[0], NoiseSource::new(&model, 0, 1.0).sample());
         assert_ne!(first[0], first[1]);
-        assert_ne!(first[0][Channel::GyroX as usize], first[0][Channel::GyroY as usize]);
+        assert_ne!(first[0][OutputRegister::GyroX as usize], first[0][OutputRegister::GyroY as usize]);
 
         let mut quiet = model.clone();
-        *quiet.channel_mut(Channel::GyroX) = Default::default();
+        *quiet.channel_mut(OutputRegister::GyroX) = Default::default();
         let changed = NoiseSource::new(&quiet, 0, 1.0).sample();
-        assert_eq!(changed[Channel::GyroY as usize], first[0][Channel::GyroY as usize]);
+        assert_eq!(changed[OutputRegister::GyroY as usize], first[0][OutputRegister::GyroY as usize]);
     }
 }

@@ -10,7 +10,7 @@ mod wire;
 
 pub use activity::Activity;
 
-use adis16405_driver::{Channel, Counts, GyroRange};
+use super::output::OutputRegister;
 
 use super::effect::Hidden;
 use super::noise::NoiseModel;
@@ -26,6 +26,9 @@ const TICK_SIXTEENTHS: u64 = 9_765_625;
 const SLOW_TICKS: u64 = 31;
 /// Data ready enabled, MSC_CTRL.
 const DATA_READY_ENABLED: u16 = 1 << 2;
+
+/// Size of a count of SUPPLY_OUT, V.
+const SUPPLY_LSB: f64 = OutputRegister::Supply.lsb(0.0);
 
 const DIAG_SUPPLY_LOW: u16 = 1 << 0;
 const DIAG_SUPPLY_HIGH: u16 = 1 << 1;
@@ -131,9 +134,9 @@ impl VirtualAdis16405 {
         if enabled { self.next_sample() } else { u64::MAX }
     }
 
-    /// The counts of the latest sample; zeros before the first.
-    pub fn counts(&self) -> Counts {
-        Counts::new(*self.sensing.counts())
+    /// The counts of the latest sample, in the order of a burst; zeros before the first.
+    pub fn counts(&self) -> &[i16; 12] {
+        self.sensing.counts()
     }
 
     /// Samples taken since time 0.
@@ -253,7 +256,7 @@ impl VirtualAdis16405 {
         self.new_data = [true; 12];
         self.samples += 1;
         self.sampled_at_ns = Some(self.now_ns);
-        let supply = f64::from(self.sensing.counts()[0]) * Channel::Supply.lsb(GyroRange::Dps300);
+        let supply = f64::from(self.sensing.counts()[0]) * SUPPLY_LSB;
         if supply < 4.75 {
             self.diagnosis |= DIAG_SUPPLY_LOW;
         } else if supply > 5.25 {

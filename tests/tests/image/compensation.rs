@@ -11,7 +11,7 @@ use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Retained, Sta
 use link::{Bounded, Checked, Decoder, Drift, Learnt, Message, Received, Term};
 use simulation::device::Device;
 use virtual_sensor::effect::surroundings::TemperatureCourse;
-use virtual_sensor::{Effect, Hidden, NoiseModel, Surroundings, VirtualAdis16405};
+use virtual_sensor::{Effect, Hidden, NoiseModel, OutputRegister, Surroundings, VirtualAdis16405};
 
 const EPOCH_S: f64 = 60.0;
 const RATE_HZ: f64 = 204.8;
@@ -122,8 +122,8 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learnt>
 #[test]
 fn a_hidden_temperature_effect_is_learnt_and_subtracted() {
     let Heard { learnt, checked, taught_s, longest_s, waited_s } = two_epochs(vec![
-        Effect::Temperature { channel: Channel::GyroX, sensitivity: SENSITIVITY },
-        Effect::Sinusoid { channel: Channel::GyroZ, frequency_hz: LINE_HZ, amplitude: 0.4, phase_rad: 0.0 },
+        Effect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY },
+        Effect::Sinusoid { channel: OutputRegister::GyroZ, frequency_hz: LINE_HZ, amplitude: 0.4, phase_rad: 0.0 },
     ]);
     println!("an epoch taught for {taught_s:.1} s, of one channel for {longest_s:.1} s at most");
     println!("a key press waited {waited_s:.2} s meanwhile");

@@ -6,7 +6,7 @@ use adis16405_driver::{Channel, GyroRange};
 use allan_core::term::Filter;
 use allan_core::{Cascade, Kind, Model, fit::fit};
 use serde::Serialize;
-use virtual_sensor::{NoiseModel, VirtualAdis16405};
+use virtual_sensor::{NoiseModel, OutputRegister, VirtualAdis16405};
 
 const OCTAVES: usize = 20;
 /// deg/s.
@@ -158,7 +158,7 @@ fn confidence(truth: &Model, octave: usize) -> f64 {
 
 fn hour(seed: u64) -> Hour {
     let mut noise = NoiseModel::still();
-    let gyro = noise.channel_mut(Channel::GyroZ);
+    let gyro = noise.channel_mut(OutputRegister::GyroZ);
     [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = TRUTH;
     let mut part = VirtualAdis16405::new(noise, seed);
     part.select();
@@ -168,7 +168,7 @@ fn hour(seed: u64) -> Hour {
     let mut overlapped = Cascade::<OCTAVES, 8>::new();
     for _ in 0..samples() {
         part.advance_to(part.next_data_ready());
-        let count = i32::from(part.counts().get(Channel::GyroZ));
+        let count = i32::from(part.counts()[OutputRegister::GyroZ as usize]);
         plain.push(count);
         overlapped.push(count);
     }

@@ -7,7 +7,6 @@ use super::kind::Kind;
 use super::limit::spectrum::Record;
 use super::place::Scene;
 use super::size::hide;
-use adis16405_driver::Channel;
 use noise_analysis::trace::sample_clock::HOST_CLOCK;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
@@ -15,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use simulation::record::{Host, SAMPLE_RATE_HZ, Simulation};
 use virtual_sensor::effect::surroundings::{Motion, SupplyCourse, TemperatureCourse};
-use virtual_sensor::{Hidden, NoiseModel, Surroundings};
+use virtual_sensor::{Hidden, NoiseModel, OutputRegister, Surroundings};
 
 /// Strength of a single effect: from undetectable to gross.
 const STRENGTH: (f64, f64) = (0.3, 30.0);
@@ -52,8 +51,12 @@ impl Case {
         let scene =
             Scene { noise: &noise, surroundings, record: Record { seconds, period_s: 1.0 / SAMPLE_RATE_HZ }, seed };
         // An accelerometer that moves shows nothing else.
-        let channels = if surroundings.motion.deviation_g > 0.0 { &Channel::INERTIAL[..3] } else { &Channel::INERTIAL };
-        let channel = |random: &mut ChaCha8Rng| channels.choose(random).copied().unwrap_or(Channel::GyroX);
+        let channels = if surroundings.motion.deviation_g > 0.0 {
+            &OutputRegister::INERTIAL[..3]
+        } else {
+            &OutputRegister::INERTIAL
+        };
+        let channel = |random: &mut ChaCha8Rng| channels.choose(random).copied().unwrap_or(OutputRegister::GyroX);
         // Two effects meet in one channel as often as not.
         let shared = random.random_bool(0.5).then(|| channel(&mut random));
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
@@ -82,7 +85,7 @@ pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 /// The paper's noise, each coefficient of each channel between half of it and twice.
 fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     let mut noise = NoiseModel::paper();
-    for channel in Channel::INERTIAL {
+    for channel in OutputRegister::INERTIAL {
         let noise = noise.channel_mut(channel);
         noise.angle_random_walk *= log_uniform(random, 0.5, 2.0);
         noise.bias_instability *= log_uniform(random, 0.5, 2.0);

@@ -126,7 +126,10 @@ pub fn examine(case: &Case) -> Result<Outcome, ExamineError> {
     if let ([answer], [effect]) = (&mut outcome.answers[..], &effects[..]) {
         answer.shape_known = unknown_noise::sees(effect, &measurement, begin_s);
     }
-    if let Some(channel) = effects.first().map(|effect| effect.channels().first().copied().unwrap_or(Channel::GyroX)) {
+    if let Some(channel) = effects
+        .first()
+        .map(|effect| effect.channels().first().map_or(Channel::GyroX, |&output| simulation::channel(output)))
+    {
         let truth = truth::unseen_error(case, channel).map_err(failed)?;
         let of = report.channels.iter().find(|report| report.name == channel.name());
         outcome.unseen = of.zip(truth).and_then(|(report, truth)| {
@@ -175,7 +178,7 @@ pub(super) fn score(case: &Case, report: &Report, begin_s: f64) -> Outcome {
 
 /// What concerns all samples alike shows in every channel.
 fn shows_in(effect: &Effect, channel: Channel) -> bool {
-    effect.channels().is_empty() || effect.channels().contains(&channel)
+    effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }
 
 /// An effect is named when at least half of the channels that show it list it; what concerns the samples, not their

@@ -26,11 +26,10 @@ pub(super) mod waveform;
 
 use super::place::{Place, Scene};
 use super::shape::GYROS;
-use adis16405_driver::Channel;
 use noise_analysis::trace::normal::quantile;
 use noise_analysis::trace::sample_clock::HOST_CLOCK;
 use std::f64::consts::PI;
-use virtual_sensor::Effect;
+use virtual_sensor::{Effect, OutputRegister};
 
 /// Probability of a false alarm at which the limit is set.
 const FALSE_ALARM: f64 = 0.01;
@@ -46,7 +45,7 @@ pub(super) fn smallest(shape: &Effect, scene: &Scene<'_>, others: &[Effect]) -> 
     let record = scene.record;
     let (seconds, period_s) = (record.seconds, record.period_s);
     let samples = seconds / period_s;
-    let in_channel = |channel: Channel| Place::of(scene, channel, others);
+    let in_channel = |channel: OutputRegister| Place::of(scene, channel, others);
     match *shape {
         Effect::Sinusoid { channel, frequency_hz, .. } => {
             (needed(0.5 * samples) / record.line(in_channel(channel).sensed(frequency_hz))).sqrt()
@@ -74,7 +73,7 @@ pub(super) fn smallest(shape: &Effect, scene: &Scene<'_>, others: &[Effect]) -> 
             deviation(&place, 1.0, None, density)
         }
         Effect::FilterBandwidth { taps_log2 } => {
-            let place = in_channel(Channel::GyroX);
+            let place = in_channel(OutputRegister::GyroX);
             let truth = |frequency: f64| {
                 let rounding = place.rounding(frequency);
                 (place.density(frequency) - rounding) * spectrum::filter(taps_log2, period_s, frequency) + rounding
@@ -90,11 +89,11 @@ pub(super) fn smallest(shape: &Effect, scene: &Scene<'_>, others: &[Effect]) -> 
             waveform::smallest(TIMES, &in_channel(channel), |block| (1.0 - (at - block as f64)).clamp(0.0, 1.0))
         }
         Effect::Temperature { channel, .. } => {
-            let course = waveform::course(scene, Channel::Temp);
+            let course = waveform::course(scene, OutputRegister::Temp);
             waveform::smallest(1.0, &in_channel(channel), |block| course[block])
         }
         Effect::Supply { channel, .. } => {
-            let course = waveform::course(scene, Channel::Supply);
+            let course = waveform::course(scene, OutputRegister::Supply);
             waveform::smallest(1.0, &in_channel(channel), |block| course[block])
         }
         Effect::Acceleration { channel, .. } => {
@@ -112,8 +111,8 @@ pub(super) fn smallest(shape: &Effect, scene: &Scene<'_>, others: &[Effect]) -> 
         }
         Effect::DroppedSamples { .. } => events::count(0.0) / samples,
         Effect::RepeatedSamples { .. } => {
-            let equal = |&channel: &Channel| in_channel(channel).equal_by_chance();
-            events::count(samples * Channel::INERTIAL.iter().map(equal).product::<f64>()) / samples
+            let equal = |&channel: &OutputRegister| in_channel(channel).equal_by_chance();
+            events::count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
         }
         Effect::SampleClock { .. } => size(needed(1.0), |off| events::clock(off * HOST_CLOCK)) * HOST_CLOCK,
     }

@@ -1,9 +1,9 @@
 //! What an effect is hidden in: the noise of a channel, the part's filter, and the recording's other effects.
 
 use super::limit::spectrum::{self, Record};
-use adis16405_driver::{Channel, GyroRange};
+use adis16405_driver::GyroRange;
 use std::f64::consts::PI;
-use virtual_sensor::{ChannelNoise, Effect, NoiseModel, Surroundings};
+use virtual_sensor::{ChannelNoise, Effect, NoiseModel, OutputRegister, Surroundings};
 
 /// A filter's null lets nothing through to tell of, and no less than this.
 const LEAST_GAIN: f64 = 1e-3;
@@ -18,19 +18,19 @@ pub(super) struct Scene<'a> {
 
 /// A channel of it, with the effects that are there already, whose every parameter a test with the truth knows.
 pub(super) struct Place<'a> {
-    pub(super) channel: Channel,
+    pub(super) channel: OutputRegister,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: Record,
     others: &'a [Effect],
 }
 
 impl<'a> Place<'a> {
-    pub(super) fn of(scene: &Scene<'a>, channel: Channel, others: &'a [Effect]) -> Self {
+    pub(super) fn of(scene: &Scene<'a>, channel: OutputRegister, others: &'a [Effect]) -> Self {
         Self { channel, noise: scene.noise.channel(channel), record: scene.record, others }
     }
 
     pub(super) fn resolution(&self) -> f64 {
-        self.channel.lsb(GyroRange::Dps300)
+        simulation::channel(self.channel).lsb(GyroRange::Dps300)
     }
 
     fn others(&self) -> impl Iterator<Item = &Effect> {

@@ -3,16 +3,15 @@
 use super::draw::log_uniform;
 use super::kind::Kind;
 use super::place::Scene;
-use adis16405_driver::Channel;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
-use virtual_sensor::Effect;
+use virtual_sensor::{Effect, OutputRegister};
 
-pub(super) const GYROS: [Channel; 3] = [Channel::GyroX, Channel::GyroY, Channel::GyroZ];
+pub(super) const GYROS: [OutputRegister; 3] = [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ];
 
 /// An effect of size 1.
-pub(super) fn draw(kind: Kind, channel: Channel, scene: &Scene<'_>, random: &mut ChaCha8Rng) -> Effect {
+pub(super) fn draw(kind: Kind, channel: OutputRegister, scene: &Scene<'_>, random: &mut ChaCha8Rng) -> Effect {
     // An accelerometer's noise is about a count: the error of a coarser quantum would not be white.
     let of_gyros = matches!(kind, Kind::Quantization | Kind::Acceleration);
     let channel = if of_gyros && !GYROS.contains(&channel) { GYROS[random.random_range(0..3)] } else { channel };

@@ -5,9 +5,8 @@ use super::kind::Kind;
 use super::limit::smallest;
 use super::place::Scene;
 use super::shape::{self, scaled, size};
-use adis16405_driver::Channel;
 use rand_chacha::ChaCha8Rng;
-use virtual_sensor::Effect;
+use virtual_sensor::{Effect, OutputRegister};
 
 /// Largest quantum of an angle, in white angle steps of a sample: with coarser ones the error is not white.
 const COARSEST: f64 = 1.0;
@@ -26,7 +25,7 @@ pub(super) fn hide(
     range: (f64, f64),
     at_least: f64,
     scene: &Scene<'_>,
-    channel: impl Fn(&mut ChaCha8Rng) -> Channel,
+    channel: impl Fn(&mut ChaCha8Rng) -> OutputRegister,
     random: &mut ChaCha8Rng,
 ) -> (Vec<Effect>, Vec<f64>) {
     let mut hidden = (Vec::new(), Vec::new());

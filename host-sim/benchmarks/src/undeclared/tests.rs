@@ -17,13 +17,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use virtual_sensor::{ChannelNoise, Effect, NoiseModel, Surroundings};
+use virtual_sensor::{ChannelNoise, Effect, NoiseModel, OutputRegister, Surroundings};
 
 const PERIOD_S: f64 = 1.0 / 204.8;
 const RECORD: Record = Record { seconds: 1800.0, period_s: PERIOD_S };
 
 fn gyro() -> ChannelNoise {
-    *NoiseModel::paper().channel(Channel::GyroX)
+    *NoiseModel::paper().channel(OutputRegister::GyroX)
 }
 
 /// The densities of the generator and of the terms of the fit were written down apart from each other.
@@ -91,11 +91,11 @@ fn limits_in_white_noise_are_those_of_the_textbook() {
     let step: Vec<f64> = (0..128).map(|block| if block < 64 { 0.0 } else { 1.0 }).collect();
     let expected = 0.5 * 1800.0 / 4.0 / 0.25;
     let mut model = NoiseModel::paper();
-    *model.channel_mut(Channel::GyroX) = white;
+    *model.channel_mut(OutputRegister::GyroX) = white;
     let scene = Scene { noise: &model, surroundings: Surroundings::default(), record: RECORD, seed: 1 };
     // Rounding adds a thousandth of the noise.
     let rounding = 0.05f64.powi(2) / 12.0 * PERIOD_S / 0.25;
-    let place = Place::of(&scene, Channel::GyroX, &[]);
+    let place = Place::of(&scene, OutputRegister::GyroX, &[]);
     assert!((waveform::ratio(&step, &place) / expected - 1.0).abs() < 1e-3 + rounding);
     // A sinusoid of M samples: half of A²·M/2/σ².
     let density = spectrum::declared(&white, PERIOD_S, 10.0);
@@ -109,9 +109,9 @@ fn limits_in_white_noise_are_those_of_the_textbook() {
 #[test]
 fn a_limit_knows_the_other_effect() {
     let mut noise = NoiseModel::paper();
-    *noise.channel_mut(Channel::GyroX) = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
+    *noise.channel_mut(OutputRegister::GyroX) = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
     let scene = Scene { noise: &noise, surroundings: Surroundings::default(), record: RECORD, seed: 1 };
-    let channel = Channel::GyroX;
+    let channel = OutputRegister::GyroX;
     let near = |ratio: f64, expected: f64| assert!((ratio / expected - 1.0).abs() < 0.01, "{ratio}, {expected}");
     let larger = |shape: &Effect, other: Effect| smallest(shape, &scene, &[other]) / smallest(shape, &scene, &[]);
 
@@ -132,7 +132,7 @@ fn a_limit_knows_the_other_effect() {
     near(larger(&ramp, spikes.clone()), ((0.25 + 100.0 * PERIOD_S * PERIOD_S) / 0.25f64).sqrt());
     near(larger(&spikes, ramp), 1.0);
     // What shows elsewhere is nothing either.
-    near(larger(&line, Effect::Markov { channel: Channel::GyroY, time_constant_s: 1.0, deviation: 9.0 }), 1.0);
+    near(larger(&line, Effect::Markov { channel: OutputRegister::GyroY, time_constant_s: 1.0, deviation: 9.0 }), 1.0);
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn sizes_scale() {
     let scene = Scene { noise: &NoiseModel::paper(), surroundings: Surroundings::default(), record: RECORD, seed: 1 };
     let mut random = ChaCha8Rng::seed_from_u64(5);
     for kind in Kind::ALL {
-        let unit = shape::draw(kind, Channel::GyroY, &scene, &mut random);
+        let unit = shape::draw(kind, OutputRegister::GyroY, &scene, &mut random);
         assert!((shape::size(&unit) - 1.0).abs() < 1e-12, "{unit:?}");
         let expected = if kind == Kind::FilterBandwidth { 1.0 } else { 0.25 };
         assert!((shape::size(&shape::scaled(unit, 0.25)) - expected).abs() < 1e-12, "{kind:?}");
@@ -251,7 +251,7 @@ fn report(found: &[Found<'_>]) -> Report {
 fn an_answer_counts_where_the_effect_is_and_a_false_alarm_everywhere() {
     let mut case = Case::draw(&[Kind::Sinusoid], 60.0, 1);
     case.simulation.hidden.surroundings.motion.deviation_g = 0.0;
-    let (channel, frequency_hz, amplitude) = (Channel::GyroY, 20.0, 0.5);
+    let (channel, frequency_hz, amplitude) = (OutputRegister::GyroY, 20.0, 0.5);
     case.simulation.hidden.effects = vec![Effect::Sinusoid { channel, frequency_hz, amplitude, phase_rad: 0.0 }];
 
     let parameters: &[_] = &[("frequency", 20.1), ("amplitude", 0.4)];
@@ -291,7 +291,7 @@ fn a_common_effect_needs_half_of_its_channels() {
 /// beside ten octaves, less than twice the true model's error on average.
 #[test]
 fn the_truth_scores_one_and_its_terms_fitted_little_more() {
-    let channel = |case: &Case| case.simulation.hidden.effects[0].channels()[0];
+    let channel = |case: &Case| simulation::channel(case.simulation.hidden.effects[0].channels()[0]);
     let errors: Vec<_> = (0..8)
         .map(|seed| Case::draw(&[Kind::Sinusoid], 60.0, seed))
         .map(|case| truth::unseen_error(&case, channel(&case)).unwrap().unwrap())

@@ -9,8 +9,9 @@ use allan_core::term::{Filter, Markov, Resonance, Sinusoid};
 use allan_core::{Cascade, Kind, Model};
 use firmware::{OCTAVES, OVERLAP};
 use recordings::recording::Sample;
+use simulation::output_register;
 use simulation::record::{RecordError, SAMPLE_RATE_HZ, Simulation};
-use virtual_sensor::{ChannelNoise, Effect, Hidden};
+use virtual_sensor::{ChannelNoise, Effect, Hidden, OutputRegister};
 
 /// Names and values of the parameters of `effect` as a report calls them; times count from the part's start.
 pub(super) fn parameters(effect: &Effect) -> Vec<(&'static str, f64)> {
@@ -74,7 +75,7 @@ pub(super) struct UnseenError {
 pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<UnseenError>, RecordError> {
     let effects: Vec<Effect> =
         case.simulation.hidden.effects.iter().filter(|effect| !can_be_taken_out(effect)).cloned().collect();
-    let model = model(case.simulation.noise.channel(channel), channel, &effects);
+    let model = model(case.simulation.noise.channel(output_register(channel)), channel, &effects);
     // Random streams go by the order of the effects, so the place of those that are taken out is kept by size 0.
     let hidden = Hidden {
         effects: case.simulation.hidden.effects.iter().map(nothing_if_taken_out).collect(),
@@ -91,7 +92,7 @@ pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<Unsee
 }
 
 fn nothing_if_taken_out(effect: &Effect) -> Effect {
-    let channel = effect.channels().first().copied().unwrap_or(Channel::AuxAdc);
+    let channel = effect.channels().first().copied().unwrap_or(OutputRegister::AuxAdc);
     if can_be_taken_out(effect) { Effect::RateRamp { channel, slope: 0.0 } } else { effect.clone() }
 }
 
@@ -109,7 +110,7 @@ fn model(noise: &ChannelNoise, channel: Channel, effects: &[Effect]) -> Model {
         Term::exact(Kind::BiasInstability, noise.bias_instability),
         Term::exact(Kind::RateRandomWalk, noise.rate_random_walk),
     ];
-    let own = effects.iter().filter(|effect| effect.channels().contains(&channel));
+    let own = effects.iter().filter(|effect| effect.channels().contains(&output_register(channel)));
     Model::new(period_s, declared.into_iter().chain(own.filter_map(term)))
 }
 

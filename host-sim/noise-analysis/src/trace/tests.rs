@@ -11,9 +11,10 @@ use adis16405_driver::Channel;
 use measurement::Measurement;
 use simulation::record::{Host, Simulation};
 use virtual_sensor::effect::surroundings::TemperatureCourse;
-use virtual_sensor::{Effect, Hidden, Surroundings};
+use virtual_sensor::{Effect, Hidden, OutputRegister, Surroundings};
 
 const GYRO: Channel = Channel::GyroY;
+const SENSED_GYRO: OutputRegister = OutputRegister::GyroY;
 
 /// White noise of a gyro sample at 204.8 Hz with the paper's N, and rounding to 0.05 deg/s.
 fn white() -> f64 {
@@ -79,7 +80,7 @@ fn noise_alone_is_not_an_effect() {
 fn a_walk_ten_times_as_strong_is_no_step() {
     for seed in 10..13 {
         let mut simulation = Simulation::of_paper(400.0, seed);
-        for channel in Channel::INERTIAL {
+        for channel in OutputRegister::INERTIAL {
             simulation.noise.channel_mut(channel).rate_random_walk *= 10.0;
         }
         assert_eq!(Case::of(simulation).findings(), []);
@@ -89,7 +90,7 @@ fn a_walk_ten_times_as_strong_is_no_step() {
 #[test]
 fn spikes_are_counted_measured_and_taken_out() {
     let size = 9.0 * white();
-    let case = Case::hiding(vec![Effect::Spikes { channel: GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
+    let case = Case::hiding(vec![Effect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
     let series = case.series(GYRO);
     let finding = spikes::find(&series).unwrap();
     assert_eq!(finding.effect.kind, "spikes");
@@ -120,7 +121,7 @@ fn spikes_show_in_filtered_noise_where_a_difference_would_drown_them() {
 
 #[test]
 fn a_step_is_placed_measured_and_taken_out() {
-    let step = Effect::BiasStep { channel: GYRO, time_s: 333.0, size: -0.15 };
+    let step = Effect::BiasStep { channel: SENSED_GYRO, time_s: 333.0, size: -0.15 };
     let case = Case::hiding(vec![step], 600.0, 4);
     let series = case.series(GYRO);
     let finding = level(&series).step.unwrap();
@@ -134,14 +135,14 @@ fn a_step_is_placed_measured_and_taken_out() {
 
 #[test]
 fn a_level_that_moves_otherwise_is_no_step() {
-    let ramp = Effect::RateRamp { channel: GYRO, slope: 1e-3 };
+    let ramp = Effect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 };
     assert_eq!(level(&Case::hiding(vec![ramp], 600.0, 5).series(GYRO)).step, None);
 
-    let telegraph = Effect::Telegraph { channel: GYRO, time_constant_s: 20.0, amplitude: 0.3 };
+    let telegraph = Effect::Telegraph { channel: SENSED_GYRO, time_constant_s: 20.0, amplitude: 0.3 };
     assert_eq!(level(&Case::hiding(vec![telegraph], 600.0, 6).series(GYRO)).step, None);
 
     let mut simulation = Simulation::of_paper(600.0, 7);
-    simulation.hidden.effects = vec![Effect::Temperature { channel: GYRO, sensitivity: 0.05 }];
+    simulation.hidden.effects = vec![Effect::Temperature { channel: SENSED_GYRO, sensitivity: 0.05 }];
     simulation.hidden.surroundings.temperature =
         TemperatureCourse { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureCourse::default() };
     let case = Case::of(simulation);
@@ -150,7 +151,7 @@ fn a_level_that_moves_otherwise_is_no_step() {
 
 #[test]
 fn a_ramp_is_measured_and_told_from_a_step() {
-    let case = Case::hiding(vec![Effect::RateRamp { channel: GYRO, slope: -1e-3 }], 600.0, 14);
+    let case = Case::hiding(vec![Effect::RateRamp { channel: SENSED_GYRO, slope: -1e-3 }], 600.0, 14);
     let series = case.series(GYRO);
     let finding = level(&series).ramp.unwrap();
     assert_covers(&finding, "slope", -1e-3);
@@ -162,15 +163,15 @@ fn a_ramp_is_measured_and_told_from_a_step() {
     }
     assert_eq!(level(&levelled).ramp, None);
 
-    let step = Effect::BiasStep { channel: GYRO, time_s: 300.0, size: 0.3 };
+    let step = Effect::BiasStep { channel: SENSED_GYRO, time_s: 300.0, size: 0.3 };
     assert_eq!(level(&Case::hiding(vec![step], 600.0, 15).series(GYRO)).ramp, None);
 }
 
 #[test]
 fn a_ramp_and_a_step_are_found_beside_each_other() {
     let effects = vec![
-        Effect::RateRamp { channel: GYRO, slope: 1e-3 },
-        Effect::BiasStep { channel: GYRO, time_s: 200.0, size: 0.3 },
+        Effect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 },
+        Effect::BiasStep { channel: SENSED_GYRO, time_s: 200.0, size: 0.3 },
     ];
     let Level { step, ramp, .. } = level(&Case::hiding(effects, 600.0, 16).series(GYRO));
     assert_covers(&ramp.unwrap(), "slope", 1e-3);
@@ -189,7 +190,7 @@ fn a_slow_cause_is_told_from_a_ramp() {
             TemperatureCourse { rise_c, time_constant_s: 100.0, ..TemperatureCourse::default() };
         Case::of(simulation)
     };
-    let case = warming(Effect::Temperature { channel: GYRO, sensitivity: -0.05 }, 8.0, 17);
+    let case = warming(Effect::Temperature { channel: SENSED_GYRO, sensitivity: -0.05 }, 8.0, 17);
     let follows = |case: &Case, channel: Channel| {
         level::find(&case.series(channel), &[&case.series(Channel::Temp)], &NoiseTable::default())
     };
@@ -200,11 +201,11 @@ fn a_slow_cause_is_told_from_a_ramp() {
     assert!(followed.error < 0.005, "{followed:?}");
     assert_eq!(follows(&case, Channel::GyroX), Level::default());
     // A temperature that stays within half a count of 0.14 °C has not been seen to move.
-    let still = warming(Effect::Temperature { channel: GYRO, sensitivity: -5.0 }, 0.07, 17);
+    let still = warming(Effect::Temperature { channel: SENSED_GYRO, sensitivity: -5.0 }, 0.07, 17);
     assert_eq!(follows(&still, GYRO).followed, []);
 
     let Level { ramp, followed, .. } =
-        follows(&warming(Effect::RateRamp { channel: GYRO, slope: 1e-3 }, 8.0, 18), GYRO);
+        follows(&warming(Effect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 }, 8.0, 18), GYRO);
     assert!(ramp.is_some() && followed.is_empty(), "{ramp:?} {followed:?}");
 }
 

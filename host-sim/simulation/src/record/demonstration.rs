@@ -1,8 +1,7 @@
 //! What the virtual sensor hides unless told not to: something for its report to find.
 
-use adis16405_driver::Channel;
 use virtual_sensor::effect::surroundings::{SupplyCourse, TemperatureCourse};
-use virtual_sensor::{Effect, Hidden, Surroundings};
+use virtual_sensor::{Effect, Hidden, OutputRegister, Surroundings};
 
 /// A line on gyro z, as of a motor nearby, and a gyro x that follows the temperature while the part warms up.
 pub(super) fn hidden() -> Hidden {
@@ -13,8 +12,8 @@ pub(super) fn hidden() -> Hidden {
             ..Surroundings::default()
         },
         effects: vec![
-            Effect::Sinusoid { channel: Channel::GyroZ, frequency_hz: 20.5, amplitude: 0.2, phase_rad: 0.0 },
-            Effect::Temperature { channel: Channel::GyroX, sensitivity: 0.05 },
+            Effect::Sinusoid { channel: OutputRegister::GyroZ, frequency_hz: 20.5, amplitude: 0.2, phase_rad: 0.0 },
+            Effect::Temperature { channel: OutputRegister::GyroX, sensitivity: 0.05 },
         ],
     }
 }

@@ -13,7 +13,7 @@ pub mod surroundings;
 pub use source::EffectSource;
 pub use surroundings::Surroundings;
 
-use adis16405_driver::Channel;
+use crate::output::OutputRegister;
 
 /// One effect. U is the unit of its channel, such as deg/s.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub enum Effect {
     /// A line: `amplitude·sin(2π·frequency·t + phase)`, sampled where the part samples, so that it may alias.
     Sinusoid {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// Hz.
         frequency_hz: f64,
         /// U.
@@ -32,7 +32,7 @@ pub enum Effect {
     /// Noise in a narrow band, as of a structure that rings: covariance `deviation²·exp(−π·bandwidth·τ)·cos(2π·frequency·τ)`.
     Resonance {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// Middle of the band, Hz.
         frequency_hz: f64,
         /// Width at half the density, Hz.
@@ -43,7 +43,7 @@ pub enum Effect {
     /// Correlated noise of covariance `deviation²·exp(−τ/time_constant)`.
     Markov {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// s.
         time_constant_s: f64,
         /// Standard deviation, U.
@@ -52,7 +52,7 @@ pub enum Effect {
     /// Jumps between two levels, equally likely, at random times: covariance `(amplitude/2)²·exp(−τ/time_constant)`.
     Telegraph {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// Correlation time, s; half the mean time between jumps.
         time_constant_s: f64,
         /// Distance of the levels, U.
@@ -61,14 +61,14 @@ pub enum Effect {
     /// The rate is the difference of an angle that is kept in steps of `√12·coefficient`; IEEE 952 quantization noise.
     Quantization {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// Q, U·s.
         coefficient: f64,
     },
     /// A value that grows for ever.
     RateRamp {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// U/s.
         slope: f64,
     },
@@ -80,28 +80,28 @@ pub enum Effect {
     /// Sensitivity to the temperature of the [`Surroundings`].
     Temperature {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// U/°C.
         sensitivity: f64,
     },
     /// Sensitivity to the supply of the [`Surroundings`].
     Supply {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// U/V.
         sensitivity: f64,
     },
     /// Sensitivity to the specific force of the [`Surroundings`].
     Acceleration {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// To the force along x, y and z, U/g.
         sensitivity: [f64; 3],
     },
     /// A Gauss-Markov process that channels share and nothing measures.
     CommonMode {
         /// The channels that have it, each in full.
-        channels: Vec<Channel>,
+        channels: Vec<OutputRegister>,
         /// s.
         time_constant_s: f64,
         /// Standard deviation, U.
@@ -110,7 +110,7 @@ pub enum Effect {
     /// Single samples that are off by `size`, up or down, at random times.
     Spikes {
         /// Where they show.
-        channel: Channel,
+        channel: OutputRegister,
         /// Mean number in an hour.
         rate_per_hour: f64,
         /// U.
@@ -119,7 +119,7 @@ pub enum Effect {
     /// The bias changes at once and for good.
     BiasStep {
         /// Where it shows.
-        channel: Channel,
+        channel: OutputRegister,
         /// When, s from time 0.
         time_s: f64,
         /// U.
@@ -166,7 +166,7 @@ impl Effect {
     }
 
     /// The channels in which it shows; none for what concerns the samples of all alike.
-    pub fn channels(&self) -> &[Channel] {
+    pub fn channels(&self) -> &[OutputRegister] {
         match self {
             Self::Sinusoid { channel, .. }
             | Self::Resonance { channel, .. }

@@ -4,7 +4,7 @@ use super::angle::AngleQuantizer;
 use super::process::{Markov, Resonance, Telegraph};
 use super::surroundings::{Course, Moment};
 use super::{Effect, Hidden, probability};
-use adis16405_driver::Channel;
+use crate::output::OutputRegister;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
@@ -68,9 +68,11 @@ impl EffectSource {
     /// Adds what is sensed at `time_s` to the value of every channel.
     pub fn disturb(&mut self, values: &mut [f64; 12], time_s: f64, period_s: f64) {
         let moment = self.course.next(time_s, period_s);
-        values[Channel::Temp as usize] += moment.temperature_c;
-        values[Channel::Supply as usize] += moment.supply_v;
-        for (channel, force_g) in [Channel::AcclX, Channel::AcclY, Channel::AcclZ].into_iter().zip(moment.force_g) {
+        values[OutputRegister::Temp as usize] += moment.temperature_c;
+        values[OutputRegister::Supply as usize] += moment.supply_v;
+        for (channel, force_g) in
+            [OutputRegister::AcclX, OutputRegister::AcclY, OutputRegister::AcclZ].into_iter().zip(moment.force_g)
+        {
             values[channel as usize] += force_g;
         }
         for active in &mut self.active {
@@ -82,7 +84,7 @@ impl EffectSource {
     }
 
     /// What the part makes of a filtered value before it rounds it to counts.
-    pub fn digitize(&mut self, channel: Channel, value: f64, period_s: f64) -> f64 {
+    pub fn digitize(&mut self, channel: OutputRegister, value: f64, period_s: f64) -> f64 {
         self.active.iter_mut().fold(value, |value, active| match &mut active.state {
             State::Angle(quantizer) if active.effect.channels() == [channel] => quantizer.quantize(value, period_s),
             _ => value,

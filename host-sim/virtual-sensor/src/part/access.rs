@@ -1,6 +1,6 @@
 //! What reading and writing a register does.
 
-use adis16405_driver::Channel;
+use crate::output::OutputRegister;
 
 use super::VirtualAdis16405;
 use super::activity::Activity;
@@ -41,9 +41,12 @@ impl VirtualAdis16405 {
     /// Bit 15 new data, bit 14 error or alarm, below them the field. After a burst a negative x rate loses its sign while
     /// XGYRO_OFF is negative (EngineerZone, thread 81805).
     fn read_output(&mut self, index: usize) -> u16 {
-        let channel = Channel::ALL[index];
+        let channel = OutputRegister::ALL[index];
         let mut field = self.sensing.counts()[index] as u16 & (u16::MAX >> (16 - channel.bits()));
-        if channel == Channel::GyroX && self.burst_since_reset && self.registers.signed(registers::XGYRO_OFF) < 0.0 {
+        if channel == OutputRegister::GyroX
+            && self.burst_since_reset
+            && self.registers.signed(registers::XGYRO_OFF) < 0.0
+        {
             field &= !SIGN;
         }
         let new_data = std::mem::take(&mut self.new_data[index]);

@@ -1,6 +1,6 @@
 //! What can be made to go wrong with the part.
 
-use adis16405_driver::Channel;
+use crate::output::OutputRegister;
 
 use super::VirtualAdis16405;
 use super::activity::Activity;
@@ -11,8 +11,8 @@ const DIAG_GYRO_X: u16 = 1 << 10;
 
 impl VirtualAdis16405 {
     /// The sensor of one inertial channel is broken: self-tests fail. Other channels have no self-test.
-    pub fn break_sensor(&mut self, channel: Channel) {
-        if let Some(index) = Channel::INERTIAL.iter().position(|&inertial| inertial == channel) {
+    pub fn break_sensor(&mut self, channel: OutputRegister) {
+        if let Some(index) = OutputRegister::INERTIAL.iter().position(|&inertial| inertial == channel) {
             self.self_test_failures |= DIAG_GYRO_X << index;
         }
     }

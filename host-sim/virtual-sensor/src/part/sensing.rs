@@ -1,6 +1,6 @@
 //! From physics to counts: noise, hidden effects, self-test stimulus, filter, corrections, quantization.
 
-use adis16405_driver::{Channel, GyroRange};
+use crate::output::OutputRegister;
 
 use crate::effect::{EffectSource, Hidden};
 use crate::filter::Bartlett;
@@ -10,13 +10,13 @@ use crate::registers::{self, RegisterFile};
 /// Size of a count of the gyro offsets, °/s.
 const GYRO_OFFSET_LSB: f64 = 0.0125;
 /// What the manual self-test moves, °/s and g. No source tells how much a real part moves.
-const STIMULUS: [(Channel, f64); 6] = [
-    (Channel::GyroX, 40.0),
-    (Channel::GyroY, 40.0),
-    (Channel::GyroZ, 40.0),
-    (Channel::AcclX, 0.5),
-    (Channel::AcclY, 0.5),
-    (Channel::AcclZ, 0.5),
+const STIMULUS: [(OutputRegister, f64); 6] = [
+    (OutputRegister::GyroX, 40.0),
+    (OutputRegister::GyroY, 40.0),
+    (OutputRegister::GyroZ, 40.0),
+    (OutputRegister::AcclX, 0.5),
+    (OutputRegister::AcclY, 0.5),
+    (OutputRegister::AcclZ, 0.5),
 ];
 
 /// The sensors and what makes numbers of them.
@@ -82,25 +82,27 @@ impl Sensing {
         self.hidden.disturb(&mut values, time_s, period_s);
         stimulate(&mut values, registers);
         let stale = self.hidden.stale();
-        let range = Setting::of(registers).range;
-        for (index, channel) in Channel::ALL.into_iter().enumerate() {
+        let gyro_lsb = Setting::of(registers).gyro_lsb;
+        for (index, channel) in OutputRegister::ALL.into_iter().enumerate() {
             let direct = values[index];
             let sensed = if filtered(channel) { self.filters[index].filter(direct) } else { direct };
-            if let Some(rate) = index.checked_sub(Channel::GyroX as usize).and_then(|axis| self.rates.get_mut(axis)) {
+            if let Some(rate) =
+                index.checked_sub(OutputRegister::GyroX as usize).and_then(|axis| self.rates.get_mut(axis))
+            {
                 *rate = sensed;
             }
             let value = self.hidden.digitize(channel, corrected(registers, channel, sensed), period_s);
             if !stale {
-                self.counts[index] = quantized(channel, range, value);
-                self.unfiltered[index] = quantized(channel, range, corrected(registers, channel, direct));
+                self.counts[index] = quantized(channel, gyro_lsb, value);
+                self.unfiltered[index] = quantized(channel, gyro_lsb, corrected(registers, channel, direct));
             }
         }
     }
 }
 
-fn quantized(channel: Channel, range: GyroRange, value: f64) -> i16 {
+fn quantized(channel: OutputRegister, gyro_lsb: f64, value: f64) -> i16 {
     let (low, high) = channel.limits();
-    let counts = ((value - channel.zero()) / channel.lsb(range)).round();
+    let counts = ((value - channel.zero()) / channel.lsb(gyro_lsb)).round();
     counts.clamp(f64::from(low), f64::from(high)) as i16
 }
 
@@ -117,30 +119,31 @@ fn stimulate(values: &mut [f64; 12], registers: &RegisterFile) {
 }
 
 /// Applies the offset, hard-iron and soft-iron registers.
-fn corrected(registers: &RegisterFile, channel: Channel, value: f64) -> f64 {
-    let axis = |first: Channel, address: u8| address + 2 * (channel as u8 - first as u8);
+fn corrected(registers: &RegisterFile, channel: OutputRegister, value: f64) -> f64 {
+    let axis = |first: OutputRegister, address: u8| address + 2 * (channel as u8 - first as u8);
     match channel {
-        Channel::GyroX | Channel::GyroY | Channel::GyroZ => {
-            value + GYRO_OFFSET_LSB * registers.signed(axis(Channel::GyroX, registers::XGYRO_OFF))
+        OutputRegister::GyroX | OutputRegister::GyroY | OutputRegister::GyroZ => {
+            value + GYRO_OFFSET_LSB * registers.signed(axis(OutputRegister::GyroX, registers::XGYRO_OFF))
         }
-        Channel::AcclX | Channel::AcclY | Channel::AcclZ => {
-            value + 3.33e-3 * registers.signed(axis(Channel::AcclX, registers::XACCL_OFF))
+        OutputRegister::AcclX | OutputRegister::AcclY | OutputRegister::AcclZ => {
+            value + 3.33e-3 * registers.signed(axis(OutputRegister::AcclX, registers::XACCL_OFF))
         }
-        Channel::MagnX | Channel::MagnY | Channel::MagnZ => {
-            let soft = f64::from(registers.read(axis(Channel::MagnX, registers::XMAGN_SIF))) / 2048.0;
-            soft * value + 0.5e-3 * registers.signed(axis(Channel::MagnX, registers::XMAGN_HIF))
+        OutputRegister::MagnX | OutputRegister::MagnY | OutputRegister::MagnZ => {
+            let soft = f64::from(registers.read(axis(OutputRegister::MagnX, registers::XMAGN_SIF))) / 2048.0;
+            soft * value + 0.5e-3 * registers.signed(axis(OutputRegister::MagnX, registers::XMAGN_HIF))
         }
-        Channel::Supply | Channel::Temp | Channel::AuxAdc => value,
+        OutputRegister::Supply | OutputRegister::Temp | OutputRegister::AuxAdc => value,
     }
 }
 
-fn filtered(channel: Channel) -> bool {
-    !matches!(channel, Channel::Supply | Channel::Temp | Channel::AuxAdc)
+fn filtered(channel: OutputRegister) -> bool {
+    !matches!(channel, OutputRegister::Supply | OutputRegister::Temp | OutputRegister::AuxAdc)
 }
 
 /// SENS_AVG in meanings.
 pub(super) struct Setting {
-    pub(super) range: GyroRange,
+    /// Size of a count of the gyros, °/s.
+    pub(super) gyro_lsb: f64,
     pub(super) taps_log2: u8,
     pub(super) valid: bool,
 }
@@ -151,13 +154,13 @@ impl Setting {
     pub(super) fn of(registers: &RegisterFile) -> Self {
         let sens_avg = registers.read(registers::SENS_AVG);
         let taps = (sens_avg & 0b111) as u8;
-        let (range, least) = match sens_avg >> 8 {
-            0b100 => (GyroRange::Dps300, 0),
-            0b010 => (GyroRange::Dps150, 2),
-            0b001 => (GyroRange::Dps75, 4),
-            _ => (GyroRange::Dps300, u8::MAX),
+        let (gyro_lsb, least) = match sens_avg >> 8 {
+            0b100 => (0.05, 0),
+            0b010 => (0.025, 2),
+            0b001 => (0.0125, 4),
+            _ => (0.05, u8::MAX),
         };
-        Self { range, taps_log2: taps.min(6), valid: (least..=6).contains(&taps) }
+        Self { gyro_lsb, taps_log2: taps.min(6), valid: (least..=6).contains(&taps) }
     }
 }
 

@@ -1,8 +1,7 @@
 //! The three cases: series whose noise is known.
 
-use adis16405_driver::Channel;
-use virtual_sensor::NoiseModel;
 use virtual_sensor::noise::NoiseSource;
+use virtual_sensor::{NoiseModel, OutputRegister};
 
 /// Samples of a series.
 pub(crate) const SAMPLES: usize = 1_000_000;
@@ -32,7 +31,7 @@ pub(crate) const CASES: [Case; 3] = [
 impl Case {
     /// [`BATCH`] independent series of [`SAMPLES`] samples.
     pub(crate) fn series(&self, seed: u64) -> Vec<Vec<f64>> {
-        let channels = &Channel::ALL[1..=BATCH];
+        let channels = &OutputRegister::ALL[1..=BATCH];
         let mut model = NoiseModel::still();
         for &channel in channels {
             let noise = model.channel_mut(channel);

@@ -16,7 +16,7 @@ use virtual_sensor::Effect;
 /// not a known course of the level. `begin_s` is when the recording begins, counted from the part's start.
 pub(crate) fn sees(effect: &Effect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
     let series = |channel: Channel| Series::of(measurement, &measurement.profile.channels[channel as usize]);
-    let own = series(*effect.channels().first()?);
+    let own = series(simulation::channel(*effect.channels().first()?));
     let blocks = Blocks::of(&own)?;
     let shape = match effect {
         Effect::RateRamp { .. } => blocks.ramp(),
@@ -34,6 +34,7 @@ pub(crate) fn sees(effect: &Effect, measurement: &Measurement, begin_s: f64) -> 
 mod tests {
     use super::super::super::{Group, case};
     use super::*;
+    use virtual_sensor::OutputRegister;
 
     /// Far above the limit it sees what is there; of what is no course it says nothing.
     #[test]
@@ -44,7 +45,7 @@ mod tests {
             let recording = simulation.run(|_| ()).unwrap();
             sees(effect, &recordings::timeline::measurement(&recording, None).unwrap(), 0.2)
         };
-        let channel = Channel::GyroX;
+        let channel = OutputRegister::GyroX;
         let step = |size: f64| Effect::BiasStep { channel, time_s: 50.0, size };
         assert_eq!([seen(&step(1.0)), seen(&step(0.0))], [Some(true), Some(false)]);
         let ramp = |slope: f64| Effect::RateRamp { channel, slope };

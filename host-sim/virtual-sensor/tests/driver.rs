@@ -1,11 +1,8 @@
 //! The virtual part and the real driver against each other. Numbers are those of the data sheet.
 
-mod procedures;
-mod registers;
-
 use adis16405_driver::{Adis16405, Channel, Config, Counts, Faults, GyroRange, Judge, Register, SamplePeriod};
 
-use super::{Activity, EmulatedBus, NoiseModel, ViolationKind, VirtualAdis16405};
+use virtual_sensor::{Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
@@ -51,7 +48,7 @@ fn the_driver_reads_what_the_part_sampled() {
     let mut negative = 0;
     for _ in 0..5000 {
         bus.wait_for_data();
-        let sampled = bus.part().counts();
+        let sampled = Counts::new(*bus.part().counts());
         let burst = imu.burst().unwrap();
         assert_eq!(burst.counts(), sampled);
         assert!(judge.judge(&burst).usable);
@@ -150,7 +147,7 @@ fn a_software_reset_restores_and_takes_time() {
 #[test]
 fn diagnosis_alarms_and_clears_on_read() {
     let mut model = NoiseModel::still();
-    model.channel_mut(Channel::Supply).bias = 4.5;
+    model.channel_mut(OutputRegister::Supply).bias = 4.5;
     let (bus, mut imu) = on_bus(model, Config::default());
     bus.wait_for_data();
     assert_eq!(imu.burst().unwrap().faults(), Faults::SUPPLY | Faults::ERROR_ALARM);
@@ -209,7 +206,7 @@ fn an_invalid_range_and_filter_is_recorded_with_the_sample() {
 #[test]
 fn the_range_scales_the_gyros_only() {
     let mut model = NoiseModel::still();
-    model.channel_mut(Channel::GyroZ).bias = -12.5;
+    model.channel_mut(OutputRegister::GyroZ).bias = -12.5;
     for (range, expected) in [(GyroRange::Dps300, -250), (GyroRange::Dps150, -500), (GyroRange::Dps75, -1000)] {
         let (bus, mut imu) = on_bus(model.clone(), config(range, 4, 1));
         bus.wait_for_data();
@@ -222,7 +219,7 @@ fn the_range_scales_the_gyros_only() {
 #[test]
 fn white_noise_has_the_declared_size() {
     let mut model = NoiseModel::still();
-    for channel in [Channel::GyroX, Channel::GyroY, Channel::GyroZ] {
+    for channel in OutputRegister::GYROS {
         model.channel_mut(channel).angle_random_walk = 0.0368;
     }
     const SAMPLES: u32 = 200_000;

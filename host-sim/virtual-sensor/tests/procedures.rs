@@ -10,7 +10,7 @@ use adis16405_driver::{
     Faults, Gpio, GyroBias, Judge, Line, Polarity, Product, Register, Signal, Sleep, Stimulus, Threshold, Watch,
 };
 
-use crate::{EmulatedBus, NoiseModel, VirtualAdis16405};
+use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
 
 /// Nothing in virtual time is ever pending.
 fn block_on<T>(future: impl Future<Output = T>) -> T {
@@ -61,7 +61,7 @@ macro_rules! both_shells {
 
 fn with_rates(rates: [f64; 3]) -> NoiseModel {
     let mut model = NoiseModel::still();
-    for (channel, rate) in [Channel::GyroX, Channel::GyroY, Channel::GyroZ].into_iter().zip(rates) {
+    for (channel, rate) in OutputRegister::GYROS.into_iter().zip(rates) {
         model.channel_mut(channel).bias = rate;
     }
     model
@@ -79,8 +79,8 @@ fn self_tests_name_the_sensor_that_fails_and_leave_the_configuration() {
         take flash = imu.flash_test(&mut delay);
         then assert!(flash.passed() && flash.ran);
 
-        then bus.part_mut().break_sensor(Channel::GyroX);
-        then bus.part_mut().break_sensor(Channel::AcclZ);
+        then bus.part_mut().break_sensor(OutputRegister::GyroX);
+        then bus.part_mut().break_sensor(OutputRegister::AcclZ);
         then bus.part_mut().damage_flash();
         take test = imu.self_test(&mut delay);
         then assert!(!test.passed());
@@ -97,7 +97,7 @@ fn self_tests_name_the_sensor_that_fails_and_leave_the_configuration() {
 #[test]
 fn what_was_diagnosed_before_a_test_is_not_lost_in_it() {
     let mut model = NoiseModel::still();
-    model.channel_mut(Channel::Supply).bias = 5.5;
+    model.channel_mut(OutputRegister::Supply).bias = 5.5;
     both_shells!(model.clone(), |bus, imu, delay|
         take test = imu.self_test(&mut delay);
         then assert_eq!(test.before, Diagnosis::SUPPLY_HIGH);
@@ -137,7 +137,7 @@ fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
 #[test]
 fn the_precision_null_averages_for_thirty_silent_seconds() {
     let mut model = with_rates([-0.5, 0.25, 0.0]);
-    for channel in [Channel::GyroX, Channel::GyroY, Channel::GyroZ] {
+    for channel in OutputRegister::GYROS {
         model.channel_mut(channel).angle_random_walk = 0.05;
     }
     both_shells!(model.clone(), |bus, imu, delay|

@@ -1,6 +1,6 @@
 //! Every register as the data sheet has it: address, width, reset value, sign extension, access, flash.
 
-use crate::{NoiseModel, ViolationKind, VirtualAdis16405};
+use virtual_sensor::{NoiseModel, ViolationKind, VirtualAdis16405};
 
 /// Address, bits, reset value, sign-extended, in flash: the readable and writable registers.
 const WRITABLE: [(u8, u32, u16, bool, bool); 23] = [
