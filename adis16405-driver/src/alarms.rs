@@ -42,9 +42,9 @@ pub enum AlarmWatch {
 
 /// The setting of an alarm. A raised alarm sets bit 8 or 9 of DIAG_STAT and the error/alarm flag of every output word.
 ///
-/// The layout of the alarm registers is that of an older part of the family and not confirmed for this one by any source at
-/// hand. Check it against your data sheet; [`Adis16405::update_register`](crate::Adis16405::update_register) can set any
-/// other layout.
+/// The layout of the alarm registers is that of an older part of the family and not confirmed for this one by any
+/// source at hand. Check it against your data sheet; [`Adis16405::update_register`](crate::Adis16405::update_register)
+/// can set any other layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

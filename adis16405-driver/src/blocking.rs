@@ -22,7 +22,8 @@ use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
 
 impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
-    /// A driver on `spi` for a part that is to be configured with `config`. Nothing is sent before [`init`](Self::init).
+    /// A driver on `spi` for a part that is to be configured with `config`. Nothing is sent before
+    /// [`init`](Self::init).
     pub fn new(spi: SPI, config: Config) -> Self {
         Self::with_state(spi, config)
     }

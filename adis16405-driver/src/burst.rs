@@ -14,7 +14,8 @@ pub const BURST_REQUEST: [u8; BURST_BYTES] = {
     request
 };
 
-/// The operations of a burst read with a pause of `gap_ns` after each word but the last, and of `stall_ns` after the last.
+/// The operations of a burst read with a pause of `gap_ns` after each word but the last, and of `stall_ns` after the
+/// last.
 pub(crate) fn burst_with_gaps(
     answer: &mut [u8; BURST_BYTES],
     gap_ns: u32,
@@ -43,8 +44,8 @@ const ERROR_ALARM: u16 = 1 << 14;
 pub struct OutputWord(pub u16);
 
 impl OutputWord {
-    /// The word that a part without errors sends for a new sample: new-data flag set, error flag clear, `counts` truncated
-    /// to the channel's width.
+    /// The word that a part without errors sends for a new sample: new-data flag set, error flag clear, `counts`
+    /// truncated to the channel's width.
     pub const fn from_counts(channel: Channel, counts: i16) -> Self {
         Self(NEW_DATA | (counts as u16 & field_mask(channel)))
     }
@@ -101,7 +102,8 @@ pub struct Burst {
 }
 
 impl Burst {
-    /// Decodes the 26 bytes received during a burst read. The first two, received while the request is sent, are ignored.
+    /// Decodes the 26 bytes received during a burst read. The first two, received while the request is sent, are
+    /// ignored.
     ///
     /// Any bytes are accepted; [`BurstValidator`](crate::BurstValidator) decides whether the words are usable.
     pub fn from_bytes(bytes: &[u8; BURST_BYTES]) -> Self {
@@ -112,8 +114,8 @@ impl Burst {
         Self { words }
     }
 
-    /// The burst that a part without errors sends for a new sample with these counts. For counts inside the width of their
-    /// channel it is the inverse of [`counts`](Self::counts).
+    /// The burst that a part without errors sends for a new sample with these counts. For counts inside the width of
+    /// their channel it is the inverse of [`counts`](Self::counts).
     pub fn from_counts(counts: &Counts) -> Self {
         let mut words = [OutputWord::default(); 12];
         for (word, channel) in words.iter_mut().zip(Channel::ALL) {

@@ -4,11 +4,12 @@ use crate::error::Error;
 use crate::protocol::{Protocol, ProtocolError};
 use crate::register::Register;
 
-/// The bias correction of the gyros in counts of 0.0125 °/s, which is added to the outputs, by the part or by the driver.
+/// The bias correction of the gyros in counts of 0.0125 °/s, which is added to the outputs, by the part or by the
+/// driver.
 ///
-/// Erratum: after a burst read, the ADIS16405 drops the sign bit of negative x rates while XGYRO_OFF is negative, also in
-/// the single reads that follow (reported for all units tested). The driver therefore keeps a negative correction of x
-/// itself and adds it to the x rate of every [`ImuSample`](crate::ImuSample); the counts do not contain it.
+/// Erratum: after a burst read, the ADIS16405 drops the sign bit of negative x rates while XGYRO_OFF is negative, also
+/// in the single reads that follow (reported for all units tested). The driver therefore keeps a negative correction of
+/// x itself and adds it to the x rate of every [`ImuSample`](crate::ImuSample); the counts do not contain it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -17,8 +17,8 @@ pub enum TimeBase {
 
 /// The power mode of the part, which sets the limits of SPI clock and stall.
 ///
-/// The data sheet (Rev. B, page 10) ends normal mode at SMPL_PRD = 0x08, Linux at 0x09. The driver follows the data sheet
-/// unless [`Timing::normal_mode_max_smpl_prd`] is set.
+/// The data sheet (Rev. B, page 10) ends normal mode at SMPL_PRD = 0x08, Linux at 0x09. The driver follows the data
+/// sheet unless [`Timing::normal_mode_max_smpl_prd`] is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -63,7 +63,8 @@ impl SamplePeriod {
     /// A period of `divisor` (NS + 1 in the data sheet) time bases.
     ///
     /// # Errors
-    /// [`ConfigError::Divisor`] if `divisor` is outside 2…128 (fast; 1 would select the external clock) or 1…128 (slow).
+    /// [`ConfigError::Divisor`] if `divisor` is outside 2…128 (fast; 1 would select the external clock) or 1…128
+    /// (slow).
     pub const fn from_divisor(base: TimeBase, divisor: u8) -> Result<Self, ConfigError> {
         let (least, flag) = match base {
             TimeBase::Fast => (2, 0x00),
@@ -150,8 +151,8 @@ impl TryFrom<u8> for SamplePeriod {
 pub enum SampleClock {
     /// The internal clock.
     Internal(SamplePeriod),
-    /// A clock at pin DIO4/CLKIN, SMPL_PRD = 0. Documented for sibling parts (up to 1.1 kHz); no source at hand confirms it
-    /// for this part.
+    /// A clock at pin DIO4/CLKIN, SMPL_PRD = 0. Documented for sibling parts (up to 1.1 kHz); no source at hand
+    /// confirms it for this part.
     External,
 }
 
@@ -222,25 +223,26 @@ impl PerClockMode {
 
 /// The times that the driver keeps. Where sources for this part disagree, [`Timing::DEFAULT`] takes the longer time.
 ///
-/// These are not confirmed by any source at hand, so check them against your data sheet: the low-power stall, the times of
-/// a flash update, a factory restore and an auto-null, and the SMPL_PRD value above which low-power mode begins.
+/// These are not confirmed by any source at hand, so check them against your data sheet: the low-power stall, the times
+/// of a flash update, a factory restore and an auto-null, and the SMPL_PRD value above which low-power mode begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timing {
-    /// Stall after a frame, ns. In normal mode the part needs 9 µs, and Analog Devices' evaluation tool keeps 16 µs. The
-    /// 75 µs of low-power mode are unconfirmed.
+    /// Stall after a frame, ns. In normal mode the part needs 9 µs, and Analog Devices' evaluation tool keeps 16 µs.
+    /// The 75 µs of low-power mode are unconfirmed.
     pub stall_ns: PerClockMode,
-    /// Pause between the words of a burst, ns. The default is 0: Linux, PX4 and flight software of satellites read the part
-    /// without a pause. Data sheets of sibling parts ask for one SCK period. With a pause, a burst is 13 transfers instead of
-    /// one.
+    /// Pause between the words of a burst, ns. The default is 0: Linux, PX4 and flight software of satellites read the
+    /// part without a pause. Data sheets of sibling parts ask for one SCK period. With a pause, a burst is 13 transfers
+    /// instead of one.
     pub word_gap_ns: u32,
     /// Largest SMPL_PRD value in normal mode: 0x08 by the data sheet (Rev. B, page 10), 0x09 by Linux.
     pub normal_mode_max_smpl_prd: u8,
-    /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode. The default is the longer time, since
-    /// the mode at power-on depends on the settings in flash.
+    /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode. The default is the longer time,
+    /// since the mode at power-on depends on the settings in flash.
     pub start_up_us: u32,
-    /// From a software reset until the part answers, µs: 100 ms, or 170 ms in low-power mode. The default is the longer time.
+    /// From a software reset until the part answers, µs: 100 ms, or 170 ms in low-power mode. The default is the longer
+    /// time.
     pub reset_us: u32,
     /// Length of the chip-select pulse that wakes the part, ns. Unconfirmed.
     pub wake_pulse_ns: u32,

@@ -1,4 +1,5 @@
-//! Procedures on the part as a whole: identification, start-up, configuration, the commands of GLOB_CMD, sleep and wake-up.
+//! Procedures on the part as a whole: identification, start-up, configuration, the commands of GLOB_CMD, sleep and
+//! wake-up.
 
 use core::num::NonZeroU8;
 
@@ -95,8 +96,9 @@ impl Protocol<'_> {
         self.set_register(Register::SmplPrd, u16::from(config.smpl_prd())).await?;
         self.state.mode = mode;
 
-        // The lower byte of SENS_AVG holds the filter, the upper one the range. If the present range needs more taps than
-        // the new filter has, the range is written first, so that no sample is taken with a combination that is not allowed.
+        // The lower byte of SENS_AVG holds the filter, the upper one the range. If the present range needs more taps
+        // than the new filter has, the range is written first, so that no sample is taken with a combination that is
+        // not allowed.
         let before = self.read(Register::SensAvg).await;
         let needed = GyroRange::from_sens_avg(before).map_or(0, GyroRange::min_filter_taps_log2);
         let order =

@@ -1,10 +1,11 @@
-//! The configuration: gyro range, filter and sample clock, and the response of the filter. A value that the part would not
-//! accept cannot be constructed.
+//! The configuration: gyro range, filter and sample clock, and the response of the filter. A value that the part would
+//! not accept cannot be constructed.
 
 use crate::channel::GyroRange;
 use crate::clock::{ConfigError, SampleClock, SamplePeriod};
 
-/// Gyro range, filter and sample clock: a combination that the part accepts. The default is that of the part after reset.
+/// Gyro range, filter and sample clock: a combination that the part accepts. The default is that of the part after
+/// reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -153,8 +154,9 @@ impl TryFrom<SerializedConfig> for Config {
 
 /// The digital filter of gyroscopes, accelerometers and magnetometers: two cascaded averages of N = 2^M samples each.
 ///
-/// The −3 dB frequencies that Linux lists for this part are those of two plain averages, to the digits given. The analog
-/// poles before the filter, at 404 Hz and 757 Hz (0.48 ms of delay by a figure for a sibling part), are not included.
+/// The −3 dB frequencies that Linux lists for this part are those of two plain averages, to the digits given. The
+/// analog poles before the filter, at 404 Hz and 757 Hz (0.48 ms of delay by a figure for a sibling part), are not
+/// included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BartlettFilter {
@@ -180,8 +182,8 @@ impl BartlettFilter {
         2 * self.taps() - 1
     }
 
-    /// Group delay in samples, N − 1, at every frequency. With the [`length`](Self::length) that Analog Devices states it
-    /// would be (2N + 1)/2; no source at hand decides between the two.
+    /// Group delay in samples, N − 1, at every frequency. With the [`length`](Self::length) that Analog Devices states
+    /// it would be (2N + 1)/2; no source at hand decides between the two.
     pub const fn group_delay(self) -> u32 {
         self.taps() - 1
     }
@@ -214,7 +216,8 @@ impl BartlettFilter {
         Some(low)
     }
 
-    /// The factor by which the filter changes the variance of white noise, (2N² + 1)/(3N³): the sum of the squared weights.
+    /// The factor by which the filter changes the variance of white noise, (2N² + 1)/(3N³): the sum of the squared
+    /// weights.
     pub fn white_noise_gain(self) -> f64 {
         let n = f64::from(self.taps());
         (2.0 * n * n + 1.0) / (3.0 * n * n * n)

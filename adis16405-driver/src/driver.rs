@@ -1,4 +1,5 @@
-//! The driver: its settings, and the table of its methods. Modules `blocking` and `asynch` make the methods of the table.
+//! The driver: its settings, and the table of its methods. Modules `blocking` and `asynch` make the methods of the
+//! table.
 
 use core::marker::PhantomData;
 
@@ -19,8 +20,8 @@ pub enum Async {}
 
 /// An ADIS16405 or ADIS16400 on an SPI bus: blocking, or asynchronous with `MODE` = `Async` (feature `async`).
 ///
-/// Every 16-bit frame is a transaction of its own, so that chip select is high between frames. The stall after the frame is
-/// part of the transaction, so the SPI device must support
+/// Every 16-bit frame is a transaction of its own, so that chip select is high between frames. The stall after the
+/// frame is part of the transaction, so the SPI device must support
 /// [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs).
 #[derive(Debug)]
 pub struct Adis16405<SPI, MODE = Blocking> {
@@ -66,8 +67,8 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
         self.state.timing
     }
 
-    /// True if XGYRO_OFF was negative when it was last read or written by a method other than the register methods. Then x
-    /// rates may lack their sign bit after a burst read ([`GyroBias`](crate::GyroBias)).
+    /// True if XGYRO_OFF was negative when it was last read or written by a method other than the register methods.
+    /// Then x rates may lack their sign bit after a burst read ([`GyroBias`](crate::GyroBias)).
     /// [`keep_negative_x_bias_on_host`](Self::keep_negative_x_bias_on_host) removes the risk.
     pub fn x_sign_at_risk(&self) -> bool {
         self.state.x_sign_at_risk
@@ -85,11 +86,11 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
 }
 
 /// The methods of the driver that run a procedure of [`Protocol`](crate::protocol::Protocol), each with the name of its
-/// procedure. The macro `$shell` makes a blocking or an asynchronous method of each row. Procedures marked `framed` consist
-/// of frames only; those marked `paced` contain pauses, and their methods take a delay.
+/// procedure. The macro `$make_methods` makes a blocking or an asynchronous method of each row. Procedures marked
+/// `framed` consist of frames only; those marked `paced` contain pauses, and their methods take a delay.
 macro_rules! procedures {
-    ($shell:ident) => {
-        $shell! {
+    ($make_methods:ident) => {
+        $make_methods! {
             /// Reads which part is connected.
             ///
             /// # Errors
@@ -99,22 +100,23 @@ macro_rules! procedures {
             /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and reads the gyro offsets
             /// ([`x_sign_at_risk`](Self::x_sign_at_risk)).
             ///
-            /// Only bytes that differ are written, the lower byte first (in SENS_AVG the upper byte first where the filter
-            /// would be too short for the old range). A register that was written is read back.
+            /// Only bytes that differ are written, the lower byte first (in SENS_AVG the upper byte first where the
+            /// filter would be too short for the old range). A register that was written is read back.
             ///
             /// # Errors
-            /// [`Error::Product`] if PROD_ID is not that of a supported part, [`Error::Verify`] if a register did not take
-            /// its value.
+            /// [`Error::Product`] if PROD_ID is not that of a supported part, [`Error::Verify`] if a register did not
+            /// take its value.
             framed fn init() -> Product;
 
-            /// Waits for the start-up time of the part ([`Timing::start_up_us`]), then does what [`init`](Self::init) does.
+            /// Waits for the start-up time of the part ([`Timing::start_up_us`]), then does what [`init`](Self::init)
+            /// does.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
             paced fn start_up() -> Product;
 
-            /// Resets the part (GLOB_CMD bit 7), leaves the bus silent for [`Timing::reset_us`], and configures the part as
-            /// [`init`](Self::init) does.
+            /// Resets the part (GLOB_CMD bit 7), leaves the bus silent for [`Timing::reset_us`], and configures the
+            /// part as [`init`](Self::init) does.
             ///
             /// A reset loads the registers from flash, and sets the volatile ones (GPIO, sleep, auxiliary DAC) to their
             /// reset values.
@@ -162,8 +164,8 @@ macro_rules! procedures {
             /// [`Error::WriteOnly`] as for [`read_register`](Self::read_register); nothing is sent then.
             framed fn read_registers[const N: usize](registers: [Register; N]) -> [u16; N];
 
-            /// Writes a register without reading it back: the lower byte, then the upper one if the register is wider than
-            /// 8 bits.
+            /// Writes a register without reading it back: the lower byte, then the upper one if the register is wider
+            /// than 8 bits.
             ///
             /// # Errors
             /// [`Error::ReadOnly`] if it cannot be written.
@@ -184,12 +186,12 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             framed fn diagnosis() -> Diagnosis;
 
-            /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end. The other bits of MSC_CTRL keep their
-            /// values; a manual self-test that was on is interrupted and switched on again afterwards.
+            /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end. The other bits of MSC_CTRL keep
+            /// their values; a manual self-test that was on is interrupted and switched on again afterwards.
             ///
             /// # Errors
-            /// [`Error::Deadline`] if it does not end within twice its usual time, [`Error::Product`] if the part does not
-            /// answer, [`Error::Verify`].
+            /// [`Error::Deadline`] if it does not end within twice its usual time, [`Error::Product`] if the part does
+            /// not answer, [`Error::Verify`].
             paced fn self_test() -> SelfTest;
 
             /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end.
@@ -198,9 +200,9 @@ macro_rules! procedures {
             /// Those of [`self_test`](Self::self_test).
             paced fn flash_test() -> FlashTest;
 
-            /// Runs a manual self-test: deflects the sensors (MSC_CTRL bit 8 or 9) and returns the response of gyros x, y,
-            /// z and accelerometers x, y, z in counts, each the difference of two means over eight samples. The part must
-            /// be still. The limits of a valid response are in the data sheet of the part.
+            /// Runs a manual self-test: deflects the sensors (MSC_CTRL bit 8 or 9) and returns the response of gyros x,
+            /// y, z and accelerometers x, y, z in counts, each the difference of two means over eight samples. The part
+            /// must be still. The limits of a valid response are in the data sheet of the part.
             ///
             /// # Errors
             /// [`Error::Verify`] if MSC_CTRL did not take the stimulus bits.
@@ -212,8 +214,8 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             framed fn gyro_offsets() -> GyroBias;
 
-            /// Sets the bias correction of the gyros x, y, z in counts of 0.0125 °/s, −4096 to 4095, which is added to the
-            /// outputs. A negative correction of x is applied by the driver: see [`GyroBias`].
+            /// Sets the bias correction of the gyros x, y, z in counts of 0.0125 °/s, −4096 to 4095, which is added to
+            /// the outputs. A negative correction of x is applied by the driver: see [`GyroBias`].
             ///
             /// # Errors
             /// [`Error::Value`] if an offset does not fit, [`Error::Verify`].
@@ -261,16 +263,16 @@ macro_rules! procedures {
             /// [`Error::Value`] if a factor does not fit, [`Error::Verify`].
             framed fn set_soft_iron(factors: [u16; 3]) -> ();
 
-            /// Runs the auto-null (GLOB_CMD bit 0): the part sets its gyro offsets from its present outputs, and must be
-            /// still. A negative offset of x is then applied by the driver: see [`GyroBias`].
+            /// Runs the auto-null (GLOB_CMD bit 0): the part sets its gyro offsets from its present outputs, and must
+            /// be still. A negative offset of x is then applied by the driver: see [`GyroBias`].
             ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer after the command, [`Error::Verify`].
             paced fn auto_null() -> GyroBias;
 
-            /// Runs the precision auto-null (GLOB_CMD bit 4): as [`auto_null`](Self::auto_null), from an average over 30 s
-            /// ([`Timing::precision_auto_null_us`]) during which the part must be still and the bus is left silent. On a
-            /// sibling part it left a mean residual of 0.05 °/s.
+            /// Runs the precision auto-null (GLOB_CMD bit 4): as [`auto_null`](Self::auto_null), from an average over
+            /// 30 s ([`Timing::precision_auto_null_us`]) during which the part must be still and the bus is left
+            /// silent. On a sibling part it left a mean residual of 0.05 °/s.
             ///
             /// The delay may feed a watchdog.
             ///
@@ -370,8 +372,8 @@ macro_rules! procedures {
             /// [`Error::Spi`]; SLP_CNT is not read back.
             framed fn sleep(sleep: Sleep) -> ();
 
-            /// Wakes the part by a low pulse on chip select ([`Timing::wake_pulse_ns`]), waits for [`Timing::wake_us`], and
-            /// reads which part is connected. Only one source describes the pulse, without a test; a reset wakes
+            /// Wakes the part by a low pulse on chip select ([`Timing::wake_pulse_ns`]), waits for [`Timing::wake_us`],
+            /// and reads which part is connected. Only one source describes the pulse, without a test; a reset wakes
             /// the part too.
             ///
             /// # Errors

@@ -8,11 +8,11 @@ use crate::clock::ConfigError;
 use crate::register::Register;
 
 bitflags::bitflags! {
-    /// The status and error flags of DIAG_STAT. A read clears the register, so a procedure that reads it returns the flags
-    /// with its result.
+    /// The status and error flags of DIAG_STAT. A read clears the register, so a procedure that reads it returns the
+    /// flags with its result.
     ///
-    /// Bits 12 to 10 are gyro z, y, x by three sources; Linux has x and z exchanged. No source at hand confirms that a flag
-    /// is set again at the next sample while its condition persists.
+    /// Bits 12 to 10 are gyro z, y, x by three sources; Linux has x and z exchanged. No source at hand confirms that a
+    /// flag is set again at the next sample while its condition persists.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Diagnosis: u16 {

@@ -29,10 +29,10 @@
 //!
 //! # Wiring and the bus
 //!
-//! SCLK, DIN, DOUT and CS go to an SPI controller in **mode 3**, most significant bit first. DIO1 carries data ready, active
-//! high; [`set_data_ready`](Adis16405::set_data_ready) changes that. The supply is 5 V (4.75 to 5.25 V). The logic inputs
-//! take 3.3 V and 5 V levels; the outputs may reach 5 V. At a supply of 3.3 V the part answers, but its outputs saturate.
-//! Steel screws disturb the magnetometer.
+//! SCLK, DIN, DOUT and CS go to an SPI controller in **mode 3**, most significant bit first. DIO1 carries data ready,
+//! active high; [`set_data_ready`](Adis16405::set_data_ready) changes that. The supply is 5 V (4.75 to 5.25 V). The
+//! logic inputs take 3.3 V and 5 V levels; the outputs may reach 5 V. At a supply of 3.3 V the part answers, but its
+//! outputs saturate. Steel screws disturb the magnetometer.
 //!
 //! | | SMPL_PRD ≤ 0x08 ([`ClockMode::Normal`]) | above ([`ClockMode::LowPower`]) |
 //! |---|---|---|
@@ -40,12 +40,13 @@
 //! | SCK, burst | 1 MHz at most | 300 kHz at most |
 //! | stall after a frame | at least 9 µs; the driver keeps 16 µs | the driver keeps 75 µs (unconfirmed) |
 //!
-//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK. Rates of 102.4 samples per second and below
-//! select low-power mode: reduce SCK first. After a restart of the microcontroller alone, the part may still be in that mode.
+//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK. Rates of 102.4 samples per second and
+//! below select low-power mode: reduce SCK first. After a restart of the microcontroller alone, the part may still be
+//! in that mode.
 //!
 //! Each frame is a transaction, so that chip select is high between frames; the stall is an
-//! [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) at the end of the transaction. With embedded-hal-bus, use a
-//! constructor that takes a delay; `new_no_delay` panics on the first stall:
+//! [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) at the end of the transaction. With embedded-hal-bus,
+//! use a constructor that takes a delay; `new_no_delay` panics on the first stall:
 //!
 //! ```
 //! # use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiBus};
@@ -61,8 +62,8 @@
 //!
 //! # Validity of a burst
 //!
-//! The part has no checksum and no sample counter. [`BurstValidator`] derives the validity of a burst from the flags of its
-//! words, from their values, and from the bursts before:
+//! The part has no checksum and no sample counter. [`BurstValidator`] derives the validity of a burst from the flags of
+//! its words, from their values, and from the bursts before:
 //!
 //! | fault | condition | usable | remedy |
 //! |---|---|---|---|
@@ -76,16 +77,16 @@
 //! | [`SUPPLY`](Faults::SUPPLY) | supply outside 4.75 to 5.25 V | no | check power |
 //! | [`REPEATED`](Faults::REPEATED) | inertial words equal those of the burst before | yes | none: mostly chance, and leaving them out would bias the noise estimate |
 //!
-//! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor. All were a full sample period
-//! apart, and 37 of them differed in another word. A sample that was read twice is told from one that is equal by chance by
-//! its new-data flags, or, in a recording without them, by its time.
+//! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor. All were a full sample
+//! period apart, and 37 of them differed in another word. A sample that was read twice is distinguished from one that
+//! is equal by chance by its new-data flags, or, in a recording without them, by its time.
 //!
 //! # Unconfirmed facts
 //!
 //! No source at hand confirms the following. Each can be set or avoided:
 //!
-//! - the stall in low-power mode, the SMPL_PRD value where that mode begins, the gap between burst words, and the times of
-//!   flash update, factory restore, auto-null and wake-up pulse: [`Timing`];
+//! - the stall in low-power mode, the SMPL_PRD value where that mode begins, the gap between burst words, and the times
+//!   of flash update, factory restore, auto-null and wake-up pulse: [`Timing`];
 //! - 0.14 °C or 0.1357 °C per count: [`ImuSample::temp_udegc`];
 //! - the layout of the alarm registers ([`Alarm`]) and the scale of the analog output ([`DacLevel`]):
 //!   [`update_register`](Adis16405::update_register) writes any other value;
@@ -95,9 +96,9 @@
 //!
 //! # Structure
 //!
-//! Every function of the part is an `async` procedure without I/O, which requests frames and pauses and receives answers.
-//! The blocking and the asynchronous driver carry the requests out; both have the same methods, from one table. A burst read
-//! does not go through a procedure, so that it takes no longer than the bus and the stall.
+//! Every function of the part is an `async` procedure without I/O, which requests frames and pauses and receives
+//! answers. The blocking and the asynchronous driver carry the requests out; both have the same methods, from one
+//! table. A burst read does not go through a procedure, so that it takes no longer than the bus and the stall.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]

@@ -27,8 +27,8 @@ pub enum Polarity {
     ActiveLow,
 }
 
-/// The pin and the active level of the data-ready or the alarm signal. The default, DIO1 and active high, is that of data
-/// ready after a reset.
+/// The pin and the active level of the data-ready or the alarm signal. The default, DIO1 and active high, is that of
+/// data ready after a reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -39,8 +39,8 @@ pub struct DioSignal {
     pub polarity: Polarity,
 }
 
-/// Enable (bit 2), polarity (bit 1) and line (bit 0) of a signal: the same bits in MSC_CTRL (data ready) and in ALM_CTRL
-/// (alarm).
+/// Enable (bit 2), polarity (bit 1) and line (bit 0) of a signal: the same bits in MSC_CTRL (data ready) and in
+/// ALM_CTRL (alarm).
 pub(crate) const SIGNAL_MASK: u16 = 0b111;
 
 impl DioSignal {
@@ -88,8 +88,8 @@ impl defmt::Format for Dio {
     }
 }
 
-/// Direction and level of the general-purpose lines, GPIO_CTRL. A line that carries data ready or an alarm does not follow
-/// these settings (not confirmed by any source at hand).
+/// Direction and level of the general-purpose lines, GPIO_CTRL. A line that carries data ready or an alarm does not
+/// follow these settings (not confirmed by any source at hand).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -113,8 +113,8 @@ impl DacLevel {
         if counts <= 0x0FFF { Some(Self(counts)) } else { None }
     }
 
-    /// The level nearest to a voltage in mV, at 0.8059 mV a count; `None` above 3300 mV. No source at hand confirms that
-    /// scale: use [`from_counts`](Self::from_counts) if your part differs.
+    /// The level nearest to a voltage in mV, at 0.8059 mV a count; `None` above 3300 mV. No source at hand confirms
+    /// that scale: use [`from_counts`](Self::from_counts) if your part differs.
     pub const fn from_millivolts(millivolts: u16) -> Option<Self> {
         if millivolts > 3300 {
             return None;

@@ -1,9 +1,9 @@
 //! The SPI protocol without I/O: register reads and writes as `async` sequences of bus requests.
 //!
 //! A procedure of the part (self-test, configuration, …) is an `async fn` on [`Protocol`], in one of the modules
-//! `commands`, `calibration`, `self_test`, `pins` and `alarms`. It awaits nothing but the response to a [`BusRequest`]. The
-//! blocking or the asynchronous driver polls the procedure, carries out each request on its bus, and resumes the procedure
-//! with the response. Every sequence of frames therefore exists once.
+//! `commands`, `calibration`, `self_test`, `pins` and `alarms`. It awaits nothing but the response to a [`BusRequest`].
+//! The blocking or the asynchronous driver polls the procedure, carries out each request on its bus, and resumes the
+//! procedure with the response. Every sequence of frames therefore exists once.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -128,8 +128,8 @@ impl<'a> Protocol<'a> {
         self.slot.request(BusRequest::ChipSelectPulse { ns }).await;
     }
 
-    /// Reads a register in two frames. The answer comes in the second, which itself requests FLASH_CNT, a register that can
-    /// be read without side effects.
+    /// Reads a register in two frames. The answer comes in the second, which itself requests FLASH_CNT, a register that
+    /// can be read without side effects.
     pub(crate) async fn read(&self, register: Register) -> u16 {
         self.frame(register.read_frame()).await;
         self.frame(Register::FlashCnt.read_frame()).await
@@ -187,8 +187,8 @@ impl<'a> Protocol<'a> {
         Ok(())
     }
 
-    /// Sets the bits of `mask` to their value in `value`: reads the register, writes the bytes that change, and reads back
-    /// if verification is on.
+    /// Sets the bits of `mask` to their value in `value`: reads the register, writes the bytes that change, and reads
+    /// back if verification is on.
     pub(crate) async fn update_register(&self, register: Register, mask: u16, value: u16) -> Result<(), ProtocolError> {
         match register.access() {
             Access::Read => return Err(Error::ReadOnly(register)),

@@ -1,5 +1,5 @@
-//! The register map of the data sheet: address, name, access and width of every register, and the 16-bit SPI frames that
-//! read and write it.
+//! The register map of the data sheet: address, name, access and width of every register, and the 16-bit SPI frames
+//! that read and write it.
 
 /// Whether a register may be read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -5,8 +5,8 @@ use crate::channel::{Channel, GyroRange};
 
 /// The counts of one sample with the gyro range they were taken in, and their values in physical units.
 ///
-/// Each value exists as `f32` and, for targets without an FPU, as exact `i32` in 10⁻⁶ (temperature: 10⁻⁶ or 10⁻³) of the
-/// unit. Scale factors are those of the data sheet.
+/// Each value exists as `f32` and, for targets without an FPU, as exact `i32` in 10⁻⁶ (temperature: 10⁻⁶ or 10⁻³) of
+/// the unit. Scale factors are those of the data sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -25,7 +25,8 @@ impl ImuSample {
         Self { counts, range, host_bias_x: 0 }
     }
 
-    /// Sets the bias correction, in counts of 0.0125 °/s, that is added to the x rate: see [`GyroBias`](crate::GyroBias).
+    /// Sets the bias correction, in counts of 0.0125 °/s, that is added to the x rate: see
+    /// [`GyroBias`](crate::GyroBias).
     #[must_use]
     pub const fn with_host_bias_x(mut self, host_bias_x: i16) -> Self {
         self.host_bias_x = host_bias_x;

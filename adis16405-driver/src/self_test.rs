@@ -1,4 +1,5 @@
-//! The tests that the part runs on itself: internal self-test, flash memory test, manual self-test (MSC_CTRL, DIAG_STAT).
+//! The tests that the part runs on itself: internal self-test, flash memory test, manual self-test (MSC_CTRL,
+//! DIAG_STAT).
 
 use crate::burst::OutputWord;
 use crate::channel::Channel;
@@ -67,8 +68,8 @@ const SETTINGS: u16 = 0x03C7;
 const STIMULI: u16 = 0x0300;
 /// Number of samples whose mean is compared with and without a stimulus.
 const AVERAGED: i32 = 8;
-/// Sample periods that a self-test may take in addition to [`Timing::self_test_us`](crate::Timing::self_test_us), whatever
-/// the sample rate.
+/// Sample periods that a self-test may take in addition to [`Timing::self_test_us`](crate::Timing::self_test_us),
+/// whatever the sample rate.
 const SAMPLES_IN_TEST: u32 = 20;
 
 const INERTIAL: [Register; 6] = [

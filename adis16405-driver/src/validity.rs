@@ -1,7 +1,7 @@
 //! Validity of a burst: which faults it shows, whether its data are usable, and how often each fault has occurred.
 //!
-//! The part has no checksum and no sample counter, so the checks use the flags of the words, their plausibility and their
-//! change from burst to burst.
+//! The part has no checksum and no sample counter, so the checks use the flags of the words, their plausibility and
+//! their change from burst to burst.
 
 use crate::burst::{Burst, OutputWord};
 use crate::channel::Channel;
@@ -32,8 +32,8 @@ bitflags::bitflags! {
         /// All twelve words have been equal for [`BurstValidator::FROZEN_AFTER`] bursts, which is over four times the
         /// length of the longest filter.
         const FROZEN = 1 << 8;
-        /// The x rate may be a negative one that lost its sign bit: XGYRO_OFF is negative and the count is 1192 or more,
-        /// which is what the sign erratum makes of −7000 and more. Detected only with
+        /// The x rate may be a negative one that lost its sign bit: XGYRO_OFF is negative and the count is 1192 or
+        /// more, which is what the sign erratum makes of −7000 and more. Detected only with
         /// [`BurstValidator::with_x_sign_at_risk`].
         const X_SIGN = 1 << 9;
     }
@@ -113,9 +113,9 @@ fn supply_in_range(word: OutputWord) -> bool {
     SUPPLY_COUNTS.contains(&word.counts(Channel::Supply))
 }
 
-/// Searches for a shift by which eleven words get a set new-data flag. Where the words came up to a byte late, the first
-/// shifted word is the supply and must be in range. Where they came early, the first shifted word is the x rate, of which
-/// any value is accepted; the supply, partly lost, is not checked.
+/// Searches for a shift by which eleven words get a set new-data flag. Where the words came up to a byte late, the
+/// first shifted word is the supply and must be in range. Where they came early, the first shifted word is the x rate,
+/// of which any value is accepted; the supply, partly lost, is not checked.
 fn is_shifted(words: &[OutputWord; 12]) -> bool {
     (1..16).any(|bits| {
         let mut moved = words.windows(2).map(|pair| OutputWord(pair[0].0 << bits | pair[1].0 >> (16 - bits)));
@@ -200,8 +200,8 @@ impl BurstValidator {
     /// Number of bursts equal to their predecessor after which [`Faults::FROZEN`] is raised.
     pub const FROZEN_AFTER: u16 = 512;
 
-    /// Sets whether x rates can lose their sign bit ([`Adis16405::x_sign_at_risk`](crate::Adis16405::x_sign_at_risk)). If
-    /// so, rates that may have lost it are marked as [`Faults::X_SIGN`]. The default is false.
+    /// Sets whether x rates can lose their sign bit ([`Adis16405::x_sign_at_risk`](crate::Adis16405::x_sign_at_risk)).
+    /// If so, rates that may have lost it are marked as [`Faults::X_SIGN`]. The default is false.
     #[must_use]
     pub const fn with_x_sign_at_risk(mut self, at_risk: bool) -> Self {
         self.x_sign_at_risk = at_risk;

@@ -70,7 +70,8 @@ proptest! {
         let bus = RepeatingBus { bytes, at: 0, transactions: 0 };
         let mut imu = Adis16405::new(bus, Config::default()).with_verified_writes(verify);
         let mut delay = TotalDelay::default();
-        let alarm = Alarm { source: Channel::GyroZ, watch: AlarmWatch::RateOfChange(7), threshold: AlarmThreshold::Above(100) };
+        let (watch, threshold) = (AlarmWatch::RateOfChange(7), AlarmThreshold::Above(100));
+        let alarm = Alarm { source: Channel::GyroZ, watch, threshold };
         let ended: Result<String, _> = match choice {
             0 => imu.start_up(&mut delay).map(|value| format!("{value:?}")),
             1 => imu.software_reset(&mut delay).map(|value| format!("{value:?}")),

@@ -1,5 +1,5 @@
-//! Output words, bursts and samples: every word and every count against plain arithmetic, with the fields and scale factors
-//! of the data sheet.
+//! Output words, bursts and samples: every word and every count against plain arithmetic, with the fields and scale
+//! factors of the data sheet.
 
 use adis16405_driver::{BURST_BYTES, Burst, BurstValidator, Channel, Counts, Faults, GyroRange, ImuSample, OutputWord};
 use proptest::prelude::*;

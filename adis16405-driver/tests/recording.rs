@@ -73,8 +73,9 @@ fn recorded_words_are_those_of_a_sensor_at_rest() {
         rates.sort_by(f64::total_cmp);
         let median = rates[rates.len() / 2];
         assert!(median.abs() < 3.0, "initial bias error is ±3 deg/s, {:?} shows {median}", COLUMNS[gyro]);
-        // Noise density 0.05 deg/s/sqrt(Hz) up to 409.6 Hz, through two averages of four (sum of squared weights 44/256),
-        // is 0.42 deg/s: 1.7 % of the rows may deviate by more than 1 deg/s, none by more than five times 0.42.
+        // Noise density 0.05 deg/s/sqrt(Hz) up to 409.6 Hz, through two averages of four (sum of squared weights
+        // 44/256), is 0.42 deg/s: 1.7 % of the rows may deviate by more than 1 deg/s, none by more than five times
+        // 0.42.
         let outliers = rates.iter().filter(|rate| (*rate - median).abs() >= 1.0).count();
         assert!(outliers * 1000 <= rates.len() * 17, "{:?}: {outliers} rows deviate from {median}", COLUMNS[gyro]);
         let farthest = (median - rates[0]).max(rates[rates.len() - 1] - median);

@@ -1,5 +1,5 @@
-//! Offsets 0x1A to 0x24, hard iron 0x26 to 0x2A, soft iron 0x2C to 0x30, on-chip compensation (MSC_CTRL 0x34, bits 7 and
-//! 6). The part sends offsets sign-extended.
+//! Offsets 0x1A to 0x24, hard iron 0x26 to 0x2A, soft iron 0x2C to 0x30, on-chip compensation (MSC_CTRL 0x34, bits 7
+//! and 6). The part sends offsets sign-extended.
 
 use adis16405_driver::{Config, Error, GyroBias, OnChipCompensation, Register};
 

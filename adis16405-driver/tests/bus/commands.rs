@@ -1,5 +1,5 @@
-//! Identification, start-up and configuration; GLOB_CMD 0x3E (bit 7 reset, 4 precision auto-null, 3 flash update, 1 factory
-//! restore, 0 auto-null); sleep, SLP_CNT 0x3A.
+//! Identification, start-up and configuration; GLOB_CMD 0x3E (bit 7 reset, 4 precision auto-null, 3 flash update, 1
+//! factory restore, 0 auto-null); sleep, SLP_CNT 0x3A.
 
 use core::num::NonZeroU8;
 

@@ -1,4 +1,5 @@
-//! A mock bus that checks every byte and every pause, and the same call through the blocking and the asynchronous driver.
+//! A mock bus that checks every byte and every pause, and the same call through the blocking and the asynchronous
+//! driver.
 
 use embedded_hal_mock::eh1::spi::Transaction;
 
@@ -59,9 +60,9 @@ pub(crate) fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
-/// `both!(config; frames; pauses in µs; |imu, delay| call)`: makes the call on the blocking and on the asynchronous driver
-/// and returns its result, which must be the same. The bus must see exactly these frames, the delay these pauses. `with`
-/// sets options of the driver.
+/// `both!(config; frames; pauses in µs; |imu, delay| call)`: makes the call on the blocking and on the asynchronous
+/// driver and returns its result, which must be the same. The bus must see exactly these frames, the delay these
+/// pauses. `with` sets options of the driver.
 macro_rules! both {
     ($config:expr; $frames:expr; $pauses:expr; |$imu:ident, $delay:ident| $call:expr) => {
         both!($config, with []; $frames; $pauses; |$imu, $delay| $call)

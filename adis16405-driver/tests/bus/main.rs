@@ -1,5 +1,5 @@
-//! The exact bytes and pauses of every public method, on the blocking and on the asynchronous driver. Addresses, bits and
-//! times are copied from the data sheet, not taken from the driver.
+//! The exact bytes and pauses of every public method, on the blocking and on the asynchronous driver. Addresses, bits
+//! and times are copied from the data sheet, not taken from the driver.
 
 #[macro_use]
 mod harness;

@@ -1,8 +1,8 @@
 //! Pins: MSC_CTRL 0x34, bits 2 to 0 data ready (enable, active high, DIO2). GPIO_CTRL 0x32, bits 11:8 levels of DIO4 to
 //! DIO1, 3:0 directions. AUX_DAC 0x4A, latched by bit 2 of GLOB_CMD 0x3E.
 //!
-//! Alarms: ALM_MAG 0x40 and 0x42, ALM_SMPL 0x44 and 0x46. ALM_CTRL 0x48, bits 15:12 and 11:8 sources of alarms 2 and 1, 7
-//! and 6 rate of change, 4 filtered data, 2 to 0 output (enable, active high, DIO2).
+//! Alarms: ALM_MAG 0x40 and 0x42, ALM_SMPL 0x44 and 0x46. ALM_CTRL 0x48, bits 15:12 and 11:8 sources of alarms 2 and 1,
+//! 7 and 6 rate of change, 4 filtered data, 2 to 0 output (enable, active high, DIO2).
 
 use adis16405_driver::{
     Alarm, AlarmNumber, AlarmThreshold, AlarmWatch, Channel, Config, DacLevel, Dio, DioLine, DioSignal, Error, Gpio,
