@@ -1,10 +1,10 @@
-//! Reads an ADIS16405 on a Linux host, such as a Raspberry Pi, by way of spidev.
+//! Reads an ADIS16405 on a Linux host, such as a Raspberry Pi, through spidev.
 //!
-//! | Raspberry Pi header | signal | at the sensor |
+//! | Raspberry Pi header | signal | sensor pin |
 //! |---|---|---|
 //! | 24, GPIO 8 | CE0 | CS |
 //! | 23, GPIO 11 | SCLK | SCLK |
-//! | 21, GPIO 9 | MISO | DOUT, through a divider or level shifter: the sensor may drive 5 V |
+//! | 21, GPIO 9 | MISO | DOUT, through a divider or level shifter, since the sensor may drive 5 V |
 //! | 19, GPIO 10 | MOSI | DIN |
 //! | 2 (5 V), 6 (ground) | supply | VCC, GND |
 //!
@@ -14,7 +14,7 @@
 
 #[cfg(target_os = "linux")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    use adis16405_driver::{Adis16405, Config, GyroRange, Judge, SamplePeriod};
+    use adis16405_driver::{Adis16405, BurstValidator, Config, GyroRange, SamplePeriod};
     use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
     use linux_embedded_hal::{Delay, SpidevDevice};
     use std::time::Duration;
@@ -30,20 +30,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let test = imu.self_test(&mut Delay)?;
     println!("{product:?}, self-test {}: {:?}", if test.passed() { "passed" } else { "failed" }, test.diagnosis);
 
-    let mut judge = Judge::default().with_x_sign_at_risk(imu.x_sign_at_risk());
+    let mut validator = BurstValidator::default().with_x_sign_at_risk(imu.x_sign_at_risk());
     for _ in 0..100 {
-        // Without the data-ready line: slower than the sensor samples, so that each sample is new.
+        // The data-ready line is not used here: reads are slower than the sensor's sampling, so each sample is new.
         std::thread::sleep(Duration::from_millis(10));
         let burst = imu.burst()?;
-        let verdict = judge.judge(&burst);
-        if verdict.usable {
-            let sample = imu.sample_of(burst);
+        let validity = validator.validate(&burst);
+        if validity.usable {
+            let sample = imu.sample_from(burst);
             println!("{:8.3?} °/s {:7.4?} g {:.1} °C", sample.gyro_dps(), sample.accl_g(), sample.temp_degc());
         } else {
-            println!("refused: {}", verdict.faults.causes().collect::<Vec<_>>().join(", "));
+            println!("not usable: {}", validity.faults.causes().collect::<Vec<_>>().join(", "));
         }
     }
-    for (cause, count) in judge.counters().by_cause().filter(|(_, count)| *count > 0) {
+    for (cause, count) in validator.counters().by_cause().filter(|(_, count)| *count > 0) {
         println!("{count} × {cause}");
     }
     Ok(())
@@ -51,5 +51,5 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 #[cfg(not(target_os = "linux"))]
 fn main() {
-    eprintln!("spidev is a thing of Linux");
+    eprintln!("This example needs Linux: spidev is a Linux interface.");
 }

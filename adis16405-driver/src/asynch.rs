@@ -1,40 +1,37 @@
-//! The shell over an asynchronous [`SpiDevice`], feature `async`.
+//! The methods of the driver over an asynchronous [`SpiDevice`] (feature `async`).
 
 use core::pin::pin;
 
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 
-use crate::alarm::{Alarm, AlarmNumber};
-use crate::compensation::Compensation;
-use crate::config::{Config, GyroRange};
-use crate::diagnosis::Diagnosis;
-use crate::driver::{Adis16405, Async};
-use crate::error::Error;
-use crate::frame::{BURST_BYTES, BURST_REQUEST, Burst, spaced_burst};
-use crate::offset::{FactoryRestore, GyroBias};
-use crate::pin::{DacLevel, Gpio, Signal};
-use crate::port::{Port, Step};
-use crate::product::Product;
-use crate::register::Register;
-use crate::sample::Sample;
-use crate::self_test::{FlashTest, SelfTest, Stimulus};
-use crate::session::{Refusal, Session};
-use crate::shell::procedures;
-use crate::sleep::Sleep;
+use crate::alarms::{Alarm, AlarmNumber};
+use crate::burst::{BURST_BYTES, BURST_REQUEST, Burst, burst_with_gaps};
+use crate::calibration::{FactoryRestore, GyroBias, OnChipCompensation};
+use crate::channel::GyroRange;
 #[cfg(doc)]
-use crate::timing::Timing;
+use crate::clock::Timing;
+use crate::commands::{Product, Sleep};
+use crate::config::Config;
+use crate::driver::{Adis16405, Async, procedures};
+use crate::error::{Diagnosis, Error};
+use crate::pins::{DacLevel, DioSignal, Gpio};
+use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot};
+use crate::register::Register;
+use crate::sample::ImuSample;
+use crate::self_test::{FlashTest, SelfTest, Stimulus};
 
 impl<SPI: SpiDevice<u8>> Adis16405<SPI, Async> {
-    /// Takes the bus; nothing is sent before [`init`](Self::init).
+    /// A driver on `spi` for a part that is to be configured with `config`. Nothing is sent before
+    /// [`init`](Self::init).
     pub fn new_async(spi: SPI, config: Config) -> Self {
-        Self::on(spi, config)
+        Self::with_state(spi, config)
     }
 
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
     ///
     /// # Errors
-    /// Only of the bus: whether the data can be believed is for [`Judge`](crate::Judge) to say.
+    /// [`Error::Spi`]. [`BurstValidator`](crate::BurstValidator) decides whether the data are usable.
     pub async fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
         let stall_ns = self.state.stall_ns();
@@ -44,18 +41,18 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Async> {
                     .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)])
                     .await?
             }
-            gap_ns => self.spi.transaction(&mut spaced_burst(&mut answer, gap_ns, stall_ns)).await?,
+            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns)).await?,
         }
         Ok(Burst::from_bytes(&answer))
     }
 
-    /// Reads a burst as a sample that knows its range and bias.
+    /// Reads a burst and returns it as a sample, as [`sample_from`](Self::sample_from) does.
     ///
     /// # Errors
-    /// Only of the bus, as [`burst`](Self::burst).
-    pub async fn sample(&mut self) -> Result<Sample, Error<SPI::Error>> {
+    /// [`Error::Spi`]. The sample is not validated: see [`burst`](Self::burst).
+    pub async fn sample(&mut self) -> Result<ImuSample, Error<SPI::Error>> {
         let burst = self.burst().await?;
-        Ok(self.sample_of(burst))
+        Ok(self.sample_from(burst))
     }
 }
 
@@ -73,54 +70,55 @@ macro_rules! methods {
     (@framed [$($doc:tt)*] $name:ident [$($n:tt)*] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
         $($doc)*
         pub async fn $name<$($n)*>(&mut self, $($declared)*) -> Result<$output, Error<SPI::Error>> {
-            let port = Port::new();
-            run(&mut self.spi, &mut NoPause, &port, Session::new(&port, &mut self.state).$name($($passed)*)).await
+            let slot = RequestSlot::new();
+            run(&mut self.spi, &mut NoPause, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*)).await
         }
     };
     (@paced [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
         $($doc)*
         pub async fn $name(&mut self, $($declared)* delay: &mut impl DelayNs) -> Result<$output, Error<SPI::Error>> {
-            let port = Port::new();
-            run(&mut self.spi, delay, &port, Session::new(&port, &mut self.state).$name($($passed)*)).await
+            let slot = RequestSlot::new();
+            run(&mut self.spi, delay, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*)).await
         }
     };
 }
 procedures!(methods);
 
+/// Runs a procedure to its end.
 async fn run<SPI: SpiDevice<u8>, T>(
     spi: &mut SPI,
     delay: &mut impl DelayNs,
-    port: &Port,
-    procedure: impl Future<Output = Result<T, Refusal>>,
+    slot: &RequestSlot,
+    procedure: impl Future<Output = Result<T, ProtocolError>>,
 ) -> Result<T, Error<SPI::Error>> {
     let mut procedure = pin!(procedure);
     loop {
-        match port.resume(procedure.as_mut()) {
-            Ok(result) => return result.map_err(Error::over_bus),
-            Err(step) => port.answer(perform(spi, delay, step).await?),
+        match slot.resume(procedure.as_mut()) {
+            Ok(result) => return result.map_err(Error::with_bus_error),
+            Err(request) => slot.respond(perform(spi, delay, request).await?),
         }
     }
 }
 
-/// What all procedures share, so that it is in flash once.
+/// Carries out one request. Not inlined, so that all methods share one copy in flash.
 #[inline(never)]
 async fn perform<SPI: SpiDevice<u8>>(
     spi: &mut SPI,
     delay: &mut impl DelayNs,
-    step: Step,
+    request: BusRequest,
 ) -> Result<[u8; 2], SPI::Error> {
     let mut answer = [0; 2];
-    match step {
-        Step::Frame { request, stall_ns } => {
-            spi.transaction(&mut [Operation::Transfer(&mut answer, &request), Operation::DelayNs(stall_ns)]).await?;
+    match request {
+        BusRequest::Frame { bytes, stall_ns } => {
+            spi.transaction(&mut [Operation::Transfer(&mut answer, &bytes), Operation::DelayNs(stall_ns)]).await?;
         }
-        Step::Select { ns } => spi.transaction(&mut [Operation::DelayNs(ns)]).await?,
-        Step::Pause { us } => delay.delay_us(us).await,
+        BusRequest::ChipSelectPulse { ns } => spi.transaction(&mut [Operation::DelayNs(ns)]).await?,
+        BusRequest::Pause { us } => delay.delay_us(us).await,
     }
     Ok(answer)
 }
 
-/// For procedures of frames alone.
+/// The delay of methods whose procedure requests no pause.
 struct NoPause;
 
 impl DelayNs for NoPause {

@@ -1,8 +1,68 @@
-//! The twelve outputs: their fields, units and scales.
+//! The gyro ranges and the twelve output channels: width, sign, unit and scale of each.
 
-use crate::config::GyroRange;
+/// Full-scale range of the gyroscopes, SENS_AVG bits 10:8.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum GyroRange {
+    /// ±300 °/s, 0.05 °/s per count.
+    #[default]
+    Dps300,
+    /// ±150 °/s, 0.025 °/s per count; needs at least 2² filter taps.
+    Dps150,
+    /// ±75 °/s, 0.0125 °/s per count; needs at least 2⁴ filter taps.
+    Dps75,
+}
 
-/// An output register, in the order of a burst read.
+impl GyroRange {
+    /// Size of one count in °/s.
+    pub const fn lsb(self) -> f64 {
+        match self {
+            GyroRange::Dps300 => 0.05,
+            GyroRange::Dps150 => 0.025,
+            GyroRange::Dps75 => 0.0125,
+        }
+    }
+
+    /// Size of one count in 10⁻⁶ °/s.
+    pub(crate) const fn lsb_udps(self) -> i32 {
+        match self {
+            GyroRange::Dps300 => 50_000,
+            GyroRange::Dps150 => 25_000,
+            GyroRange::Dps75 => 12_500,
+        }
+    }
+
+    /// The smallest M (log2 of the filter taps) that the data sheet allows with this range.
+    pub const fn min_filter_taps_log2(self) -> u8 {
+        match self {
+            GyroRange::Dps300 => 0,
+            GyroRange::Dps150 => 2,
+            GyroRange::Dps75 => 4,
+        }
+    }
+
+    /// The range that a SENS_AVG value selects; `None` for codes that the data sheet does not define.
+    pub const fn from_sens_avg(sens_avg: u16) -> Option<Self> {
+        match sens_avg >> 8 & 0b111 {
+            0b100 => Some(GyroRange::Dps300),
+            0b010 => Some(GyroRange::Dps150),
+            0b001 => Some(GyroRange::Dps75),
+            _ => None,
+        }
+    }
+
+    /// The code in SENS_AVG bits 10:8.
+    pub(crate) const fn sens_avg_code(self) -> u16 {
+        match self {
+            GyroRange::Dps300 => 0b100,
+            GyroRange::Dps150 => 0b010,
+            GyroRange::Dps75 => 0b001,
+        }
+    }
+}
+
+/// An output channel. The discriminants, 0 to 11, are the positions in a burst read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -51,11 +111,11 @@ impl Channel {
         Channel::AuxAdc,
     ];
 
-    /// The gyroscopes, then the accelerometers.
+    /// The gyroscopes x, y, z, then the accelerometers x, y, z.
     pub const INERTIAL: [Channel; 6] =
         [Channel::GyroX, Channel::GyroY, Channel::GyroZ, Channel::AcclX, Channel::AcclY, Channel::AcclZ];
 
-    /// Name in reports and file headers, such as `gyro_x`.
+    /// Name in reports and file headers, for example `gyro_x`.
     pub const fn name(self) -> &'static str {
         match self {
             Channel::Supply => "supply",
@@ -75,7 +135,7 @@ impl Channel {
 
     /// Width of the data field in bits: 12 for supply, temperature and auxiliary input, else 14.
     ///
-    /// Sources disagree on 12 or 14 bits for the supply; its data need 12 (5 V is count 2068).
+    /// Sources give 12 or 14 bits for the supply. 12 are enough for its values: 5 V is count 2068.
     pub const fn bits(self) -> u32 {
         match self {
             Channel::Supply | Channel::Temp | Channel::AuxAdc => 12,
@@ -83,12 +143,12 @@ impl Channel {
         }
     }
 
-    /// True for two's complement, false for offset binary (supply, auxiliary input).
+    /// True for two's complement, false for unsigned channels (supply, auxiliary input).
     pub const fn signed(self) -> bool {
         !matches!(self, Channel::Supply | Channel::AuxAdc)
     }
 
-    /// Least and greatest count that the field can hold.
+    /// Smallest and largest count that the data field can hold.
     pub const fn limits(self) -> (i16, i16) {
         if self.signed() {
             let half = 1i16 << (self.bits() - 1);
@@ -111,7 +171,7 @@ impl Channel {
 
     /// Size of one count in [`unit`](Self::unit); only the gyroscopes depend on `range`.
     ///
-    /// For the temperature sources give 0.14 °C and 0.1357 °C; 0.14 °C, which most drivers use, is taken here.
+    /// For the temperature, sources give 0.14 °C and 0.1357 °C; this returns 0.14 °C, the value that most drivers use.
     pub const fn lsb(self, range: GyroRange) -> f64 {
         match self {
             Channel::Supply => 2.418e-3,
@@ -124,7 +184,9 @@ impl Channel {
     }
 
     /// Value at count 0 in [`unit`](Self::unit): 25 for the temperature, else 0.
-    pub const fn zero(self) -> f64 {
+    ///
+    /// The value of a count is `count · lsb + offset`.
+    pub const fn offset(self) -> f64 {
         match self {
             Channel::Temp => 25.0,
             _ => 0.0,

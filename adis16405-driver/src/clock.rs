@@ -1,6 +1,8 @@
-//! When the part samples, and which SPI limits that brings.
+//! Time: the sample period, the SPI clock limits that follow from it, and the times that the driver keeps.
 
-use crate::config::ConfigError;
+use core::fmt;
+
+use crate::channel::GyroRange;
 
 /// Time base of the sample period, SMPL_PRD bit 7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -13,20 +15,22 @@ pub enum TimeBase {
     Slow,
 }
 
-/// Which SPI clock and stall limits hold. The data sheet (Rev. B, page 10) sets the border at SMPL_PRD = 0x08; Linux
-/// sets it at 0x0A. The stricter is taken.
+/// The power mode of the part, which sets the limits of SPI clock and stall.
+///
+/// The data sheet (Rev. B, page 10) ends normal mode at SMPL_PRD = 0x08, Linux at 0x09. The driver follows the data
+/// sheet unless [`Timing::normal_mode_max_smpl_prd`] is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ClockMode {
     /// SMPL_PRD ≤ 0x08: SCK up to 2 MHz (1 MHz in a burst), stall at least 9 µs.
     Normal,
-    /// SMPL_PRD > 0x08: SCK up to 300 kHz; a stall of 75 µs, which no source at hand confirms.
+    /// SMPL_PRD > 0x08: SCK up to 300 kHz, stall 75 µs (the stall is not confirmed by any source at hand).
     LowPower,
 }
 
 impl ClockMode {
-    /// Highest SCK for single frames, Hz.
+    /// Maximum SCK for single frames, Hz.
     pub const fn max_sck_hz(self) -> u32 {
         match self {
             ClockMode::Normal => 2_000_000,
@@ -34,7 +38,7 @@ impl ClockMode {
         }
     }
 
-    /// Highest SCK for a burst read, Hz.
+    /// Maximum SCK for a burst read, Hz.
     pub const fn max_burst_sck_hz(self) -> u32 {
         match self {
             ClockMode::Normal => 1_000_000,
@@ -43,7 +47,7 @@ impl ClockMode {
     }
 }
 
-/// Internal sample period: `time base · divisor`.
+/// Period of the internal sample clock: time base · divisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -53,13 +57,14 @@ pub struct SamplePeriod {
 }
 
 impl SamplePeriod {
-    /// 819.2 samples per second, what the part does after reset (SMPL_PRD = 0x0001).
+    /// The period after a reset, SMPL_PRD = 0x0001: 819.2 samples per second.
     pub const RESET: Self = Self { smpl_prd: 0x01 };
 
-    /// `divisor` = NS + 1 time bases per sample.
+    /// A period of `divisor` (NS + 1 in the data sheet) time bases.
     ///
     /// # Errors
-    /// If `divisor` is outside 2…128 (fast; 1 would select the external clock) or 1…128 (slow).
+    /// [`ConfigError::Divisor`] if `divisor` is outside 2…128 (fast; 1 would select the external clock) or 1…128
+    /// (slow).
     pub const fn from_divisor(base: TimeBase, divisor: u8) -> Result<Self, ConfigError> {
         let (least, flag) = match base {
             TimeBase::Fast => (2, 0x00),
@@ -71,11 +76,11 @@ impl SamplePeriod {
         Ok(Self { smpl_prd: flag | (divisor - 1) })
     }
 
-    /// The period whose rate is nearest to `hz`, clamped to 0.4129…819.2 samples per second; [`hz`](Self::hz) tells
-    /// what became of it.
+    /// The period whose rate is nearest to `hz`, in samples per second; rates outside 0.4129…819.2 give the limit.
+    /// [`hz`](Self::hz) returns the rate that was chosen.
     ///
     /// # Errors
-    /// If `hz` is not finite and positive.
+    /// [`ConfigError::Rate`] if `hz` is not finite and positive.
     pub fn nearest(hz: f64) -> Result<Self, ConfigError> {
         if !(hz.is_finite() && hz > 0.0) {
             return Err(ConfigError::Rate);
@@ -90,7 +95,7 @@ impl SamplePeriod {
         Ok(best)
     }
 
-    /// From the value of SMPL_PRD; `None` for 0x00, which means an external clock.
+    /// From the value of SMPL_PRD; `None` for 0x00, which selects the external clock.
     pub const fn from_register(smpl_prd: u8) -> Option<Self> {
         if smpl_prd == 0 { None } else { Some(Self { smpl_prd }) }
     }
@@ -100,37 +105,192 @@ impl SamplePeriod {
         self.smpl_prd
     }
 
-    /// Length in ticks of 1/1638.4 s, an exact integer.
+    /// Length in units of 1/1638.4 s, an exact integer.
     pub const fn ticks(self) -> u32 {
         let divisor = (self.smpl_prd & 0x7F) as u32 + 1;
         if self.smpl_prd & 0x80 == 0 { divisor } else { 31 * divisor }
     }
 
-    /// Samples per second.
+    /// Sample rate in samples per second.
     pub const fn hz(self) -> f64 {
         1638.4 / self.ticks() as f64
     }
 
-    /// The SPI limits that this period brings.
+    /// The power mode that this period selects by the data sheet.
     pub const fn clock_mode(self) -> ClockMode {
         if self.smpl_prd <= 0x08 { ClockMode::Normal } else { ClockMode::LowPower }
     }
 }
 
-/// What makes the part take a sample.
+impl Default for SamplePeriod {
+    fn default() -> Self {
+        Self::RESET
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<SamplePeriod> for u8 {
+    fn from(period: SamplePeriod) -> Self {
+        period.register()
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<u8> for SamplePeriod {
+    type Error = &'static str;
+
+    fn try_from(smpl_prd: u8) -> Result<Self, Self::Error> {
+        Self::from_register(smpl_prd).ok_or("SMPL_PRD 0 is the external clock, not a period")
+    }
+}
+
+/// The source of the sample clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum SampleClock {
-    /// Its own clock.
+    /// The internal clock.
     Internal(SamplePeriod),
-    /// A clock at pin DIO4/CLKIN, SMPL_PRD = 0. Known of sibling parts (up to 1.1 kHz); no source at hand confirms it
-    /// for this one.
+    /// A clock at pin DIO4/CLKIN, SMPL_PRD = 0. Documented for sibling parts (up to 1.1 kHz); no source at hand
+    /// confirms it for this part.
     External,
 }
 
-impl Default for SamplePeriod {
+/// Why a sample period or a [`Config`](crate::Config) was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum ConfigError {
+    /// The sample rate is not finite and positive.
+    Rate,
+    /// The divisor is outside the limits of the time base.
+    Divisor {
+        /// The requested time base.
+        base: TimeBase,
+        /// The requested divisor.
+        divisor: u8,
+    },
+    /// The number of filter taps, 2^M, is above 2⁶ or below the minimum of the range.
+    FilterTaps {
+        /// The requested range.
+        range: GyroRange,
+        /// The requested M.
+        filter_taps_log2: u8,
+    },
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            ConfigError::Rate => write!(f, "the sample rate must be a finite number above 0"),
+            ConfigError::Divisor { base: TimeBase::Fast, divisor } => {
+                write!(f, "divisor {divisor} of the 0.61035 ms time base is outside 2 to 128")
+            }
+            ConfigError::Divisor { base: TimeBase::Slow, divisor } => {
+                write!(f, "divisor {divisor} of the 18.921 ms time base is outside 1 to 128")
+            }
+            ConfigError::FilterTaps { range, filter_taps_log2 } => write!(
+                f,
+                "filter taps 2^{filter_taps_log2} are outside 2^{} to 2^6 for {range:?}",
+                range.min_filter_taps_log2()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+/// A time that depends on the power mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PerClockMode {
+    /// In [`ClockMode::Normal`].
+    pub normal: u32,
+    /// In [`ClockMode::LowPower`].
+    pub low_power: u32,
+}
+
+impl PerClockMode {
+    /// The time in the given mode.
+    pub const fn get(self, mode: ClockMode) -> u32 {
+        match mode {
+            ClockMode::Normal => self.normal,
+            ClockMode::LowPower => self.low_power,
+        }
+    }
+}
+
+/// The times that the driver keeps. Where sources for this part disagree, [`Timing::DEFAULT`] takes the longer time.
+///
+/// These are not confirmed by any source at hand, so check them against your data sheet: the low-power stall, the times
+/// of a flash update, a factory restore and an auto-null, and the SMPL_PRD value above which low-power mode begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Timing {
+    /// Stall after a frame, ns. In normal mode the part needs 9 µs, and Analog Devices' evaluation tool keeps 16 µs.
+    /// The 75 µs of low-power mode are unconfirmed.
+    pub stall_ns: PerClockMode,
+    /// Pause between the words of a burst, ns. The default is 0: Linux, PX4 and flight software of satellites read the
+    /// part without a pause. Data sheets of sibling parts ask for one SCK period. With a pause, a burst is 13 transfers
+    /// instead of one.
+    pub word_gap_ns: u32,
+    /// Largest SMPL_PRD value in normal mode: 0x08 by the data sheet (Rev. B, page 10), 0x09 by Linux.
+    pub normal_mode_max_smpl_prd: u8,
+    /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode. The default is the longer time,
+    /// since the mode at power-on depends on the settings in flash.
+    pub start_up_us: u32,
+    /// From a software reset until the part answers, µs: 100 ms, or 170 ms in low-power mode. The default is the longer
+    /// time.
+    pub reset_us: u32,
+    /// Length of the chip-select pulse that wakes the part, ns. Unconfirmed.
+    pub wake_pulse_ns: u32,
+    /// From wake-up until the part answers, µs.
+    pub wake_us: PerClockMode,
+    /// Duration of a flash memory test, µs.
+    pub flash_test_us: PerClockMode,
+    /// Duration of the internal self-test at 819.2 samples per second, µs.
+    pub self_test_us: u32,
+    /// Time without bus traffic after the flash-update command, µs. Sources give 50 ms and "at least 100 ms".
+    pub flash_update_us: u32,
+    /// Time without bus traffic after the factory-restore command, µs. Unconfirmed.
+    pub factory_restore_us: u32,
+    /// Time without bus traffic after the auto-null command, µs. Unconfirmed.
+    pub auto_null_us: u32,
+    /// Time without bus traffic after the precision auto-null command, µs: 30 s, or "about 35 s" on an older part.
+    pub precision_auto_null_us: u32,
+    /// Interval at which a self-clearing bit is polled, µs.
+    pub poll_us: u32,
+}
+
+impl Timing {
+    /// The times of a new driver.
+    pub const DEFAULT: Self = Self {
+        stall_ns: PerClockMode { normal: 16_000, low_power: 75_000 },
+        word_gap_ns: 0,
+        normal_mode_max_smpl_prd: 0x08,
+        start_up_us: 290_000,
+        reset_us: 170_000,
+        wake_pulse_ns: 10_000,
+        wake_us: PerClockMode { normal: 4_000, low_power: 15_000 },
+        flash_test_us: PerClockMode { normal: 17_000, low_power: 90_000 },
+        self_test_us: 12_000,
+        flash_update_us: 100_000,
+        factory_restore_us: 50_000,
+        auto_null_us: 50_000,
+        precision_auto_null_us: 30_000_000,
+        poll_us: 1_000,
+    };
+
+    /// The power mode that a value of SMPL_PRD selects.
+    pub const fn clock_mode(&self, smpl_prd: u8) -> ClockMode {
+        if smpl_prd <= self.normal_mode_max_smpl_prd { ClockMode::Normal } else { ClockMode::LowPower }
+    }
+}
+
+impl Default for Timing {
     fn default() -> Self {
-        Self::RESET
+        Self::DEFAULT
     }
 }

@@ -2,12 +2,12 @@
 //! [`embedded_hal::spi::SpiDevice`], or over that of embedded-hal-async with feature `async`.
 //!
 //! ```text
-//! SPI bytes ─► Burst (12 output words, flags) ─► Sample (sign-extended counts, range) ─► °/s, g, gauss, °C, V
-//!                    └► Judge ─► Verdict (faults by cause)
+//! SPI bytes ─► Burst (12 output words) ─► Counts (sign-extended) ─► ImuSample: °/s, g, gauss, °C, V
+//!                └► BurstValidator ─► Validity (faults by cause)
 //! ```
 //!
 //! ```
-//! use adis16405_driver::{Adis16405, Config, Error, GyroRange, Judge, SamplePeriod};
+//! use adis16405_driver::{Adis16405, BurstValidator, Config, Error, GyroRange, SamplePeriod};
 //! use embedded_hal::{delay::DelayNs, spi::SpiDevice};
 //!
 //! fn read<SPI: SpiDevice<u8>>(spi: SPI, delay: &mut impl DelayNs) -> Result<(), Error<SPI::Error>> {
@@ -16,11 +16,11 @@
 //!     let mut imu = Adis16405::new(spi, config);
 //!     imu.start_up(delay)?;
 //!     let healthy = imu.self_test(delay)?.passed();
-//!     let mut judge = Judge::default().with_x_sign_at_risk(imu.x_sign_at_risk());
+//!     let mut validator = BurstValidator::default().with_x_sign_at_risk(imu.x_sign_at_risk());
 //!     // … at every data-ready edge:
 //!     let burst = imu.burst()?;
-//!     if judge.judge(&burst).usable {
-//!         let [x, y, z] = imu.sample_of(burst).gyro_dps();
+//!     if validator.validate(&burst).usable {
+//!         let [x, y, z] = imu.sample_from(burst).gyro_dps();
 //!         # let _ = (healthy, x, y, z);
 //!     }
 //!     Ok(())
@@ -29,24 +29,24 @@
 //!
 //! # Wiring and the bus
 //!
-//! SCLK, DIN, DOUT and CS go to an SPI controller in **mode 3**, most significant bit first; DIO1 carries data ready, active
-//! high, unless told otherwise ([`set_data_ready`](Adis16405::set_data_ready)). The supply is 5 V (4.75 to 5.25 V); the
-//! logic takes 3.3 V and 5 V levels, and its outputs may reach 5 V. At 3.3 V supply the outputs saturate instead of falling
-//! silent. Steel screws disturb the magnetometer.
+//! SCLK, DIN, DOUT and CS go to an SPI controller in **mode 3**, most significant bit first. DIO1 carries data ready,
+//! active high; [`set_data_ready`](Adis16405::set_data_ready) changes that. The supply is 5 V (4.75 to 5.25 V). The
+//! logic inputs take 3.3 V and 5 V levels; the outputs may reach 5 V. At a supply of 3.3 V the part answers, but its
+//! outputs saturate. Steel screws disturb the magnetometer.
 //!
 //! | | SMPL_PRD ≤ 0x08 ([`ClockMode::Normal`]) | above ([`ClockMode::LowPower`]) |
 //! |---|---|---|
 //! | SCK, single frames | 2 MHz at most | 300 kHz at most |
 //! | SCK, burst | 1 MHz at most | 300 kHz at most |
-//! | stall after a frame | 9 µs at least, 16 µs kept | 75 µs kept (unconfirmed) |
+//! | stall after a frame | at least 9 µs; the driver keeps 16 µs | the driver keeps 75 µs (unconfirmed) |
 //!
-//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK: 102.4 samples per second and fewer are
-//! low-power mode, where the bus must be slowed down first. A microcontroller that restarts while the part keeps its power
-//! may meet it in that mode.
+//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK. Rates of 102.4 samples per second and
+//! below select low-power mode: reduce SCK first. After a restart of the microcontroller alone, the part may still be
+//! in that mode.
 //!
-//! Each frame is a transaction, so chip select is high in between; the stall is an
-//! [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) at the transaction's end. With embedded-hal-bus use a
-//! constructor that takes a delay; `new_no_delay` panics on the first stall:
+//! Each frame is a transaction, so that chip select is high between frames; the stall is an
+//! [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) at the end of the transaction. With embedded-hal-bus,
+//! use a constructor that takes a delay; `new_no_delay` panics on the first stall:
 //!
 //! ```
 //! # use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiBus};
@@ -58,99 +58,88 @@
 //! # Ok(()) }
 //! ```
 //!
-//! The firmware of this workspace (`firmware/src/bin/observatory-f405`) has the whole of it: clock, pins, the data-ready
-//! interrupt and a queue. `examples/spidev.rs` reads the part on a Linux host.
+//! `examples/mock.rs` runs without hardware; `examples/spidev.rs` reads a part on a Linux host.
 //!
-//! # What a verdict means
+//! # Validity of a burst
 //!
-//! The part has no checksum and no sample counter. [`Judge`] uses all that there is:
+//! The part has no checksum and no sample counter. [`BurstValidator`] derives the validity of a burst from the flags of
+//! its words, from their values, and from the bursts before:
 //!
-//! | fault | what was seen | usable | what to do |
+//! | fault | condition | usable | remedy |
 //! |---|---|---|---|
-//! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | nothing but zeros, or ones | no | wiring, power; then [`start_up`](Adis16405::start_up) |
-//! | [`SHIFTED`](Faults::SHIFTED) | a good burst, some bits off | no | SCK integrity; the next chip select puts it right |
-//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | read before the next sample was there | no | wait for data ready |
+//! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0, or all bits 1 | no | check wiring and power; then [`start_up`](Adis16405::start_up) |
+//! | [`SHIFTED`](Faults::SHIFTED) | a valid burst, shifted by 1 to 15 bits | no | check SCK; the next transaction is aligned again |
+//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | a new-data flag is clear | no | wait for data ready |
 //! | [`FROZEN`](Faults::FROZEN) | twelve words equal for 512 bursts | no | [`software_reset`](Adis16405::software_reset) |
-//! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | no | damaged word, or the sign erratum |
-//! | [`X_SIGN`](Faults::X_SIGN) | an x rate that may lack its sign | no | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
-//! | [`ERROR_ALARM`](Faults::ERROR_ALARM) | a flag in DIAG_STAT | no | [`diagnosis`](Adis16405::diagnosis), which clears it |
-//! | [`SUPPLY`](Faults::SUPPLY) | supply outside 4.75 to 5.25 V | no | power |
-//! | [`REPEATED`](Faults::REPEATED) | inertial words as before, but new data | yes | nothing: mostly chance, and leaving them out would bias the noise |
+//! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | no | a damaged word, or the sign erratum |
+//! | [`X_SIGN`](Faults::X_SIGN) | an x rate that may lack its sign bit | no | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
+//! | [`ERROR_ALARM`](Faults::ERROR_ALARM) | an error/alarm flag is set | no | [`diagnosis`](Adis16405::diagnosis), which clears it |
+//! | [`SUPPLY`](Faults::SUPPLY) | supply outside 4.75 to 5.25 V | no | check power |
+//! | [`REPEATED`](Faults::REPEATED) | inertial words equal those of the burst before | yes | none: mostly chance, and leaving them out would bias the noise estimate |
 //!
-//! The 45 equal neighbours in a measured minute of 49,425 bursts were each a full sample period apart, and 37 of them
-//! differed in another word. What tells a sample that was read twice from one that is equal by chance is the new-data bit,
-//! or, in a recording without it, that it comes too soon.
+//! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor. All were a full sample
+//! period apart, and 37 of them differed in another word. A sample that was read twice is distinguished from one that
+//! is equal by chance by its new-data flags, or, in a recording without them, by its time.
 //!
-//! # What no source at hand confirms
+//! # Unconfirmed facts
 //!
-//! It can all be set: the stall in low-power mode, where that mode begins, the gap between burst words, and the times of
-//! flash update, factory restore, auto-null and wake-up pulse ([`Timing`]); 0.14 °C or 0.1357 °C a count
-//! ([`Sample::temp_udegc`]); the layout of the alarm registers ([`alarm`]) and the scale of the analog output
-//! ([`DacLevel`]), for which [`update_register`](Adis16405::update_register) is the way around; the width of SUPPLY_OUT,
-//! 12 or 14 bits ([`OutputWord`] is the raw word); the external clock ([`SampleClock::External`]), indefinite sleep
-//! ([`Sleep::Indefinite`]), the delay of the filter ([`Filter::group_delay`]) and the order of x and z in DIAG_STAT
-//! ([`Diagnosis`]).
+//! No source at hand confirms the following. Each can be set or avoided:
 //!
-//! # How it is built
+//! - the stall in low-power mode, the SMPL_PRD value where that mode begins, the gap between burst words, and the times
+//!   of flash update, factory restore, auto-null and wake-up pulse: [`Timing`];
+//! - 0.14 °C or 0.1357 °C per count: [`ImuSample::temp_udegc`];
+//! - the layout of the alarm registers ([`Alarm`]) and the scale of the analog output ([`DacLevel`]):
+//!   [`update_register`](Adis16405::update_register) writes any other value;
+//! - 12 or 14 bits in SUPPLY_OUT: [`OutputWord`] has the raw word;
+//! - the external clock ([`SampleClock::External`]) and indefinite sleep ([`Sleep::Indefinite`]);
+//! - the delay of the filter ([`BartlettFilter::group_delay`]) and the order of x and z in DIAG_STAT ([`Diagnosis`]).
 //!
-//! What the part can be told is a procedure without I/O: an `async fn` that asks for frames and pauses and gets answers. Two
-//! thin shells carry them out, blocking and asynchronous; both have the same methods, from one table. A burst goes to the
-//! bus directly, and takes no longer than the bus and the stall.
+//! # Structure
+//!
+//! Every function of the part is an `async` procedure without I/O, which requests frames and pauses and receives
+//! answers. The blocking and the asynchronous driver carry the requests out; both have the same methods, from one
+//! table. A burst read does not go through a procedure, so that it takes no longer than the bus and the stall.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-pub mod alarm;
+mod alarms;
 #[cfg(feature = "async")]
 mod asynch;
 mod blocking;
-pub mod channel;
-pub mod clock;
-pub mod compensation;
-pub mod config;
-pub mod diagnosis;
-pub mod driver;
-pub mod error;
-pub mod fault;
-pub mod filter;
-pub mod frame;
-pub mod judge;
-#[cfg(feature = "defmt")]
-mod log;
-pub mod offset;
-pub mod pin;
-mod port;
-mod procedure;
-pub mod product;
-pub mod register;
-pub mod sample;
-pub mod self_test;
-mod session;
-mod shell;
-pub mod sleep;
-#[cfg(feature = "serde")]
-mod stored;
-pub mod timing;
+mod burst;
+mod calibration;
+mod channel;
+mod clock;
+mod commands;
+mod config;
+mod driver;
+mod error;
+mod pins;
+mod protocol;
+mod register;
+mod sample;
+mod self_test;
+mod validity;
 
-pub use alarm::{Alarm, AlarmNumber, Threshold, Watch};
-pub use channel::Channel;
-pub use clock::{ClockMode, SampleClock, SamplePeriod, TimeBase};
-pub use compensation::Compensation;
-pub use config::{Config, ConfigError, GyroRange};
-pub use diagnosis::Diagnosis;
+pub use alarms::{Alarm, AlarmNumber, AlarmThreshold, AlarmWatch};
+pub use burst::{BURST_BYTES, BURST_REQUEST, Burst, Counts, OutputWord};
+pub use calibration::{FactoryRestore, GyroBias, OnChipCompensation};
+pub use channel::{Channel, GyroRange};
+pub use clock::{ClockMode, ConfigError, PerClockMode, SampleClock, SamplePeriod, TimeBase, Timing};
+pub use commands::{Product, Sleep};
+pub use config::{BartlettFilter, Config};
 #[cfg(feature = "async")]
 pub use driver::Async;
 pub use driver::{Adis16405, Blocking};
-pub use error::Error;
-pub use fault::Faults;
-pub use filter::Filter;
-pub use frame::{BURST_BYTES, BURST_REQUEST, Burst, OutputWord};
-pub use judge::{Counters, Judge, Verdict};
-pub use offset::{FactoryRestore, GyroBias};
-pub use pin::{DacLevel, Dio, Gpio, Line, Polarity, Signal};
-pub use product::Product;
+pub use error::{Diagnosis, Error};
+pub use pins::{DacLevel, Dio, DioLine, DioSignal, Gpio, Polarity};
 pub use register::{Access, Register};
-pub use sample::{Counts, Sample};
+pub use sample::ImuSample;
 pub use self_test::{FlashTest, SelfTest, Stimulus};
-pub use sleep::Sleep;
-pub use timing::{ByMode, Timing};
+pub use validity::{BurstValidator, FaultCounters, Faults, Validity};
+
+/// Compiles the example of the README as a documentation test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,4 +1,5 @@
-//! The register map: address, name, access and width of every register.
+//! The register map of the data sheet: address, name, access and width of every register, and the 16-bit SPI frames
+//! that read and write it.
 
 /// Whether a register may be read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -9,13 +10,13 @@ pub enum Access {
     Read,
     /// Read and write.
     ReadWrite,
-    /// Write only. (Reading GLOB_CMD would start a burst.)
+    /// Write only: GLOB_CMD, whose address starts a burst read when it is read, and SLP_CNT.
     Write,
 }
 
 macro_rules! registers {
     ($($(#[$doc:meta])* $variant:ident $name:literal $address:literal $access:ident $bits:literal,)*) => {
-        /// A register of the ADIS16405, named as in the data sheet; the value is the address of its lower byte.
+        /// A register of the ADIS16405, named as in the data sheet. The discriminant is the address of its lower byte.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -31,12 +32,12 @@ macro_rules! registers {
                 match self { $(Register::$variant => $name,)* }
             }
 
-            /// How it may be accessed.
+            /// Whether the register can be read, written, or both.
             pub const fn access(self) -> Access {
                 match self { $(Register::$variant => Access::$access,)* }
             }
 
-            /// Width in bits, from bit 0.
+            /// Number of bits that hold a value, counted from bit 0: 8 to 16.
             pub const fn bits(self) -> u32 {
                 match self { $(Register::$variant => $bits,)* }
             }
@@ -97,7 +98,7 @@ registers! {
     ZmagnSif "ZMAGN_SIF" 0x30 ReadWrite 12,
     /// Digital inputs and outputs.
     GpioCtrl "GPIO_CTRL" 0x32 ReadWrite 12,
-    /// Self-test, data-ready line, compensation.
+    /// Self-tests, data-ready line, on-chip compensation.
     MscCtrl "MSC_CTRL" 0x34 ReadWrite 12,
     /// Sample period: bit 7 time base, bits 6:0 NS.
     SmplPrd "SMPL_PRD" 0x36 ReadWrite 8,
@@ -105,17 +106,17 @@ registers! {
     SensAvg "SENS_AVG" 0x38 ReadWrite 11,
     /// Sleep. Sources disagree on whether it can be read, and on its width (8 bits, or bit 8 for an indefinite sleep).
     SlpCnt "SLP_CNT" 0x3A Write 9,
-    /// Diagnosis; reading clears it.
+    /// Status and error flags ([`Diagnosis`](crate::Diagnosis)); a read clears them.
     DiagStat "DIAG_STAT" 0x3C Read 16,
-    /// Commands. Reading it starts a burst.
+    /// Commands, one bit each. A read frame with this address starts a burst read.
     GlobCmd "GLOB_CMD" 0x3E Write 8,
     /// Threshold of alarm 1.
     AlmMag1 "ALM_MAG1" 0x40 ReadWrite 16,
     /// Threshold of alarm 2.
     AlmMag2 "ALM_MAG2" 0x42 ReadWrite 16,
-    /// Samples of alarm 1.
+    /// Samples over which alarm 1 takes the rate of change.
     AlmSmpl1 "ALM_SMPL1" 0x44 ReadWrite 8,
-    /// Samples of alarm 2.
+    /// Samples over which alarm 2 takes the rate of change.
     AlmSmpl2 "ALM_SMPL2" 0x46 ReadWrite 8,
     /// Alarm sources and outputs.
     AlmCtrl "ALM_CTRL" 0x48 ReadWrite 16,
@@ -131,22 +132,22 @@ impl Register {
         self as u8
     }
 
-    /// Bits that hold something; compare nothing else (offsets read back sign-extended).
+    /// The bits inside the register's width. Compare only these: the part sends offset registers sign-extended.
     pub const fn mask(self) -> u16 {
         if self.bits() >= 16 { u16::MAX } else { (1 << self.bits()) - 1 }
     }
 
-    /// The frame that asks for the register; the answer comes in the next frame.
+    /// The frame that requests the register's value. The part sends the value during the next frame.
     pub const fn read_frame(self) -> [u8; 2] {
         [self.address(), 0]
     }
 
-    /// The frame that writes the lower byte.
+    /// The frame that writes the lower byte of `value`.
     pub const fn write_low_frame(self, value: u16) -> [u8; 2] {
         [0x80 | self.address(), value.to_be_bytes()[1]]
     }
 
-    /// The frame that writes the upper byte.
+    /// The frame that writes the upper byte of `value`.
     pub const fn write_high_frame(self, value: u16) -> [u8; 2] {
         [0x80 | (self.address() + 1), value.to_be_bytes()[0]]
     }

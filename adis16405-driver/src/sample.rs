@@ -1,76 +1,39 @@
-//! One sample: twelve sign-extended counts, and what they mean.
+//! One sample in physical units.
 
-use crate::channel::Channel;
-use crate::config::GyroRange;
+use crate::burst::Counts;
+use crate::channel::{Channel, GyroRange};
 
-/// The twelve sign-extended counts of one sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Counts([i16; 12]);
-
-impl Counts {
-    /// Counts in burst order ([`Channel::ALL`]).
-    pub const fn new(counts: [i16; 12]) -> Self {
-        Self(counts)
-    }
-
-    /// The count of one channel.
-    pub const fn get(&self, channel: Channel) -> i16 {
-        self.0[channel as usize]
-    }
-
-    /// All counts in burst order.
-    pub const fn as_array(&self) -> &[i16; 12] {
-        &self.0
-    }
-
-    /// Angular rates x, y, z.
-    pub const fn gyro(&self) -> [i16; 3] {
-        [self.0[1], self.0[2], self.0[3]]
-    }
-
-    /// Specific forces x, y, z.
-    pub const fn accl(&self) -> [i16; 3] {
-        [self.0[4], self.0[5], self.0[6]]
-    }
-
-    /// Magnetic field x, y, z.
-    pub const fn magn(&self) -> [i16; 3] {
-        [self.0[7], self.0[8], self.0[9]]
-    }
-}
-
-/// The counts of one sample with what it takes to scale them, so that a scale is never that of another range.
+/// The counts of one sample with the gyro range they were taken in, and their values in physical units.
 ///
-/// Values with a unit come twice: as `f32`, and as exact `i32` in a millionth (temperature: a thousandth) of the unit
-/// for targets without an FPU.
+/// Each value exists as `f32` and, for targets without an FPU, as exact `i32` in 10⁻⁶ (temperature: 10⁻⁶ or 10⁻³) of
+/// the unit. Scale factors are those of the data sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Sample {
+pub struct ImuSample {
     counts: Counts,
     range: GyroRange,
     host_bias_x: i16,
 }
 
-/// One count of a bias register of the gyros, 0.0125 °/s, in 10⁻⁶ °/s.
+/// One count of XGYRO_OFF, 0.0125 °/s, in 10⁻⁶ °/s.
 const BIAS_UDPS: i32 = 12_500;
 
-impl Sample {
-    /// Counts that were taken in `range`.
+impl ImuSample {
+    /// From counts that were taken in `range`, without a host-side bias correction.
     pub const fn new(counts: Counts, range: GyroRange) -> Self {
         Self { counts, range, host_bias_x: 0 }
     }
 
-    /// Adds a bias correction in counts of 0.0125 °/s to the x rate: see [`GyroBias`](crate::GyroBias).
+    /// Sets the bias correction, in counts of 0.0125 °/s, that is added to the x rate: see
+    /// [`GyroBias`](crate::GyroBias).
     #[must_use]
     pub const fn with_host_bias_x(mut self, host_bias_x: i16) -> Self {
         self.host_bias_x = host_bias_x;
         self
     }
 
-    /// The counts as the part sent them, without the host's bias correction.
+    /// The counts as the part sent them, without the host-side bias correction.
     pub const fn counts(&self) -> &Counts {
         &self.counts
     }
@@ -80,19 +43,19 @@ impl Sample {
         self.range
     }
 
-    /// Bias correction that the host adds to the x rate, in counts of 0.0125 °/s.
+    /// The bias correction that is added to the x rate, in counts of 0.0125 °/s.
     pub const fn host_bias_x(&self) -> i16 {
         self.host_bias_x
     }
 
-    /// Angular rates about x, y, z in 10⁻⁶ °/s, bias correction included.
+    /// Angular rates about x, y, z in 10⁻⁶ °/s, host-side bias correction included.
     pub fn gyro_udps(&self) -> [i32; 3] {
         let lsb = self.range.lsb_udps();
         let [x, y, z] = self.counts.gyro().map(|count| i32::from(count) * lsb);
         [x + i32::from(self.host_bias_x) * BIAS_UDPS, y, z]
     }
 
-    /// Angular rates about x, y, z in °/s, bias correction included.
+    /// Angular rates about x, y, z in °/s, host-side bias correction included.
     pub fn gyro_dps(&self) -> [f32; 3] {
         self.gyro_udps().map(millionths)
     }
@@ -137,8 +100,8 @@ impl Sample {
         millionths(self.aux_adc_uv())
     }
 
-    /// Internal temperature in 10⁻⁶ °C, with `udegc_per_count`: sources give 140,000 (most drivers) and 135,700 (Analog
-    /// Devices' register map).
+    /// Internal temperature in 10⁻⁶ °C for a scale of `udegc_per_count` in 10⁻⁶ °C a count. Sources give 140,000 (most
+    /// drivers) and 135,700 (Analog Devices' register map).
     pub fn temp_udegc(&self, udegc_per_count: i32) -> i32 {
         25_000_000i32.saturating_add(i32::from(self.counts.get(Channel::Temp)).saturating_mul(udegc_per_count))
     }

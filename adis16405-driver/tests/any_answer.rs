@@ -1,28 +1,28 @@
-//! Whatever the bus answers, every procedure ends, in bounded time, with a value or an error.
+//! For any answer of the bus, every procedure ends in bounded time with a value or an error, and none panics.
 
 use std::convert::Infallible;
 
 use adis16405_driver::{
-    Adis16405, Alarm, AlarmNumber, BURST_BYTES, Channel, Config, DacLevel, GyroRange, Judge, Register, Stimulus,
-    Threshold, Watch,
+    Adis16405, Alarm, AlarmNumber, AlarmThreshold, AlarmWatch, BURST_BYTES, BurstValidator, Channel, Config, DacLevel,
+    GyroRange, Register, Stimulus,
 };
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// A bus that answers with the bytes that it has, over and over.
-struct Babble {
+/// A bus that answers with the given bytes, repeated.
+struct RepeatingBus {
     bytes: Vec<u8>,
     at: usize,
     transactions: usize,
 }
 
-impl ErrorType for Babble {
+impl ErrorType for RepeatingBus {
     type Error = Infallible;
 }
 
-impl SpiDevice for Babble {
+impl SpiDevice for RepeatingBus {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
         self.transactions += 1;
         for operation in operations {
@@ -37,11 +37,11 @@ impl SpiDevice for Babble {
     }
 }
 
-/// Sums what it is asked to wait, µs.
+/// The sum of the requested delays, µs.
 #[derive(Default)]
-struct Clock(u64);
+struct TotalDelay(u64);
 
-impl DelayNs for Clock {
+impl DelayNs for TotalDelay {
     fn delay_ns(&mut self, ns: u32) {
         self.0 += u64::from(ns).div_ceil(1000);
     }
@@ -51,7 +51,7 @@ impl DelayNs for Clock {
     }
 }
 
-/// Half of the answers contain a right PROD_ID somewhere, so that procedures get past their first step.
+/// Half of the answers begin with a valid PROD_ID, so that procedures get past the identification.
 fn answers() -> impl Strategy<Value = Vec<u8>> {
     let any = prop::collection::vec(any::<u8>(), 1..200);
     let plausible = any.clone().prop_map(|bytes| [vec![0x00, 0x00, 0x40, 0x15], bytes].concat());
@@ -66,49 +66,50 @@ proptest! {
     })]
 
     #[test]
-    fn every_procedure_ends(bytes in answers(), choice in 0..16u32, verify: bool) {
-        let bus = Babble { bytes, at: 0, transactions: 0 };
+    fn every_procedure_ends_in_bounded_time(bytes in answers(), choice in 0..16u32, verify: bool) {
+        let bus = RepeatingBus { bytes, at: 0, transactions: 0 };
         let mut imu = Adis16405::new(bus, Config::default()).with_verified_writes(verify);
-        let mut clock = Clock::default();
-        let alarm = Alarm { source: Channel::GyroZ, watch: Watch::RateOfChange(7), threshold: Threshold::Above(100) };
+        let mut delay = TotalDelay::default();
+        let (watch, threshold) = (AlarmWatch::RateOfChange(7), AlarmThreshold::Above(100));
+        let alarm = Alarm { source: Channel::GyroZ, watch, threshold };
         let ended: Result<String, _> = match choice {
-            0 => imu.start_up(&mut clock).map(|value| format!("{value:?}")),
-            1 => imu.software_reset(&mut clock).map(|value| format!("{value:?}")),
-            2 => imu.self_test(&mut clock).map(|value| format!("{value:?}")),
-            3 => imu.flash_test(&mut clock).map(|value| format!("{value:?}")),
-            4 => imu.stimulus_response(Stimulus::Negative, &mut clock).map(|value| format!("{value:?}")),
-            5 => imu.auto_null(&mut clock).map(|value| format!("{value:?}")),
-            6 => imu.precision_auto_null(&mut clock).map(|value| format!("{value:?}")),
-            7 => imu.factory_restore(&mut clock).map(|value| format!("{value:?}")),
-            8 => imu.flash_update(&mut clock).map(|value| format!("{value:?}")),
+            0 => imu.start_up(&mut delay).map(|value| format!("{value:?}")),
+            1 => imu.software_reset(&mut delay).map(|value| format!("{value:?}")),
+            2 => imu.self_test(&mut delay).map(|value| format!("{value:?}")),
+            3 => imu.flash_test(&mut delay).map(|value| format!("{value:?}")),
+            4 => imu.stimulus_response(Stimulus::Negative, &mut delay).map(|value| format!("{value:?}")),
+            5 => imu.auto_null(&mut delay).map(|value| format!("{value:?}")),
+            6 => imu.precision_auto_null(&mut delay).map(|value| format!("{value:?}")),
+            7 => imu.factory_restore(&mut delay).map(|value| format!("{value:?}")),
+            8 => imu.flash_update(&mut delay).map(|value| format!("{value:?}")),
             9 => imu.set_alarm(AlarmNumber::Two, Some(alarm)).map(|value| format!("{value:?}")),
             10 => imu.alarm(AlarmNumber::One).map(|value| format!("{value:?}")),
             11 => imu.set_range(GyroRange::Dps150).map(|value| format!("{value:?}")),
             12 => imu.keep_negative_x_bias_on_host().map(|value| format!("{value:?}")),
             13 => imu.set_aux_dac(DacLevel::default()).map(|value| format!("{value:?}")),
-            14 => imu.wake(&mut clock).map(|value| format!("{value:?}")),
+            14 => imu.wake(&mut delay).map(|value| format!("{value:?}")),
             _ => imu.read_registers([Register::TempOut, Register::DiagStat]).map(|value| format!("{value:?}")),
         };
         if let Err(error) = &ended {
             prop_assert!(!error.to_string().is_empty());
         }
-        // The longest pause is the precision null's 30 s, the most frames are those of eight samples, twice.
-        prop_assert!(clock.0 < 31_000_000, "{} µs", clock.0);
+        // The longest delay is the 30 s of the precision auto-null; a stimulus response takes the most frames.
+        prop_assert!(delay.0 < 31_000_000, "{} µs", delay.0);
         prop_assert!(imu.release().transactions < 1000);
     }
 
     #[test]
-    fn every_burst_is_judged(bytes in prop::collection::vec(any::<u8>(), 1..100)) {
-        let mut imu = Adis16405::new(Babble { bytes, at: 0, transactions: 0 }, Config::default());
-        let mut judge = Judge::default().with_x_sign_at_risk(true);
+    fn every_burst_is_validated_and_its_values_are_finite(bytes in prop::collection::vec(any::<u8>(), 1..100)) {
+        let mut imu = Adis16405::new(RepeatingBus { bytes, at: 0, transactions: 0 }, Config::default());
+        let mut validator = BurstValidator::default().with_x_sign_at_risk(true);
         for _ in 0..50 {
             let burst = imu.burst().unwrap();
-            let verdict = judge.judge(&burst);
-            prop_assert_eq!(verdict.faults.cause().is_none(), verdict.faults.is_empty());
-            let sample = imu.sample_of(burst);
+            let validity = validator.validate(&burst);
+            prop_assert_eq!(validity.faults.cause().is_none(), validity.faults.is_empty());
+            let sample = imu.sample_from(burst);
             prop_assert!(sample.gyro_dps().into_iter().chain(sample.accl_g()).all(f32::is_finite));
         }
-        prop_assert_eq!(judge.counters().bursts, 50);
+        prop_assert_eq!(validator.counters().bursts, 50);
         prop_assert_eq!(imu.release().at, 50 * BURST_BYTES);
     }
 }

@@ -1,9 +1,11 @@
-//! Configurations: which exist, and what rate they give.
+//! Configurations: sample rates, ranges with their filters, the response of the filter, serialisation.
 
-use adis16405_driver::{ClockMode, Config, ConfigError, GyroRange, SamplePeriod, TimeBase};
+use std::f64::consts::PI;
+
+use adis16405_driver::{BartlettFilter, ClockMode, Config, ConfigError, GyroRange, SamplePeriod, TimeBase};
 
 #[test]
-fn sample_rates() {
+fn sample_periods_are_those_of_the_data_sheet_and_nearest_finds_them() {
     // 0.61035 ms · (NS + 1) and 18.921 ms · (NS + 1); 819.2 SPS after reset. The printed periods have five digits.
     for (base, divisor, register, period_ms) in [
         (TimeBase::Fast, 2, 0x01, 2.0 * 0.61035),
@@ -29,17 +31,17 @@ fn sample_rates() {
     for (base, divisor) in [(TimeBase::Fast, 0), (TimeBase::Fast, 1), (TimeBase::Fast, 129), (TimeBase::Slow, 0)] {
         assert_eq!(SamplePeriod::from_divisor(base, divisor), Err(ConfigError::Divisor { base, divisor }));
     }
-    assert_eq!(SamplePeriod::from_register(0), None, "the external clock is not chosen by accident");
+    assert_eq!(SamplePeriod::from_register(0), None, "0 selects the external clock");
 }
 
 #[test]
-fn slow_sampling_slows_the_bus() {
+fn low_power_mode_begins_above_smpl_prd_8() {
     let mode = |register| SamplePeriod::from_register(register).unwrap().clock_mode();
     assert_eq!((mode(0x08), mode(0x09), mode(0x80)), (ClockMode::Normal, ClockMode::LowPower, ClockMode::LowPower));
 }
 
 #[test]
-fn narrow_ranges_need_taps() {
+fn narrow_ranges_need_more_filter_taps() {
     for (range, least, field) in
         [(GyroRange::Dps300, 0, 0x0400), (GyroRange::Dps150, 2, 0x0200), (GyroRange::Dps75, 4, 0x0100)]
     {
@@ -53,4 +55,110 @@ fn narrow_ranges_need_taps() {
         }
     }
     assert_eq!(Config::default().sens_avg(), 0x0402, "reset value of SENS_AVG");
+}
+
+/// The weights of two cascaded averages of `n` samples.
+fn weights(n: usize) -> Vec<f64> {
+    let mut weights = vec![0.0; 2 * n - 1];
+    for first in 0..n {
+        for second in 0..n {
+            weights[first + second] += 1.0 / (n * n) as f64;
+        }
+    }
+    weights
+}
+
+/// The magnitude of the discrete-time Fourier transform of `weights` at `frequency` cycles per sample.
+fn response(weights: &[f64], frequency: f64) -> f64 {
+    let at = |k: usize| 2.0 * PI * frequency * k as f64;
+    let real: f64 = weights.iter().enumerate().map(|(k, w)| w * at(k).cos()).sum();
+    let imaginary: f64 = weights.iter().enumerate().map(|(k, w)| w * at(k).sin()).sum();
+    real.hypot(imaginary)
+}
+
+#[test]
+fn the_response_is_that_of_two_cascaded_averages() {
+    for taps_log2 in 0..=6 {
+        let filter = BartlettFilter::new(taps_log2);
+        let weights = weights(1 << taps_log2);
+        assert_eq!(filter.length() as usize, weights.len());
+        for (age, weight) in weights.iter().enumerate() {
+            assert!((filter.weight(age as u32) - weight).abs() < 1e-15);
+        }
+        assert_eq!(filter.weight(filter.length()), 0.0);
+        let power: f64 = weights.iter().map(|w| w * w).sum();
+        assert!((filter.white_noise_gain() - power).abs() < 1e-15);
+        let delay: f64 = weights.iter().enumerate().map(|(k, w)| k as f64 * w).sum();
+        assert!(
+            (f64::from(filter.group_delay()) - delay).abs() < 1e-9,
+            "the delay of a symmetric filter is the centroid of its weights"
+        );
+        for step in -300..=300 {
+            let frequency = f64::from(step) * 0.01;
+            let difference = filter.gain(frequency) - response(&weights, frequency);
+            assert!(difference.abs() < 1e-12, "M = {taps_log2}, {frequency}: {difference:e}");
+        }
+    }
+}
+
+/// The divisors of the sample rate are those in the Linux driver of this part (drivers/iio/imu/adis16400.c).
+#[test]
+fn the_3_db_frequency_is_that_of_linux() {
+    assert_eq!(BartlettFilter::new(0).cutoff(), None);
+    for (taps_log2, divisor) in [(1, 6.0), (2, 12.0), (3, 25.0), (4, 50.0), (5, 100.0), (6, 200.0)] {
+        let filter = BartlettFilter::new(taps_log2);
+        let cutoff = filter.cutoff().unwrap();
+        assert!((filter.gain(cutoff).powi(2) - 0.5).abs() < 1e-12);
+        assert!((1.0 / cutoff - divisor).abs() <= 0.75, "M = {taps_log2}: fs/{}", 1.0 / cutoff);
+    }
+}
+
+#[test]
+fn a_configuration_returns_its_filter_of_at_most_64_taps() {
+    let config = Config::new(GyroRange::Dps75, 5, SamplePeriod::RESET).unwrap();
+    assert_eq!(config.filter().taps(), 32);
+    assert_eq!(BartlettFilter::new(200).taps(), 64, "M is 6 at most");
+}
+
+#[cfg(feature = "serde")]
+mod serialisation {
+    use adis16405_driver::{
+        Alarm, AlarmThreshold, AlarmWatch, Burst, Channel, Config, Counts, DacLevel, Diagnosis, Faults, GyroRange,
+        SamplePeriod, TimeBase, Timing,
+    };
+
+    fn assert_round_trip<T>(value: T)
+    where
+        T: serde::Serialize + serde::de::DeserializeOwned + PartialEq + std::fmt::Debug,
+    {
+        let text = serde_json::to_string(&value).unwrap();
+        assert_eq!(serde_json::from_str::<T>(&text).unwrap(), value, "{text}");
+    }
+
+    #[test]
+    fn values_survive_serialisation() {
+        let period = SamplePeriod::from_divisor(TimeBase::Slow, 7).unwrap();
+        assert_round_trip(Config::new(GyroRange::Dps75, 5, period).unwrap().with_external_clock());
+        assert_round_trip(Timing::DEFAULT);
+        assert_round_trip(Burst::from_counts(&Counts::new([2068, -1, 2, -3, 4, -5, 6, -7, 8, -9, 10, 11])));
+        assert_round_trip(Faults::SUPPLY | Faults::SHIFTED);
+        assert_round_trip(Diagnosis::ALARM_2);
+        assert_round_trip(DacLevel::from_counts(4095).unwrap());
+        assert_round_trip(Alarm {
+            source: Channel::MagnY,
+            watch: AlarmWatch::RateOfChange(3),
+            threshold: AlarmThreshold::Below(-7),
+        });
+    }
+
+    #[test]
+    fn values_that_the_part_does_not_accept_are_not_deserialised() {
+        let good = serde_json::to_string(&Config::default()).unwrap();
+        let narrow = good.replace("Dps300", "Dps75");
+        assert_ne!(narrow, good);
+        let error = serde_json::from_str::<Config>(&narrow).unwrap_err().to_string();
+        assert!(error.contains("filter taps 2^2 are outside 2^4 to 2^6 for Dps75"), "{error}");
+        assert!(serde_json::from_str::<SamplePeriod>("0").is_err());
+        assert!(serde_json::from_str::<DacLevel>("4096").is_err());
+    }
 }

@@ -1,10 +1,11 @@
-//! Output words and bursts of real, still ADIS16405s (psas/stm32, `adis16405_log.txt-example`; psas/Launch-10), decoded.
+//! Decoding of output words and bursts that were recorded from real ADIS16405s at rest (psas/stm32,
+//! `adis16405_log.txt-example`; psas/Launch-10).
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 
-use adis16405_driver::{Burst, Channel, Faults, GyroRange, Judge, OutputWord};
+use adis16405_driver::{Burst, BurstValidator, Channel, Faults, GyroRange, OutputWord};
 use flate2::read::GzDecoder;
 
 /// Columns of the recording after the time stamp.
@@ -20,7 +21,7 @@ const COLUMNS: [Channel; 9] = [
     Channel::MagnZ,
 ];
 
-/// The recording; `None`, said aloud, where it is absent.
+/// The path of the recording; `None`, with a message, where it is absent.
 fn recording(test: &str, file: &str) -> Option<PathBuf> {
     let recordings = match std::env::var_os("ADIS_RECORDINGS") {
         Some(folder) => PathBuf::from(folder),
@@ -28,7 +29,7 @@ fn recording(test: &str, file: &str) -> Option<PathBuf> {
     };
     let path = recordings.join(file);
     if !path.exists() {
-        // Not by a macro, which the test harness would hide.
+        // Not by eprintln!, whose output the test harness hides.
         writeln!(std::io::stderr(), "skipped {test}: {} is absent", path.display()).expect("stderr");
         return None;
     }
@@ -36,8 +37,8 @@ fn recording(test: &str, file: &str) -> Option<PathBuf> {
 }
 
 #[test]
-fn recorded_words_are_those_of_a_still_sensor() {
-    let test = "recorded_words_are_those_of_a_still_sensor";
+fn recorded_words_are_those_of_a_sensor_at_rest() {
+    let test = "recorded_words_are_those_of_a_sensor_at_rest";
     let Some(path) = recording(test, "adis16405-words/stm32.csv") else { return };
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
@@ -72,24 +73,25 @@ fn recorded_words_are_those_of_a_still_sensor() {
         rates.sort_by(f64::total_cmp);
         let median = rates[rates.len() / 2];
         assert!(median.abs() < 3.0, "initial bias error is ±3 deg/s, {:?} shows {median}", COLUMNS[gyro]);
-        // Noise density 0.05 deg/s/sqrt(Hz) up to 409.6 Hz, through two averages of four (sum of squared weights 44/256),
-        // is 0.42 deg/s: 1.7 % of the rows may stray by more than 1 deg/s, none by more than five times 0.42.
-        let strays = rates.iter().filter(|rate| (*rate - median).abs() >= 1.0).count();
-        assert!(strays * 1000 <= rates.len() * 17, "{:?}: {strays} rows stray from {median}", COLUMNS[gyro]);
+        // Noise density 0.05 deg/s/sqrt(Hz) up to 409.6 Hz, through two averages of four (sum of squared weights
+        // 44/256), is 0.42 deg/s: 1.7 % of the rows may deviate by more than 1 deg/s, none by more than five times
+        // 0.42.
+        let outliers = rates.iter().filter(|rate| (*rate - median).abs() >= 1.0).count();
+        assert!(outliers * 1000 <= rates.len() * 17, "{:?}: {outliers} rows deviate from {median}", COLUMNS[gyro]);
         let farthest = (median - rates[0]).max(rates[rates.len() - 1] - median);
-        assert!(farthest < 2.1, "{:?} strays {farthest} deg/s from {median}", COLUMNS[gyro]);
+        assert!(farthest < 2.1, "{:?} deviates by {farthest} deg/s from {median}", COLUMNS[gyro]);
     }
 }
 
-/// Counts are put back into their fields with plain arithmetic; what the driver makes of them must be the same counts.
+/// The recorded counts are encoded into words by plain arithmetic; the driver must decode the same counts from them.
 #[test]
-fn recorded_bursts_survive_the_wire_and_chance_repetitions_are_told() {
-    let test = "recorded_bursts_survive_the_wire_and_chance_repetitions_are_told";
+fn recorded_bursts_are_decoded_and_their_repetitions_are_usable() {
+    let test = "recorded_bursts_are_decoded_and_their_repetitions_are_usable";
     let Some(path) = recording(test, "adis16405-burst/launch10.csv.gz") else { return };
     let mut lines = BufReader::new(GzDecoder::new(File::open(path).unwrap())).lines().map(Result::unwrap);
     assert!(lines.next().unwrap().starts_with("time_s,supply_counts,gyro_x_counts,"));
 
-    let mut judge = Judge::default();
+    let mut validator = BurstValidator::default();
     let mut previous = Burst::default();
     let (mut bursts, mut other_words) = (0, 0);
     for line in lines {
@@ -104,14 +106,14 @@ fn recorded_bursts_survive_the_wire_and_chance_repetitions_are_told() {
         let burst = Burst::from_bytes(&bytes.try_into().unwrap());
         assert!(burst.counts().as_array().iter().map(|count| i32::from(*count)).eq(counts));
 
-        let verdict = judge.judge(&burst);
-        assert!(verdict.usable && (verdict.faults - Faults::REPEATED).is_empty(), "{line}: {:?}", verdict.faults);
-        if verdict.faults.contains(Faults::REPEATED) {
+        let validity = validator.validate(&burst);
+        assert!(validity.usable && (validity.faults - Faults::REPEATED).is_empty(), "{line}: {:?}", validity.faults);
+        if validity.faults.contains(Faults::REPEATED) {
             other_words += u32::from(burst != previous);
         }
         previous = burst;
         bursts += 1;
     }
-    // Of the 45 neighbours with equal inertial words 37 differ in others: new samples, equal by chance.
-    assert_eq!((bursts, judge.counters().get(Faults::REPEATED), other_words), (49_425, 45, 37));
+    // 37 of the 45 repetitions of the inertial words differ in other words: new samples, equal by chance.
+    assert_eq!((bursts, validator.counters().get(Faults::REPEATED), other_words), (49_425, 45, 37));
 }

@@ -1,4 +1,5 @@
-//! A mock bus on which every byte and every pause is foretold, and the same call on it through both shells.
+//! A mock bus that checks every byte and every pause, and the same call through the blocking and the asynchronous
+//! driver.
 
 use embedded_hal_mock::eh1::spi::Transaction;
 
@@ -20,32 +21,32 @@ pub(crate) fn frame(sent: [u8; 2], answer: u16) -> Frames {
     frame_with(STALL_NS, &sent, &answer.to_be_bytes())
 }
 
-/// What the part sends where nothing is defined.
+/// The answer of the part where the data sheet defines none.
 const UNDEFINED: u16 = 0xA55A;
 
-/// A read: the address, then 0x0000 during which the answer comes.
+/// A read: the address, then 0x0000, during which the answer comes.
 pub(crate) fn read(address: u8, answer: u16) -> Frames {
     [frame([address, 0], UNDEFINED), frame([0, 0], answer)].concat()
 }
 
-/// Several reads in one go: each frame brings the answer to the one before.
+/// Overlapping reads: each frame brings the answer to the one before.
 pub(crate) fn read_all(reads: &[(u8, u16)]) -> Frames {
     let asked = reads.iter().map(|read| read.0).chain([0]);
     let answers = [UNDEFINED].into_iter().chain(reads.iter().map(|read| read.1));
     asked.zip(answers).flat_map(|(address, answer)| frame([address, 0], answer)).collect()
 }
 
-/// A write of one byte: bit 15 and the byte's own address.
+/// A write of one byte: bit 15, the address of the byte, the byte.
 pub(crate) fn write(address: u8, byte: u8) -> Frames {
     frame([0x80 | address, byte], UNDEFINED)
 }
 
-/// What ends an `init`: XGYRO_OFF to ZGYRO_OFF.
+/// The last reads of an `init`: XGYRO_OFF, YGYRO_OFF, ZGYRO_OFF.
 pub(crate) fn gyro_offsets(x: u16, y: u16, z: u16) -> Frames {
     read_all(&[(0x1A, x), (0x1C, y), (0x1E, z)])
 }
 
-/// An `init` of a part that is configured already.
+/// The frames of an `init` on a part that is already configured.
 pub(crate) fn init(smpl_prd: u16, sens_avg: u16) -> Frames {
     [read(0x56, 16405), read(0x36, smpl_prd), read(0x38, sens_avg), gyro_offsets(0, 0, 0)].concat()
 }
@@ -59,8 +60,9 @@ pub(crate) fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
-/// `both!(config; frames; pauses in µs; |imu, delay| call)`: what the call returns, the same through both shells, with
-/// exactly these frames on the bus and these pauses between them. `with` changes the driver before.
+/// `both!(config; frames; pauses in µs; |imu, delay| call)`: makes the call on the blocking and on the asynchronous
+/// driver and returns its result, which must be the same. The bus must see exactly these frames, the delay these
+/// pauses. `with` sets options of the driver.
 macro_rules! both {
     ($config:expr; $frames:expr; $pauses:expr; |$imu:ident, $delay:ident| $call:expr) => {
         both!($config, with []; $frames; $pauses; |$imu, $delay| $call)
@@ -85,11 +87,11 @@ macro_rules! both {
             let asynchronous = crate::harness::block_on(async { $call.await });
             $imu.release().done();
             $delay.done();
-            assert_eq!(asynchronous, blocking, "the two shells differ");
+            assert_eq!(asynchronous, blocking, "the blocking and the asynchronous driver differ");
         }
         blocking
     }};
 }
 
-/// No pauses.
+/// No pauses, for methods without a delay.
 pub(crate) const NONE: [u32; 0] = [];

@@ -1,13 +1,11 @@
-//! Exact bytes and pauses of every public method, through both shells. Addresses, bits and times are written down again
-//! here from the data sheet and its like, not taken from the driver.
+//! The exact bytes and pauses of every public method, on the blocking and on the asynchronous driver. Addresses, bits
+//! and times are copied from the data sheet, not taken from the driver.
 
 #[macro_use]
 mod harness;
 
-mod alarms;
+mod calibration;
 mod commands;
-mod corrections;
-mod frames;
-mod pins;
-mod self_tests;
-mod start;
+mod pins_and_alarms;
+mod registers_and_bursts;
+mod self_test;

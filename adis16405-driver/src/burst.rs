@@ -1,23 +1,22 @@
-//! What crosses the wire: output words and the burst read.
+//! The burst read: its bytes on the bus, its twelve output words, and the counts that they hold.
 
 use embedded_hal::spi::Operation;
 
 use crate::channel::Channel;
-use crate::fault::{Faults, burst_faults};
-use crate::sample::Counts;
 
-/// Bytes in a burst read: the request and twelve output words.
+/// Bytes in a burst read: the two-byte request and twelve 16-bit output words.
 pub const BURST_BYTES: usize = 26;
 
-/// What the controller sends in a burst read: a read of GLOB_CMD (0x3E00), then zeros.
+/// The bytes that the controller sends in a burst read: a read of GLOB_CMD (0x3E00), then zeros.
 pub const BURST_REQUEST: [u8; BURST_BYTES] = {
     let mut request = [0; BURST_BYTES];
     request[0] = 0x3E;
     request
 };
 
-/// The operations of a burst read with a pause of `gap_ns` between its words and the stall at its end.
-pub(crate) fn spaced_burst(
+/// The operations of a burst read with a pause of `gap_ns` after each word but the last, and of `stall_ns` after the
+/// last.
+pub(crate) fn burst_with_gaps(
     answer: &mut [u8; BURST_BYTES],
     gap_ns: u32,
     stall_ns: u32,
@@ -25,7 +24,7 @@ pub(crate) fn spaced_burst(
     static REQUEST: [u8; BURST_BYTES] = BURST_REQUEST;
     let mut words = answer.chunks_exact_mut(2).zip(REQUEST.chunks_exact(2));
     core::array::from_fn(|index| {
-        // Words and pauses take turns: as many operations as there are bytes.
+        // 13 words alternate with 13 pauses: 26 operations.
         let word = if index % 2 == 0 { words.next() } else { None };
         match word {
             Some((answer, request)) => Operation::Transfer(answer, request),
@@ -37,19 +36,21 @@ pub(crate) fn spaced_burst(
 const NEW_DATA: u16 = 1 << 15;
 const ERROR_ALARM: u16 = 1 << 14;
 
-/// An output register as read: bit 15 new data, bit 14 error or alarm, below them the 12- or 14-bit field.
+/// An output register as read: bit 15 is the new-data flag, bit 14 the error/alarm flag, below them the 12- or 14-bit
+/// data field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OutputWord(pub u16);
 
 impl OutputWord {
-    /// The word of a fresh, healthy reading: new data set, error clear, `counts` cut to the channel's field.
-    pub const fn fresh(channel: Channel, counts: i16) -> Self {
+    /// The word that a part without errors sends for a new sample: new-data flag set, error flag clear, `counts`
+    /// truncated to the channel's width.
+    pub const fn from_counts(channel: Channel, counts: i16) -> Self {
         Self(NEW_DATA | (counts as u16 & field_mask(channel)))
     }
 
-    /// Bit 15: the register was updated since it was last read.
+    /// Bit 15: the register was updated since the previous read.
     pub const fn new_data(self) -> bool {
         self.0 & NEW_DATA != 0
     }
@@ -59,7 +60,7 @@ impl OutputWord {
         self.0 & ERROR_ALARM != 0
     }
 
-    /// The data field as it is, without the flags and without a sign.
+    /// The data field without flags and without sign extension.
     pub const fn field(self, channel: Channel) -> u16 {
         self.0 & field_mask(channel)
     }
@@ -80,7 +81,7 @@ const fn field_mask(channel: Channel) -> u16 {
     (1 << channel.bits()) - 1
 }
 
-/// How far a field must be moved to have its top bit in bit 15, and whether that is a sign; in burst order.
+/// For each channel in burst order: the left shift that moves its sign bit to bit 15, and whether it is signed.
 const FIELDS: [(u32, bool); 12] = {
     let mut fields = [(0, false); 12];
     let mut index = 0;
@@ -101,8 +102,10 @@ pub struct Burst {
 }
 
 impl Burst {
-    /// Reads what came in during a burst. The first two bytes (while the request went out) carry no data.
-    /// Every input is accepted: whether to believe it is the question of [`Judge`](crate::Judge).
+    /// Decodes the 26 bytes received during a burst read. The first two, received while the request is sent, are
+    /// ignored.
+    ///
+    /// Any bytes are accepted; [`BurstValidator`](crate::BurstValidator) decides whether the words are usable.
     pub fn from_bytes(bytes: &[u8; BURST_BYTES]) -> Self {
         let mut words = [OutputWord::default(); 12];
         for (word, pair) in words.iter_mut().zip(bytes[2..].chunks_exact(2)) {
@@ -111,16 +114,17 @@ impl Burst {
         Self { words }
     }
 
-    /// The burst of a fresh, healthy sample: inverse of [`counts`](Self::counts) for counts inside their fields.
-    pub fn fresh(counts: &Counts) -> Self {
+    /// The burst that a part without errors sends for a new sample with these counts. For counts inside the width of
+    /// their channel it is the inverse of [`counts`](Self::counts).
+    pub fn from_counts(counts: &Counts) -> Self {
         let mut words = [OutputWord::default(); 12];
         for (word, channel) in words.iter_mut().zip(Channel::ALL) {
-            *word = OutputWord::fresh(channel, counts.get(channel));
+            *word = OutputWord::from_counts(channel, counts.get(channel));
         }
         Self { words }
     }
 
-    /// The bytes that the part sends in a burst, the two before the data zero; inverse of
+    /// The 26 bytes that the part sends in a burst read, the first two of them zero; inverse of
     /// [`from_bytes`](Self::from_bytes).
     pub fn to_bytes(&self) -> [u8; BURST_BYTES] {
         let mut bytes = [0; BURST_BYTES];
@@ -130,7 +134,7 @@ impl Burst {
         bytes
     }
 
-    /// Sign-extended counts.
+    /// The data fields of the twelve words, sign-extended where the channel is signed.
     pub fn counts(&self) -> Counts {
         let mut counts = [0; 12];
         for ((count, word), (shift, signed)) in counts.iter_mut().zip(self.words).zip(FIELDS) {
@@ -139,10 +143,42 @@ impl Burst {
         }
         Counts::new(counts)
     }
+}
 
-    /// Faults that this burst shows by itself; [`Faults::REPEATED`], [`Faults::FROZEN`] and [`Faults::X_SIGN`] need a
-    /// [`Judge`](crate::Judge).
-    pub fn faults(&self) -> Faults {
-        burst_faults(self)
+/// The twelve register counts of one sample, sign-extended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counts([i16; 12]);
+
+impl Counts {
+    /// From counts in burst order ([`Channel::ALL`]).
+    pub const fn new(counts: [i16; 12]) -> Self {
+        Self(counts)
+    }
+
+    /// The count of one channel.
+    pub const fn get(&self, channel: Channel) -> i16 {
+        self.0[channel as usize]
+    }
+
+    /// All counts in burst order.
+    pub const fn as_array(&self) -> &[i16; 12] {
+        &self.0
+    }
+
+    /// Counts of the gyroscopes x, y, z.
+    pub const fn gyro(&self) -> [i16; 3] {
+        [self.0[1], self.0[2], self.0[3]]
+    }
+
+    /// Counts of the accelerometers x, y, z.
+    pub const fn accl(&self) -> [i16; 3] {
+        [self.0[4], self.0[5], self.0[6]]
+    }
+
+    /// Counts of the magnetometers x, y, z.
+    pub const fn magn(&self) -> [i16; 3] {
+        [self.0[7], self.0[8], self.0[9]]
     }
 }

@@ -1,4 +1,4 @@
-//! Single registers and bursts.
+//! Reads and writes of registers, and bursts.
 
 use adis16405_driver::{Access, Adis16405, Config, Error, GyroRange, Register, SamplePeriod, Timing};
 use embedded_hal_mock::eh1::spi::{Mock, Transaction};
@@ -17,7 +17,7 @@ fn new_sends_nothing() {
 }
 
 #[test]
-fn a_read_is_two_frames_and_several_overlap() {
+fn a_read_is_two_frames_and_several_reads_overlap() {
     let value =
         both!(Config::default(); [read(0x3C, 0x1234)]; NONE; |imu, delay| imu.read_register(Register::DiagStat));
     assert_eq!(value, Ok(0x1234));
@@ -30,16 +30,16 @@ fn a_read_is_two_frames_and_several_overlap() {
 }
 
 #[test]
-fn the_low_power_mode_stalls_longer() {
+fn the_stall_is_75_us_in_low_power_mode() {
     let slow = |answer: [u8; 2], sent: [u8; 2]| frame_with(75_000, &sent, &answer);
     let bus = [slow([0, 0], [0x3C, 0]), slow([0x12, 0x34], [0, 0])];
     let low_power = config(GyroRange::Dps300, 2, 0x09);
     assert_eq!(both!(low_power; bus; NONE; |imu, delay| imu.read_register(Register::DiagStat)), Ok(0x1234));
 }
 
-/// Linux has the border of low-power mode one higher.
+/// Linux has the limit of normal mode one higher than the data sheet.
 #[test]
-fn the_border_of_low_power_mode_can_be_set() {
+fn the_limit_of_normal_mode_can_be_set() {
     let timing = Timing { normal_mode_max_smpl_prd: 0x09, ..Timing::DEFAULT };
     let config = config(GyroRange::Dps300, 2, 0x09);
     let value = both!(config, with [.with_timing(timing)]; [read(0x00, 7)]; NONE; |imu, delay| imu.flash_writes());
@@ -55,7 +55,7 @@ fn the_stall_can_be_set() {
 }
 
 #[test]
-fn registers_are_written_byte_by_byte_the_lower_first() {
+fn registers_are_written_by_bytes_with_the_lower_first() {
     let bus = [write(0x1A, 0x34), write(0x1B, 0x12)];
     let written = both!(Config::default(); bus; NONE; |imu, delay| imu.write_register(Register::XgyroOff, 0x1234));
     assert_eq!(written, Ok(()));
@@ -72,14 +72,14 @@ fn an_update_writes_the_bytes_that_change_and_reads_back() {
     assert_eq!(update(vec![read(0x48, 0x1234), write(0x49, 0xA2), read(0x48, 0xA234)], 0xF000, 0xA000), Ok(()));
     let both_bytes = vec![read(0x48, 0x1234), write(0x48, 0xCD), write(0x49, 0xAB), read(0x48, 0xABCD)];
     assert_eq!(update(both_bytes, 0xFFFF, 0xABCD), Ok(()));
-    // Bits outside the mask may change by themselves.
+    // Other bits of the register may change in between.
     assert_eq!(update(vec![read(0x48, 0x1234), write(0x48, 0x54), read(0x48, 0xFF5F)], 0x00F0, 0x0050), Ok(()));
     let refused = update(vec![read(0x48, 0x1234), write(0x48, 0x54), read(0x48, 0x1234)], 0x00F0, 0x0050);
     assert_eq!(refused, Err(Error::Verify { register: Register::AlmCtrl, expected: 0x0050, answer: 0x0030 }));
 }
 
 #[test]
-fn verification_can_be_left_out() {
+fn without_verification_nothing_is_read_back() {
     let bus = [read(0x36, 0x0001), write(0x36, 0x05)];
     let written = both!(Config::default(), with [.with_verified_writes(false)]; bus; NONE;
         |imu, delay| imu.update_register(Register::SmplPrd, 0xFFFF, 0x05));
@@ -87,7 +87,7 @@ fn verification_can_be_left_out() {
 }
 
 #[test]
-fn access_is_respected_without_touching_the_bus() {
+fn a_forbidden_access_is_refused_without_bus_traffic() {
     for &register in Register::ALL {
         if register.access() == Access::Read {
             let refused = Err(Error::ReadOnly(register));
@@ -112,7 +112,7 @@ fn access_is_respected_without_touching_the_bus() {
     }
 }
 
-/// 0x3E00, then zeros; the answer starts with the third byte.
+/// The bytes sent, 0x3E00 and zeros, and those received, whose words start with the third byte.
 fn burst_bytes() -> ([u8; 26], [u8; 26]) {
     let mut sent = [0; 26];
     sent[0] = 0x3E;
@@ -137,7 +137,7 @@ fn a_burst_is_one_transaction_of_26_bytes() {
 }
 
 #[test]
-fn a_burst_can_have_gaps_between_its_words() {
+fn a_word_gap_splits_a_burst_into_13_transfers() {
     let (sent, answer) = burst_bytes();
     let mut bus = vec![Transaction::transaction_start()];
     for word in 0..13 {
@@ -152,9 +152,9 @@ fn a_burst_can_have_gaps_between_its_words() {
     assert_eq!(burst.words[11].0, 0x9697);
 }
 
-/// The register map of the data sheet: the address of a register's lower byte.
+/// The addresses of the lower bytes, and widths, of the data sheet's register map.
 #[test]
-fn addresses() {
+fn registers_have_the_addresses_and_widths_of_the_data_sheet() {
     let mut expected: Vec<u8> = (0x00..=0x4A).step_by(2).collect();
     expected.push(0x56);
     let addresses: Vec<u8> = Register::ALL.iter().map(|register| register.address()).collect();

@@ -1,17 +1,18 @@
-//! Offsets 0x1A to 0x24, hard iron 0x26 to 0x2A, soft iron 0x2C to 0x30. The part reads offsets back sign-extended.
+//! Offsets 0x1A to 0x24, hard iron 0x26 to 0x2A, soft iron 0x2C to 0x30, on-chip compensation (MSC_CTRL 0x34, bits 7
+//! and 6). The part sends offsets sign-extended.
 
-use adis16405_driver::{Config, Error, GyroBias, Register};
+use adis16405_driver::{Config, Error, GyroBias, OnChipCompensation, Register};
 
 use crate::harness::{Frames, NONE, gyro_offsets, read, read_all, write};
 
-/// One register that is set: read, both bytes written, read back.
+/// The frames that set a register: a read, writes of both bytes, and a read back.
 fn set(address: u8, value: u16, width: u16) -> Frames {
     let [upper, lower] = (value & width).to_be_bytes();
     [read(address, 0x1111 & width), write(address, lower), write(address + 1, upper), read(address, value)].concat()
 }
 
 #[test]
-fn gyro_offsets_are_13_bits_and_a_negative_x_stays_on_the_host() {
+fn gyro_offsets_are_13_bits_and_the_driver_applies_a_negative_x() {
     let bias = both!(Config::default(); [gyro_offsets(0xFFC8, 0x1FC8, 0x0FFF)]; NONE; |imu, delay| imu.gyro_offsets());
     assert_eq!(bias, Ok(GyroBias { part: [-56, -56, 4095], host_x: 0 }));
 
@@ -45,7 +46,7 @@ fn accelerometer_offsets_are_12_bits_and_hard_iron_14() {
 }
 
 #[test]
-fn soft_iron_is_12_bits_without_a_sign() {
+fn soft_iron_is_12_bits_unsigned() {
     let bus = [read_all(&[(0x2C, 0x0800), (0x2E, 0x0FFF), (0x30, 0xF000)])];
     assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.soft_iron()), Ok([0x0800, 0x0FFF, 0]));
     let bus = [set(0x2C, 0x0800, 0x0FFF), set(0x2E, 0x0FFF, 0x0FFF), set(0x30, 0x0000, 0x0FFF)];
@@ -53,7 +54,7 @@ fn soft_iron_is_12_bits_without_a_sign() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_before_anything_is_sent() {
+fn values_that_do_not_fit_are_refused_without_bus_traffic() {
     let empty = || [Frames::new()];
     for (x, y, z, register, value) in [
         (4096, 0, 0, Register::XgyroOff, 4096),
@@ -71,4 +72,19 @@ fn what_does_not_fit_is_refused_before_anything_is_sent() {
     assert_eq!(refused.unwrap_err().to_string(), "-8193 does not fit YMAGN_HIF");
     let refused = both!(Config::default(); empty(); NONE; |imu, delay| imu.set_soft_iron([0x1000, 0, 0]));
     assert_eq!(refused, Err(Error::Value { register: Register::XmagnSif, value: 0x1000 }));
+}
+
+#[test]
+fn each_compensation_has_its_bit() {
+    for (bits, linear_acceleration, origin_alignment) in
+        [(0x00, false, false), (0x40, false, true), (0x80, true, false), (0xC0, true, true)]
+    {
+        let compensation = OnChipCompensation { linear_acceleration, origin_alignment };
+        let control = 0x0006 | bits;
+        let got = both!(Config::default(); [read(0x34, control)]; NONE; |imu, delay| imu.compensation());
+        assert_eq!(got, Ok(compensation));
+        let other = control ^ 0x40;
+        let bus = [read(0x34, other), write(0x34, control as u8), read(0x34, control)];
+        assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_compensation(compensation)), Ok(()));
+    }
 }

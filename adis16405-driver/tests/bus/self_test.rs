@@ -1,4 +1,5 @@
-//! Internal self-test, flash test, stimulus. MSC_CTRL 0x34: bit 11 flash test, 10 self-test, 9 negative, 8 positive.
+//! Internal self-test, flash test, manual self-test. MSC_CTRL 0x34: bit 11 flash test, 10 internal self-test, 9 and 8
+//! manual self-test, negative and positive.
 
 use adis16405_driver::{Config, Diagnosis, Error, FlashTest, Register, SelfTest, Stimulus};
 
@@ -24,7 +25,7 @@ fn a_self_test_is_polled_until_its_bit_clears() {
 }
 
 #[test]
-fn a_manual_self_test_that_was_on_is_taken_up_again() {
+fn a_manual_self_test_that_was_on_is_switched_on_again() {
     let bus = [
         read(0x56, 16405),
         read(0x3C, 0),
@@ -41,9 +42,9 @@ fn a_manual_self_test_that_was_on_is_taken_up_again() {
     assert!(outcome.passed());
 }
 
-/// A part that was asleep shows no bit set and no failure: that is not a pass.
+/// A sleeping part never shows the test bit set, and reports no failure. That is not a pass.
 #[test]
-fn a_test_that_never_ran_is_not_passed() {
+fn a_test_that_did_not_run_is_not_passed() {
     let bus = || {
         [
             read(0x56, 16405),
@@ -59,9 +60,9 @@ fn a_test_that_never_ran_is_not_passed() {
     assert_eq!((outcome.ran, outcome.diagnosis, outcome.passed()), (false, Diagnosis::empty(), false));
 }
 
-/// 17 ms usually, 34 ms at most, in steps of 1 ms.
+/// The test takes 17 ms; the deadline is 34 ms, and the poll interval 1 ms.
 #[test]
-fn a_flash_test_that_does_not_end_meets_its_deadline() {
+fn a_flash_test_that_does_not_end_is_an_error_at_the_deadline() {
     let mut bus = vec![read(0x56, 16405), read(0x3C, 0), read(0x34, 6), write(0x35, 0x08)];
     bus.extend((0..35).map(|_| read(0x34, 0x0806)));
     let pauses = [1_000; 34];
@@ -72,7 +73,7 @@ fn a_flash_test_that_does_not_end_meets_its_deadline() {
 }
 
 #[test]
-fn a_flash_test_tells_a_wrong_checksum() {
+fn a_flash_test_reports_a_wrong_checksum() {
     let bus = [
         read(0x56, 16405),
         read(0x3C, 0),
@@ -90,7 +91,7 @@ fn a_flash_test_tells_a_wrong_checksum() {
 }
 
 #[test]
-fn a_stimulus_is_measured_against_rest_and_taken_away() {
+fn a_stimulus_response_is_a_difference_of_means_and_the_stimulus_is_switched_off() {
     for (stimulus, bit) in [(Stimulus::Positive, 0x01u8), (Stimulus::Negative, 0x02)] {
         let sample = |k: u16| {
             read_all(&[
@@ -107,7 +108,7 @@ fn a_stimulus_is_measured_against_rest_and_taken_away() {
         bus.extend([read(0x34, 0x0006), write(0x35, bit), read(0x34, u16::from(bit) << 8 | 6)]);
         bus.extend((0..8).map(|_| sample(500)));
         bus.extend([read(0x34, u16::from(bit) << 8 | 6), write(0x35, 0x00), read(0x34, 0x0006)]);
-        // 12 ms and eight sample periods for the filter of 2·4 taps to settle, then a period of 2 · 0.611 ms a sample.
+        // 12 ms and eight sample periods until the filter of 2 · 4 taps has settled, then 2 · 0.611 ms per sample.
         let mean = [[12_000 + 8 * 1_222].as_slice(), [1_222; 8].as_slice()].concat();
         let pauses = [mean.clone(), mean].concat();
         let response = both!(Config::default(); bus.clone(); pauses.clone();
@@ -117,7 +118,7 @@ fn a_stimulus_is_measured_against_rest_and_taken_away() {
 }
 
 #[test]
-fn a_diagnosis_is_handed_out_as_it_was_read() {
+fn a_diagnosis_has_the_bits_that_were_read() {
     for bits in [0x0000, 0xFFFF, 0x0080, 0x8420] {
         let diagnosis = both!(Config::default(); [read(0x3C, bits)]; NONE; |imu, delay| imu.diagnosis());
         assert_eq!(diagnosis.map(|diagnosis| diagnosis.bits()), Ok(bits));

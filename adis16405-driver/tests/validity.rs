@@ -1,6 +1,6 @@
-//! Which bursts are believed, and what is counted.
+//! The faults that bursts show, which of them leave the data usable, and how they are counted.
 
-use adis16405_driver::{Burst, Channel, Counts, Faults, Judge, OutputWord};
+use adis16405_driver::{Burst, BurstValidator, Channel, Counts, Faults, OutputWord};
 
 /// A still, level sensor at 5 V (count 2068).
 const STILL: [i16; 12] = [2068, 3, -2, 1, 4, -5, 300, 120, -40, 500, 20, 1000];
@@ -8,18 +8,18 @@ const STILL: [i16; 12] = [2068, 3, -2, 1, 4, -5, 300, 120, -40, 500, 20, 1000];
 fn burst(change: impl FnOnce(&mut [i16; 12])) -> Burst {
     let mut counts = STILL;
     change(&mut counts);
-    Burst::fresh(&Counts::new(counts))
+    Burst::from_counts(&Counts::new(counts))
 }
 
 #[test]
-fn a_healthy_burst_is_usable() {
-    let verdict = Judge::default().judge(&burst(|_| ()));
-    assert!(verdict.usable);
-    assert_eq!(verdict.faults.cause(), None);
+fn a_burst_without_faults_is_usable() {
+    let validity = BurstValidator::default().validate(&burst(|_| ()));
+    assert!(validity.usable);
+    assert_eq!(validity.faults.cause(), None);
 }
 
 #[test]
-fn the_supply_window() {
+fn a_supply_outside_4_75_to_5_25_v_is_a_fault() {
     // 4.75 V and 5.25 V are 1964.4 and 2171.2 counts of 2.418 mV.
     for (supply, inside) in [(1964, false), (1965, true), (2171, true), (2172, false), (0, false), (4095, false)] {
         let faults = burst(|counts| counts[0] = supply).faults();
@@ -28,7 +28,7 @@ fn the_supply_window() {
 }
 
 #[test]
-fn flags_of_any_word_count() {
+fn the_flags_of_any_word_are_faults() {
     for channel in Channel::ALL {
         let mut stale = burst(|_| ());
         stale.words[channel as usize].0 &= 0x7FFF;
@@ -40,32 +40,33 @@ fn flags_of_any_word_count() {
 }
 
 #[test]
-fn a_dead_line_is_named_as_such() {
+fn bursts_of_zeros_or_ones_have_the_cause_of_a_stuck_line() {
     assert_eq!(Burst::from_bytes(&[0x00; 26]).faults().cause(), Some("stuck_low"));
     assert_eq!(Burst::from_bytes(&[0xFF; 26]).faults().cause(), Some("stuck_high"));
 }
 
 #[test]
-fn a_repetition_is_six_equal_inertial_words() {
-    let mut judge = Judge::default();
-    assert!(judge.judge(&burst(|_| ())).usable);
-    let repeated = judge.judge(&burst(|counts| counts[10] = 21));
+fn six_equal_inertial_words_are_a_repetition_and_usable() {
+    let mut validator = BurstValidator::default();
+    assert!(validator.validate(&burst(|_| ())).usable);
+    let repeated = validator.validate(&burst(|counts| counts[10] = 21));
     assert_eq!(repeated.faults, Faults::REPEATED);
-    assert!(repeated.usable, "new data may equal the last by chance");
-    assert!(judge.judge(&burst(|counts| counts[6] += 1)).usable);
+    assert!(repeated.usable, "a new sample may equal the last by chance");
+    assert!(validator.validate(&burst(|counts| counts[6] += 1)).usable);
 
     let mut stale = burst(|counts| counts[6] += 1);
     stale.words[1] = OutputWord(stale.words[1].0 & 0x7FFF);
-    assert_eq!(judge.judge(&stale).faults, Faults::REPEATED | Faults::NO_NEW_DATA);
+    assert_eq!(validator.validate(&stale).faults, Faults::REPEATED | Faults::NO_NEW_DATA);
 
-    let counters = judge.counters();
+    let counters = validator.counters();
     assert_eq!((counters.bursts, counters.unusable), (4, 1));
     assert_eq!(counters.get(Faults::REPEATED), 2);
     let seen: Vec<_> = counters.by_cause().filter(|(_, count)| *count > 0).collect();
     assert_eq!(seen, [("no_new_data", 1), ("repeated", 2)]);
 }
 
-/// The 26 bytes as the controller sees them when it is `bits` clocks ahead (the part seems late) or behind.
+/// The 26 bytes that the controller receives if its clock count is `bits` ahead of the part (words arrive late) or, for
+/// negative `bits`, behind.
 fn out_of_step(burst: &Burst, bits: i32) -> Burst {
     let sent: Vec<bool> =
         burst.to_bytes().iter().flat_map(|byte| (0..8).map(move |bit| byte >> (7 - bit) & 1 != 0)).collect();
@@ -79,7 +80,7 @@ fn out_of_step(burst: &Burst, bits: i32) -> Burst {
 }
 
 #[test]
-fn a_shifted_frame_is_named_as_such() {
+fn a_burst_shifted_by_up_to_a_byte_has_the_cause_shifted() {
     for bits in (-8..=8).filter(|bits| *bits != 0) {
         let shifted = out_of_step(&burst(|_| ()), bits);
         assert_eq!(shifted.faults().cause(), Some("shifted"), "{bits} bits: {shifted:04x?}");
@@ -87,14 +88,14 @@ fn a_shifted_frame_is_named_as_such() {
     assert_eq!(out_of_step(&burst(|_| ()), 0).faults(), Faults::empty());
 }
 
-/// Stale or noisy words are not taken for shifted ones: of a million random bursts at most a handful may pass for one.
+/// Bursts without new data are not taken for shifted ones, and random words only as often as chance has it.
 #[test]
-fn other_damage_is_not_called_a_shift() {
+fn stale_bursts_are_not_shifted_and_random_ones_by_chance_only() {
     let mut stale = burst(|_| ());
     stale.words.iter_mut().for_each(|word| word.0 &= 0x7FFF);
     assert_eq!(stale.faults(), Faults::NO_NEW_DATA);
 
-    // Fibonacci hashing: every bit of its upper half is as good as random.
+    // A linear congruential generator; the upper 16 bits of its state are taken as random.
     let mut state = 16405u64;
     let mut called_shifted = 0;
     for _ in 0..1_000_000 {
@@ -105,12 +106,13 @@ fn other_damage_is_not_called_a_shift() {
         }
         called_shifted += u32::from(noise.faults().contains(Faults::SHIFTED));
     }
-    // Eight ways to be early, each 2⁻¹¹; eight to be late, each 2⁻¹¹ · 207/4096. Of a million 0.41 % are 4,100; 5 √ of that.
+    // Eight early shifts pass with probability 2⁻¹¹ each, eight late ones with 2⁻¹¹ · 207/4096: 0.41 % or 4,100 of a
+    // million. The tolerance is 6 standard deviations of that count, √4,100 = 64.
     assert!((4_100 - 400..=4_100 + 400).contains(&called_shifted), "{called_shifted}");
 }
 
 #[test]
-fn rates_beyond_the_sensor_are_impossible() {
+fn rates_beyond_7000_counts_are_impossible() {
     // ±6000 counts are full scale in every range; ±350 °/s at 0.05 °/s are 7000.
     for (rate, possible) in
         [(0, true), (6000, true), (7000, true), (7001, false), (-7000, true), (-7001, false), (8184, false)]
@@ -122,32 +124,32 @@ fn rates_beyond_the_sensor_are_impossible() {
     }
 }
 
-/// The sign bit is 2¹³: −7000 becomes 1192, −1 becomes 8191.
+/// The sign bit is 2¹³: without it −7000 reads 1192, and −1 reads 8191.
 #[test]
-fn a_lost_sign_is_suspected_only_where_it_can_be_lost() {
+fn a_lost_sign_is_reported_only_where_it_is_at_risk() {
     for (x, suspect) in [(-1, false), (0, false), (1191, false), (1192, true), (6000, true)] {
         let burst = burst(|counts| counts[1] = x);
-        assert_eq!(Judge::default().judge(&burst).faults, Faults::empty());
-        let verdict = Judge::default().with_x_sign_at_risk(true).judge(&burst);
-        assert_eq!(verdict.faults, if suspect { Faults::X_SIGN } else { Faults::empty() }, "{x}");
-        assert_eq!(verdict.usable, !suspect);
+        assert_eq!(BurstValidator::default().validate(&burst).faults, Faults::empty());
+        let validity = BurstValidator::default().with_x_sign_at_risk(true).validate(&burst);
+        assert_eq!(validity.faults, if suspect { Faults::X_SIGN } else { Faults::empty() }, "{x}");
+        assert_eq!(validity.usable, !suspect);
     }
 }
 
 #[test]
-fn outputs_that_never_change_are_frozen() {
-    let mut judge = Judge::default();
+fn twelve_words_equal_for_512_bursts_are_frozen() {
+    let mut validator = BurstValidator::default();
     let same = burst(|_| ());
-    let usable = (0..1000).take_while(|_| judge.judge(&same).usable).count();
+    let usable = (0..1000).take_while(|_| validator.validate(&same).usable).count();
     assert_eq!(usable, 512, "the first and 511 that repeat it");
-    assert_eq!(judge.judge(&same).faults, Faults::REPEATED | Faults::FROZEN);
-    assert_eq!(judge.judge(&same).faults.cause(), Some("frozen"));
-    assert!(judge.judge(&burst(|counts| counts[11] += 1)).usable, "any of the twelve words is a sign of life");
-    assert_eq!(judge.counters().get(Faults::FROZEN), 3);
+    assert_eq!(validator.validate(&same).faults, Faults::REPEATED | Faults::FROZEN);
+    assert_eq!(validator.validate(&same).faults.cause(), Some("frozen"));
+    assert!(validator.validate(&burst(|counts| counts[11] += 1)).usable, "a change of any of the twelve words ends it");
+    assert_eq!(validator.counters().get(Faults::FROZEN), 3);
 }
 
 #[test]
-fn every_fault_has_a_name() {
+fn every_fault_has_its_flag_name_as_cause() {
     let named = Faults::CAUSES.into_iter().fold(Faults::empty(), |all, (fault, _)| all | fault);
     assert_eq!(named, Faults::all());
     for (name, flag) in Faults::all().iter_names() {

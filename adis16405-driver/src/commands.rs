@@ -1,0 +1,196 @@
+//! Procedures on the part as a whole: identification, start-up, configuration, the commands of GLOB_CMD, sleep and
+//! wake-up.
+
+use core::num::NonZeroU8;
+
+use crate::calibration::{FactoryRestore, GyroBias};
+use crate::channel::GyroRange;
+use crate::clock::{ClockMode, SamplePeriod};
+use crate::config::Config;
+use crate::error::{Diagnosis, Error};
+use crate::protocol::{Protocol, ProtocolError, WriteOrder};
+use crate::register::Register;
+
+/// A part that this driver supports.
+///
+/// Both have the same registers and scale factors; they differ in the temperature range of their calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Product {
+    /// ADIS16400, PROD_ID 0x4010.
+    Adis16400,
+    /// ADIS16405, PROD_ID 0x4015.
+    Adis16405,
+}
+
+impl Product {
+    /// The part with this value in PROD_ID; `None` for other parts.
+    pub const fn from_prod_id(prod_id: u16) -> Option<Self> {
+        match prod_id {
+            16400 => Some(Product::Adis16400),
+            16405 => Some(Product::Adis16405),
+            _ => None,
+        }
+    }
+
+    /// The value of PROD_ID: the part number in decimal.
+    pub const fn prod_id(self) -> u16 {
+        match self {
+            Product::Adis16400 => 16400,
+            Product::Adis16405 => 16405,
+        }
+    }
+}
+
+/// Duration of a sleep (SLP_CNT).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Sleep {
+    /// This number of half seconds; the part then wakes up by itself.
+    HalfSeconds(NonZeroU8),
+    /// Until the part is woken, reset or powered on again (bit 8). Linux and an Arduino library use this bit; Analog
+    /// Devices' register map lists only bits 7:0.
+    Indefinite,
+}
+
+/// The bits of GLOB_CMD.
+const AUTO_NULL: u16 = 1 << 0;
+const FACTORY_RESTORE: u16 = 1 << 1;
+const FLASH_UPDATE: u16 = 1 << 3;
+const PRECISION_AUTO_NULL: u16 = 1 << 4;
+const SOFTWARE_RESET: u16 = 1 << 7;
+
+/// The bit of SLP_CNT for a sleep without end.
+const SLEEP_INDEFINITELY: u16 = 1 << 8;
+
+impl Protocol<'_> {
+    pub(crate) async fn identity(&self) -> Result<Product, ProtocolError> {
+        let answer = self.read(Register::ProdId).await;
+        Product::from_prod_id(answer).ok_or(Error::Product { answer })
+    }
+
+    pub(crate) async fn diagnosis(&self) -> Result<Diagnosis, ProtocolError> {
+        Ok(Diagnosis::from_bits_retain(self.read(Register::DiagStat).await))
+    }
+
+    pub(crate) async fn init(&mut self) -> Result<Product, ProtocolError> {
+        let product = self.identity().await?;
+        self.configure(self.state.config).await?;
+        self.gyro_offsets().await?;
+        Ok(product)
+    }
+
+    pub(crate) async fn start_up(&mut self) -> Result<Product, ProtocolError> {
+        self.pause(self.state.timing.start_up_us).await;
+        self.init().await
+    }
+
+    pub(crate) async fn configure(&mut self, config: Config) -> Result<(), ProtocolError> {
+        let mode = self.state.timing.clock_mode(config.smpl_prd());
+        // The longer stall of low-power mode is kept until the new sample period is known to be set.
+        if mode == ClockMode::LowPower {
+            self.state.mode = mode;
+        }
+        self.set_register(Register::SmplPrd, u16::from(config.smpl_prd())).await?;
+        self.state.mode = mode;
+
+        // The lower byte of SENS_AVG holds the filter, the upper one the range. If the present range needs more taps
+        // than the new filter has, the range is written first, so that no sample is taken with a combination that is
+        // not allowed.
+        let before = self.read(Register::SensAvg).await;
+        let needed = GyroRange::from_sens_avg(before).map_or(0, GyroRange::min_filter_taps_log2);
+        let order =
+            if needed > config.filter_taps_log2() { WriteOrder::HighByteFirst } else { WriteOrder::LowByteFirst };
+        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), order).await?;
+        self.state.config = config;
+        Ok(())
+    }
+
+    pub(crate) async fn set_sample_rate(&mut self, hz: f64) -> Result<f64, ProtocolError> {
+        let period = SamplePeriod::nearest(hz).map_err(Error::Config)?;
+        self.configure(self.state.config.with_sample_period(period)).await?;
+        Ok(period.hz())
+    }
+
+    pub(crate) async fn set_range(&mut self, range: GyroRange) -> Result<(), ProtocolError> {
+        let config = self.state.config.with_range(range).map_err(Error::Config)?;
+        self.configure(config).await
+    }
+
+    pub(crate) async fn set_filter_taps_log2(&mut self, filter_taps_log2: u8) -> Result<(), ProtocolError> {
+        let config = self.state.config.with_filter_taps_log2(filter_taps_log2).map_err(Error::Config)?;
+        self.configure(config).await
+    }
+
+    /// Writes a command bit to GLOB_CMD and leaves the bus silent for `silence_us`.
+    async fn command(&self, command: u16, silence_us: u32) {
+        self.write_low(Register::GlobCmd, command).await;
+        self.pause(silence_us).await;
+    }
+
+    pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
+        self.command(SOFTWARE_RESET, self.state.timing.reset_us).await;
+        self.init().await
+    }
+
+    pub(crate) async fn auto_null(&mut self) -> Result<GyroBias, ProtocolError> {
+        self.run_auto_null(AUTO_NULL, self.state.timing.auto_null_us).await
+    }
+
+    pub(crate) async fn precision_auto_null(&mut self) -> Result<GyroBias, ProtocolError> {
+        self.run_auto_null(PRECISION_AUTO_NULL, self.state.timing.precision_auto_null_us).await
+    }
+
+    /// Has the part set its gyro offsets from its outputs, which replaces a host-side bias; a negative offset of x then
+    /// becomes the host-side bias.
+    async fn run_auto_null(&mut self, command: u16, silence_us: u32) -> Result<GyroBias, ProtocolError> {
+        self.command(command, silence_us).await;
+        self.identity().await?;
+        self.state.host_bias_x = 0;
+        self.keep_negative_x_bias_on_host().await
+    }
+
+    pub(crate) async fn factory_restore(&mut self) -> Result<FactoryRestore, ProtocolError> {
+        let lost = FactoryRestore {
+            gyro: self.gyro_offsets().await?,
+            accl: self.accl_offsets().await?,
+            hard_iron: self.hard_iron().await?,
+            soft_iron: self.soft_iron().await?,
+        };
+        self.command(FACTORY_RESTORE, self.state.timing.factory_restore_us).await;
+        self.state.host_bias_x = 0;
+        self.init().await?;
+        Ok(lost)
+    }
+
+    pub(crate) async fn flash_writes(&self) -> Result<u16, ProtocolError> {
+        Ok(self.read(Register::FlashCnt).await)
+    }
+
+    pub(crate) async fn flash_update(&mut self) -> Result<u16, ProtocolError> {
+        let before = self.flash_writes().await?;
+        self.command(FLASH_UPDATE, self.state.timing.flash_update_us).await;
+        let diagnosis = self.diagnosis().await?;
+        let after = self.flash_writes().await?;
+        if diagnosis.contains(Diagnosis::FLASH_UPDATE) || after == before {
+            return Err(Error::FlashUpdate { before, after, diagnosis });
+        }
+        Ok(after)
+    }
+
+    pub(crate) async fn sleep(&self, sleep: Sleep) -> Result<(), ProtocolError> {
+        match sleep {
+            Sleep::HalfSeconds(count) => self.write_low(Register::SlpCnt, u16::from(count.get())).await,
+            Sleep::Indefinite => self.write_high(Register::SlpCnt, SLEEP_INDEFINITELY).await,
+        }
+        Ok(())
+    }
+
+    pub(crate) async fn wake(&self) -> Result<Product, ProtocolError> {
+        self.chip_select_pulse(self.state.timing.wake_pulse_ns).await;
+        self.pause(self.state.timing.wake_us.get(self.state.mode)).await;
+        self.identity().await
+    }
+}

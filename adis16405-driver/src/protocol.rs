@@ -1,0 +1,264 @@
+//! The SPI protocol without I/O: register reads and writes as `async` sequences of bus requests.
+//!
+//! A procedure of the part (self-test, configuration, …) is an `async fn` on [`Protocol`], in one of the modules
+//! `commands`, `calibration`, `self_test`, `pins` and `alarms`. It awaits nothing but the response to a [`BusRequest`].
+//! The blocking or the asynchronous driver polls the procedure, carries out each request on its bus, and resumes the
+//! procedure with the response. Every sequence of frames therefore exists once.
+
+use core::cell::Cell;
+use core::convert::Infallible;
+use core::future::poll_fn;
+use core::pin::Pin;
+use core::task::{Context, Poll, Waker};
+
+use crate::clock::{ClockMode, Timing};
+use crate::config::Config;
+use crate::error::Error;
+use crate::register::{Access, Register};
+
+/// An operation that a procedure requests from the driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BusRequest {
+    /// Exchange a 16-bit frame in a transaction of its own, with a stall of `stall_ns` at its end.
+    Frame { bytes: [u8; 2], stall_ns: u32 },
+    /// Hold chip select low for `ns` without clocking.
+    ChipSelectPulse { ns: u32 },
+    /// Wait for `us` without bus traffic.
+    Pause { us: u32 },
+}
+
+/// Passes requests from a procedure to the driver, and responses back.
+#[derive(Debug)]
+pub(crate) struct RequestSlot {
+    request: Cell<BusRequest>,
+    response: Cell<Option<[u8; 2]>>,
+}
+
+impl RequestSlot {
+    pub(crate) const fn new() -> Self {
+        Self { request: Cell::new(BusRequest::Pause { us: 0 }), response: Cell::new(None) }
+    }
+
+    /// Called by a procedure: places a request and waits for its response.
+    async fn request(&self, request: BusRequest) -> [u8; 2] {
+        self.request.set(request);
+        poll_fn(|_| match self.response.take() {
+            Some(response) => Poll::Ready(response),
+            None => Poll::Pending,
+        })
+        .await
+    }
+
+    /// Called by the driver: runs the procedure up to its next request (`Err`) or to its end (`Ok`).
+    pub(crate) fn resume<T>(&self, procedure: Pin<&mut impl Future<Output = T>>) -> Result<T, BusRequest> {
+        // The waker is never used: a procedure can go on only after respond().
+        match procedure.poll(&mut Context::from_waker(Waker::noop())) {
+            Poll::Ready(output) => Ok(output),
+            Poll::Pending => Err(self.request.get()),
+        }
+    }
+
+    /// Called by the driver: the two bytes that the part sent during a frame, or zeros for other requests.
+    pub(crate) fn respond(&self, response: [u8; 2]) {
+        self.response.set(Some(response));
+    }
+}
+
+/// The error of a procedure, which has no bus that could fail.
+pub(crate) type ProtocolError = Error<Infallible>;
+
+/// What the driver keeps between procedures.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DriverState {
+    pub(crate) config: Config,
+    pub(crate) timing: Timing,
+    /// Whether changed registers are read back and compared.
+    pub(crate) verify: bool,
+    /// The power mode of the part. While it changes, low-power mode, which has the longer stall.
+    pub(crate) mode: ClockMode,
+    /// Bias correction of gyro x that the driver adds instead of XGYRO_OFF, in counts of 0.0125 °/s.
+    pub(crate) host_bias_x: i16,
+    /// True if XGYRO_OFF was negative when it was last read or written.
+    pub(crate) x_sign_at_risk: bool,
+}
+
+impl DriverState {
+    pub(crate) const fn new(config: Config) -> Self {
+        let timing = Timing::DEFAULT;
+        let mode = timing.clock_mode(config.smpl_prd());
+        Self { config, timing, verify: true, mode, host_bias_x: 0, x_sign_at_risk: false }
+    }
+
+    /// Stall after a frame in the present power mode, ns.
+    pub(crate) const fn stall_ns(&self) -> u32 {
+        self.timing.stall_ns.get(self.mode)
+    }
+}
+
+/// Which byte of a register is written first. Each byte takes effect as soon as it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WriteOrder {
+    LowByteFirst,
+    HighByteFirst,
+}
+
+/// The procedures of the part. This module has those on registers; the modules of the part's functions add theirs.
+pub(crate) struct Protocol<'a> {
+    slot: &'a RequestSlot,
+    pub(crate) state: &'a mut DriverState,
+}
+
+impl<'a> Protocol<'a> {
+    pub(crate) fn new(slot: &'a RequestSlot, state: &'a mut DriverState) -> Self {
+        Self { slot, state }
+    }
+
+    /// Sends a frame and returns the 16 bits received during it: the answer to the frame before.
+    async fn frame(&self, bytes: [u8; 2]) -> u16 {
+        u16::from_be_bytes(self.slot.request(BusRequest::Frame { bytes, stall_ns: self.state.stall_ns() }).await)
+    }
+
+    /// Leaves the bus silent for `us`.
+    pub(crate) async fn pause(&self, us: u32) {
+        self.slot.request(BusRequest::Pause { us }).await;
+    }
+
+    /// Holds chip select low for `ns` without clocking.
+    pub(crate) async fn chip_select_pulse(&self, ns: u32) {
+        self.slot.request(BusRequest::ChipSelectPulse { ns }).await;
+    }
+
+    /// Reads a register in two frames. The answer comes in the second, which itself requests FLASH_CNT, a register that
+    /// can be read without side effects.
+    pub(crate) async fn read(&self, register: Register) -> u16 {
+        self.frame(register.read_frame()).await;
+        self.frame(Register::FlashCnt.read_frame()).await
+    }
+
+    /// Reads N registers in N + 1 frames: each frame brings the answer to the one before.
+    pub(crate) async fn read_all<const N: usize>(&self, registers: [Register; N]) -> [u16; N] {
+        let mut answers = [0; N];
+        if let Some(first) = registers.first() {
+            self.frame(first.read_frame()).await;
+        }
+        for (index, answer) in answers.iter_mut().enumerate() {
+            let next = registers.get(index + 1).copied().unwrap_or(Register::FlashCnt);
+            *answer = self.frame(next.read_frame()).await;
+        }
+        answers
+    }
+
+    /// Reads a register that the caller chose, if it can be read.
+    pub(crate) async fn read_register(&self, register: Register) -> Result<u16, ProtocolError> {
+        let [answer] = self.read_registers([register]).await?;
+        Ok(answer)
+    }
+
+    /// Reads registers that the caller chose in N + 1 frames, if all can be read.
+    pub(crate) async fn read_registers<const N: usize>(
+        &self,
+        registers: [Register; N],
+    ) -> Result<[u16; N], ProtocolError> {
+        match registers.into_iter().find(|register| register.access() == Access::Write) {
+            Some(register) => Err(Error::WriteOnly(register)),
+            None => Ok(self.read_all(registers).await),
+        }
+    }
+
+    /// Writes the lower byte of a register.
+    pub(crate) async fn write_low(&self, register: Register, value: u16) {
+        self.frame(register.write_low_frame(value)).await;
+    }
+
+    /// Writes the upper byte of a register.
+    pub(crate) async fn write_high(&self, register: Register, value: u16) {
+        self.frame(register.write_high_frame(value)).await;
+    }
+
+    /// Writes the lower byte, then the upper one if the register is wider than 8 bits.
+    pub(crate) async fn write_register(&self, register: Register, value: u16) -> Result<(), ProtocolError> {
+        if register.access() == Access::Read {
+            return Err(Error::ReadOnly(register));
+        }
+        self.write_low(register, value).await;
+        if register.bits() > 8 {
+            self.write_high(register, value).await;
+        }
+        Ok(())
+    }
+
+    /// Sets the bits of `mask` to their value in `value`: reads the register, writes the bytes that change, and reads
+    /// back if verification is on.
+    pub(crate) async fn update_register(&self, register: Register, mask: u16, value: u16) -> Result<(), ProtocolError> {
+        match register.access() {
+            Access::Read => return Err(Error::ReadOnly(register)),
+            Access::Write => return Err(Error::WriteOnly(register)),
+            Access::ReadWrite => {}
+        }
+        let before = self.read(register).await;
+        self.update_from(register, before, mask, value, WriteOrder::LowByteFirst).await
+    }
+
+    /// As [`update_register`](Self::update_register), for a register that was just read as `before`.
+    pub(crate) async fn update_from(
+        &self,
+        register: Register,
+        before: u16,
+        mask: u16,
+        value: u16,
+        order: WriteOrder,
+    ) -> Result<(), ProtocolError> {
+        let mask = mask & register.mask();
+        let after = (before & !mask | value & mask) & register.mask();
+        let different = (before & register.mask()) ^ after;
+        if different & 0xFF00 != 0 && order == WriteOrder::HighByteFirst {
+            self.write_high(register, after).await;
+        }
+        if different & 0x00FF != 0 {
+            self.write_low(register, after).await;
+        }
+        if different & 0xFF00 != 0 && order == WriteOrder::LowByteFirst {
+            self.write_high(register, after).await;
+        }
+        if different != 0 && self.state.verify {
+            let expected = value & mask;
+            let answer = self.read(register).await & mask;
+            if answer != expected {
+                return Err(Error::Verify { register, expected, answer });
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets all bits of a register, as [`update_register`](Self::update_register) does.
+    pub(crate) async fn set_register(&self, register: Register, value: u16) -> Result<(), ProtocolError> {
+        self.update_register(register, u16::MAX, value).await
+    }
+
+    /// Polls a register until the bits of `mask` are clear, for at most `most_us`. Returns whether they were set in any
+    /// poll.
+    ///
+    /// # Errors
+    /// [`Error::Deadline`] if they are still set after `most_us`.
+    pub(crate) async fn wait_until_clear(
+        &self,
+        register: Register,
+        mask: u16,
+        most_us: u32,
+    ) -> Result<bool, ProtocolError> {
+        let mut was_set = false;
+        let mut waited_us = 0u32;
+        loop {
+            if self.read(register).await & mask == 0 {
+                return Ok(was_set);
+            }
+            was_set = true;
+            if waited_us >= most_us {
+                return Err(Error::Deadline { register, mask, waited_us });
+            }
+            let step_us = self.state.timing.poll_us.max(1);
+            self.pause(step_us).await;
+            waited_us = waited_us.saturating_add(step_us);
+        }
+    }
+}
