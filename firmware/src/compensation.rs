@@ -65,7 +65,7 @@ pub fn learn(epoch: &Epoch, index: usize, config: Config, keep_on: &mut dyn FnMu
     };
     let with_reference = |sensitivity: &Sensitivity| {
         let cause = members[sensitivity.covariate];
-        let reference = known.means[cause] * lsb(cause, config) + CHANNELS[cause].zero();
+        let reference = known.means[cause] * lsb(cause, config) + CHANNELS[cause].offset();
         Followed { cause, value: sensitivity.value, error: sensitivity.error, reference }
     };
     Some(followed.iter().map(with_reference).take(MAX_CAUSES).collect())

@@ -8,7 +8,7 @@ use crate::outbox::Outbox;
 use crate::retained::Retained;
 use crate::summary::{OCTAVES, OVERLAP};
 use crate::sums::Sums;
-use adis16405_driver::{Burst, Channel, Config, Faults, Judge};
+use adis16405_driver::{Burst, BurstValidator, Channel, Config, Faults};
 use allan_core::Cascade;
 use heapless::spsc;
 use link::{Health, MessageRef, Raw, RawBurst};
@@ -52,7 +52,7 @@ impl Default for Statistics {
 pub struct Estimators<'m> {
     config: Config,
     statistics: &'m mut Statistics,
-    judge: Judge,
+    validator: BurstValidator,
     cadence: Cadence,
     health: Health,
     stuck: u32,
@@ -68,7 +68,7 @@ impl<'m> Estimators<'m> {
         Self {
             config,
             statistics,
-            judge: Judge::default(),
+            validator: BurstValidator::default(),
             cadence: Cadence::new(config.sample_period()),
             health: Health::default(),
             stuck: 0,
@@ -140,7 +140,7 @@ impl<'m> Estimators<'m> {
     /// Forgets the statistics and the counters, and keeps step with the sensor.
     pub fn forget(&mut self) {
         self.begin_epoch();
-        self.judge = Judge::default();
+        self.validator = BurstValidator::default();
         self.health = Health::default();
     }
 
@@ -193,7 +193,7 @@ impl<'m> Estimators<'m> {
     /// What was lost so far; the counters of the application and the board are 0.
     #[must_use]
     pub fn health(&self) -> Health {
-        let counters = self.judge.counters();
+        let counters = self.validator.counters();
         Health {
             bursts: counters.bursts,
             used: counters.bursts - counters.unusable,
@@ -222,7 +222,7 @@ impl<'m> Estimators<'m> {
             self.gap(1);
             return;
         }
-        let verdict = self.judge.judge(burst);
+        let verdict = self.validator.validate(burst);
         let stuck = verdict.faults.intersects(Faults::STUCK_LOW | Faults::STUCK_HIGH);
         self.stuck = if stuck { self.stuck + 1 } else { 0 };
         if !verdict.usable {

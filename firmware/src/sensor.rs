@@ -1,6 +1,6 @@
 //! What the application does to the sensor while it is not sampled.
 
-use adis16405_driver::{Adis16405, Config, Diagnosis, Error, Product, Signal};
+use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -59,7 +59,7 @@ pub fn bring_up<SPI: SpiDevice<u8>>(
     if sensor.x_sign_at_risk() {
         sensor.keep_negative_x_bias_on_host()?;
     }
-    sensor.set_data_ready(Some(Signal::default()))?;
+    sensor.set_data_ready(Some(DioSignal::default()))?;
     Ok(Identity { product, tested: test.ran, diagnosis: test.diagnosis })
 }
 

@@ -11,7 +11,7 @@ const SUPPLY: i16 = 2068;
 
 /// A good burst whose inertial counts are those of no other `k` nearby.
 fn burst(k: i16) -> Burst {
-    Burst::fresh(&Counts::new([SUPPLY, k, 2 * k, 3, 4, 5, 6, 7, 8, 9, 10, 11]))
+    Burst::from_counts(&Counts::new([SUPPLY, k, 2 * k, 3, 4, 5, 6, 7, 8, 9, 10, 11]))
 }
 
 /// Time of the edge of sample period `period`.

@@ -10,7 +10,7 @@ const GOOD: [i16; 12] = [2068, 11, 12, 13, 4, 5, 6, 7, 8, 9, 10, 11];
 fn good(gyro_x: i16) -> Burst {
     let mut counts = GOOD;
     counts[1] = gyro_x;
-    Burst::fresh(&Counts::new(counts))
+    Burst::from_counts(&Counts::new(counts))
 }
 
 /// One clock too many: every bit arrives one place to the left.

@@ -28,7 +28,7 @@ pub fn read(file: &Path, range: GyroRange) -> Result<Recording, InputError> {
     let mut rows = Rows::open(file)?;
     let mut recorder = Recorder::new(rows.channels(), range);
     while let Some(row) = rows.next()? {
-        recorder.push(row.clock, &Burst::fresh(&row.counts));
+        recorder.push(row.clock, &Burst::from_counts(&row.counts));
     }
     Ok(recorder.finish())
 }

@@ -3,7 +3,7 @@
 //! Counts from a table and bursts from the bus meet in [`Recorder`]: the same words are judged by the same code, so that
 //! both ways give the same recording.
 
-use adis16405_driver::{Burst, Channel, Counts, Faults, GyroRange, Judge};
+use adis16405_driver::{Burst, BurstValidator, Channel, Counts, Faults, GyroRange};
 
 /// What the channels that were not recorded read: 0, and a supply of 5 V (2068 counts of 2.418 mV).
 pub const NOT_RECORDED: [i16; 12] = {
@@ -54,7 +54,7 @@ pub struct Recording {
 #[derive(Debug)]
 pub struct Recorder {
     recording: Recording,
-    judge: Judge,
+    validator: BurstValidator,
     judged: Faults,
 }
 
@@ -68,12 +68,16 @@ impl Recorder {
         } else {
             Faults::all() - Faults::REPEATED - Faults::FROZEN
         };
-        Self { recording: Recording { channels, range, samples: Vec::new() }, judge: Judge::default(), judged }
+        Self {
+            recording: Recording { channels, range, samples: Vec::new() },
+            validator: BurstValidator::default(),
+            judged,
+        }
     }
 
     /// Adds a burst that was read at `clock`.
     pub fn push(&mut self, clock: Clock, burst: &Burst) {
-        let faults = self.judge.judge(burst).faults & self.judged;
+        let faults = self.validator.validate(burst).faults & self.judged;
         self.recording.samples.push(Sample { clock, counts: burst.counts(), faults });
     }
 

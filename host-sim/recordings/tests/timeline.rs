@@ -16,7 +16,7 @@ fn recording(clocks: &[Clock], counts: impl Fn(usize) -> i16) -> Recording {
         let mut values = [counts(at); 12];
         values[Channel::Supply as usize] = 2068;
         values[Channel::AuxAdc as usize] = 0;
-        recorder.push(*clock, &Burst::fresh(&Counts::new(values)));
+        recorder.push(*clock, &Burst::from_counts(&Counts::new(values)));
     }
     recorder.finish()
 }

@@ -40,7 +40,7 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
     let mut recorder = Recorder::new(rows.channels(), range);
     let mut player = Player::new();
     while let Some(row) = rows.next()? {
-        let answer = Burst::fresh(&row.counts).to_bytes();
+        let answer = Burst::from_counts(&row.counts).to_bytes();
         let burst =
             player.burst(&BURST_REQUEST, &answer).map_err(|reason| InputError::line(file, rows.line(), reason))?;
         recorder.push(row.clock, &burst);

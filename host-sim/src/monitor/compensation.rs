@@ -35,7 +35,7 @@ impl Compensation {
         let value = |place: u8| {
             let channel = *Channel::ALL.get(usize::from(place))?;
             let word = OutputWord(u16::from_be_bytes(burst.words[usize::from(place)]));
-            Some((channel, f64::from(word.counts(channel)) * channel.lsb(range) + channel.zero()))
+            Some((channel, f64::from(word.counts(channel)) * channel.lsb(range) + channel.offset()))
         };
         let compensated = |(&place, causes): (&u8, &Vec<Cause>)| {
             let (channel, raw) = value(place).filter(|_| !causes.is_empty())?;

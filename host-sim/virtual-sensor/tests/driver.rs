@@ -1,6 +1,6 @@
 //! The virtual part and the real driver against each other. Numbers are those of the data sheet.
 
-use adis16405_driver::{Adis16405, Channel, Config, Counts, Faults, GyroRange, Judge, Register, SamplePeriod};
+use adis16405_driver::{Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, Register, SamplePeriod};
 
 use virtual_sensor::{Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405};
 
@@ -44,14 +44,14 @@ fn low_power_mode_needs_a_slow_clock() {
 #[test]
 fn the_driver_reads_what_the_part_sampled() {
     let (bus, mut imu) = on_bus(NoiseModel::paper(), config(GyroRange::Dps300, 0, 7));
-    let mut judge = Judge::default();
+    let mut validator = BurstValidator::default();
     let mut negative = 0;
     for _ in 0..5000 {
         bus.wait_for_data();
         let sampled = Counts::new(*bus.part().counts());
         let burst = imu.burst().unwrap();
         assert_eq!(burst.counts(), sampled);
-        assert!(judge.judge(&burst).usable);
+        assert!(validator.validate(&burst).usable);
         negative += sampled.as_array().iter().filter(|count| **count < 0).count();
     }
     assert!(negative > 5000, "z senses −1 g, gyros are often below 0: {negative}");

@@ -6,8 +6,9 @@ use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
 use adis16405_driver::{
-    Adis16405, Alarm, AlarmNumber, Channel, Compensation, Config, DacLevel, Diagnosis, Dio, Error, FactoryRestore,
-    Faults, Gpio, GyroBias, Judge, Line, Polarity, Product, Register, Signal, Sleep, Stimulus, Threshold, Watch,
+    Adis16405, Alarm, AlarmNumber, AlarmThreshold, AlarmWatch, BurstValidator, Channel, Config, DacLevel, Diagnosis,
+    Dio, DioLine, DioSignal, Error, FactoryRestore, Faults, Gpio, GyroBias, OnChipCompensation, Polarity, Product,
+    Register, Sleep, Stimulus,
 };
 
 use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
@@ -71,7 +72,7 @@ fn with_rates(rates: [f64; 3]) -> NoiseModel {
 fn self_tests_name_the_sensor_that_fails_and_leave_the_configuration() {
     both_shells!(NoiseModel::still(), |bus, imu, delay|
         expect imu.set_data_ready(None) => Ok(());
-        expect imu.set_compensation(Compensation { linear_acceleration: true, origin_alignment: false }) => Ok(());
+        expect imu.set_compensation(OnChipCompensation { linear_acceleration: true, origin_alignment: false }) => Ok(());
         // Compensation, polarity and no data ready: bit 2 and with it bit 1 and 0 are cleared.
         expect imu.read_register(Register::MscCtrl) => Ok(0x0080);
         take test = imu.self_test(&mut delay);
@@ -209,11 +210,12 @@ fn sleep_and_wake() {
 
 #[test]
 fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
-    let above = Alarm { source: Channel::AcclZ, watch: Watch::Level, threshold: Threshold::Above(-301) };
-    let cold = Alarm { source: Channel::Temp, watch: Watch::Level, threshold: Threshold::Below(-10) };
-    let change = Alarm { source: Channel::GyroY, watch: Watch::RateOfChange(4), threshold: Threshold::Above(99) };
+    let above = Alarm { source: Channel::AcclZ, watch: AlarmWatch::Level, threshold: AlarmThreshold::Above(-301) };
+    let cold = Alarm { source: Channel::Temp, watch: AlarmWatch::Level, threshold: AlarmThreshold::Below(-10) };
+    let change =
+        Alarm { source: Channel::GyroY, watch: AlarmWatch::RateOfChange(4), threshold: AlarmThreshold::Above(99) };
     both_shells!(NoiseModel::still(), |bus, imu, delay|
-        expect imu.set_alarm_output(Some(Signal { line: Line::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
+        expect imu.set_alarm_output(Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
         expect imu.set_alarm(AlarmNumber::One, Some(above)) => Ok(());
         expect imu.set_alarm(AlarmNumber::Two, Some(cold)) => Ok(());
         expect imu.alarm(AlarmNumber::One) => Ok(Some(above));
@@ -239,7 +241,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
         expect imu.diagnosis() => Ok(Diagnosis::ALARM_2);
         expect imu.diagnosis() => Ok(Diagnosis::empty());
 
-        given beyond = Alarm { threshold: Threshold::Above(2048), ..cold };
+        given beyond = Alarm { threshold: AlarmThreshold::Above(2048), ..cold };
         expect imu.set_alarm(AlarmNumber::One, Some(beyond))
             => Err(Error::Value { register: Register::AlmMag1, value: 2048 });
     );
@@ -248,7 +250,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
 #[test]
 fn lines_and_levels() {
     both_shells!(NoiseModel::still(), |bus, imu, delay|
-        expect imu.data_ready() => Ok(Some(Signal { line: Line::Dio1, polarity: Polarity::ActiveHigh }));
+        expect imu.data_ready() => Ok(Some(DioSignal { line: DioLine::Dio1, polarity: Polarity::ActiveHigh }));
         then bus.wait_for_data();
         then assert!(bus.part().pin(1));
         given now = bus.part().now();
@@ -315,7 +317,7 @@ fn the_x_gyro_erratum_strikes_and_is_avoided() {
         take burst = imu.burst();
         then assert_eq!(burst.words[1].0, 0x9FF8);
         then assert_eq!(burst.words[2].0, 0xBFFC);
-        then assert!(Judge::default().judge(&burst).faults.contains(Faults::IMPOSSIBLE_RATE));
+        then assert!(BurstValidator::default().validate(&burst).faults.contains(Faults::IMPOSSIBLE_RATE));
         take _bias = imu.gyro_offsets();
         then assert!(imu.x_sign_at_risk());
 

@@ -2,7 +2,7 @@
 
 use crate::bus::Bus;
 use adis16405_driver::{
-    Adis16405, AlarmNumber, Compensation, Config, DacLevel, Error, Gpio, GyroRange, Register, Sleep, Stimulus,
+    Adis16405, AlarmNumber, Config, DacLevel, Error, Gpio, GyroRange, OnChipCompensation, Register, Sleep, Stimulus,
 };
 use core::convert::Infallible;
 use core::hint::black_box;
@@ -42,7 +42,7 @@ async fn all(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.data_ready().await?);
     black_box(imu.set_data_ready(black_box(None)).await?);
     black_box(imu.compensation().await?);
-    black_box(imu.set_compensation(black_box(Compensation::default())).await?);
+    black_box(imu.set_compensation(black_box(OnChipCompensation::default())).await?);
     black_box(imu.alarm(black_box(AlarmNumber::One)).await?);
     black_box(imu.set_alarm(black_box(AlarmNumber::Two), black_box(None)).await?);
     black_box(imu.set_alarm_output(black_box(None)).await?);

@@ -1,7 +1,7 @@
 //! Instructions of a burst, its decoding, its verdict and its values, each counted alone.
 
 use crate::bus::Bus;
-use adis16405_driver::{Adis16405, BURST_BYTES, Burst, Config, Judge};
+use adis16405_driver::{Adis16405, BURST_BYTES, Burst, BurstValidator, Config};
 use core::hint::black_box;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{Peripherals, SYST};
@@ -20,7 +20,7 @@ pub(crate) fn count(bus: Bus) {
     timer.enable_counter();
 
     let mut imu = Adis16405::new(bus, Config::default());
-    let mut judge = Judge::default();
+    let mut validator = BurstValidator::default();
     let mut bytes = [0x80; BURST_BYTES];
     for (at, byte) in bytes.iter_mut().enumerate() {
         *byte ^= at as u8;
@@ -29,9 +29,9 @@ pub(crate) fn count(bus: Bus) {
     let burst = Burst::from_bytes(&bytes);
     report("words", || Burst::from_bytes(black_box(&bytes)));
     report("counts", || black_box(&burst).counts());
-    report("verdict", || judge.judge(black_box(&burst)));
+    report("verdict", || validator.validate(black_box(&burst)));
     report("values", || {
-        let sample = imu.sample_of(black_box(burst));
+        let sample = imu.sample_from(black_box(burst));
         (sample.gyro_dps(), sample.accl_g())
     });
     report("burst", || imu.burst());

@@ -2,7 +2,7 @@
 
 use crate::bus::Bus;
 use adis16405_driver::{
-    Adis16405, AlarmNumber, Compensation, Config, DacLevel, Error, Gpio, GyroRange, Register, Sleep, Stimulus,
+    Adis16405, AlarmNumber, Config, DacLevel, Error, Gpio, GyroRange, OnChipCompensation, Register, Sleep, Stimulus,
 };
 use core::convert::Infallible;
 use core::hint::black_box;
@@ -35,7 +35,7 @@ pub(crate) fn use_all(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.data_ready()?);
     black_box(imu.set_data_ready(black_box(None))?);
     black_box(imu.compensation()?);
-    black_box(imu.set_compensation(black_box(Compensation::default()))?);
+    black_box(imu.set_compensation(black_box(OnChipCompensation::default()))?);
     black_box(imu.alarm(black_box(AlarmNumber::One))?);
     black_box(imu.set_alarm(black_box(AlarmNumber::Two), black_box(None))?);
     black_box(imu.set_alarm_output(black_box(None))?);
