@@ -15,13 +15,14 @@ Where the files are (docs/recordings.md has the licences):
     stm32     github.com/psas/stm32             projects/flight-imu/host_fc/adis16405_log.txt-example
 
 What is tested and what is not. `--self-test` makes a small file of each format from known counts, converts it and compares
-every count. The conversion of `stm32` was also checked against the first lines of the public file. The public .rda and .log
-files themselves were not at hand when this was written, therefore:
+every count. In the same way files of each format were made from the complete recordings, and converted back to the same bytes.
+The first lines of the public stm32 file were compared too. The public .rda and .log files themselves were not at hand:
   * `imudata` does not rely on a unit. The values are multiples of one count; the size of a count is found in the data and
     printed, and the conversion stops if the values of a column are not multiples of it.
-  * `launch10` looks for ADIS messages and does not need to know the others. The byte order of the words is found by the
-    supply, which is the first word. It was not possible to check which part of the log the figures of docs/recordings.md
-    come from: they are of 49,425 rows over 60.6 s with the part at rest; `--from` and `--to` cut the converted log.
+  * `launch10` follows fc/fc/logfile_to_csv.py of the same repository. It looks for ADIS messages and does not need to know
+    the others; the byte order of the words is found by the supply, which is the first word. Which part of the log the
+    figures of docs/recordings.md come from could not be checked: they are of 49,425 rows over 60.6 s with the part at rest;
+    `--from` and `--to` cut the converted log.
 """
 
 import argparse
