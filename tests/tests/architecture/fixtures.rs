@@ -1,7 +1,7 @@
 //! The checks on small crates: what must be found, and what must not.
 
 use crate::modules::Crate;
-use crate::{Package, circles, describe_dependencies, describe_double_names};
+use crate::{Package, circles, describe_circles, describe_dependencies, describe_double_names};
 use std::path::Path;
 
 /// Writes a crate and reads it: pairs of a file's name in `src` and its text.
@@ -83,6 +83,22 @@ fn a_circle_through_re_exports_is_found() {
     let a = "pub struct A; fn a(_: crate::Renamed) {}";
     let b = "use crate::A; pub struct B(A);";
     assert_eq!(circles_of(&[("lib.rs", lib), ("a.rs", a), ("b.rs", b)]), [["a.rs", "b.rs"]]);
+}
+
+#[test]
+fn a_circle_of_folders_is_found() {
+    let files = [
+        ("lib.rs", "mod line; mod noise;"),
+        ("line.rs", "mod find; pub mod shape;"),
+        ("line/find.rs", "use crate::noise::level::level; fn find() { level(); }"),
+        ("line/shape.rs", "pub struct Shape;"),
+        ("noise.rs", "pub mod level; mod draw;"),
+        ("noise/level.rs", "pub fn level() {}"),
+        ("noise/draw.rs", "fn draw() { crate::line::shape::Shape; }"),
+    ];
+    assert_eq!(circles_of(&files), [[""; 0]; 0], "no circle of files");
+    let text = with_crate(&files, |read, root| describe_circles(&read.uses(), root));
+    assert_eq!(text, "circle of 2:\n  line uses noise: level\n  noise uses line: Shape\n");
 }
 
 #[test]

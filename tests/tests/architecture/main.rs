@@ -92,16 +92,40 @@ fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     circles.into_iter().collect()
 }
 
-/// The circles as text: the files, and below each the others that it uses, with the names.
+/// The uses between the modules of each folder, every one taken together with the modules below it.
+fn between_modules(uses: &Uses) -> Uses {
+    let mut between = Uses::new();
+    for (file, used) in uses {
+        for (other, names) in used {
+            let same = file.components().zip(other.components()).take_while(|(one, another)| one == another).count();
+            let module = |path: &Path| path.components().take(same + 1).collect::<PathBuf>().with_extension("");
+            // A file and those in the folder of its name are one module of the folder around them.
+            if module(file) != module(other) {
+                between.entry(module(file)).or_default().entry(module(other)).or_default().extend(names.clone());
+            }
+        }
+    }
+    between
+}
+
+/// The circles of files, and those of modules that are more than one file each: what uses what, and by which names.
 fn describe_circles(uses: &Uses, root: &Path) -> String {
+    let between = between_modules(uses);
+    let of_files = circles(uses);
+    let module = |files: &BTreeSet<&Path>| files.iter().map(|file| file.with_extension("")).collect();
+    let told: Vec<BTreeSet<PathBuf>> = of_files.iter().map(module).collect();
+    let mut of_modules = circles(&between);
+    of_modules.retain(|circle| !told.contains(&module(circle)));
     let mut text = String::new();
-    for circle in circles(uses) {
-        writeln!(text, "circle of {} files:", circle.len()).expect("memory");
-        for &file in &circle {
-            for (used, names) in uses[file].iter().filter(|(used, _)| circle.contains(used.as_path())) {
-                let [file, used] = [file, used].map(|path| path.strip_prefix(root).unwrap_or(path).display());
+    for (uses, circle) in
+        of_files.iter().map(|circle| (uses, circle)).chain(of_modules.iter().map(|circle| (&between, circle)))
+    {
+        writeln!(text, "circle of {}:", circle.len()).expect("memory");
+        for &user in circle {
+            for (used, names) in uses[user].iter().filter(|(used, _)| circle.contains(used.as_path())) {
+                let [user, used] = [user, used].map(|path| path.strip_prefix(root).unwrap_or(path).display());
                 let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                writeln!(text, "  {file} uses {used}: {}", names.join(", ")).expect("memory");
+                writeln!(text, "  {user} uses {used}: {}", names.join(", ")).expect("memory");
             }
         }
     }
