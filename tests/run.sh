@@ -2,7 +2,7 @@
 # Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long]
 #
 # Needs rustup with its default toolchain and a C compiler. What else is missing is installed, and said: by rustup, by
-# apt-get (as root, or with sudo), and Node.js with npm, for the emulator of the Pico, from PyPI into target/tools.
+# apt-get (as root, or with sudo), and Node.js with npm, for the emulator of the Pico, from PyPI into the target folder.
 # With --long also the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
 # The last line says how many tests passed, failed and were skipped.
 set -euo pipefail
@@ -10,6 +10,8 @@ cd "$(dirname "$0")/.."
 
 MCU=thumbv7em-none-eabihf # Cortex-M4F: the firmware
 SMALL=thumbv6m-none-eabi  # Cortex-M0+: the Pico's firmware, the two libraries
+mkdir -p "${CARGO_TARGET_DIR:-target}"
+TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 STEPS=(
     "tools:install what is missing"
     "format:formatting"
@@ -34,10 +36,10 @@ host() {
 }
 lint() { run cargo clippy --locked "$@" -- -D warnings; }
 document() { RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps "$@"; }
-as_root() { if [ "$(id -u)" = 0 ]; then run "$@"; else run sudo "$@"; fi; }
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 debian() {
-    [ -n "${apt_updated-}" ] || as_root apt-get update -qq
-    apt_updated=yes
+    printf '+ apt-get install %s\n' "$*"
+    as_root apt-get update -qq
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
@@ -53,7 +55,7 @@ tools() {
     command -v qemu-system-arm >/dev/null || debian qemu-system-arm
     # rp2040js runs with Node.js 18 and later.
     if ! node --eval 'process.exit(parseInt(process.versions.node) < 18)' 2>/dev/null || ! command -v npm >/dev/null; then
-        local venv=$PWD/target/tools
+        local venv=$TARGET/tools
         if [ ! -x "$venv/bin/npm" ]; then
             python3 -c 'import ensurepip, venv' 2>/dev/null || debian python3-venv
             run python3 -m venv "$venv"
@@ -64,9 +66,10 @@ tools() {
     printf '%s, Node.js %s, %s\n' "$(cargo --version)" "$(node --version)" "$(qemu-system-arm --version | head -n 1)"
 }
 format() { run cargo fmt --all --check; }
-lint_images() {
-    lint --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --profile image
-    lint --package firmware --bin observatory-pico --features board-pico --target "$SMALL" --profile image
+lint_images() { # where the tests build them, so that their build scripts are compiled once
+    local image=(--profile image --target-dir "$TARGET/image" --package firmware)
+    lint "${image[@]}" --bin observatory-f405 --features board-f405 --target "$MCU"
+    lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
 }
 lint_libraries() {
     for target in "$MCU" "$SMALL"; do
@@ -81,8 +84,7 @@ documentation() {
 }
 build() {
     host test --no-run
-    HOST_SIM=$(realpath "${CARGO_TARGET_DIR:-target}")/debug/host-sim # the program as just built
-    export HOST_SIM
+    export HOST_SIM=$TARGET/debug/host-sim # the program as just built
 }
 tests() { host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee "$log"; }
 
