@@ -89,11 +89,12 @@ build() {
 tests() { host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee "$log"; }
 
 clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
+row() { table+=$(printf '%5d s  %s' $((SECONDS - began)) "$title$1")$'\n'; }
 # Prints the seconds of each step, the skipped tests, and the totals of all test runs.
 conclude() {
     local status=$?
+    [ "$status" = 0 ] || row ", FAILED"
     printf '\n%s' "$table"
-    [ "$status" = 0 ] || printf 'FAILED in: %s\n' "$title"
     sort -u "$SKIPPED_TESTS" | sed 's/^/skipped: /'
     awk -v skipped="$(cut -d: -f1 "$SKIPPED_TESTS" | sort -u | grep -c .)" '
         /^test result: / { passed += $4; failed += $6; ignored += $8 }
@@ -105,7 +106,7 @@ if [ -z "${ADIS_RECORDINGS-}" ] && [ -d ../shared/data ]; then
     ADIS_RECORDINGS=$(realpath ../shared/data)
     export ADIS_RECORDINGS
 fi
-log=$(mktemp) title="" table=""
+log=$(mktemp) title="" table="" began=0
 SKIPPED_TESTS=$(mktemp) # tests append "NAME: REASON"
 export SKIPPED_TESTS
 trap conclude EXIT
@@ -115,5 +116,5 @@ for index in "${!STEPS[@]}"; do
     title=${STEPS[index]#*:} began=$SECONDS
     printf '\n[%d/%d] %s (elapsed %s)\n' $((index + 1)) ${#STEPS[@]} "$title" "$(clock)"
     "${STEPS[index]%%:*}"
-    table+=$(printf '%5d s  %s' $((SECONDS - began)) "$title")$'\n'
+    row ""
 done
