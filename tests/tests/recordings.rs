@@ -1,23 +1,9 @@
 //! Measured recordings through the whole system, against figures that were published for them.
 
 use serde_json::Value;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::Command;
-
-/// The folder with the recordings; `None`, said aloud, where there is none.
-fn recording(test: &str, file: &str) -> Option<PathBuf> {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let folder = std::env::var_os("ADIS_RECORDINGS").map_or_else(|| PathBuf::from(default), PathBuf::from);
-    let path = folder.join(file);
-    if !path.exists() {
-        // Not by a macro, which the test harness would hide.
-        writeln!(std::io::stderr(), "skipped {test}: {} is absent (set ADIS_RECORDINGS)", path.display())
-            .expect("stderr");
-        return None;
-    }
-    Some(path)
-}
+use system_tests::recording;
 
 /// Runs the command-line program and returns the bytes of its JSON report.
 fn report(arguments: &[&str], recording: &PathBuf) -> Vec<u8> {
@@ -38,8 +24,11 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Vec<u8> {
     std::fs::read(json).expect("the report")
 }
 
-/// The program, built by cargo as another package's binary is: on demand, in the profile of the tests.
+/// The program: the one that `HOST_SIM` names, or built by cargo in the profile of the tests.
 fn host_sim() -> PathBuf {
+    if let Some(program) = std::env::var_os("HOST_SIM") {
+        return program.into();
+    }
     let build = Command::new(env!("CARGO"))
         .args(["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "host-sim"])
         .status()

@@ -1,0 +1,180 @@
+//! The workspace's architecture: which crate may depend on which, no circle of modules, no two public types of one name.
+//!
+//! `WORKSPACE_ROOT` names another checkout to look at.
+
+mod fixtures;
+mod modules;
+
+use modules::{Crate, Uses};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Each crate with the crates of the workspace that it may depend on. Dependencies for tests alone are free.
+#[rustfmt::skip]
+const MAY_DEPEND_ON: &[(&str, &str)] = &[
+    ("adis16405-driver", ""),
+    ("allan-core", ""),
+    ("link", ""),
+    ("firmware", "adis16405-driver allan-core link"),
+    ("recordings", "adis16405-driver link"),
+    ("noise-analysis", "allan-core recordings"),
+    ("virtual-sensor", ""),
+    ("simulation", "adis16405-driver firmware link recordings virtual-sensor"),
+    ("reports", "allan-core noise-analysis recordings"),
+    ("benchmarks", "adis16405-driver allan-core noise-analysis recordings reports simulation virtual-sensor"),
+    ("host-sim", "adis16405-driver allan-core benchmarks firmware link noise-analysis recordings reports simulation \
+                  virtual-sensor"),
+    ("system-tests", ""),
+    ("driver-footprint", "adis16405-driver"),
+    ("instruction-counts", "allan-core"),
+    ("peers-accuracy", "adis16405-driver allan-core host-sim noise-analysis recordings virtual-sensor"),
+];
+
+struct Package {
+    name: String,
+    /// Crates of the workspace that it depends on, except for tests and build scripts.
+    dependencies: Vec<String>,
+    /// Root files of its library and of its programs.
+    roots: Vec<PathBuf>,
+}
+
+fn workspace() -> PathBuf {
+    let here = || Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests live in the workspace").to_owned();
+    std::env::var_os("WORKSPACE_ROOT").map_or_else(here, PathBuf::from).canonicalize().expect("a folder")
+}
+
+fn packages() -> Vec<Package> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
+        .current_dir(workspace())
+        .output()
+        .expect("cargo starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let list = |value: &Value| value.as_array().expect("a list").clone();
+    let text = |value: &Value| value.as_str().expect("a text").to_owned();
+    let package = |package: Value| {
+        let own = |dependency: &Value| dependency["path"].is_string() && dependency["kind"].is_null();
+        let root = |target: &Value| {
+            list(&target["kind"]).iter().any(|kind| ["lib", "bin", "proc-macro"].contains(&kind.as_str().unwrap_or("")))
+        };
+        let dependencies = list(&package["dependencies"]);
+        let targets = list(&package["targets"]);
+        Package {
+            name: text(&package["name"]),
+            dependencies: dependencies.iter().filter(|&each| own(each)).map(|each| text(&each["name"])).collect(),
+            roots: targets.iter().filter(|&each| root(each)).map(|each| text(&each["src_path"]).into()).collect(),
+        }
+    };
+    list(&metadata["packages"]).into_iter().map(package).collect()
+}
+
+/// Sets of files each of which uses, in the end, every other one of its set.
+fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
+    let reached = |from: &Path| {
+        let mut reached = BTreeSet::new();
+        let mut open = vec![from.to_owned()];
+        while let Some(file) = open.pop() {
+            let next = uses.get(&file).into_iter().flat_map(BTreeMap::keys);
+            open.extend(next.filter(|&next| reached.insert(next.clone())).cloned());
+        }
+        reached
+    };
+    let reached: BTreeMap<&Path, BTreeSet<PathBuf>> = uses.keys().map(|file| (file.as_path(), reached(file))).collect();
+    let circle = |file: &Path| -> BTreeSet<&Path> {
+        let both_ways = |other: &&Path| reached[file].contains(*other) && reached[other].contains(file);
+        reached.keys().copied().filter(both_ways).collect()
+    };
+    let circles: BTreeSet<_> = reached.keys().map(|file| circle(file)).filter(|circle| circle.len() > 1).collect();
+    circles.into_iter().collect()
+}
+
+/// The uses between the modules of each folder, every one taken together with the modules below it.
+fn between_modules(uses: &Uses) -> Uses {
+    let mut between = Uses::new();
+    for (file, used) in uses {
+        for (other, names) in used {
+            let same = file.components().zip(other.components()).take_while(|(one, another)| one == another).count();
+            let module = |path: &Path| path.components().take(same + 1).collect::<PathBuf>().with_extension("");
+            // A file and those in the folder of its name are one module of the folder around them.
+            if module(file) != module(other) {
+                between.entry(module(file)).or_default().entry(module(other)).or_default().extend(names.clone());
+            }
+        }
+    }
+    between
+}
+
+/// The circles of files, and those of modules that are more than one file each: what uses what, and by which names.
+fn describe_circles(uses: &Uses, root: &Path) -> String {
+    let between = between_modules(uses);
+    let of_files = circles(uses);
+    let module = |files: &BTreeSet<&Path>| files.iter().map(|file| file.with_extension("")).collect();
+    let told: Vec<BTreeSet<PathBuf>> = of_files.iter().map(module).collect();
+    let mut of_modules = circles(&between);
+    of_modules.retain(|circle| !told.contains(&module(circle)));
+    let mut text = String::new();
+    for (uses, circle) in
+        of_files.iter().map(|circle| (uses, circle)).chain(of_modules.iter().map(|circle| (&between, circle)))
+    {
+        writeln!(text, "circle of {}:", circle.len()).expect("memory");
+        for &user in circle {
+            for (used, names) in uses[user].iter().filter(|(used, _)| circle.contains(used.as_path())) {
+                let [user, used] = [user, used].map(|path| path.strip_prefix(root).unwrap_or(path).display());
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                writeln!(text, "  {user} uses {used}: {}", names.join(", ")).expect("memory");
+            }
+        }
+    }
+    text
+}
+
+/// Names of public types that are defined more than once, with the places.
+fn describe_double_names(types: &[(String, PathBuf)], root: &Path) -> String {
+    let mut places: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for (name, file) in types {
+        places.entry(name).or_default().push(file.strip_prefix(root).unwrap_or(file).display().to_string());
+    }
+    places.retain(|_, places| places.len() > 1);
+    places.iter().map(|(name, places)| format!("{name}: {}\n", places.join(", "))).collect()
+}
+
+/// Dependencies that the table does not allow.
+fn describe_dependencies(packages: &[Package]) -> String {
+    let mut text = String::new();
+    for Package { name, dependencies, .. } in packages {
+        let Some((_, allowed)) = MAY_DEPEND_ON.iter().find(|(package, _)| package == name) else {
+            writeln!(text, "{name} is not in the table").expect("memory");
+            continue;
+        };
+        for dependency in dependencies.iter().filter(|each| !allowed.split(' ').any(|name| name == each.as_str())) {
+            writeln!(text, "{name} depends on {dependency}").expect("memory");
+        }
+    }
+    text
+}
+
+#[test]
+fn no_modules_of_a_crate_use_each_other_in_a_circle() {
+    let root = workspace();
+    let roots = packages().into_iter().flat_map(|package| package.roots);
+    let circles: String = roots.map(|file| describe_circles(&Crate::read(&file).uses(), &root)).collect();
+    assert!(circles.is_empty(), "\n{circles}");
+}
+
+#[test]
+fn no_two_public_types_of_the_workspace_have_one_name() {
+    let roots = packages().into_iter().flat_map(|package| package.roots);
+    let types: Vec<(String, PathBuf)> = roots.flat_map(|file| Crate::read(&file).public_types).collect();
+    let double = describe_double_names(&types, &workspace());
+    assert!(double.is_empty(), "\n{double}");
+}
+
+#[test]
+fn crates_depend_only_on_what_the_design_allows() {
+    let refused = describe_dependencies(&packages());
+    assert!(refused.is_empty(), "\n{refused}");
+}
