@@ -1,15 +1,16 @@
-//! The application's main loop: commands, probing of the sensor, epochs and learning, checkpoints, reports.
+//! The application's main loop: commands, checkpoints, epochs and learning, reports.
 
 use crate::board::{Board, BoardContext, Chip};
 use crate::command::{CommandError, CommandParser, DeviceCommand};
 use crate::console::{Answer, Console, VERSION_LINE};
+use crate::device::{DeviceState, FIRST_CONFIG, FIRST_SETTINGS, SensorState, config_from_registers};
 use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
-use crate::report::{DeviceState, ReportPart, ReportProgress, SensorState, running_sums, send};
+use crate::report::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
-use crate::sensor::{LOW_POWER_LIMIT_HZ, SensorIdentity, auto_null, probe};
+use crate::sensor::{LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
-use adis16405_driver::{ClockMode, Config, ConfigError, GyroRange, SamplePeriod, TimeBase};
+use adis16405_driver::{ClockMode, Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
 use link::{Boot, MessageRef, text_line};
 
@@ -25,25 +26,6 @@ pub struct Start {
     pub finished: &'static mut FinishedEpoch,
 }
 
-/// Configuration at the first start: 204.8 samples a second, ±300 °/s, no filter.
-pub const FIRST_CONFIG: Config = {
-    let Ok(period) = SamplePeriod::from_divisor(TimeBase::Fast, 8) else { panic!("divisor") };
-    let Ok(config) = Config::new(GyroRange::Dps300, 0, period) else { panic!("filter") };
-    config
-};
-
-/// Settings at the first start: a report every ten seconds, one epoch without end.
-const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
-    smpl_prd: FIRST_CONFIG.sample_period().register(),
-    sens_avg: FIRST_CONFIG.sens_avg(),
-    epoch_s: 0,
-    epoch: 0,
-    interval_s: 10,
-    starts: 0,
-};
-
-/// Time between two probes of a sensor that does not answer.
-const RETRY_US: u64 = 1_000_000;
 /// Time for which auto-null stays armed.
 const ARMED_US: u64 = 10_000_000;
 /// Time between two checkpoints of one channel each.
@@ -76,17 +58,6 @@ where
     }
 }
 
-/// The configuration of a sensor whose registers have these values.
-fn config_from_registers(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
-    let range = match sens_avg >> 8 {
-        0b100 => GyroRange::Dps300,
-        0b010 => GyroRange::Dps150,
-        0b001 => GyroRange::Dps75,
-        _ => return None,
-    };
-    Config::new(range, sens_avg as u8, SamplePeriod::from_register(smpl_prd)?).ok()
-}
-
 fn interval_us(settings: RetainedSettings) -> u64 {
     u64::from(settings.interval_s) * 1_000_000
 }
@@ -94,7 +65,7 @@ fn interval_us(settings: RetainedSettings) -> u64 {
 impl App {
     /// Restores settings and statistics from retained RAM, if it holds any.
     ///
-    /// Not inlined: the temporaries would otherwise stay on the stack of the main loop.
+    /// Not inlined: its frame of 4.7 kB (temporaries) would otherwise be part of the main loop's.
     #[inline(never)]
     pub fn new(start: Start, board: &mut impl Board) -> Self {
         let Start { spi_clock_hz, mut boot, mut retained, finished } = start;
@@ -155,7 +126,7 @@ impl App {
                 None => {}
             }
         }
-        self.supervise_sensor(board);
+        self.state.supervise_sensor(board);
         self.checkpoint(board);
         self.check_timers(board);
     }
@@ -173,12 +144,6 @@ impl App {
 
     fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         self.console.print(board, text);
-    }
-
-    /// Sends a text as a log message, which host programs receive too.
-    fn log(&self, board: &mut impl Board, text: Arguments<'_>) {
-        let line = text_line(text);
-        send(board, MessageRef::Log(&line));
     }
 
     // Commands
@@ -295,49 +260,6 @@ impl App {
         }
     }
 
-    // Sensor
-
-    /// Probes the sensor when that is due, and stops using one that is silent or suspect. Not inlined, as `execute`.
-    #[inline(never)]
-    fn supervise_sensor(&mut self, board: &mut impl Board) {
-        let now_us = board.now_us();
-        match self.state.sensor {
-            SensorState::Probing { at_us } if now_us >= at_us => self.probe(board),
-            SensorState::Probing { .. } => {}
-            SensorState::Sampled { since_us } => {
-                let (suspect, silent) =
-                    board.estimators(|estimators| (estimators.is_suspect(), estimators.is_silent_at(now_us)));
-                if suspect || silent {
-                    self.state.recoveries = self.state.recoveries.saturating_add(1);
-                    let reason = if silent { "no data-ready edges" } else { "silent, stuck or out of step" };
-                    self.log(board, format_args!("sensor: {reason}; probing it"));
-                    board.set_sampling(false);
-                    self.state.sensor = SensorState::Probing { at_us: now_us.max(since_us + RETRY_US) };
-                }
-            }
-        }
-    }
-
-    fn probe(&mut self, board: &mut impl Board) {
-        let result = probe(board.sensor_bus(), self.state.config).map_err(|error| text_line(format_args!("{error}")));
-        let now_us = board.now_us();
-        match result {
-            Ok(SensorIdentity { product, tested, diagnosis }) => {
-                self.state.product_id = product.prod_id();
-                let test = if tested { "passed" } else { "did not run" };
-                let (product, diagnosis) = (self.state.product_id, diagnosis.bits());
-                self.log(board, format_args!("sensor: ADIS{product}, self-test {test}, DIAG_STAT {diagnosis:#06x}"));
-                board.estimators(|estimators| estimators.mark_probed(now_us));
-                board.set_sampling(true);
-                self.state.sensor = SensorState::Sampled { since_us: now_us };
-            }
-            Err(error) => {
-                self.log(board, format_args!("sensor: {error}; trying again"));
-                self.state.sensor = SensorState::Probing { at_us: now_us + RETRY_US };
-            }
-        }
-    }
-
     // Checkpoints and timers
 
     /// Writes one channel at a time to retained RAM, all of them once in 0.8 s: a restart loses no more than that.
@@ -423,7 +345,7 @@ impl App {
         self.state.learner.finished = Some(epoch);
     }
 
-    /// Not inlined: its frame holds the fit (a search for added terms), of which the regression needs none.
+    /// Not inlined: its frame of 2.5 kB (the fit) would otherwise add to that of the regression in `learn`.
     #[inline(never)]
     fn fit_model(&mut self, board: &mut impl Board, epoch: &FinishedEpoch, index: usize, regressors: Regressors) {
         let config = self.state.config;
@@ -445,7 +367,7 @@ impl App {
     }
 }
 
-/// Not inlined: the message takes stack only while it is sent.
+/// Not inlined: its frame of 1.7 kB (the message) would otherwise add to that of the fit.
 #[inline(never)]
 fn send_learned(board: &mut impl Board, fit: &EpochFit, index: usize, epoch: u32) {
     let message = fit.message(index, epoch);

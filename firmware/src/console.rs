@@ -2,9 +2,10 @@
 
 use crate::board::Board;
 use crate::command::HELP;
+use crate::device::DeviceState;
 use crate::estimators::Estimators;
 use crate::learner::ValidationResult;
-use crate::report::{DeviceState, running_sums};
+use crate::report::running_sums;
 use crate::statistics::{CHANNELS, INERTIAL, OCTAVES};
 use core::fmt::{self, Arguments};
 use heapless::Deque;
@@ -99,7 +100,7 @@ impl Console {
 
     /// Makes and sends the next line of the first answer.
     ///
-    /// Not inlined, here and below: the text lines and models would otherwise take stack in every caller.
+    /// Not inlined, here and below: frames of up to 1.9 kB (text lines, model) would otherwise be part of every caller's.
     #[inline(never)]
     pub(crate) fn send_line(&mut self, state: &DeviceState, board: &mut impl Board) {
         let Some(&answer) = self.answers.front() else { return };

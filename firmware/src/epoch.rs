@@ -56,7 +56,7 @@ impl FinishedEpoch {
 
     /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
     ///
-    /// Not inlined: the sums (0.8 kB) would otherwise take stack in every caller.
+    /// Not inlined: its frame of 0.6 kB (the sums) would otherwise be part of every caller's.
     #[inline(never)]
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, config: Config) {
         self.sums(index).rebuild_curve(curve, CHANNELS[index], config);
@@ -94,7 +94,7 @@ type Candidates = Vec<usize, MAX_COVARIATES>;
 ///
 /// Calls `keep_on` before every fit; `None` if that returned false.
 ///
-/// Not inlined: the covariates' curves would otherwise take stack in every caller.
+/// Not inlined: its frame of 3.9 kB (curve, covariates) would otherwise be part of every caller's.
 #[must_use]
 #[inline(never)]
 pub fn estimate_regressors(
@@ -154,7 +154,8 @@ pub(crate) fn rebuild_compensated_curve(
     if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, config, regressors) }
 }
 
-/// Not inlined, here and below: the covariates' curves would otherwise take stack in every caller.
+/// Not inlined: its frame of 5.3 kB (two curves, covariates) would otherwise be part of every caller's; those of `covariate`
+/// and `degrades` take 1.9 and 2.4 kB.
 #[inline(never)]
 fn subtract(
     curve: &mut Curve<OCTAVES>,

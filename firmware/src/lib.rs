@@ -8,13 +8,14 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `board` | what the application needs of a board; [`microcontroller`](#modules) has what the images share |
+//! | `board`, `microcontroller` | what the application needs of a board; what the images of all boards share |
 //! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
 //! | [`sensor`] | serial clock, probing, auto-null |
 //! | `estimators` | the path of every sample into the statistics, health counters |
 //! | `statistics` | exact sums of a channel and of pairs of channels; curve, baseline model and report made of them |
 //! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
+//! | `device` | state of the device, supervision of the sensor |
 //! | `report`, [`console`] | reports in frames, answers in text |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
@@ -32,6 +33,7 @@ mod board;
 pub mod command;
 pub mod console;
 mod crash_record;
+mod device;
 pub mod epoch;
 mod estimators;
 pub mod learner;
@@ -45,9 +47,10 @@ mod statistics;
 mod transmit;
 
 pub use acquisition::{BurstQueue, Sampler, TimedBurst};
-pub use app::{App, FIRST_CONFIG, Start, run};
+pub use app::{App, Start, run};
 pub use board::{Board, BoardContext, BoardMeters, Chip, Locks, Uptime};
 pub use crash_record::CrashRecord;
+pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;
 pub use estimators::{Estimators, estimate};
 pub use retained::RetainedRam;

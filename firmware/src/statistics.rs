@@ -92,7 +92,7 @@ impl ChannelSums {
 
     /// Rebuilds the Allan variance curve of a channel in its unit.
     ///
-    /// Not inlined, here and below: a curve or sums would otherwise take stack in every caller.
+    /// Not inlined, here and below: frames of 0.7 to 1.9 kB (curve, sums) would otherwise be part of every caller's.
     #[inline(never)]
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, config: Config) {
         let period = 1.0 / config.sample_period().hz();
