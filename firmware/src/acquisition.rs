@@ -1,70 +1,295 @@
-//! From the data-ready edge to the queue: what runs in the two interrupts of a burst.
+//! Acquisition: bursts at data-ready (DRDY) edges, and what the times of the edges say of the sensor.
+//!
+//! [`Sampler`] runs in the two sampling interrupts (data-ready edge, end of the DMA transfer) and queues [`TimedBurst`]s.
+//! [`DataReadyMonitor`] runs behind the queue: sample rate, lost and spurious edges, a suspect sensor.
 
-use adis16405_driver::{BURST_BYTES, Burst};
+use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
 use heapless::spsc;
 
-/// Bursts that may wait for the estimators, and the one slot that the queue needs: 38 ms at 819.2 samples a second.
+/// Slots of the burst queue, one of which stays empty: room for 38 ms at 819.2 samples a second.
 pub const QUEUE_SLOTS: usize = 32;
 
-/// The queue from sampling to the estimators.
-pub type Arrivals = spsc::Queue<Arrival, QUEUE_SLOTS>;
+/// One tick of the sensor's sample clock, 1/1638.4 s, in 1/256 µs; this is exact.
+const TICK_Q8: u64 = 156_250;
+/// Time without an edge after which the sensor may have been reset. Its shortest start-up takes far longer.
+const SILENCE_US: u64 = 25_000;
+/// The same in sample periods; the longer of the two applies.
+const SILENT_PERIODS: u64 = 4;
+/// From so many periods on, the measured mean period is used in the place of the programmed one.
+const SETTLED_PERIODS: u64 = 64;
+/// Suspicion from which on the sensor is to be probed.
+const SUSPECT: u32 = 8;
 
-/// One data-ready edge.
+/// The queue from the sampling interrupts to the estimators.
+pub type BurstQueue = spsc::Queue<TimedBurst, QUEUE_SLOTS>;
+
+/// The burst that was read at one data-ready edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Arrival {
+pub struct TimedBurst {
     /// Time of the edge in microseconds since the start.
     pub at_us: u64,
-    /// Edges before this one whose bursts found the queue full.
+    /// Number of bursts before this one that were dropped because the queue was full.
     pub dropped: u32,
-    /// The burst, or `None` if the bus refused.
+    /// The burst, or `None` if the bus transfer failed.
     pub burst: Option<Burst>,
 }
 
-/// Starts a burst at each data-ready edge and queues what it brought. It never waits.
+/// Decides at each data-ready edge whether a burst is read, and queues the bursts. It never blocks.
 pub struct Sampler<'q> {
-    queue: spsc::Producer<'q, Arrival>,
-    running: bool,
-    /// Time of the edge whose burst is on the bus.
+    queue: spsc::Producer<'q, TimedBurst>,
+    enabled: bool,
+    /// Time of the edge whose burst is being transferred.
     reading: Option<u64>,
     dropped: u32,
 }
 
 impl<'q> Sampler<'q> {
-    /// A sampler that ignores edges until it is told to [`run`](Self::run).
-    pub fn new(queue: spsc::Producer<'q, Arrival>) -> Self {
-        Self { queue, running: false, reading: None, dropped: 0 }
+    /// A sampler that ignores edges until it is [enabled](Self::set_enabled).
+    pub fn new(queue: spsc::Producer<'q, TimedBurst>) -> Self {
+        Self { queue, enabled: false, reading: None, dropped: 0 }
     }
 
-    /// Starts or stops taking notice of edges. A burst that is on the bus goes on.
-    pub fn run(&mut self, on: bool) {
-        self.running = on;
+    /// Enables or disables sampling. A transfer in progress is completed and queued.
+    pub fn set_enabled(&mut self, enabled: bool) {
+        self.enabled = enabled;
     }
 
-    /// Whether a burst is on the bus.
+    /// Whether a burst is being transferred.
     #[must_use]
     pub fn is_reading(&self) -> bool {
         self.reading.is_some()
     }
 
-    /// To be called at every data-ready edge: whether a burst is to be started now.
+    /// To be called at every data-ready edge; returns whether the transfer of a burst must be started now.
     ///
-    /// An edge during a burst starts none; its sample shows as lost by the time to the next.
+    /// An edge during a transfer starts none: its sample is lost, which
+    /// [`DataReadyMonitor`] concludes from the time to the next edge.
     #[must_use]
-    pub fn edge(&mut self, at_us: u64) -> bool {
-        let start = self.running && self.reading.is_none();
+    pub fn data_ready(&mut self, at_us: u64) -> bool {
+        let start = self.enabled && self.reading.is_none();
         if start {
             self.reading = Some(at_us);
         }
         start
     }
 
-    /// To be called when the burst has ended, with what came in, or `None` if the bus failed.
-    pub fn burst(&mut self, answer: Option<&[u8; BURST_BYTES]>) {
+    /// To be called at the end of a transfer with the bytes received, or `None` if it failed.
+    pub fn burst_read(&mut self, received: Option<&[u8; BURST_BYTES]>) {
         let Some(at_us) = self.reading.take() else { return };
-        let arrival = Arrival { at_us, dropped: self.dropped, burst: answer.map(Burst::from_bytes) };
-        match self.queue.enqueue(arrival) {
+        let timed = TimedBurst { at_us, dropped: self.dropped, burst: received.map(Burst::from_bytes) };
+        match self.queue.enqueue(timed) {
             Ok(()) => self.dropped = 0,
             Err(_full) => self.dropped = self.dropped.saturating_add(1),
         }
+    }
+}
+
+/// How a data-ready edge fits the ones before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrdyEdge {
+    /// Number of sample periods since the edge before; 1 if no edge was lost, and for the first edge.
+    Periods(u32),
+    /// Spurious: at no multiple of the sample period.
+    Spurious,
+}
+
+/// Monitors the data-ready edges of a sensor with one programmed sample period.
+#[derive(Debug, Clone, Copy)]
+pub struct DataReadyMonitor {
+    /// Programmed period in 1/256 µs.
+    period_q8: u64,
+    last_us: Option<u64>,
+    /// When the sensor was probed last.
+    probed_us: u64,
+    /// Periods between edges so far, and the time that they took.
+    periods: u64,
+    elapsed_us: u64,
+    /// Rises with every lost or spurious edge, falls with every regular one.
+    suspicion: u32,
+    silent: bool,
+    /// The next edge may come at any phase: configuring the sensor restarts its sample clock.
+    new_phase: bool,
+}
+
+impl DataReadyMonitor {
+    /// A monitor for edges at multiples of `period`, each within a quarter of it.
+    #[must_use]
+    pub const fn new(period: SamplePeriod) -> Self {
+        let period_q8 = period.ticks() as u64 * TICK_Q8;
+        Self {
+            period_q8,
+            last_us: None,
+            probed_us: 0,
+            periods: 0,
+            elapsed_us: 0,
+            suspicion: 0,
+            silent: false,
+            new_phase: false,
+        }
+    }
+
+    /// Takes the time of an edge in microseconds; times must not decrease.
+    pub fn edge(&mut self, at_us: u64) -> DrdyEdge {
+        self.silent |= self.is_silent_at(at_us);
+        let Some(last_us) = self.last_us else {
+            self.last_us = Some(at_us);
+            return DrdyEdge::Periods(1);
+        };
+        let interval_us = at_us.saturating_sub(last_us);
+        let (interval, period) = (interval_us << 8, self.mean_period_q8());
+        let periods = (interval + period / 2) / period;
+        let deviation = interval.abs_diff(periods * period);
+        if core::mem::take(&mut self.new_phase) {
+            self.last_us = Some(at_us);
+            return DrdyEdge::Periods(u32::try_from(periods.max(1)).unwrap_or(u32::MAX));
+        }
+        if periods == 0 || deviation > period / 4 {
+            self.suspicion = (self.suspicion + 3).min(2 * SUSPECT);
+            return DrdyEdge::Spurious;
+        }
+        self.last_us = Some(at_us);
+        if periods <= SILENT_PERIODS {
+            self.periods += periods;
+            self.elapsed_us += interval_us;
+        }
+        self.suspicion =
+            if periods == 1 { self.suspicion.saturating_sub(1) } else { (self.suspicion + 2).min(2 * SUSPECT) };
+        DrdyEdge::Periods(u32::try_from(periods).unwrap_or(u32::MAX))
+    }
+
+    /// Whether the sensor must be probed before its samples are used: it was silent for so long that it may have been
+    /// reset, or its edges come at another rate.
+    #[must_use]
+    pub const fn is_suspect(&self) -> bool {
+        self.silent || self.suspicion >= SUSPECT
+    }
+
+    /// Whether no edge has come for so long before `now_us` that the sensor may be disconnected or reset.
+    #[must_use]
+    pub fn is_silent_at(&self, now_us: u64) -> bool {
+        let last_sign_us = self.last_us.unwrap_or(0).max(self.probed_us);
+        now_us.saturating_sub(last_sign_us) > self.silence_us()
+    }
+
+    /// Clears the suspicion: the sensor was probed and configured at `now_us`.
+    pub fn mark_probed(&mut self, now_us: u64) {
+        self.probed_us = now_us;
+        self.new_phase = true;
+        self.silent = false;
+        self.suspicion = 0;
+    }
+
+    /// Mean sample rate in Hz; `None` before the second edge.
+    #[must_use]
+    pub fn measured_hz(&self) -> Option<f64> {
+        (self.elapsed_us > 0).then(|| self.periods as f64 * 1e6 / self.elapsed_us as f64)
+    }
+
+    fn mean_period_q8(&self) -> u64 {
+        if self.periods < SETTLED_PERIODS { self.period_q8 } else { (self.elapsed_us << 8) / self.periods }
+    }
+
+    fn silence_us(&self) -> u64 {
+        SILENCE_US.max((SILENT_PERIODS * self.period_q8) >> 8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adis16405_driver::TimeBase;
+
+    const PERIOD_US: f64 = 1e6 / 204.8;
+
+    fn monitor() -> DataReadyMonitor {
+        DataReadyMonitor::new(SamplePeriod::from_divisor(TimeBase::Fast, 8).unwrap())
+    }
+
+    #[test]
+    fn after_a_long_loss_the_next_edge_raises_no_suspicion() {
+        let mut monitor = monitor();
+        feed(&mut monitor, [0.0, 1.0, 2.0], 1.0);
+        monitor.mark_probed((10_000.0 * PERIOD_US) as u64);
+        assert_eq!(feed(&mut monitor, [10_001.4, 10_002.4], 1.0), [1, 9_998, 0], "at another phase");
+        assert!(!monitor.is_suspect());
+    }
+
+    /// Feeds edges at these multiples of the period, by a clock that is `fast` times too fast; counts the regular, lost and
+    /// spurious ones.
+    fn feed(monitor: &mut DataReadyMonitor, at: impl IntoIterator<Item = f64>, fast: f64) -> [u32; 3] {
+        let [mut single, mut lost, mut spurious] = [0; 3];
+        for periods in at {
+            match monitor.edge((periods * PERIOD_US * fast) as u64) {
+                DrdyEdge::Periods(1) => single += 1,
+                DrdyEdge::Periods(n) => lost += n - 1,
+                DrdyEdge::Spurious => spurious += 1,
+            }
+        }
+        [single, lost, spurious]
+    }
+
+    #[test]
+    fn the_rate_is_measured_against_the_clock() {
+        for fast in [0.97, 1.0, 1.03] {
+            let mut monitor = monitor();
+            assert_eq!(monitor.measured_hz(), None);
+            assert_eq!(feed(&mut monitor, (0..10_000).map(f64::from), fast), [10_000, 0, 0]);
+            let measured = monitor.measured_hz().unwrap();
+            // Times are truncated to microseconds: 1 µs in 10 000 periods of 4.9 ms.
+            assert!((measured * fast / 204.8 - 1.0).abs() < 1.0 / (9_999.0 * PERIOD_US * fast), "{measured}");
+            assert!(!monitor.is_suspect());
+        }
+    }
+
+    /// With a clock 3 % off, 100 lost edges are counted correctly once the rate is measured.
+    #[test]
+    fn lost_edges_are_counted_exactly() {
+        let mut monitor = monitor();
+        let at = (0..1000).chain(1003..1500).chain(1600..2000).map(f64::from);
+        assert_eq!(feed(&mut monitor, at, 1.03), [1895, 103, 0]);
+        let measured = monitor.measured_hz().unwrap();
+        assert!((measured * 1.03 - 204.8).abs() < 1e-3, "{measured}");
+        assert!(monitor.is_suspect(), "the sensor may have been reset within 100 periods");
+        monitor.mark_probed(2000 * 5000);
+        assert!(!monitor.is_suspect());
+    }
+
+    #[test]
+    fn a_few_lost_edges_raise_no_suspicion() {
+        let mut monitor = monitor();
+        let at = (0..1000).filter(|k| k % 50 != 7).map(f64::from);
+        assert_eq!(feed(&mut monitor, at, 1.0), [960, 20, 0]);
+        assert!(!monitor.is_suspect());
+    }
+
+    #[test]
+    fn a_spurious_edge_is_recognised() {
+        let mut monitor = monitor();
+        let at = [0.0, 1.0, 1.3, 2.0, 3.0, 3.6, 4.0, 5.0, 6.0];
+        assert_eq!(feed(&mut monitor, at, 1.0), [7, 0, 2]);
+        assert!(!monitor.is_suspect());
+    }
+
+    /// A reset sets the sensor to 819.2 samples a second; a disturbed write may set a slower rate.
+    #[test]
+    fn another_rate_raises_suspicion_within_a_few_edges() {
+        for ratio in [0.25, 0.3, 0.5, 1.4, 2.0, 4.0] {
+            let mut monitor = monitor();
+            feed(&mut monitor, (0..100).map(f64::from), 1.0);
+            feed(&mut monitor, (1..16).map(|k| 99.0 + ratio * f64::from(k)), 1.0);
+            assert!(monitor.is_suspect(), "{ratio}");
+        }
+    }
+
+    #[test]
+    fn silence_is_detected_without_an_edge() {
+        let mut monitor = monitor();
+        monitor.mark_probed(500_000);
+        assert!(!monitor.is_silent_at(525_000));
+        assert!(monitor.is_silent_at(525_001), "no edge since the sensor was probed");
+        monitor.mark_probed(990_000);
+        monitor.edge(1_000_000);
+        assert!(!monitor.is_silent_at(1_025_000));
+        assert!(monitor.is_silent_at(1_025_001));
     }
 }

@@ -1,55 +1,308 @@
-//! What a board lends the application.
+//! The board as the main loop sees it: the trait, and the board context that implements it over a microcontroller's
+//! resources and interrupt locks.
 
+use crate::acquisition::Sampler;
 use crate::estimators::Estimators;
-use crate::outbox::Outbox;
+use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
-use embedded_hal::spi::SpiDevice;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use heapless::spsc;
+use rtic_core::Mutex;
 
-/// The board as the main loop sees it; a [`Desk`](crate::Desk) over a microcontroller, or over a virtual sensor on the
-/// host.
+/// Time before the first frame after a burst in µs: the sensor's stall time.
+const STALL_US: u32 = 16;
+
+/// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
 pub trait Board {
-    /// The sensor's bus, for registers, while it is not sampled.
+    /// The sensor's bus, for registers.
     type Bus<'a>: SpiDevice<u8>
     where
         Self: 'a;
-    /// Pauses between frames, long ones too.
-    type Pause<'a>: DelayNs
+    /// Waits between frames and during the self-test.
+    type Delay<'a>: DelayNs
     where
         Self: 'a;
 
     /// Time since the start in microseconds.
     fn now_us(&mut self) -> u64;
-    /// The bus, and what waits between frames. Nothing must be sent while the sensor is sampled.
-    fn bus(&mut self) -> (Self::Bus<'_>, Self::Pause<'_>);
-    /// Starts or stops sampling; when it has returned after a stop, no burst is under way and the sensor's stall is over.
-    fn sample(&mut self, on: bool);
-    /// The estimators, which rest meanwhile: it must not take long.
-    fn estimators<R>(&mut self, look: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
-    /// The way out. Only what was queued is guaranteed to leave.
-    fn outbox<R>(&mut self, send: impl FnOnce(&mut Outbox<'static>) -> R) -> R;
-    /// The next byte that a person or a program sent.
-    fn received(&mut self) -> Option<u8>;
-    /// What the board measures of itself.
-    fn meters(&mut self) -> Meters;
-    /// Feeds the watchdog: the main loop is alive.
-    fn alive(&mut self);
-    /// Restarts the microcontroller; memory is retained.
+    /// The sensor's bus and a delay. To be used only while sampling is disabled.
+    fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
+    /// Enables or disables sampling. On return after disabling, no burst is being transferred, and the sensor's stall time
+    /// has passed.
+    fn set_sampling(&mut self, enabled: bool);
+    /// Gives access to the estimators, which process no burst meanwhile: `access` must be short.
+    fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
+    /// Gives access to the transmit queue, and has what is queued transmitted.
+    fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R;
+    /// The next received byte.
+    fn receive(&mut self) -> Option<u8>;
+    /// Load figures of the board.
+    fn meters(&mut self) -> BoardMeters;
+    /// Feeds the watchdog.
+    fn feed_watchdog(&mut self);
+    /// Restarts the microcontroller; retained RAM keeps its content.
     fn restart(&mut self);
 }
 
-/// What a board measures of itself, since it started.
+/// Load figures of a board since it started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Meters {
+pub struct BoardMeters {
     /// Time that the processor slept, in microseconds.
     pub asleep_us: u64,
-    /// Bytes that came faster than they were read.
+    /// Received bytes lost because they came faster than they were read.
     pub serial_overruns: u32,
     /// Longest sampling interrupt in processor cycles.
     pub sampling_cycles: u32,
-    /// Longest turn of the estimators in processor cycles, interruptions included.
+    /// Longest run of the estimators in processor cycles, preemption included.
     pub estimator_cycles: u32,
-    /// Most bytes of stack ever used.
+    /// Largest stack depth in bytes.
     pub stack_bytes: u32,
-    /// Bytes of stack that there are.
+    /// Size of the stack in bytes.
     pub stack_size: u32,
+}
+
+/// Microseconds since the start, from a microsecond counter of 32 bits.
+#[derive(Debug, Clone, Copy)]
+pub struct Uptime {
+    last: u32,
+    total_us: u64,
+}
+
+impl Uptime {
+    /// Time 0 at counter value `counter`.
+    #[must_use]
+    pub const fn new(counter: u32) -> Self {
+        Self { last: counter, total_us: 0 }
+    }
+
+    /// The time at counter value `counter`; must be called at least once in 71 minutes, in which the counter wraps.
+    pub fn at(&mut self, counter: u32) -> u64 {
+        self.total_us += u64::from(counter.wrapping_sub(self.last));
+        self.last = counter;
+        self.total_us
+    }
+}
+
+/// What differs from one microcontroller to the next.
+pub trait Chip {
+    /// A counter of microseconds that wraps at 2³².
+    fn microseconds(&mut self) -> u32;
+    /// Sleeps until an interrupt is pending and returns before it is served. `clock` is called with the counter right before
+    /// and right after the sleep, while interrupts are disabled.
+    fn sleep(&mut self, clock: impl FnMut(u32));
+    /// Requests the interrupt that transmits what is queued.
+    fn transmit(&mut self);
+    /// Feeds the watchdog.
+    fn feed(&mut self);
+    /// Restarts the microcontroller.
+    fn restart(&mut self);
+    /// Load figures, without the time asleep.
+    fn meters(&mut self) -> BoardMeters;
+}
+
+/// What the main loop shares with the interrupts. Each lock disables only the interrupts that share the resource.
+pub struct Locks<T, B, S, E, Q> {
+    /// [`Uptime`], shared with sampling.
+    pub uptime: T,
+    /// The sensor's bus, shared with sampling.
+    pub bus: B,
+    /// [`Sampler`], shared with sampling.
+    pub sampler: S,
+    /// [`Estimators`], shared with the estimators' interrupt.
+    pub estimators: E,
+    /// [`TransmitQueue`], shared with the estimators' interrupt.
+    pub transmit_queue: Q,
+}
+
+/// A [`Board`] made of a chip and of what it shares with its interrupts.
+pub struct BoardContext<'r, C, T, B, S, E, Q> {
+    chip: C,
+    locks: Locks<T, B, S, E, Q>,
+    received: &'r mut spsc::Consumer<'static, u8>,
+    asleep_us: u64,
+    watchdog: WatchdogFeeder,
+}
+
+/// Feeds the watchdog only when the microsecond counter has advanced since the last time: without a running counter no wait
+/// would end, and the watchdog must restart the microcontroller.
+#[derive(Clone, Copy)]
+struct WatchdogFeeder {
+    /// The counter when the watchdog was fed last.
+    fed_at: u32,
+}
+
+impl WatchdogFeeder {
+    fn feed(&mut self, chip: &mut impl Chip) {
+        let now = chip.microseconds();
+        if now != self.fed_at {
+            self.fed_at = now;
+            chip.feed();
+        }
+    }
+}
+
+impl<'r, C: Chip, T, B, S, E, Q> BoardContext<'r, C, T, B, S, E, Q> {
+    /// `received` is the queue of bytes from the serial port.
+    pub fn new(chip: C, locks: Locks<T, B, S, E, Q>, received: &'r mut spsc::Consumer<'static, u8>) -> Self {
+        Self { chip, locks, received, asleep_us: 0, watchdog: WatchdogFeeder { fed_at: 0 } }
+    }
+
+    /// Sleeps until the next interrupt.
+    pub(crate) fn sleep(&mut self) {
+        let mut fell_asleep = None;
+        let asleep_us = &mut self.asleep_us;
+        self.chip.sleep(|now| match fell_asleep {
+            None => fell_asleep = Some(now),
+            Some(then) => *asleep_us += u64::from(now.wrapping_sub(then)),
+        });
+    }
+}
+
+impl<C, T, B, S, E, Q> Board for BoardContext<'_, C, T, B, S, E, Q>
+where
+    C: Chip,
+    T: Mutex<T = Uptime>,
+    B: Mutex,
+    B::T: SpiDevice<u8>,
+    S: Mutex<T = Sampler<'static>>,
+    E: Mutex<T = Estimators<'static>>,
+    Q: Mutex<T = TransmitQueue<'static>>,
+{
+    type Bus<'a>
+        = LockedBus<'a, B>
+    where
+        Self: 'a;
+
+    type Delay<'a>
+        = FeedingDelay<'a, C>
+    where
+        Self: 'a;
+
+    fn now_us(&mut self) -> u64 {
+        let chip = &mut self.chip;
+        self.locks.uptime.lock(|uptime| uptime.at(chip.microseconds()))
+    }
+
+    fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>) {
+        (LockedBus(&mut self.locks.bus), FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog })
+    }
+
+    fn set_sampling(&mut self, enabled: bool) {
+        self.locks.sampler.lock(|sampler| sampler.set_enabled(enabled));
+        if !enabled {
+            // The transfer of a burst takes 0.4 ms at most.
+            while self.locks.sampler.lock(|sampler| sampler.is_reading()) {}
+            FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(STALL_US);
+        }
+    }
+
+    fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
+        self.locks.estimators.lock(access)
+    }
+
+    fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R {
+        let result = self.locks.transmit_queue.lock(access);
+        self.chip.transmit();
+        result
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.received.dequeue()
+    }
+
+    fn meters(&mut self) -> BoardMeters {
+        BoardMeters { asleep_us: self.asleep_us, ..self.chip.meters() }
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed(&mut self.chip);
+    }
+
+    fn restart(&mut self) {
+        self.chip.restart();
+    }
+}
+
+/// Waits by the chip's counter and feeds the watchdog meanwhile.
+pub struct FeedingDelay<'a, C> {
+    chip: &'a mut C,
+    watchdog: &'a mut WatchdogFeeder,
+}
+
+impl<C: Chip> DelayNs for FeedingDelay<'_, C> {
+    fn delay_ns(&mut self, ns: u32) {
+        self.delay_us(ns.div_ceil(1000));
+    }
+
+    fn delay_us(&mut self, us: u32) {
+        let start = self.chip.microseconds();
+        while self.chip.microseconds().wrapping_sub(start) <= us {
+            self.watchdog.feed(self.chip);
+        }
+    }
+}
+
+/// The shared bus, locked for one transaction at a time.
+pub struct LockedBus<'a, B>(&'a mut B);
+
+impl<B: Mutex<T: SpiDevice<u8>>> ErrorType for LockedBus<'_, B> {
+    type Error = <B::T as ErrorType>::Error;
+}
+
+impl<B: Mutex<T: SpiDevice<u8>>> SpiDevice<u8> for LockedBus<'_, B> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
+        self.0.lock(|bus| bus.transaction(operations))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uptime_continues_when_the_counter_wraps() {
+        let mut uptime = Uptime::new(0xFFFF_FFF0);
+        assert_eq!(uptime.at(0xFFFF_FFFF), 15);
+        assert_eq!(uptime.at(0), 16);
+        assert_eq!(uptime.at(5), 21);
+        assert_eq!(uptime.at(5), 21);
+        assert_eq!(uptime.at(4), 0x1_0000_0014);
+    }
+
+    /// A chip whose counter does not advance for its first readings; counts how often the watchdog is fed until then and
+    /// afterwards.
+    #[derive(Default)]
+    struct StoppedCounter {
+        readings: u32,
+        feedings: [u32; 2],
+    }
+
+    const STOPPED_READINGS: u32 = 10_000;
+
+    impl Chip for StoppedCounter {
+        fn microseconds(&mut self) -> u32 {
+            self.readings += 1;
+            self.readings.saturating_sub(STOPPED_READINGS)
+        }
+
+        fn feed(&mut self) {
+            self.feedings[usize::from(self.readings > STOPPED_READINGS)] += 1;
+        }
+
+        fn sleep(&mut self, _: impl FnMut(u32)) {}
+        fn transmit(&mut self) {}
+        fn restart(&mut self) {}
+        fn meters(&mut self) -> BoardMeters {
+            BoardMeters::default()
+        }
+    }
+
+    #[test]
+    fn the_watchdog_is_not_fed_while_the_counter_stands_still() {
+        let (mut chip, mut watchdog) = (StoppedCounter::default(), WatchdogFeeder { fed_at: 0 });
+        FeedingDelay { chip: &mut chip, watchdog: &mut watchdog }.delay_us(50);
+        let [stopped, running] = chip.feedings;
+        assert_eq!(stopped, 0);
+        assert!(running > 20, "{running} times in 50 us");
+    }
 }

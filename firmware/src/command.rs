@@ -1,10 +1,10 @@
-//! What a person or a program may type.
+//! Commands of the serial port: keys that act at once, and lines that end with Enter.
 
 use adis16405_driver::GyroRange;
 use heapless::Vec;
 
-/// What `?` answers, line by line.
-pub const HELP: [&str; 18] = [
+/// The lines that `?` prints.
+pub const HELP: [&str; 19] = [
     "at the press of a key:",
     "?          this list",
     "r          report in frames, for a program",
@@ -20,79 +20,81 @@ pub const HELP: [&str; 18] = [
     "i SECONDS  time between reports, 0 for none",
     "w 1, w 0   start and stop the stream of raw bursts",
     "check      self-test of the sensor",
-    "arm, null  null the gyro bias; null must follow within 10 s",
-    "zero       forget the statistics and begin again",
+    "arm        allow autonull for 10 s",
+    "autonull   store the gyro output as the bias; keep the sensor still",
+    "clear      reset the statistics",
     "boot       restart; the statistics are kept",
 ];
 
-/// One command, checked.
+/// A valid command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Command {
+pub enum DeviceCommand {
     /// List the commands.
     Help,
-    /// Report in frames.
+    /// Send a report in frames.
     Report,
-    /// Report as a table of text.
+    /// Print the report as a table.
     Table,
-    /// Who, how long, how many.
+    /// Print the state of the device.
     Status,
-    /// Version of the firmware.
+    /// Print the version of the firmware.
     Version,
-    /// Counters of faults.
-    Faults,
-    /// Forget what was learnt.
+    /// Print the counters that are not 0.
+    Counters,
+    /// Reset statistics, models and counters.
     ResetStatistics,
-    /// Sample rate in 1/1000 Hz.
+    /// Set the sample rate, in 1/1000 Hz.
     Rate(u32),
-    /// Full scale of the gyros.
+    /// Set the full scale of the gyros.
     Range(GyroRange),
-    /// Base-2 logarithm of the filter's taps.
+    /// Set the base-2 logarithm of the filter's taps.
     Filter(u8),
-    /// Length of an epoch in s, 0 for no end.
+    /// Set the length of an epoch in s, 0 for no end.
     Epoch(u32),
-    /// Seconds between reports, 0 for none.
+    /// Set the seconds between reports, 0 for none.
     Interval(u32),
-    /// Whether to send the raw bursts.
-    Raw(bool),
-    /// Run the sensor's self-test.
+    /// Start or stop the stream of raw bursts.
+    RawStream(bool),
+    /// Probe the sensor, self-test included.
     SelfTest,
-    /// Make ready for auto-null.
-    ArmNull,
-    /// Carry out auto-null.
-    Null,
+    /// Allow auto-null for 10 s.
+    ArmAutoNull,
+    /// Store the present gyro output as the bias in the sensor.
+    AutoNull,
     /// Restart the microcontroller.
     Restart,
 }
 
-/// What is wrong with what was typed.
+/// Why input is no command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mistake {
-    /// No command begins with this byte. What follows on the line is ignored, keys that act at once excepted.
-    Unknown(u8),
-    /// The line that begins with this letter is no command.
-    Line(u8),
+pub enum CommandError {
+    /// No command begins with this byte. The rest of the line is ignored, except keys that act at once.
+    UnknownKey(u8),
+    /// The line, which begins with this letter, is no command.
+    InvalidLine(u8),
 }
 
 /// Longest line in bytes.
-const LONGEST: usize = 16;
+const MAX_LINE: usize = 16;
 
-/// Puts commands together from bytes.
+/// Parses commands from received bytes.
 ///
-/// Whatever changes or interrupts something takes a whole line, so that noise on an open input does not do it.
+/// Commands that change or interrupt something are whole lines, so that noise on an unconnected input does not trigger them.
 #[derive(Debug, Clone, Default)]
-pub struct Parser {
-    line: Vec<u8, LONGEST>,
-    spoilt: bool,
+pub struct CommandParser {
+    line: Vec<u8, MAX_LINE>,
+    /// The line is invalid: ignored up to its end.
+    invalid: bool,
 }
 
-impl Parser {
-    /// Takes one byte: the command or mistake that it completes, if any.
-    pub fn push(&mut self, byte: u8) -> Option<Result<Command, Mistake>> {
+impl CommandParser {
+    /// Takes one byte and returns the command or error that it completes, if any.
+    pub fn push(&mut self, byte: u8) -> Option<Result<DeviceCommand, CommandError>> {
         match byte {
             b'\r' | b'\n' => {
-                let spoilt = core::mem::take(&mut self.spoilt);
-                let &letter = self.line.first().filter(|_| !spoilt)?;
-                let command = whole_line(&self.line).ok_or(Mistake::Line(letter));
+                let invalid = core::mem::take(&mut self.invalid);
+                let &letter = self.line.first().filter(|_| !invalid)?;
+                let command = whole_line(&self.line).ok_or(CommandError::InvalidLine(letter));
                 self.line.clear();
                 Some(command)
             }
@@ -102,66 +104,67 @@ impl Parser {
                 None
             }
             _ if self.line.is_empty() && key(byte).is_some() => key(byte).map(Ok),
-            _ if self.spoilt => None,
-            b'a'..=b'z' | b'0'..=b'9' | b'.' if !self.line.is_empty() || STARTS.contains(&byte) => {
-                self.line.push(byte).err().map(|byte| self.spoil(byte))
+            _ if self.invalid => None,
+            b'a'..=b'z' | b'0'..=b'9' | b'.' if !self.line.is_empty() || LINE_STARTS.contains(&byte) => {
+                self.line.push(byte).err().map(|byte| self.reject(byte))
             }
-            _ => Some(self.spoil(byte)),
+            _ => Some(self.reject(byte)),
         }
     }
 
-    fn spoil(&mut self, byte: u8) -> Result<Command, Mistake> {
-        let mistake = self.line.first().map_or(Mistake::Unknown(byte), |&letter| Mistake::Line(letter));
+    fn reject(&mut self, byte: u8) -> Result<DeviceCommand, CommandError> {
+        let error =
+            self.line.first().map_or(CommandError::UnknownKey(byte), |&letter| CommandError::InvalidLine(letter));
         self.line.clear();
-        self.spoilt = true;
-        Err(mistake)
+        self.invalid = true;
+        Err(error)
     }
 }
 
-fn key(byte: u8) -> Option<Command> {
+fn key(byte: u8) -> Option<DeviceCommand> {
     Some(match byte {
-        b'?' => Command::Help,
-        b'r' => Command::Report,
-        b't' => Command::Table,
-        b's' => Command::Status,
-        b'k' => Command::Faults,
-        b'v' => Command::Version,
+        b'?' => DeviceCommand::Help,
+        b'r' => DeviceCommand::Report,
+        b't' => DeviceCommand::Table,
+        b's' => DeviceCommand::Status,
+        b'k' => DeviceCommand::Counters,
+        b'v' => DeviceCommand::Version,
         _ => return None,
     })
 }
 
 /// Letters that a line may begin with.
-const STARTS: &[u8] = b"fgneiwcazb";
+const LINE_STARTS: &[u8] = b"fgneiwcab";
 
-fn whole_line(line: &[u8]) -> Option<Command> {
+fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
     match line {
-        b"check" => return Some(Command::SelfTest),
-        b"arm" => return Some(Command::ArmNull),
-        b"null" => return Some(Command::Null),
-        b"zero" => return Some(Command::ResetStatistics),
-        b"boot" => return Some(Command::Restart),
+        b"check" => return Some(DeviceCommand::SelfTest),
+        b"arm" => return Some(DeviceCommand::ArmAutoNull),
+        b"autonull" => return Some(DeviceCommand::AutoNull),
+        b"clear" => return Some(DeviceCommand::ResetStatistics),
+        b"boot" => return Some(DeviceCommand::Restart),
         _ => {}
     }
     let (&letter, digits) = line.split_first()?;
     let thousandths = thousandths(digits)?;
     if letter == b'f' {
-        return Some(Command::Rate(thousandths));
+        return Some(DeviceCommand::Rate(thousandths));
     }
     let number = if thousandths % 1000 == 0 { thousandths / 1000 } else { return None };
     match (letter, number) {
-        (b'g', 300) => Some(Command::Range(GyroRange::Dps300)),
-        (b'g', 150) => Some(Command::Range(GyroRange::Dps150)),
-        (b'g', 75) => Some(Command::Range(GyroRange::Dps75)),
-        (b'n', 0..=6) => Some(Command::Filter(number as u8)),
-        (b'e', _) => Some(Command::Epoch(number)),
-        (b'i', _) => Some(Command::Interval(number)),
-        (b'w', 0) => Some(Command::Raw(false)),
-        (b'w', 1) => Some(Command::Raw(true)),
+        (b'g', 300) => Some(DeviceCommand::Range(GyroRange::Dps300)),
+        (b'g', 150) => Some(DeviceCommand::Range(GyroRange::Dps150)),
+        (b'g', 75) => Some(DeviceCommand::Range(GyroRange::Dps75)),
+        (b'n', 0..=6) => Some(DeviceCommand::Filter(number as u8)),
+        (b'e', _) => Some(DeviceCommand::Epoch(number)),
+        (b'i', _) => Some(DeviceCommand::Interval(number)),
+        (b'w', 0) => Some(DeviceCommand::RawStream(false)),
+        (b'w', 1) => Some(DeviceCommand::RawStream(true)),
         _ => None,
     }
 }
 
-/// A decimal number in thousandths, cut after the third decimal; the largest is 4 294 967.295.
+/// Parses a decimal number as thousandths, truncated after the third decimal; the largest is 4 294 967.295.
 fn thousandths(digits: &[u8]) -> Option<u32> {
     let mut parts = digits.split(|&byte| byte == b'.');
     let (whole, fraction) = (parts.next()?, parts.next().unwrap_or_default());
@@ -178,5 +181,112 @@ fn thousandths(digits: &[u8]) -> Option<u32> {
 }
 
 #[cfg(test)]
-#[path = "command_tests.rs"]
-mod tests;
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use std::vec::Vec;
+
+    fn parse(text: &str) -> Vec<Result<DeviceCommand, CommandError>> {
+        let mut parser = CommandParser::default();
+        text.bytes().filter_map(|byte| parser.push(byte)).collect()
+    }
+
+    #[test]
+    fn single_letters_act_at_once_and_numbers_with_enter() {
+        assert_eq!(parse("r?"), [Ok(DeviceCommand::Report), Ok(DeviceCommand::Help)]);
+        assert_eq!(
+            parse("f 819.2\rn4\ng 75\r\n"),
+            [
+                Ok(DeviceCommand::Rate(819_200)),
+                Ok(DeviceCommand::Filter(4)),
+                Ok(DeviceCommand::Range(GyroRange::Dps75)),
+            ]
+        );
+        assert_eq!(
+            parse("e3600\ri0\rw1\rw 0\r"),
+            [
+                Ok(DeviceCommand::Epoch(3600)),
+                Ok(DeviceCommand::Interval(0)),
+                Ok(DeviceCommand::RawStream(true)),
+                Ok(DeviceCommand::RawStream(false)),
+            ]
+        );
+        assert_eq!(
+            parse("f.5\rf5.\rf1.23456\r"),
+            [Ok(DeviceCommand::Rate(500)), Ok(DeviceCommand::Rate(5000)), Ok(DeviceCommand::Rate(1234)),]
+        );
+    }
+
+    #[test]
+    fn commands_that_change_something_are_whole_lines() {
+        assert_eq!(
+            parse("clear\rcheck\narm\rautonull\rboot\r"),
+            [
+                Ok(DeviceCommand::ResetStatistics),
+                Ok(DeviceCommand::SelfTest),
+                Ok(DeviceCommand::ArmAutoNull),
+                Ok(DeviceCommand::AutoNull),
+                Ok(DeviceCommand::Restart),
+            ]
+        );
+        // After an unknown key the line is ignored, except the key `t`, which acts at once.
+        assert_eq!(
+            parse("xautonull\rclear\r"),
+            [Err(CommandError::UnknownKey(b'x')), Ok(DeviceCommand::Table), Ok(DeviceCommand::ResetStatistics),]
+        );
+    }
+
+    #[test]
+    fn an_error_is_reported_once_and_ends_with_the_line() {
+        assert_eq!(
+            parse("xyXY5r\rr"),
+            [Err(CommandError::UnknownKey(b'x')), Ok(DeviceCommand::Report), Ok(DeviceCommand::Report)]
+        );
+        assert_eq!(parse("f1\u{8}\u{8}r"), [Ok(DeviceCommand::Report)], "backspace deletes a letter");
+        let long = "f00000000000000000\r";
+        for wrong in [
+            "f\r",
+            "f.\r",
+            "n7\r",
+            "n1.5\r",
+            "g100\r",
+            "w2\r",
+            "f1e3\r",
+            "f-1\r",
+            "f1.2.3\r",
+            "f1.2345x\r",
+            "e4294968\r",
+            "cl3ar\r",
+            long,
+        ] {
+            let letter = wrong.as_bytes()[0];
+            assert_eq!(parse(wrong), [Err(CommandError::InvalidLine(letter))], "{wrong}");
+        }
+    }
+
+    /// The first letters in the help are exactly the keys and the letters that a line may begin with.
+    #[test]
+    fn the_help_is_complete() {
+        let first = |line: &&str| line.split([' ', ',']).next().unwrap().as_bytes()[0];
+        let listed: Vec<u8> = HELP.iter().filter(|line| !line.ends_with(':')).map(first).collect();
+        for letter in b'!'..=b'~' {
+            let known = key(letter).is_some() || LINE_STARTS.contains(&letter);
+            assert_eq!(known, listed.contains(&letter), "{}", letter as char);
+        }
+    }
+
+    /// A million random bytes give keys, but no command that changes something.
+    #[test]
+    fn noise_changes_nothing() {
+        let mut parser = CommandParser::default();
+        let mut state = 1_u64;
+        for _ in 0..1_000_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            if let Some(Ok(command)) = parser.push((state >> 56) as u8) {
+                use DeviceCommand::{Counters, Help, Report, Status, Table, Version};
+                assert!(matches!(command, Help | Report | Table | Status | Counters | Version), "{command:?}");
+            }
+        }
+    }
+}

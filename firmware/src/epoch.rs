@@ -1,58 +1,51 @@
-//! What a finished epoch has left: sums, while the next epoch's are under way.
+//! A finished epoch: its sums, the regression of its channels on covariates, and the curves of the compensated streams.
+//!
+//! The compensated stream of a channel is `y − Σ βᵢ·(cᵢ − rᵢ)`, sample by sample, with the sensitivities `β` and references
+//! `r` learned in the epoch before. Its Allan variance follows from the curves and covariances of the epoch,
+//! `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`, so that no second estimator is needed.
 
-use crate::couplings::{Couplings, Covariances};
-use crate::estimators::{CHANNELS, Estimator};
-use crate::retained::{Records, Retained};
-use crate::summary::OCTAVES;
-use crate::sums::Sums;
-use adis16405_driver::Config;
-use allan_core::Curve;
+use crate::estimators::Estimators;
+use crate::retained::{ChannelRecords, RetainedRam};
+use crate::statistics::{
+    AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
+};
+use adis16405_driver::{Channel, Config};
+use allan_core::regression::{Beside, Covariate, Sensitivity};
+use allan_core::{Curve, Point};
+use heapless::Vec;
+use link::{MAX_COVARIATES, ReportedShift};
 
-/// An epoch that is over. The sums of its channels lie where those of the running one are kept for the next start: as long
-/// as they are needed, nothing else may be kept there.
+/// The statistics of a finished epoch.
+///
+/// The sums of its channels are not copied: they stay in the retained RAM where the epoch's end has written them. As long as
+/// they are needed, no further checkpoint may be written.
 #[derive(Clone)]
-pub struct Epoch {
-    /// Epochs finished before it.
+pub struct FinishedEpoch {
+    /// Number of the epoch: epochs finished before it.
     pub number: u32,
-    records: Records,
-    covariances: Covariances,
+    records: ChannelRecords,
+    covariances: AllanCovariances,
 }
 
-impl Epoch {
+impl FinishedEpoch {
     /// An epoch of no samples.
-    pub const EMPTY: Self = Self { number: 0, records: Records::NONE, covariances: Covariances::NONE };
+    pub const EMPTY: Self = Self { number: 0, records: ChannelRecords::EMPTY, covariances: AllanCovariances::EMPTY };
 
-    /// Takes the place of what was there before.
-    pub(crate) fn take(
-        &mut self,
-        retained: &mut Retained,
-        cascades: &[Estimator; CHANNELS.len()],
-        couplings: &Couplings,
-    ) {
-        for (index, cascade) in cascades.iter().enumerate() {
-            retained.keep_sums(index, &Sums::of(cascade));
-        }
-        self.records = retained.records();
-        self.covariances.take(couplings);
+    /// Ends the running epoch of `estimators` and overwrites this value with its statistics.
+    pub fn fill(&mut self, estimators: &mut Estimators<'_>, retained: &mut RetainedRam) {
+        estimators.end_epoch(|statistics| {
+            for (index, estimator) in statistics.estimators.iter().enumerate() {
+                retained.checkpoint(index, &ChannelSums::from_estimator(estimator));
+            }
+            self.records = retained.channel_records();
+            self.covariances.fill(&statistics.cross_sums);
+        });
     }
 
     /// The sums of [`CHANNELS`]`[index]`.
     #[must_use]
-    pub fn sums(&self, index: usize) -> Sums {
+    pub fn sums(&self, index: usize) -> ChannelSums {
         self.records.sums(index)
-    }
-
-    /// Draws the curve of [`CHANNELS`]`[index]` in its unit.
-    #[inline(never)] // so that the sums are not on everybody's stack
-    pub fn draw(&self, curve: &mut Curve<OCTAVES>, index: usize, config: Config) {
-        self.sums(index).draw(curve, CHANNELS[index], config);
-    }
-
-    /// What the channels have in common; `None` if that is not known of all their samples, as after a restart.
-    #[must_use]
-    pub fn covariances(&self) -> Option<&Covariances> {
-        let whole = (0..CHANNELS.len()).all(|index| self.samples(index) == self.covariances.samples);
-        whole.then_some(&self.covariances)
     }
 
     /// Samples of [`CHANNELS`]`[index]`.
@@ -60,4 +53,208 @@ impl Epoch {
     pub fn samples(&self, index: usize) -> u64 {
         self.records.samples(index)
     }
+
+    /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
+    ///
+    /// Not inlined: its frame of 0.6 kB (the sums) would otherwise be part of every caller's.
+    #[inline(never)]
+    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, config: Config) {
+        self.sums(index).rebuild_curve(curve, CHANNELS[index], config);
+    }
+
+    /// The covariances of the channels; `None` if they do not cover all samples of the channels, as after a restart.
+    #[must_use]
+    pub fn covariances(&self) -> Option<&AllanCovariances> {
+        let complete = (0..CHANNELS.len()).all(|index| self.samples(index) == self.covariances.samples);
+        complete.then_some(&self.covariances)
+    }
+}
+
+/// A covariate with a significant sensitivity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Regressor {
+    /// Index of the covariate in [`CHANNELS`].
+    pub covariate: usize,
+    /// Sensitivity in the channel's unit over the covariate's.
+    pub value: f64,
+    /// Standard error of the sensitivity: value ± 1.96·error holds 95 %.
+    pub error: f64,
+    /// Value of the covariate at which the correction is 0, in its unit: the mean of the epoch that was learned from.
+    pub reference: f64,
+}
+
+/// The regressors of one channel.
+pub type Regressors = Vec<Regressor, MAX_COVARIATES>;
+
+/// Indices of covariates in [`CHANNELS`].
+type Candidates = Vec<usize, MAX_COVARIATES>;
+
+/// Estimates the significant sensitivities of the inertial channel [`CHANNELS`]`[index]` in an epoch. The result is empty
+/// also if the epoch has no [covariances](FinishedEpoch::covariances).
+///
+/// Calls `keep_on` before every fit; `None` if that returned false.
+///
+/// Not inlined: its frame of 3.9 kB (curve, covariates) would otherwise be part of every caller's.
+#[must_use]
+#[inline(never)]
+pub fn estimate_regressors(
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+    keep_on: &mut dyn FnMut() -> bool,
+) -> Option<Regressors> {
+    let Some(covariances) = epoch.covariances() else { return Some(Regressors::new()) };
+    let mut candidates: Candidates = candidates(index).collect();
+    let mut channel = Curve::empty();
+    epoch.rebuild_curve(&mut channel, index, config);
+    let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
+    for &candidate in &candidates {
+        if !keep_on() {
+            return None;
+        }
+        // There is room for as many covariates as there are candidates.
+        let _ = covariates.push(covariate(epoch, candidate, config, true));
+    }
+    let sensitivities = loop {
+        let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+            scaled_covariance(
+                covariances,
+                (with.map_or(index, |other| candidates[other]), candidates[covariate]),
+                n,
+                config,
+            )
+        };
+        let regression = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
+        let sensitivities = regression.followed_while(keep_on)?;
+        let degrades = || degrades(epoch, &candidates, config, &sensitivities, &regression);
+        // Sensitivities are chosen by falling significance: the last one is the weakest.
+        let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
+        candidates.remove(weakest.covariate);
+        covariates.remove(weakest.covariate);
+    };
+    let with_reference = |sensitivity: &Sensitivity| {
+        let covariate = candidates[sensitivity.covariate];
+        let reference = covariances.means[covariate] * lsb(covariate, config) + CHANNELS[covariate].offset();
+        Regressor { covariate, value: sensitivity.value, error: sensitivity.error, reference }
+    };
+    Some(sensitivities.iter().map(with_reference).take(MAX_COVARIATES).collect())
+}
+
+/// Rebuilds the curve of the compensated stream of [`CHANNELS`]`[index]` over an epoch. Below 2⁸ samples it is the curve of
+/// the stream itself. `None`, with the curve of the stream itself, if the epoch has no
+/// [covariances](FinishedEpoch::covariances).
+pub(crate) fn rebuild_compensated_curve(
+    curve: &mut Curve<OCTAVES>,
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+    regressors: &[Regressor],
+) -> Option<()> {
+    epoch.rebuild_curve(curve, index, config);
+    if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, config, regressors) }
+}
+
+/// Not inlined: its frame of 5.3 kB (two curves, covariates) would otherwise be part of every caller's; those of `covariate`
+/// and `degrades` take 1.9 and 2.4 kB.
+#[inline(never)]
+fn subtract(
+    curve: &mut Curve<OCTAVES>,
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+    regressors: &[Regressor],
+) -> Option<()> {
+    let covariances = epoch.covariances()?;
+    let candidates: Candidates = regressors.iter().map(|regressor| regressor.covariate).collect();
+    let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
+    for &candidate in &candidates {
+        let _ = covariates.push(covariate(epoch, candidate, config, false));
+    }
+    let exact = |(covariate, regressor): (usize, &Regressor)| Sensitivity::exact(covariate, regressor.value);
+    let sensitivities: Vec<Sensitivity, MAX_COVARIATES> = regressors.iter().enumerate().map(exact).collect();
+    let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+        scaled_covariance(
+            covariances,
+            (with.map_or(index, |other| candidates[other]), candidates[covariate]),
+            n,
+            config,
+        )
+    };
+    let channel = &curve.clone();
+    Beside { channel, covariates: &covariates, covariance: &covariance }.subtract_from(curve, &sensitivities);
+    Some(())
+}
+
+/// Change of the mean of a stream, and of the compensated stream, since the epoch before, in the channel's unit.
+/// `before` are the means of that epoch in counts.
+#[must_use]
+pub(crate) fn mean_shift(
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+    regressors: &[Regressor],
+    before: &ChannelMeans,
+) -> Option<ReportedShift> {
+    let means = &epoch.covariances()?.means;
+    let change = |index: usize| (means[index] - before[index]) * CHANNELS[index].lsb(config.range());
+    let raw = change(index);
+    let correction = regressors.iter().map(|regressor| regressor.value * change(regressor.covariate)).sum::<f64>();
+    Some(ReportedShift { raw, compensated: raw - correction })
+}
+
+/// Candidate covariates of an inertial channel: temperature and supply, and for a gyro the accelerations.
+fn candidates(index: usize) -> impl Iterator<Item = usize> {
+    let position = |channel: Channel| CHANNELS.iter().position(move |&other| other == channel);
+    let environment = [Channel::Temp, Channel::Supply].into_iter();
+    let motion = [Channel::AcclX, Channel::AcclY, Channel::AcclZ].into_iter().filter(move |_| index < GYROS);
+    environment.chain(motion).filter_map(position)
+}
+
+/// Allan covariance of two channels at averaging factor `n`, in the product of their units.
+fn scaled_covariance(covariances: &AllanCovariances, (a, b): (usize, usize), n: u64, config: Config) -> Option<f64> {
+    Some(covariances.covariance(a, b, n)? * lsb(a, config) * lsb(b, config))
+}
+
+/// The covariate [`CHANNELS`]`[index]` at the octaves of the cross sums, with its own noise modelled (`modelled`, for an
+/// estimate) or as measured (for a subtraction).
+#[inline(never)]
+fn covariate(epoch: &FinishedEpoch, index: usize, config: Config, modelled: bool) -> Covariate<CROSS_OCTAVES> {
+    let mut curve = Curve::empty();
+    epoch.rebuild_curve(&mut curve, index, config);
+    if modelled {
+        Covariate::new(&curve, lsb(index, config), 1 << FIRST_CROSS_OCTAVE)
+    } else {
+        Covariate::as_measured(&curve, 1 << FIRST_CROSS_OCTAVE)
+    }
+}
+
+fn lsb(index: usize, config: Config) -> f64 {
+    CHANNELS[index].lsb(config.range())
+}
+
+/// Whether the subtraction would raise the Allan variance at any octave by more than twice its standard error.
+///
+/// A chance correlation with a covariate that hardly varies has a large sensitivity, which would add the covariate's noise
+/// to the stream. At octaves without covariances that noise is all that the subtraction adds.
+#[inline(never)]
+fn degrades(
+    epoch: &FinishedEpoch,
+    candidates: &Candidates,
+    config: Config,
+    sensitivities: &[Sensitivity],
+    regression: &Beside<'_, OCTAVES, CROSS_OCTAVES>,
+) -> bool {
+    let mut added = [0.0; OCTAVES];
+    let mut covariate = Curve::empty();
+    for sensitivity in sensitivities {
+        epoch.rebuild_curve(&mut covariate, candidates[sensitivity.covariate], config);
+        for (added, point) in added.iter_mut().zip(covariate.points()).take(FIRST_CROSS_OCTAVE) {
+            *added += sensitivity.value * sensitivity.value * point.avar;
+        }
+    }
+    let worse = |(raw, added): (&Point, f64)| {
+        let subtracted = regression.subtracted_at(raw, sensitivities).unwrap_or(raw.avar);
+        subtracted + added > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf))
+    };
+    regression.channel.points().iter().zip(added).any(worse)
 }

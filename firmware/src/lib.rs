@@ -1,13 +1,28 @@
-//! The application that characterises an ADIS16405 while it runs: the same code on every board and on the host.
+//! The application that characterises an ADIS16405 while it is sampled: the same code in the images of all boards and on the
+//! host.
 //!
 //! ```text
-//! data-ready edge ─► Sampler ─► queue ─► Estimators ─► App ─► Outbox ─► serial port
-//!  (interrupts)      bursts              (below them)  (main loop)
+//! data-ready edge ─► Sampler ─► burst queue ─► Estimators ─► App ─► transmit queue ─► serial port
+//!  acquisition (two interrupts)                (interrupt)   (main loop)
 //! ```
 //!
-//! A board brings pins, clocks and interrupts; what all images share beside the application is in `microcontroller`: it
-//! calls the [`Sampler`] at data-ready edges and at the ends of bursts, [`estimate`] at a lower priority, and [`run`] from
-//! the main program. Nothing of a higher priority ever waits for anything of a lower one.
+//! | module | content |
+//! |---|---|
+//! | `board`, `microcontroller` | what the application needs of a board; what the images of all boards share |
+//! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
+//! | [`sensor`] | serial clock, probing, auto-null |
+//! | `estimators` | the path of every sample into the statistics, health counters |
+//! | `statistics` | exact sums of a channel and of pairs of channels; curve, baseline model and report made of them |
+//! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
+//! | [`learner`] | models fitted to a finished epoch and validated on the next |
+//! | `device` | state of the device, supervision of the sensor |
+//! | `report`, [`console`] | reports in frames, answers in text |
+//! | `transmit` | the queue to the serial port, raw stream |
+//! | [`command`], `app` | commands, main loop |
+//! | [`retained`], `crash_record` | what survives a warm reset |
+//!
+//! Sampling has a higher priority than the estimators, and these a higher one than the main loop. No priority waits for a
+//! lower one.
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]
@@ -15,36 +30,29 @@
 pub mod acquisition;
 mod app;
 mod board;
-pub mod cadence;
 pub mod command;
-pub mod compensation;
-pub mod couplings;
-mod desk;
-mod epoch;
+pub mod console;
+mod crash_record;
+mod device;
+pub mod epoch;
 mod estimators;
-mod last_words;
-pub mod lesson;
+pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
-#[allow(unsafe_code, reason = "registers, and memory that outlives a reset")]
+#[allow(unsafe_code, reason = "registers, and memory that is not initialised at the start")]
 pub mod microcontroller;
-pub mod outbox;
+mod report;
 pub mod retained;
 pub mod sensor;
-pub mod spi_clock;
-mod summary;
-mod sums;
-pub mod table;
-mod uptime;
+mod statistics;
+mod transmit;
 
-pub use acquisition::{Arrival, Arrivals, Sampler};
-pub use app::{App, FIRST_CONFIG, Start};
-pub use board::{Board, Meters};
-pub use desk::{Chip, Desk, Locks, run};
-pub use epoch::Epoch;
-pub use estimators::{CHANNELS, Estimator, Estimators, Statistics, estimate};
-pub use last_words::LastWords;
-pub use outbox::{Outbox, Outgoing};
-pub use retained::Retained;
-pub use summary::{OCTAVES, OVERLAP, channel_model, channel_report, unseen_error};
-pub use sums::Sums;
-pub use uptime::Uptime;
+pub use acquisition::{BurstQueue, Sampler, TimedBurst};
+pub use app::{App, Start, run};
+pub use board::{Board, BoardContext, BoardMeters, Chip, Locks, Uptime};
+pub use crash_record::CrashRecord;
+pub use device::FIRST_CONFIG;
+pub use epoch::FinishedEpoch;
+pub use estimators::{Estimators, estimate};
+pub use retained::RetainedRam;
+pub use statistics::{CHANNELS, ChannelEstimator, ChannelSums, OCTAVES, OVERLAP, Statistics};
+pub use transmit::{TransmitBuffer, TransmitQueue};

@@ -1,73 +1,71 @@
-//! Memory that a warm reset leaves alone: statistics, settings and last words, each with a checksum.
+//! Retained RAM: statistics and settings in memory that a warm reset does not clear, each record with a checksum.
 //!
-//! The memory is an array of atomic words, so that whatever it holds after the supply came on is a valid value. There is
-//! one slot more than there are records. A record is always written into the slot of which a newer version exists, or
-//! none, so that a reset in the middle of it costs that version and never the one before.
+//! The memory is an array of atomic words, so that any content after power-on is a valid value. There is one slot more than
+//! there are records. A record is always written into a slot that is not the newest version of any record, so that a reset
+//! during the write loses that version and not the one before.
 
-use crate::estimators::CHANNELS;
-use crate::summary::OCTAVES;
-use crate::sums::Sums;
+use crate::statistics::{CHANNELS, ChannelSums, OCTAVES};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Words of a record: the samples, the missing ones, and for every octave a sum of 96 and a count of 64 bits.
-const PAYLOAD: usize = 4 + OCTAVES * OCTAVE;
-const OCTAVE: usize = 5;
-/// Payload, and before it the kind, the version and the generation, after it the checksum.
+/// Payload words of a record: the samples, the missing ones, and for every octave a sum of 96 and a count of 64 bits.
+const PAYLOAD: usize = 4 + OCTAVES * OCTAVE_WORDS;
+const OCTAVE_WORDS: usize = 5;
+/// Words of a slot: kind, version, generation, payload, checksum.
 const SLOT_WORDS: usize = PAYLOAD + 4;
-/// Largest sum that is kept.
-const MOST: u128 = (1 << 96) - 1;
-/// Records: the settings, then the channels.
+/// Largest sum that a record holds.
+const MAX_SUM: u128 = (1 << 96) - 1;
+/// Kinds of records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
-/// Told from memory that holds something else; in the upper half of a slot's first word. Changes with the layout.
+/// Marks a record, in the upper half of a slot's first word. Changes with the layout.
 const MAGIC: u32 = 0xAD17_0000;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// The memory, for a section that is not initialised at the start.
-pub type Memory = [Slot; KINDS + 1];
+/// The memory, to be placed in a linker section that is not initialised at the start.
+pub type RetainedMemory = [Slot; KINDS + 1];
 
-/// What [`Memory`] is where it is initialised: nothing kept.
+/// A [`RetainedMemory`] without records.
 #[must_use]
-pub const fn blank() -> Memory {
+pub const fn blank_memory() -> RetainedMemory {
     [const { [const { AtomicU32::new(0) }; SLOT_WORDS] }; KINDS + 1]
 }
 
-/// What is kept besides the statistics.
+/// The settings of the application.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settings {
+pub struct RetainedSettings {
     /// Value of SMPL_PRD.
     pub smpl_prd: u8,
     /// Value of SENS_AVG.
     pub sens_avg: u16,
-    /// Length of an epoch in s.
+    /// Length of an epoch in s, 0 for an epoch without end.
     pub epoch_s: u32,
-    /// Epochs finished.
+    /// Number of epochs finished.
     pub epoch: u32,
-    /// Seconds between reports.
+    /// Seconds between reports, 0 for none.
     pub interval_s: u32,
-    /// Starts since the supply came on.
+    /// Starts since power-on.
     pub starts: u32,
 }
 
-/// The records in a [`Memory`].
-pub struct Retained {
-    memory: &'static Memory,
-    /// Statistics of another generation are out of date.
+/// The records in a [`RetainedMemory`].
+pub struct RetainedRam {
+    memory: &'static RetainedMemory,
+    /// Channel records of another generation are out of date.
     generation: u32,
     version: u32,
     /// Slot of the newest version of each record.
     newest: [Option<usize>; KINDS],
-    settings: Option<Settings>,
+    settings: Option<RetainedSettings>,
 }
 
-impl Retained {
-    /// Finds the records that are whole.
+impl RetainedRam {
+    /// Finds the newest valid version of every record.
     #[must_use]
-    pub fn open(memory: &'static Memory) -> Self {
+    pub fn open(memory: &'static RetainedMemory) -> Self {
         let mut retained = Self { memory, generation: 0, version: 0, newest: [None; KINDS], settings: None };
         for (index, slot) in memory.iter().enumerate() {
-            let Some((kind, version)) = whole(slot) else { continue };
+            let Some((kind, version)) = valid_record(slot) else { continue };
             let newer = retained.newest[kind].is_none_or(|other| word(&memory[other], 1) < version);
             if newer {
                 retained.newest[kind] = Some(index);
@@ -77,7 +75,7 @@ impl Retained {
         if let Some(slot) = retained.newest[SETTINGS].map(|index| &memory[index]) {
             retained.generation = word(slot, 2);
             let at = |index: usize| word(slot, 3 + index);
-            retained.settings = Some(Settings {
+            retained.settings = Some(RetainedSettings {
                 smpl_prd: at(0) as u8,
                 sens_avg: at(1) as u16,
                 epoch_s: at(2),
@@ -89,7 +87,7 @@ impl Retained {
         retained
     }
 
-    /// Forgets everything, as after the supply came on.
+    /// Erases all records, as after power-on.
     pub fn clear(&mut self) {
         for slot in self.memory {
             slot[0].store(0, Relaxed);
@@ -97,42 +95,42 @@ impl Retained {
         *self = Self::open(self.memory);
     }
 
-    /// The settings that were kept.
+    /// The settings that were written last.
     #[must_use]
-    pub fn settings(&self) -> Option<Settings> {
+    pub fn settings(&self) -> Option<RetainedSettings> {
         self.settings
     }
 
-    /// The statistics of [`CHANNELS`]`[index]` that were kept under these settings.
+    /// The sums of [`CHANNELS`]`[index]`; `None` without a record of the present generation.
     #[must_use]
-    pub fn sums(&self, index: usize) -> Option<Sums> {
+    pub fn restore(&self, index: usize) -> Option<ChannelSums> {
         let slot = &self.memory[self.newest.get(1 + index).copied()??];
         (word(slot, 2) == self.generation).then(|| sums(slot))
     }
 
-    /// The records of all channels, under whatever settings. They stay until others are kept.
+    /// The records of all channels, of any generation. They are valid until further ones are written.
     #[must_use]
-    pub fn records(&self) -> Records {
-        Records(core::array::from_fn(|index| self.newest[1 + index].map(|slot| &self.memory[slot])))
+    pub fn channel_records(&self) -> ChannelRecords {
+        ChannelRecords(core::array::from_fn(|index| self.newest[1 + index].map(|slot| &self.memory[slot])))
     }
 
-    /// Keeps the settings. Statistics that were kept under others are out of date with `fresh`.
-    pub fn keep_settings(&mut self, settings: Settings, fresh: bool) {
-        self.generation = self.generation.wrapping_add(u32::from(fresh));
+    /// Writes the settings; with `new_generation` the channel records written before are out of date.
+    pub fn write_settings(&mut self, settings: RetainedSettings, new_generation: bool) {
+        self.generation = self.generation.wrapping_add(u32::from(new_generation));
         self.settings = Some(settings);
-        let Settings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts } = settings;
+        let RetainedSettings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts } = settings;
         let words = [u32::from(smpl_prd), u32::from(sens_avg), epoch_s, epoch, interval_s, starts];
         self.write(SETTINGS, words);
     }
 
-    /// Keeps what the estimator of [`CHANNELS`]`[index]` has learnt.
+    /// Writes the sums of [`CHANNELS`]`[index]`.
     ///
     /// Differences of counts of 14 bits are within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum of squares
-    /// passes 2⁷¹·n ≤ 2⁹⁴.
-    pub fn keep_sums(&mut self, index: usize, sums: &Sums) {
+    /// exceeds 2⁷¹·n ≤ 2⁹⁴.
+    pub fn checkpoint(&mut self, index: usize, sums: &ChannelSums) {
         let halves = |wide: u64| [wide as u32, (wide >> 32) as u32];
         let octave = |&(squares, count): &(u128, u64)| {
-            let squares = squares.min(MOST);
+            let squares = squares.min(MAX_SUM);
             let [[a, b], [d, e]] = [squares as u64, count].map(halves);
             [a, b, (squares >> 64) as u32, d, e]
         };
@@ -143,7 +141,7 @@ impl Retained {
     }
 
     fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
-        // There is one slot more than kinds, so one is nobody's newest.
+        // There is one slot more than kinds, so at least one holds no newest version.
         let Some(free) = (0..self.memory.len()).find(|index| !self.newest.contains(&Some(*index))) else { return };
         let slot = &self.memory[free];
         self.version = self.version.wrapping_add(1);
@@ -159,21 +157,21 @@ impl Retained {
     }
 }
 
-/// The channels' records of one moment, where they are kept.
+/// References to the records of all channels at one time.
 #[derive(Clone)]
-pub struct Records([Option<&'static Slot>; CHANNELS.len()]);
+pub struct ChannelRecords([Option<&'static Slot>; CHANNELS.len()]);
 
-impl Records {
-    /// None at all.
-    pub const NONE: Self = Self([None; CHANNELS.len()]);
+impl ChannelRecords {
+    /// No records.
+    pub const EMPTY: Self = Self([None; CHANNELS.len()]);
 
-    /// The statistics of [`CHANNELS`]`[index]`; none of a channel that was not kept.
+    /// The sums of [`CHANNELS`]`[index]`; empty without a record.
     #[must_use]
-    pub fn sums(&self, index: usize) -> Sums {
-        self.slot(index).map_or(Sums::NONE, sums)
+    pub fn sums(&self, index: usize) -> ChannelSums {
+        self.slot(index).map_or(ChannelSums::EMPTY, sums)
     }
 
-    /// Samples of [`CHANNELS`]`[index]`.
+    /// Samples of [`CHANNELS`]`[index]`; 0 without a record.
     #[must_use]
     pub fn samples(&self, index: usize) -> u64 {
         self.slot(index).map_or(0, |slot| wide(slot, 0))
@@ -186,17 +184,17 @@ impl Records {
 
 type Slot = [AtomicU32; SLOT_WORDS];
 
-/// Two words of the payload.
+/// Two payload words as a number of 64 bits.
 fn wide(slot: &Slot, at: usize) -> u64 {
     u64::from(word(slot, 3 + at)) | u64::from(word(slot, 4 + at)) << 32
 }
 
-fn sums(slot: &Slot) -> Sums {
+fn sums(slot: &Slot) -> ChannelSums {
     let octaves = core::array::from_fn(|octave| {
-        let at = 4 + OCTAVE * octave;
+        let at = 4 + OCTAVE_WORDS * octave;
         (u128::from(wide(slot, at)) | u128::from(word(slot, 5 + at)) << 64, wide(slot, at + 3))
     });
-    Sums { samples: wide(slot, 0), missing: wide(slot, 2), octaves }
+    ChannelSums { samples: wide(slot, 0), missing: wide(slot, 2), octaves }
 }
 
 fn word(slot: &[AtomicU32], index: usize) -> u32 {
@@ -211,13 +209,108 @@ fn checksum(words: &[AtomicU32]) -> u32 {
     digest.finalize()
 }
 
-/// The kind and version of the record in a slot, if it is whole.
-fn whole(slot: &Slot) -> Option<(usize, u32)> {
+/// The kind and version of the record in a slot, if its checksum is right.
+fn valid_record(slot: &Slot) -> Option<(usize, u32)> {
     let kind = (word(slot, 0) ^ MAGIC) as usize;
     let intact = kind < KINDS && word(slot, SLOT_WORDS - 1) == checksum(&slot[..SLOT_WORDS - 1]);
     intact.then(|| (kind, word(slot, 1)))
 }
 
 #[cfg(test)]
-#[path = "retained_tests.rs"]
-mod tests;
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::statistics::ChannelEstimator;
+    use std::boxed::Box;
+
+    const SETTINGS_WRITTEN: RetainedSettings =
+        RetainedSettings { smpl_prd: 7, sens_avg: 0x0400, epoch_s: 3600, epoch: 2, interval_s: 10, starts: 3 };
+
+    fn memory() -> &'static RetainedMemory {
+        Box::leak(Box::new(blank_memory()))
+    }
+
+    fn sums(samples: i32) -> ChannelSums {
+        let mut estimator = ChannelEstimator::new();
+        (0..samples).for_each(|k| estimator.push(k * k % 8191 - 4096));
+        estimator.gap(5);
+        ChannelSums::from_estimator(&estimator)
+    }
+
+    #[test]
+    fn records_are_found_after_a_restart() {
+        let memory = memory();
+        let mut before = RetainedRam::open(memory);
+        assert_eq!(before.settings(), None);
+        assert!(before.restore(0).is_none());
+        before.write_settings(SETTINGS_WRITTEN, true);
+        for round in 1..4 {
+            (0..CHANNELS.len()).for_each(|index| before.checkpoint(index, &sums(100 * round + index as i32)));
+        }
+        let after = RetainedRam::open(memory);
+        assert_eq!(after.settings(), Some(SETTINGS_WRITTEN));
+        for index in 0..CHANNELS.len() {
+            assert_eq!(after.restore(index).unwrap(), sums(300 + index as i32));
+        }
+    }
+
+    /// Sums of up to 96 bits are stored exactly; larger ones, which no counts reach, saturate.
+    #[test]
+    fn wide_sums_are_stored_exactly() {
+        let memory = memory();
+        let mut retained = RetainedRam::open(memory);
+        retained.write_settings(SETTINGS_WRITTEN, true);
+        let octaves = core::array::from_fn(|octave| (MAX_SUM - octave as u128, u64::MAX - octave as u64));
+        let wide = ChannelSums { samples: u64::MAX, missing: 1 << 33, octaves };
+        retained.checkpoint(3, &wide);
+        assert_eq!(RetainedRam::open(memory).restore(3).unwrap(), wide);
+        retained.checkpoint(3, &ChannelSums { octaves: [(u128::MAX, 1); OCTAVES], ..wide.clone() });
+        assert_eq!(retained.restore(3).unwrap(), ChannelSums { octaves: [(MAX_SUM, 1); OCTAVES], ..wide });
+    }
+
+    #[test]
+    fn statistics_under_other_settings_are_out_of_date() {
+        let memory = memory();
+        let mut retained = RetainedRam::open(memory);
+        retained.write_settings(SETTINGS_WRITTEN, true);
+        retained.checkpoint(1, &sums(50));
+        retained.write_settings(RetainedSettings { epoch_s: 60, ..SETTINGS_WRITTEN }, false);
+        assert!(RetainedRam::open(memory).restore(1).is_some());
+        retained.write_settings(SETTINGS_WRITTEN, true);
+        assert!(RetainedRam::open(memory).restore(1).is_none());
+        retained.clear();
+        assert_eq!(RetainedRam::open(memory).settings(), None);
+    }
+
+    /// A bit flips in any word of the slot written last: the version before is found.
+    #[test]
+    fn damage_loses_one_version_only() {
+        for word in 0..SLOT_WORDS {
+            let memory = memory();
+            let mut retained = RetainedRam::open(memory);
+            retained.write_settings(SETTINGS_WRITTEN, true);
+            retained.checkpoint(2, &sums(100));
+            retained.checkpoint(2, &sums(200));
+            let slot = retained.newest[3].unwrap();
+            memory[slot][word].fetch_xor(0x10, Relaxed);
+            assert_eq!(RetainedRam::open(memory).restore(2).map(|sums| sums.samples), Some(100), "word {word}");
+        }
+    }
+
+    /// The reset comes after any number of words of the new version.
+    #[test]
+    fn a_reset_during_a_write_loses_that_version_only() {
+        let memory = memory();
+        let mut retained = RetainedRam::open(memory);
+        retained.write_settings(SETTINGS_WRITTEN, true);
+        retained.checkpoint(0, &sums(100));
+        retained.checkpoint(0, &sums(200));
+        let newest = retained.newest[1].unwrap();
+        let free = (0..memory.len()).find(|index| !retained.newest.contains(&Some(*index))).unwrap();
+        for (written, (to, from)) in memory[free].iter().zip(&memory[newest]).enumerate() {
+            assert_eq!(RetainedRam::open(memory).restore(0).map(|sums| sums.samples), Some(200), "{written} words");
+            to.store(!from.load(Relaxed), Relaxed);
+        }
+    }
+}

@@ -1,37 +1,63 @@
-//! What the application does to the sensor while it is not sampled.
+//! The sensor's bus apart from sampling: serial clock, probing (identify, test, configure), auto-null.
 
 use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
 
-/// What a sensor that answers says of itself.
+/// Largest serial clock of a burst read in Hz (ADIS16400/ADIS16405 data sheet Rev. B, page 10).
+pub const BURST_LIMIT_HZ: u32 = 1_000_000;
+/// Largest serial clock in the sensor's low-power mode in Hz (data sheet Rev. B, page 10).
+pub(crate) const LOW_POWER_LIMIT_HZ: u32 = 300_000;
+
+/// The largest clock of at most `limit_hz` that a divider by 2, 4, 8 … 256 makes of `bus_hz`; `None` if 256 is not enough.
+///
+/// HALs round a request to the nearest prescaler, which may exceed the sensor's limit.
+#[must_use]
+pub const fn largest_clock_hz(bus_hz: u32, limit_hz: u32) -> Option<u32> {
+    let mut shift = 1;
+    while shift <= 8 {
+        if bus_hz.div_ceil(1 << shift) <= limit_hz {
+            return Some(bus_hz >> shift);
+        }
+        shift += 1;
+    }
+    None
+}
+
+/// The clock that a divider by `2^(field + 1)` makes of `bus_hz`, in Hz, rounded up; `field` as in an STM32's CR1.
+#[must_use]
+pub const fn prescaled_clock_hz(bus_hz: u32, field: u8) -> u32 {
+    bus_hz.div_ceil(1 << (field as u32 % 8 + 1))
+}
+
+/// A sensor that has passed a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Identity {
-    /// Which part it is.
+pub struct SensorIdentity {
+    /// Product that answered.
     pub product: Product,
-    /// Whether the self-test was seen to run; a part that was asleep tests nothing.
+    /// Whether the self-test was seen to run; a sensor in sleep mode runs none.
     pub tested: bool,
     /// DIAG_STAT after the self-test.
     pub diagnosis: Diagnosis,
 }
 
-/// Why the sensor cannot be used.
+/// Why a probe has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble<E> {
-    /// The driver's word.
+pub enum ProbeError<E> {
+    /// The bus failed, another product answered, or a register did not take its value.
     Driver(Error<E>),
-    /// The self-test found something.
+    /// The self-test failed.
     SelfTest(Diagnosis),
 }
 
-impl<E> From<Error<E>> for Trouble<E> {
+impl<E> From<Error<E>> for ProbeError<E> {
     fn from(error: Error<E>) -> Self {
         Self::Driver(error)
     }
 }
 
-impl<E: fmt::Debug> fmt::Display for Trouble<E> {
+impl<E: fmt::Debug> fmt::Display for ProbeError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Driver(error) => error.fmt(f),
@@ -40,36 +66,59 @@ impl<E: fmt::Debug> fmt::Display for Trouble<E> {
     }
 }
 
-/// Identifies the sensor, tests it, and configures it: range, filter, sample period, data ready on DIO1, active high, and
-/// no negative bias of gyro x.
+/// Identifies the sensor, runs its self-test, and configures it: range, filter, sample period, and data ready on DIO1,
+/// active high. A negative bias of gyro x is moved from the sensor to the host.
 ///
 /// # Errors
-/// The bus failed, something else answers, the self-test failed, or a register did not take its value.
-pub fn bring_up<SPI: SpiDevice<u8>>(
-    (bus, mut pause): (SPI, impl DelayNs),
+/// As [`ProbeError`] lists them.
+pub fn probe<SPI: SpiDevice<u8>>(
+    (bus, mut delay): (SPI, impl DelayNs),
     config: Config,
-) -> Result<Identity, Trouble<SPI::Error>> {
+) -> Result<SensorIdentity, ProbeError<SPI::Error>> {
     let mut sensor = Adis16405::new(bus, config);
     let product = sensor.init()?;
-    let test = sensor.self_test(&mut pause)?;
+    let test = sensor.self_test(&mut delay)?;
     if test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES) {
-        return Err(Trouble::SelfTest(test.diagnosis));
+        return Err(ProbeError::SelfTest(test.diagnosis));
     }
-    // Otherwise bursts would lose the sign of negative x rates; a constant is nothing to the Allan variance.
+    // With such a bias, bursts lose the sign of negative x rates (erratum). The Allan variance does not depend on the bias.
     if sensor.x_sign_at_risk() {
         sensor.keep_negative_x_bias_on_host()?;
     }
     sensor.set_data_ready(Some(DioSignal::default()))?;
-    Ok(Identity { product, tested: test.ran, diagnosis: test.diagnosis })
+    Ok(SensorIdentity { product, tested: test.ran, diagnosis: test.diagnosis })
 }
 
-/// Has the sensor take its present gyro output for the bias; it must be still.
+/// Has the sensor store its present gyro output as the bias; it must be still.
 ///
 /// # Errors
 /// The bus failed, or the sensor does not answer afterwards.
 pub fn auto_null<SPI: SpiDevice<u8>>(
-    (bus, mut pause): (SPI, impl DelayNs),
+    (bus, mut delay): (SPI, impl DelayNs),
     config: Config,
 ) -> Result<(), Error<SPI::Error>> {
-    Adis16405::new(bus, config).auto_null(&mut pause).map(|_offsets| ())
+    Adis16405::new(bus, config).auto_null(&mut delay).map(|_offsets| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_does_not_exceed_the_limit() {
+        assert_eq!(largest_clock_hz(84_000_000, 1_000_000), Some(656_250));
+        assert_eq!(largest_clock_hz(64_000_000, 1_000_000), Some(1_000_000));
+        assert_eq!(largest_clock_hz(64_000_001, 1_000_000), Some(500_000));
+        assert_eq!(largest_clock_hz(1_000_000, 1_000_000), Some(500_000));
+        assert_eq!(largest_clock_hz(257_000_000, 1_000_000), None);
+        assert_eq!(largest_clock_hz(u32::MAX, 0), None);
+    }
+
+    #[test]
+    fn a_prescaler_field_is_decoded_as_in_the_reference_manual() {
+        assert_eq!(prescaled_clock_hz(84_000_000, 0b000), 42_000_000);
+        assert_eq!(prescaled_clock_hz(84_000_000, 0b101), 1_312_500);
+        assert_eq!(prescaled_clock_hz(84_000_000, 0b110), 656_250);
+        assert_eq!(prescaled_clock_hz(84_000_000, 0b111), 328_125);
+    }
 }

@@ -1,15 +1,17 @@
-//! Sampling and estimating without a board: order, gaps by cause, the raw stream.
+//! Sampling and estimating without a board: order, gaps and counters by cause, the raw stream.
 
-use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts};
-use firmware::{Arrival, Arrivals, CHANNELS, Estimators, Outbox, Outgoing, Sampler, Statistics, estimate};
-use link::{Decoder, Message, Raw, Received};
+use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts, OutputWord};
+use firmware::{
+    BurstQueue, CHANNELS, Estimators, Sampler, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
+};
+use link::{Decoder, Health, Message, RawMessage, Received};
 
 /// The default configuration samples at 819.2 Hz.
 const PERIOD_US: f64 = 1e6 / 819.2;
 /// The supply in counts of 2.418 mV: 5.00 V.
 const SUPPLY: i16 = 2068;
 
-/// A good burst whose inertial counts are those of no other `k` nearby.
+/// A valid burst whose inertial counts depend on `k`.
 fn burst(k: i16) -> Burst {
     Burst::from_counts(&Counts::new([SUPPLY, k, 2 * k, 3, 4, 5, 6, 7, 8, 9, 10, 11]))
 }
@@ -19,21 +21,21 @@ fn at_us(period: u32) -> u64 {
     (f64::from(period) * PERIOD_US) as u64
 }
 
-fn arrival(period: u32, burst: Option<Burst>) -> Arrival {
-    Arrival { at_us: at_us(period), dropped: 0, burst }
+fn timed(period: u32, burst: Option<Burst>) -> TimedBurst {
+    TimedBurst { at_us: at_us(period), dropped: 0, burst }
 }
 
-/// Allan's sum worked out by hand: counts 0, 1, 3 have first differences 1, 2, whose squares sum to 5.
+/// The sums worked out by hand: counts 0, 1, 3 have first differences 1, 2, whose squares sum to 5.
 #[test]
 fn counts_reach_the_estimators() {
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, Config::default());
     for (period, k) in (0..).zip([0, 1, 3]) {
-        assert!(!estimators.take(arrival(period, Some(burst(k))), 0));
+        assert!(!estimators.process(timed(period, Some(burst(k))), 0));
     }
     let sums = |channel| {
         let index = CHANNELS.iter().position(|&other| other == channel).unwrap();
-        let estimator = estimators.get(index).unwrap();
+        let estimator = estimators.channel(index).unwrap();
         (estimator.len(), estimator.sum_of_squares(0).unwrap())
     };
     assert_eq!(sums(Channel::GyroX), (3, (5, 2)));
@@ -43,7 +45,7 @@ fn counts_reach_the_estimators() {
     assert_eq!(sums(Channel::Supply), (3, (0, 2)));
 }
 
-/// Nothing straddles what was lost: of 1, lost, 5, 9 only the step from 5 to 9 counts.
+/// No difference is taken across a lost sample: of 1, lost, 5, 9 only the step from 5 to 9 counts.
 #[test]
 fn losses_are_gaps_and_are_counted_by_cause() {
     let zeros = Some(Burst::from_bytes(&[0; BURST_BYTES]));
@@ -52,12 +54,12 @@ fn losses_are_gaps_and_are_counted_by_cause() {
     for (lost, periods, dropped) in cases {
         let mut statistics = Statistics::new();
         let mut estimators = Estimators::new(&mut statistics, Config::default());
-        estimators.take(arrival(0, Some(burst(1))), 0);
-        estimators.take(Arrival { dropped, ..arrival(periods, lost) }, 4);
-        estimators.take(arrival(periods + 1, Some(burst(5))), 0);
-        estimators.take(arrival(periods + 2, Some(burst(9))), 0);
+        estimators.process(timed(0, Some(burst(1))), 0);
+        estimators.process(TimedBurst { dropped, ..timed(periods, lost) }, 4);
+        estimators.process(timed(periods + 1, Some(burst(5))), 0);
+        estimators.process(timed(periods + 2, Some(burst(9))), 0);
         let case = format!("{lost:?}, {periods} periods, {dropped} dropped");
-        let estimator = estimators.get(0).unwrap();
+        let estimator = estimators.channel(0).unwrap();
         assert_eq!((estimator.len(), estimator.missing()), (3, u64::from(periods)), "{case}");
         assert_eq!(estimator.sum_of_squares(0), Some((16, 1)), "{case}");
         let health = estimators.health();
@@ -69,96 +71,96 @@ fn losses_are_gaps_and_are_counted_by_cause() {
     }
 }
 
-/// An edge between two samples is noise on the line: its burst is no sample, and no sample is missing.
+/// The burst of an edge between two samples is not used, and no sample is missing.
 #[test]
-fn a_stray_edge_is_no_sample() {
+fn a_spurious_edge_is_no_sample() {
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, Config::default());
-    estimators.take(arrival(0, Some(burst(1))), 0);
-    estimators.take(Arrival { at_us: 500, ..arrival(0, Some(burst(1))) }, 0);
-    estimators.take(arrival(1, Some(burst(2))), 0);
-    let estimator = estimators.get(0).unwrap();
+    estimators.process(timed(0, Some(burst(1))), 0);
+    estimators.process(TimedBurst { at_us: 500, ..timed(0, Some(burst(1))) }, 0);
+    estimators.process(timed(1, Some(burst(2))), 0);
+    let estimator = estimators.channel(0).unwrap();
     assert_eq!((estimator.len(), estimator.missing(), estimator.sum_of_squares(0)), (2, 0, Some((1, 1))));
-    assert_eq!(estimators.health().stray_edges, 1);
+    assert_eq!(estimators.health().spurious_edges, 1);
 }
 
-/// After a silence in which the sensor may have been reset its samples are not used until it was checked.
+/// After a silence in which the sensor may have been reset its samples are not used until it is probed.
 #[test]
-fn after_a_silence_samples_wait_for_the_check() {
+fn after_a_silence_samples_are_not_used_before_the_probe() {
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, Config::default());
-    estimators.trust(0);
-    estimators.take(arrival(0, Some(burst(1))), 0);
+    estimators.mark_probed(0);
+    estimators.process(timed(0, Some(burst(1))), 0);
     for (period, k) in [(100, 2), (101, 3)] {
-        estimators.take(arrival(period, Some(burst(k))), 0);
-        assert!(estimators.is_doubtful());
+        estimators.process(timed(period, Some(burst(k))), 0);
+        assert!(estimators.is_suspect());
     }
-    estimators.trust(at_us(101) + 1);
-    estimators.take(arrival(102, Some(burst(4))), 0);
-    let estimator = estimators.get(0).unwrap();
+    estimators.mark_probed(at_us(101) + 1);
+    estimators.process(timed(102, Some(burst(4))), 0);
+    let estimator = estimators.channel(0).unwrap();
     assert_eq!((estimator.len(), estimator.missing()), (2, 101));
     let health = estimators.health();
     assert_eq!((health.lost_edges, health.unchecked, health.used), (99, 2, 2));
 }
 
 #[test]
-fn a_stuck_data_line_raises_doubt() {
+fn a_sensor_with_a_stuck_data_line_is_suspect() {
     for bytes in [[0; BURST_BYTES], [0xFF; BURST_BYTES]] {
         let mut statistics = Statistics::new();
         let mut estimators = Estimators::new(&mut statistics, Config::default());
-        let mut doubtful = |period| {
-            estimators.take(arrival(period, Some(Burst::from_bytes(&bytes))), 0);
-            estimators.is_doubtful()
+        let mut suspect = |period| {
+            estimators.process(timed(period, Some(Burst::from_bytes(&bytes))), 0);
+            estimators.is_suspect()
         };
-        assert_eq!((0..20).position(&mut doubtful), Some(15));
+        assert_eq!((0..20).position(&mut suspect), Some(15));
     }
 }
 
 #[test]
 fn a_full_queue_is_counted_with_the_next_burst_that_fits() {
-    let mut queue = Arrivals::new();
+    let mut queue = BurstQueue::new();
     let (producer, mut consumer) = queue.split();
     let mut sampler = Sampler::new(producer);
     let capacity = consumer.capacity() as u64;
-    assert!(!sampler.edge(0), "nobody asked for samples");
-    sampler.run(true);
+    assert!(!sampler.data_ready(0), "sampling is disabled");
+    sampler.set_enabled(true);
     let mut sample = |at_us: u64| {
-        assert!(sampler.edge(at_us));
-        assert!(!sampler.edge(at_us + 1), "a burst is on the bus");
-        sampler.burst(Some(&burst(at_us as i16).to_bytes()));
+        assert!(sampler.data_ready(at_us));
+        assert!(!sampler.data_ready(at_us + 1), "a burst is being transferred");
+        sampler.burst_read(Some(&burst(at_us as i16).to_bytes()));
     };
     (0..capacity + 7).for_each(&mut sample);
-    let mut arrived = |count| -> Vec<(u64, u32)> {
-        (0..count).map_while(|_| consumer.dequeue()).map(|arrival| (arrival.at_us, arrival.dropped)).collect()
+    let mut queued = |count| -> Vec<(u64, u32)> {
+        (0..count).map_while(|_| consumer.dequeue()).map(|timed| (timed.at_us, timed.dropped)).collect()
     };
-    assert!(arrived(1000).into_iter().eq((0..capacity).map(|at_us| (at_us, 0))));
+    assert!(queued(1000).into_iter().eq((0..capacity).map(|at_us| (at_us, 0))));
     sample(1000);
     sample(1001);
-    assert_eq!(arrived(3), [(1000, 7), (1001, 0)]);
+    assert_eq!(queued(3), [(1000, 7), (1001, 0)]);
 }
 
-/// The raw stream holds every burst, usable or not, each with its place: those that are lost leave a gap in the numbers.
+/// The raw stream contains every burst, usable or not, with its sample number and time; lost ones leave a gap in the numbers.
 #[test]
-fn the_raw_stream_is_what_came_off_the_bus() {
-    let (mut arrivals, mut outgoing, mut statistics) = (Arrivals::new(), Outgoing::new(), Statistics::new());
-    let (mut producer, mut consumer) = arrivals.split();
-    let (to_port, mut port) = outgoing.split();
-    let mut outbox = Outbox::new(to_port);
+fn the_raw_stream_contains_every_burst() {
+    let (mut bursts, mut buffer, mut statistics) = (BurstQueue::new(), TransmitBuffer::new(), Statistics::new());
+    let (mut producer, mut consumer) = bursts.split();
+    let (to_port, mut port) = buffer.split();
+    let mut transmit_queue = TransmitQueue::new(to_port);
     let mut estimators = Estimators::new(&mut statistics, Config::default());
-    estimators.set_raw(true);
+    estimators.set_raw_stream(true);
     let mut expected = Vec::new();
     for period in (0..40).chain(50..58) {
         let bytes = if period % 7 == 0 { [0; BURST_BYTES] } else { burst(period as i16).to_bytes() };
         let burst = Burst::from_bytes(&bytes);
         expected.push((u64::from(period), at_us(period), burst.words.map(|word| word.0.to_be_bytes())));
-        producer.enqueue(arrival(period, Some(burst))).unwrap();
-        estimate(&mut estimators, &mut outbox, &mut consumer);
+        producer.enqueue(timed(period, Some(burst))).unwrap();
+        estimate(&mut estimators, &mut transmit_queue, &mut consumer);
     }
     let mut decoder = Decoder::new();
     let received = std::iter::from_fn(|| port.dequeue()).filter_map(|byte| decoder.push(byte));
     let mut found = Vec::new();
     for message in received.filter_map(Received::message) {
-        let Message::Raw(Raw { first, at_us, sens_avg, bursts }) = message else { panic!("{message:?}") };
+        let Message::Raw(RawMessage { first, at_us, sens_avg, bursts }) = message else { panic!("{message:?}") };
         assert_eq!(sens_avg, Config::default().sens_avg());
         let (mut number, mut time) = (first, at_us);
         for burst in bursts {
@@ -171,19 +173,19 @@ fn the_raw_stream_is_what_came_off_the_bus() {
     assert_eq!(found, expected);
 }
 
-/// A line that nobody empties: messages of the raw stream are dropped whole, counted, and missed by their numbers.
+/// While the serial port sends nothing, raw messages are dropped completely, counted, and missing by their sequence numbers.
 #[test]
-fn what_the_line_cannot_take_is_counted() {
-    let (mut arrivals, mut outgoing, mut statistics) = (Arrivals::new(), Outgoing::new(), Statistics::new());
-    let (mut producer, mut consumer) = arrivals.split();
-    let (to_port, mut port) = outgoing.split();
-    let mut outbox = Outbox::new(to_port);
+fn raw_messages_without_room_are_dropped_and_counted() {
+    let (mut bursts, mut buffer, mut statistics) = (BurstQueue::new(), TransmitBuffer::new(), Statistics::new());
+    let (mut producer, mut consumer) = bursts.split();
+    let (to_port, mut port) = buffer.split();
+    let mut transmit_queue = TransmitQueue::new(to_port);
     let mut estimators = Estimators::new(&mut statistics, Config::default());
-    estimators.set_raw(true);
+    estimators.set_raw_stream(true);
     let mut decoder = Decoder::new();
     for period in 0..320 {
-        producer.enqueue(arrival(period, Some(burst(period as i16)))).unwrap();
-        estimate(&mut estimators, &mut outbox, &mut consumer);
+        producer.enqueue(timed(period, Some(burst(period as i16)))).unwrap();
+        estimate(&mut estimators, &mut transmit_queue, &mut consumer);
         if period == 303 || period == 319 {
             std::iter::from_fn(|| port.dequeue()).for_each(|byte| drop(decoder.push(byte)));
         }
@@ -193,4 +195,52 @@ fn what_the_line_cannot_take_is_counted() {
     assert_eq!((counters.frames + counters.missing, counters.missing), (20, dropped));
     assert_eq!(counters.bad_frames, 0);
     assert_eq!(estimators.health().used, 320, "the estimators lose nothing");
+}
+
+/// Counts of a sensor at rest.
+const AT_REST: [i16; 12] = [SUPPLY, 11, 12, 13, 4, 5, 6, 7, 8, 9, 10, 11];
+
+fn with_rate(gyro_x: i16) -> Burst {
+    let mut counts = AT_REST;
+    counts[1] = gyro_x;
+    Burst::from_counts(&Counts::new(counts))
+}
+
+/// A burst with one clock too many: every bit arrives one place to the left.
+fn shifted(burst: &Burst) -> Burst {
+    let next = |k: usize| burst.words.get(k + 1).map_or(0, |word| word.0 >> 15);
+    Burst { words: core::array::from_fn(|k| OutputWord(burst.words[k].0 << 1 | next(k))) }
+}
+
+fn health_after(bursts: impl IntoIterator<Item = Burst>) -> Health {
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
+    for (period, burst) in (0..).zip(bursts) {
+        estimators.process(timed(period, Some(burst)), 0);
+    }
+    estimators.health()
+}
+
+#[test]
+fn damaged_bursts_are_counted_by_cause() {
+    // Beyond ±7000 counts of 0.05 deg/s the part cannot measure.
+    let damaged = [
+        with_rate(1),
+        with_rate(7_001),
+        with_rate(2),
+        with_rate(-7_001),
+        with_rate(3),
+        shifted(&with_rate(4)),
+        with_rate(5),
+    ];
+    let health = health_after(damaged);
+    assert_eq!((health.bursts, health.used), (7, 4), "{health:?}");
+    assert_eq!((health.impossible_rate, health.shifted, health.frozen, health.x_sign), (2, 1, 0, 0), "{health:?}");
+}
+
+/// The 513th of equal bursts is the first with 512 before it.
+#[test]
+fn a_frozen_sensor_is_counted() {
+    let health = health_after(core::iter::repeat_n(with_rate(1), 600));
+    assert_eq!((health.bursts, health.frozen, health.used), (600, 88, 512), "{health:?}");
 }

@@ -7,7 +7,7 @@ mod wording;
 pub use compensation::{Compensated, Compensation};
 pub use wording::Narrator;
 
-use link::Counters;
+use link::DecoderCounters;
 use recordings::serial::Cable;
 use std::io::{self, Read, Write};
 use std::time::Instant;
@@ -28,8 +28,8 @@ pub fn show<P: Read + Write>(cable: &mut Cable<P>, deadline: Option<Instant>, ou
 }
 
 /// One line on what was found and lost.
-pub fn summary(counters: &Counters) -> String {
-    let Counters { frames, lines, bad_frames, other_version, missing, discarded_bytes } = counters;
+pub fn summary(counters: &DecoderCounters) -> String {
+    let DecoderCounters { frames, lines, bad_frames, other_version, missing, discarded_bytes } = counters;
     format!(
         "{frames} messages, {missing} missing by their numbers, {lines} lines, {bad_frames} damaged, \
          {other_version} of another version, {discarded_bytes} bytes of noise"

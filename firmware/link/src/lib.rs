@@ -1,50 +1,28 @@
-//! The wire format between the firmware and the host.
+//! The wire format between the firmware and the host, version 3.
 //!
-//! A frame is a [`Message`] with the format's version and a sequence number, as postcard, followed by its CRC-32 (ISO-HDLC, little
-//! endian), made free of zero bytes by COBS and enclosed in a zero byte at either end. The leading zero ends
-//! whatever noise or text came before, so that it costs a receiver the noise and never the frame.
+//! **Frames.** A frame carries one [`Message`]: format version (`u8`), sequence number (`u16`) and message, serialised by
+//! postcard, then the CRC-32 (ISO-HDLC, little endian) of these bytes. The whole is COBS-encoded, so that it contains no
+//! zero byte, and enclosed in a zero byte at either end. The leading zero byte terminates noise or text that precedes the
+//! frame: the receiver discards that, and not the frame.
 //!
-//! Between frames there may be lines of plain text, for a person with any terminal program: printable ASCII that ends in
-//! CR LF, enclosed in zero bytes too.
+//! **Text lines.** Between frames there may be lines of plain text for a terminal program: printable ASCII that ends in CR
+//! LF, also enclosed in zero bytes.
 //!
-//! [`Encoder`] turns messages into frames, [`Decoder`] finds the frames in a stream of bytes and counts what it
-//! could not use. Neither panics, whatever it is fed.
+//! [`Encoder`] turns messages into frames. [`Decoder`] finds frames and text lines in a stream of bytes and counts what it
+//! could not use. Neither panics on any input.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-mod decode;
-mod encode;
+mod frame;
 mod message;
 mod text;
 
-pub use decode::{Counters, Decoder, Received};
-pub use encode::Encoder;
+pub use frame::{Decoder, DecoderCounters, Encoder, MAX_FRAME, MAX_RAW_FRAME, Received, VERSION};
 pub use message::{
-    Boot, BootCause, Bounded, Cause, ChannelReport, Checked, Coefficient, Drift, Effect, Health, Hello, Learnt,
-    MAX_CAUSES, MAX_COEFFICIENTS, MAX_DRIFTS, MAX_EFFECTS, MAX_POINTS, MAX_RAW, MAX_TEXT, Message, MessageRef,
-    ModelError, Point, Raw, RawBurst, Shift, Term,
+    Boot, BootCause, ChannelMessage, Health, Hello, LearnedMessage, MAX_ADDED_TERMS, MAX_COEFFICIENTS, MAX_COVARIATES,
+    MAX_DRIFTS, MAX_OCTAVES, MAX_RAW_BURSTS, Message, MessageRef, OctaveSums, RawBurst, RawMessage, ReportedAddedTerm,
+    ReportedCoefficient, ReportedDrift, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedShift,
+    ReportedTerm, ValidationMessage,
 };
-pub use text::{Line, line_bytes};
-
-/// Version of the format. Messages and their fields are only ever appended to within a version.
-pub const VERSION: u8 = 3;
-
-/// Longest frame in bytes, both zero bytes included.
-///
-/// A channel report with [`MAX_POINTS`] points and [`MAX_COEFFICIENTS`] coefficients, every integer in its longest
-/// encoding, takes 1 397 bytes before COBS, which adds one byte in 254.
-pub const MAX_FRAME: usize = 1408;
-
-/// Longest frame of the raw stream in bytes: [`MAX_RAW`] bursts, every integer in its longest encoding.
-pub const MAX_RAW_FRAME: usize = 584;
-
-/// What COBS encloses: the message between the version and sequence number and the checksum.
-#[derive(serde::Serialize, serde::Deserialize)]
-struct Envelope<M> {
-    version: u8,
-    sequence: u16,
-    message: M,
-}
-
-const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+pub use text::{MAX_TEXT, TextLine, text_line, wire_bytes};

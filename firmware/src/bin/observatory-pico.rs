@@ -7,14 +7,14 @@
 //! | GP20 | data ready, rising edge | DIO1 |
 //! | GP0, GP1 | UART0 TX, RX, 460 800 Bd 8N1 | to the host |
 //!
-//! The sensor runs from 5 V. The RP2040's pins take 3.3 V: the sensor's outputs need a divider or level shifter if they
-//! rise above that.
+//! The sensor runs from 5 V. The RP2040's pins accept 3.3 V at most: outputs of the sensor above that need a divider or level
+//! shifter.
 #![no_std]
 #![no_main]
 
-use firmware::microcontroller::rp2040::{Rp2040, SensorBus, SerialPort, boot_cause};
-use firmware::microcontroller::{Line, Parts};
-use firmware::spi_clock;
+use firmware::microcontroller::rp2040::{Rp2040, Spi0Bus, Uart0Port, boot_cause};
+use firmware::microcontroller::{BoardParts, UartQueues};
+use firmware::sensor::BURST_LIMIT_HZ;
 use rp2040_hal::clocks::{Clock, init_clocks_and_plls};
 use rp2040_hal::fugit::RateExtU32;
 use rp2040_hal::gpio::bank0::{Gpio0, Gpio1, Gpio16, Gpio17, Gpio18, Gpio19, Gpio20};
@@ -33,10 +33,10 @@ const BAUD: u32 = 460_800;
 type Pin<I, F> = gpio::Pin<I, F, PullDown>;
 type DataReady = Pin<Gpio20, FunctionSioInput>;
 type Wires = (Pin<Gpio19, FunctionSpi>, Pin<Gpio16, FunctionSpi>, Pin<Gpio18, FunctionSpi>);
-type Bus = SensorBus<Wires, Pin<Gpio17, FunctionSioOutput>>;
-type Port = SerialPort<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart>)>;
+type Bus = Spi0Bus<Wires, Pin<Gpio17, FunctionSioOutput>>;
+type Port = Uart0Port<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart>)>;
 
-fn start(device: pac::Peripherals, line: Line) -> Parts<Rp2040, DataReady, Bus, Port> {
+fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Rp2040, DataReady, Bus, Port> {
     let cause = boot_cause(&device.VREG_AND_CHIP_RESET, &device.WATCHDOG);
     let mut resets = device.RESETS;
     let mut watchdog = Watchdog::new(device.WATCHDOG);
@@ -49,7 +49,7 @@ fn start(device: pac::Peripherals, line: Line) -> Parts<Rp2040, DataReady, Bus, 
         &mut resets,
         &mut watchdog,
     ) else {
-        panic!("clocks out of reach");
+        panic!("the clocks do not start");
     };
     let microcontroller = Rp2040::start(device.TIMER, watchdog, &mut resets, &clocks);
     let sio = Sio::new(device.SIO);
@@ -60,22 +60,22 @@ fn start(device: pac::Peripherals, line: Line) -> Parts<Rp2040, DataReady, Bus, 
     let lines = (pins.gpio0.into_function(), pins.gpio1.into_function());
     let serial = uart::UartPeripheral::new(device.UART0, lines, &mut resets)
         .enable(settings, peripheral)
-        .expect("a baud rate within reach");
+        .expect("the baud rate is in range");
 
     let wires = (pins.gpio19.into_function(), pins.gpio16.into_function(), pins.gpio18.into_function());
     let spi = Spi::<_, _, _, 8>::new(device.SPI0, wires);
-    let request = spi_clock::BURST_LIMIT_HZ.Hz();
+    let request = BURST_LIMIT_HZ.Hz();
     let spi = spi.init(&mut resets, peripheral, request, spi::FrameFormat::MotorolaSpi(embedded_hal::spi::MODE_3));
     let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
-    let bus = SensorBus::new(spi, select, device.DMA, &mut resets);
+    let bus = Spi0Bus::new(spi, select, device.DMA, &mut resets);
     let spi_clock_hz = bus.clock_hz(peripheral.to_Hz());
 
     let data_ready = pins.gpio20.into_pull_down_input();
     data_ready.set_interrupt_enabled(gpio::Interrupt::EdgeHigh, true);
 
-    let port = SerialPort::new(serial, line);
+    let port = Uart0Port::new(serial, queues);
     let core_hz = clocks.system_clock.freq().to_Hz();
-    Parts { cause, core_hz, spi_clock_hz, microcontroller, data_ready, bus, port }
+    BoardParts { cause, core_hz, spi_clock_hz, microcontroller, data_ready, bus, port }
 }
 
 firmware::observatory! {

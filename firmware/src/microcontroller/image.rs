@@ -1,18 +1,58 @@
-//! The image: the application's parts in the interrupts of a board.
+//! The image of a board: retained memory, crash record, and the macro that connects the application with the interrupts.
 
-/// Makes an image of a board file.
+use crate::crash_record::CrashRecord;
+use crate::retained::{RetainedMemory, RetainedRam, blank_memory};
+use core::panic::PanicInfo;
+use cortex_m_rt::ExceptionFrame;
+use link::{Boot, BootCause};
+
+// Sections of RAM that the start-up code does not initialise.
+
+#[unsafe(link_section = ".uninit.retained")]
+static RETAINED: RetainedMemory = blank_memory();
+
+#[unsafe(link_section = ".uninit.crash_record")]
+static CRASH_RECORD: CrashRecord = CrashRecord::blank();
+
+/// The cause of the start with the crash record, and the retained RAM, which is erased after power-on.
+pub fn restore(cause: BootCause) -> (Boot, RetainedRam) {
+    let mut retained = RetainedRam::open(&RETAINED);
+    if cause == BootCause::PowerOn {
+        retained.clear();
+    }
+    (Boot { cause, crash_record: CRASH_RECORD.take(), ..Boot::default() }, retained)
+}
+
+/// Writes the place of a panic into the crash record.
+pub fn record_panic(info: &PanicInfo<'_>) {
+    let (file, line) = info.location().map_or(("?", 0), |at| (at.file(), at.line()));
+    CRASH_RECORD.write(format_args!("panic at {file}:{line}"));
+    defmt::error!("panic at {=str}:{=u32}", file, line);
+}
+
+/// Writes the place of a fault into the crash record; there is no frame if the stack has overflowed.
+pub fn record_fault(frame: Option<&ExceptionFrame>) {
+    match frame {
+        Some(frame) => {
+            CRASH_RECORD.write(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()));
+        }
+        None => CRASH_RECORD.write(format_args!("stack overflow")),
+    }
+}
+
+/// Defines the image of a board: start-up, interrupts and main loop.
 ///
-/// `start` takes the peripherals of `device` and the [`Line`](crate::microcontroller::Line) and returns the
-/// [`Parts`](crate::microcontroller::Parts), of these types. The interrupts are those of the data-ready edge, of the end
-/// of a burst, of the serial port, and one without a peripheral for the estimators.
+/// `start` takes the peripherals of `device` and the [`UartQueues`](crate::microcontroller::UartQueues) and returns
+/// [`BoardParts`](crate::microcontroller::BoardParts) of the given types. The interrupts are those of the data-ready edge, of
+/// the end of a burst, of the serial port, and, for the estimators, one whose peripheral is not used.
 ///
 /// | priority | interrupt |
 /// |---|---|
-/// | 4 | the serial port: a handful of instructions, so that no byte is lost |
+/// | 4 | serial port: short, so that no received byte is lost |
 /// | 3 | data ready, end of a burst |
-/// | 2 | the estimators |
-/// | 1 | SysTick, which only wakes |
-/// | 0 | the main loop: commands, fit, report |
+/// | 2 | estimators |
+/// | 1 | SysTick: empty, wakes the main loop |
+/// | 0 | main loop: commands, probing, reports, learning |
 #[macro_export]
 macro_rules! observatory {
     (
@@ -29,14 +69,17 @@ macro_rules! observatory {
             use super::*;
             use $($device)::+::Interrupt;
             use heapless::spsc::Consumer;
-            use $crate::spi_clock::BURST_LIMIT_HZ;
-            use $crate::microcontroller::{
-                Bus as _, DataReady as _, ESTIMATOR_CYCLES, Incoming, Line, Microcontroller, Parts, Port as _, Processor,
-                SAMPLING_CYCLES, count_lost_bytes, measure, survivors,
+            use $crate::microcontroller::image::restore;
+            use $crate::microcontroller::processor::{
+                ESTIMATOR_CYCLES, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
             };
+            use $crate::microcontroller::{
+                BoardParts, BurstBus as _, DataReadyPin as _, Microcontroller, ReceiveBuffer, UartPort as _, UartQueues,
+            };
+            use $crate::sensor::BURST_LIMIT_HZ;
             use $crate::{
-                Arrival, Arrivals, Epoch, Estimators, FIRST_CONFIG, Locks, Outbox, Outgoing, Sampler, Start, Statistics,
-                Uptime, estimate, run,
+                BoardContext, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, Sampler, Start, Statistics,
+                TimedBurst, TransmitBuffer, TransmitQueue, Uptime, estimate, run,
             };
 
             #[shared]
@@ -45,13 +88,13 @@ macro_rules! observatory {
                 bus: $bus,
                 sampler: Sampler<'static>,
                 estimators: Estimators<'static>,
-                outbox: Outbox<'static>,
+                transmit_queue: TransmitQueue<'static>,
             }
 
             #[local]
             struct Local {
                 data_ready: $data_ready,
-                arrivals: Consumer<'static, Arrival>,
+                bursts: Consumer<'static, TimedBurst>,
                 port: $port,
                 processor: Processor<$microcontroller>,
                 received: Consumer<'static, u8>,
@@ -59,35 +102,35 @@ macro_rules! observatory {
             }
 
             #[init(local = [
-                queue: Arrivals = Arrivals::new(),
+                burst_queue: BurstQueue = BurstQueue::new(),
                 statistics: Statistics = Statistics::new(),
-                finished: Epoch = Epoch::EMPTY,
-                outgoing: Outgoing = Outgoing::new(),
-                incoming: Incoming = Incoming::new(),
+                finished: FinishedEpoch = FinishedEpoch::EMPTY,
+                transmit_buffer: TransmitBuffer = TransmitBuffer::new(),
+                receive_buffer: ReceiveBuffer = ReceiveBuffer::new(),
             ])]
             fn init(context: init::Context) -> (Shared, Local) {
-                let (to_port, outgoing) = context.local.outgoing.split();
-                let (incoming, received) = context.local.incoming.split();
-                let (to_estimators, arrivals) = context.local.queue.split();
-                let Parts { cause, core_hz, spi_clock_hz, microcontroller, data_ready, bus, port } =
-                    $start(context.device, Line { outgoing, incoming });
+                let (to_port, transmit) = context.local.transmit_buffer.split();
+                let (receive, received) = context.local.receive_buffer.split();
+                let (to_estimators, bursts) = context.local.burst_queue.split();
+                let BoardParts { cause, core_hz, spi_clock_hz, microcontroller, data_ready, bus, port } =
+                    $start(context.device, UartQueues { transmit, receive });
                 assert!(spi_clock_hz <= BURST_LIMIT_HZ, "serial clock above the burst limit");
                 defmt::info!("{=u32} Hz, SCK {=u32} Hz", core_hz, spi_clock_hz);
                 let transmit = || rtic::pend(Interrupt::$serial);
                 let processor = Processor::new(microcontroller, core_hz, context.core.SYST, transmit);
-                let (boot, retained) = survivors::recall(cause);
+                let (boot, retained) = restore(cause);
                 let shared = Shared {
                     uptime: Uptime::new(<$microcontroller>::counter()),
                     bus,
                     sampler: Sampler::new(to_estimators),
                     estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
-                    outbox: Outbox::new(to_port),
+                    transmit_queue: TransmitQueue::new(to_port),
                 };
                 let start = Some(Start { spi_clock_hz, boot, retained, finished: context.local.finished });
-                (shared, Local { data_ready, arrivals, port, processor, received, start })
+                (shared, Local { data_ready, bursts, port, processor, received, start })
             }
 
-            #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, estimators, outbox])]
+            #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, estimators, transmit_queue])]
             fn idle(context: idle::Context) -> ! {
                 let shared = context.shared;
                 let locks = Locks {
@@ -95,41 +138,43 @@ macro_rules! observatory {
                     bus: shared.bus,
                     sampler: shared.sampler,
                     estimators: shared.estimators,
-                    outbox: shared.outbox,
+                    transmit_queue: shared.transmit_queue,
                 };
                 let start = context.local.start.take().expect("the main loop starts once");
-                run(context.local.processor, locks, context.local.received, start)
+                run(BoardContext::new(context.local.processor, locks, context.local.received), start)
             }
 
-            /// A new sample: the burst begins, and goes on by itself.
+            /// A new sample: starts the transfer of a burst by DMA.
             #[task(binds = $edge, priority = 3, local = [data_ready], shared = [uptime, bus, sampler])]
             fn data_ready(context: data_ready::Context) {
                 measure(&SAMPLING_CYCLES, || {
                     let data_ready::SharedResources { uptime, bus, sampler, .. } = context.shared;
                     context.local.data_ready.clear();
                     (uptime, bus, sampler).lock(|uptime, bus, sampler| {
-                        if sampler.edge(uptime.at(<$microcontroller>::counter())) {
+                        if sampler.data_ready(uptime.at(<$microcontroller>::counter())) {
                             bus.start_burst();
                         }
                     });
                 });
             }
 
-            /// The burst is over.
+            /// The end of the transfer: queues the burst and requests the estimators.
             #[task(binds = $burst_end, priority = 3, shared = [bus, sampler])]
             fn burst_read(context: burst_read::Context) {
                 measure(&SAMPLING_CYCLES, || {
                     let burst_read::SharedResources { bus, sampler, .. } = context.shared;
-                    (bus, sampler).lock(|bus, sampler| sampler.burst(bus.end_burst()));
+                    (bus, sampler).lock(|bus, sampler| sampler.burst_read(bus.end_burst()));
                 });
                 rtic::pend(Interrupt::$free);
             }
 
-            #[task(binds = $free, priority = 2, local = [arrivals], shared = [estimators, outbox])]
+            #[task(binds = $free, priority = 2, local = [bursts], shared = [estimators, transmit_queue])]
             fn estimators(context: estimators::Context) {
                 measure(&ESTIMATOR_CYCLES, || {
-                    let estimators::SharedResources { estimators, outbox, .. } = context.shared;
-                    (estimators, outbox).lock(|estimators, outbox| estimate(estimators, outbox, context.local.arrivals));
+                    let estimators::SharedResources { estimators, transmit_queue, .. } = context.shared;
+                    (estimators, transmit_queue).lock(|estimators, transmit_queue| {
+                        estimate(estimators, transmit_queue, context.local.bursts);
+                    });
                 });
                 rtic::pend(Interrupt::$serial);
             }
@@ -145,11 +190,11 @@ macro_rules! observatory {
 
         #[panic_handler]
         fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
-            $crate::microcontroller::survivors::panicked(info);
+            $crate::microcontroller::image::record_panic(info);
             <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
 
-        /// With what the processor stacked, unless there was no memory for it: then on a new stack.
+        /// Passes on the exception frame, or, if the stack has overflowed, none and the stack pointer reset to the stack's start.
         #[unsafe(naked)]
         #[unsafe(export_name = "HardFault")]
         unsafe extern "C" fn hard_fault() -> ! {
@@ -169,7 +214,7 @@ macro_rules! observatory {
         }
 
         extern "C" fn faulted(frame: Option<&cortex_m_rt::ExceptionFrame>) -> ! {
-            $crate::microcontroller::survivors::faulted(frame);
+            $crate::microcontroller::image::record_fault(frame);
             <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
     };

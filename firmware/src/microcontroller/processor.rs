@@ -1,23 +1,23 @@
-//! The Cortex-M: sleep, its clock of cycles, and what it measures of its own work.
+//! The Cortex-M core: sleep, SysTick as the cycle counter, and load figures.
 
 use super::Microcontroller;
-use crate::{Chip, Meters};
+use crate::board::{BoardMeters, Chip};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
-/// Longest sampling interrupt in cycles. Only the sampling interrupts write it.
+/// Longest sampling interrupt in cycles; written by the sampling interrupts only.
 pub static SAMPLING_CYCLES: AtomicU32 = AtomicU32::new(0);
-/// Longest turn of the estimators in cycles. Only they write it.
+/// Longest run of the estimators in cycles; written by their interrupt only.
 pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
-/// Bytes lost on the way in. Only the serial port's interrupt writes it.
+/// Received bytes that were lost; written by the serial port's interrupt only.
 static SERIAL_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
-/// So often the main loop goes round, without a sensor too. SysTick's 24 bits take 168 MHz.
+/// Rate in Hz at which SysTick wakes the main loop, also without a sensor. At 168 MHz the reload value fits SysTick's 24 bits.
 const WAKE_HZ: u32 = 16;
 
-/// Runs `work` and remembers how many cycles it took, if more than ever before. It must end before SysTick, which counts
-/// down, has wrapped twice.
+/// Runs `work` and stores the cycles that it took in `longest` if they are the most so far. `work` must take less than one
+/// period of SysTick, which counts down.
 pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     let start = SYST::get_current();
     work();
@@ -28,15 +28,15 @@ pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     }
 }
 
-/// Counts bytes lost on the way in.
+/// Counts received bytes that were lost.
 pub fn count_lost_bytes(lost: u32) {
     SERIAL_OVERRUNS.store(SERIAL_OVERRUNS.load(Relaxed).saturating_add(lost), Relaxed);
 }
 
-/// The processor of a microcontroller, as the main loop sees it.
+/// The processor of a microcontroller.
 pub struct Processor<M> {
     microcontroller: M,
-    /// Requests the serial port's interrupt.
+    /// Requests the serial port's interrupt, which transmits what is queued.
     transmit: fn(),
 }
 
@@ -77,9 +77,9 @@ impl<M: Microcontroller> Chip for &mut Processor<M> {
         M::restart()
     }
 
-    fn meters(&mut self) -> Meters {
+    fn meters(&mut self) -> BoardMeters {
         let (stack_bytes, stack_size) = stack();
-        Meters {
+        BoardMeters {
             asleep_us: 0,
             serial_overruns: SERIAL_OVERRUNS.load(Relaxed),
             sampling_cycles: SAMPLING_CYCLES.load(Relaxed),
@@ -90,16 +90,17 @@ impl<M: Microcontroller> Chip for &mut Processor<M> {
     }
 }
 
-/// How much of the stack was ever used, from its start down to the first word that the paint of the start-up code is gone
-/// from, and how much there is.
+/// Largest depth and size of the stack in bytes. The start-up code fills the stack with a pattern; the depth is what lies
+/// above the last word that still holds it, counted from the end of the stack.
 fn stack() -> (u32, u32) {
     unsafe extern "C" {
         static _stack_start: u32;
         static _stack_end: u32;
     }
+    /// The pattern of cortex-m-rt's feature paint-stack.
     const PAINT: u32 = 0xCCCC_CCCC;
     let (start, end) = (&raw const _stack_start as usize, &raw const _stack_end as usize);
-    // SAFETY: between these symbols of the linker lies the stack, all of it readable RAM.
+    // SAFETY: the stack lies between these linker symbols and is readable RAM.
     let is_painted = |&address: &usize| unsafe { (address as *const u32).read_volatile() } == PAINT;
     let size = start - end;
     ((size - (end..start).step_by(4).take_while(is_painted).count() * 4) as u32, size as u32)

@@ -2,7 +2,7 @@
 
 use crate::frame_log::{Frame, FrameLog};
 use adis16405_driver::{BURST_REQUEST, Register};
-use link::{Counters, Decoder, Message, Raw, Received};
+use link::{Decoder, DecoderCounters, Message, RawMessage, Received};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
@@ -66,7 +66,7 @@ impl<P: Read + Write> Cable<P> {
     }
 
     /// What was found and lost so far.
-    pub fn counters(&self) -> Counters {
+    pub fn counters(&self) -> DecoderCounters {
         self.decoder.counters()
     }
 }
@@ -103,7 +103,7 @@ pub struct Recorded {
     /// Sample periods between the first and the last of which no burst came: lost on the device or on the line.
     pub missing: u64,
     /// What became of the bytes.
-    pub counters: Counters,
+    pub counters: DecoderCounters,
 }
 
 /// Turns the stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off.
@@ -131,7 +131,7 @@ pub fn record<P: Read + Write>(cable: &mut Cable<P>, file: &Path, seconds: f64) 
     outcome.map(|()| Recorded { bursts, missing, counters: cable.counters() })
 }
 
-fn next_raw<P: Read + Write>(cable: &mut Cable<P>, deadline: Instant) -> io::Result<Option<Raw>> {
+fn next_raw<P: Read + Write>(cable: &mut Cable<P>, deadline: Instant) -> io::Result<Option<RawMessage>> {
     while let Some(received) = cable.next(Some(deadline))? {
         if let Received::Message { message: Message::Raw(raw), .. } = received {
             return Ok(Some(raw));
@@ -163,7 +163,7 @@ impl Tape {
     ///
     /// # Errors
     /// As the operating system answers.
-    pub fn write(&mut self, raw: &Raw) -> io::Result<()> {
+    pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
         let (mut number, mut at_us) = (raw.first, raw.at_us);
         if self.sens_avg.replace(raw.sens_avg) != Some(raw.sens_avg) {
             let mosi = Register::SensAvg.write_high_frame(raw.sens_avg).to_vec();

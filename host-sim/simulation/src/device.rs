@@ -3,10 +3,10 @@
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
-use firmware::retained::{Memory, blank};
+use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::{
-    App, Arrival, Arrivals, Board, Epoch, Estimators, FIRST_CONFIG, Meters, Outbox, Outgoing, Retained, Sampler, Start,
-    Statistics, estimate,
+    App, Board, BoardMeters, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler, Start,
+    Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
 use heapless::spsc::Consumer;
 use link::Boot;
@@ -22,17 +22,17 @@ const WAKE_US: u64 = 100_000;
 /// A device that is not there: the application, its sensor, and both ends of its serial line, which takes no time.
 pub struct Device {
     app: App,
-    desk: Desk,
+    board: VirtualBoard,
 }
 
 /// Everything but the application.
-struct Desk {
+struct VirtualBoard {
     bus: EmulatedBus,
     now_us: u64,
     sampler: Sampler<'static>,
     estimators: Estimators<'static>,
-    arrivals: Consumer<'static, Arrival>,
-    outbox: Outbox<'static>,
+    arrivals: Consumer<'static, TimedBurst>,
+    transmit_queue: TransmitQueue<'static>,
     outgoing: Consumer<'static, u8>,
     sent: Vec<u8>,
     received: VecDeque<u8>,
@@ -43,17 +43,17 @@ impl Device {
     /// Starts the application with a sensor, and with what `memory` retains.
     ///
     /// The queues and statistics, 50 kB, are never given back: on the target they are statics.
-    pub fn new(part: VirtualAdis16405, memory: &'static Memory) -> Self {
-        let (to_estimators, arrivals) = Box::leak(Box::new(Arrivals::new())).split();
-        let (to_port, outgoing) = Box::leak(Box::new(Outgoing::new())).split();
+    pub fn new(part: VirtualAdis16405, memory: &'static RetainedMemory) -> Self {
+        let (to_estimators, arrivals) = Box::leak(Box::new(BurstQueue::new())).split();
+        let (to_port, outgoing) = Box::leak(Box::new(TransmitBuffer::new())).split();
         let statistics = Box::leak(Box::new(Statistics::new()));
-        let mut desk = Desk {
+        let mut board = VirtualBoard {
             now_us: part.now() / 1000,
             bus: EmulatedBus::with_sck_hz(part, SCK_HZ),
             sampler: Sampler::new(to_estimators),
             estimators: Estimators::new(statistics, FIRST_CONFIG),
             arrivals,
-            outbox: Outbox::new(to_port),
+            transmit_queue: TransmitQueue::new(to_port),
             outgoing,
             sent: Vec::new(),
             received: VecDeque::new(),
@@ -62,57 +62,57 @@ impl Device {
         let start = Start {
             spi_clock_hz: SCK_HZ,
             boot: Boot::default(),
-            retained: Retained::open(memory),
-            finished: Box::leak(Box::new(Epoch::EMPTY)),
+            retained: RetainedRam::open(memory),
+            finished: Box::leak(Box::new(FinishedEpoch::EMPTY)),
         };
-        Self { app: App::new(start, &mut desk), desk }
+        Self { app: App::new(start, &mut board), board }
     }
 
     /// Memory in which nothing is retained.
-    pub fn blank_memory() -> &'static Memory {
-        Box::leak(Box::new(blank()))
+    pub fn blank_memory() -> &'static RetainedMemory {
+        Box::leak(Box::new(blank_memory()))
     }
 
     /// What is typed at the far end of the line.
     pub fn press(&mut self, keys: &[u8]) {
-        self.desk.received.extend(keys);
+        self.board.received.extend(keys);
     }
 
     /// Lets virtual time pass until `until_us` and returns the bytes that the device sent meanwhile.
     pub fn run_until(&mut self, until_us: u64) -> Vec<u8> {
         self.turn();
-        while self.desk.now_us < until_us {
-            let ready_us = self.desk.bus.part().next_data_ready() / 1000 + 1;
-            let next_us = ready_us.min(self.desk.now_us + WAKE_US).min(until_us);
-            let before = self.desk.bus.part().samples();
-            self.desk.advance_to(next_us);
-            if self.desk.bus.part().samples() > before {
-                self.desk.data_ready();
+        while self.board.now_us < until_us {
+            let ready_us = self.board.bus.part().next_data_ready() / 1000 + 1;
+            let next_us = ready_us.min(self.board.now_us + WAKE_US).min(until_us);
+            let before = self.board.bus.part().samples();
+            self.board.advance_to(next_us);
+            if self.board.bus.part().samples() > before {
+                self.board.data_ready();
             }
             self.turn();
         }
-        std::mem::take(&mut self.desk.sent)
+        std::mem::take(&mut self.board.sent)
     }
 
     /// The bus and the part on it.
     pub fn bus(&self) -> &EmulatedBus {
-        &self.desk.bus
+        &self.board.bus
     }
 
     /// How often the application asked to be restarted.
     pub fn restarts(&self) -> u32 {
-        self.desk.restarts
+        self.board.restarts
     }
 
     fn turn(&mut self) {
-        while self.app.turn(&mut self.desk) {
-            self.desk.transmit();
+        while self.app.turn(&mut self.board) {
+            self.board.transmit();
         }
-        self.desk.transmit();
+        self.board.transmit();
     }
 }
 
-impl Desk {
+impl VirtualBoard {
     fn advance_to(&mut self, us: u64) {
         self.bus.advance_to(us * 1000);
         self.now_us = us;
@@ -120,13 +120,13 @@ impl Desk {
 
     /// What the two sampling interrupts and the one of the estimators do.
     fn data_ready(&mut self) {
-        if self.sampler.edge(self.now_us) {
+        if self.sampler.data_ready(self.now_us) {
             let mut answer = [0; BURST_BYTES];
             let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
-            self.sampler.burst(Some(&answer));
+            self.sampler.burst_read(Some(&answer));
             self.now_us = self.now_us.max(self.bus.part().now() / 1000);
         }
-        estimate(&mut self.estimators, &mut self.outbox, &mut self.arrivals);
+        estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);
     }
 
     fn transmit(&mut self) {
@@ -134,9 +134,9 @@ impl Desk {
     }
 }
 
-impl Board for Desk {
+impl Board for VirtualBoard {
     type Bus<'a> = EmulatedBus;
-    type Pause<'a> = Pause;
+    type Delay<'a> = BoardDelay;
 
     fn now_us(&mut self) -> u64 {
         // Frames on the bus take virtual time.
@@ -144,31 +144,31 @@ impl Board for Desk {
         self.now_us
     }
 
-    fn bus(&mut self) -> (EmulatedBus, Pause) {
-        (self.bus.clone(), Pause(self.bus.clone()))
+    fn sensor_bus(&mut self) -> (EmulatedBus, BoardDelay) {
+        (self.bus.clone(), BoardDelay(self.bus.clone()))
     }
 
-    fn sample(&mut self, on: bool) {
-        self.sampler.run(on);
+    fn set_sampling(&mut self, enabled: bool) {
+        self.sampler.set_enabled(enabled);
     }
 
-    fn estimators<R>(&mut self, look: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
-        look(&mut self.estimators)
+    fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
+        access(&mut self.estimators)
     }
 
-    fn outbox<R>(&mut self, send: impl FnOnce(&mut Outbox<'static>) -> R) -> R {
-        send(&mut self.outbox)
+    fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R {
+        access(&mut self.transmit_queue)
     }
 
-    fn received(&mut self) -> Option<u8> {
+    fn receive(&mut self) -> Option<u8> {
         self.received.pop_front()
     }
 
-    fn meters(&mut self) -> Meters {
-        Meters::default()
+    fn meters(&mut self) -> BoardMeters {
+        BoardMeters::default()
     }
 
-    fn alive(&mut self) {}
+    fn feed_watchdog(&mut self) {}
 
     fn restart(&mut self) {
         self.restarts += 1;
@@ -176,9 +176,9 @@ impl Board for Desk {
 }
 
 /// Lets virtual time pass.
-struct Pause(EmulatedBus);
+struct BoardDelay(EmulatedBus);
 
-impl DelayNs for Pause {
+impl DelayNs for BoardDelay {
     fn delay_ns(&mut self, ns: u32) {
         let until = self.0.part().now() + u64::from(ns);
         self.0.advance_to(until);

@@ -3,8 +3,8 @@
 use adis16405_driver::{Channel, OutputWord};
 use embedded_hal::spi::SpiDevice;
 use firmware::CHANNELS;
-use firmware::table::Short;
-use link::{Decoder, Health, Hello, Message, Raw, Received};
+use firmware::console::ShortFloat;
+use link::{Decoder, Health, Hello, Message, RawMessage, Received};
 use simulation::device::Device;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
@@ -25,7 +25,7 @@ fn hear(bytes: &[u8]) -> Heard {
     for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
         match received {
             Received::Message { message, .. } => heard.messages.push(message),
-            Received::Line(line) => heard.lines.push(line.as_str().to_owned()),
+            Received::Text(line) => heard.lines.push(line.as_str().to_owned()),
         }
     }
     let counters = decoder.counters();
@@ -59,7 +59,7 @@ impl Heard {
     /// Splits reports: hello, eight channels, health; what an epoch adds is left out.
     fn reports(&self) -> usize {
         let extra = |message: &&Message| {
-            matches!(message, Message::Log(_) | Message::Raw(_) | Message::Checked(_) | Message::Learnt(_))
+            matches!(message, Message::Log(_) | Message::Raw(_) | Message::Validation(_) | Message::Learned(_))
         };
         let frames: Vec<&Message> = self.messages.iter().filter(|message| !extra(message)).collect();
         for report in frames.chunks(10) {
@@ -118,7 +118,7 @@ fn rate_range_and_filter_are_set_and_refused_by_name() {
         ("f 50\r", "below 182 SPS the sensor takes a serial clock of 300000 Hz, not 1000000 Hz"),
         ("f 0\r", "the sample rate must be a finite number above 0"),
         ("g 100\r", "no such g command; ? lists them"),
-        ("null\r", "not armed"),
+        ("autonull\r", "not armed"),
         ("x", "x is no command; ? lists them"),
     ] {
         let until = (device.bus().part().now() / 1000) + SECOND / 10;
@@ -141,18 +141,18 @@ fn the_table_shows_what_the_report_says() {
         panic!("{:?}", heard.messages);
     };
     assert!(heard.lines[0].starts_with("Allan deviation"));
-    for (line, point) in heard.lines[2..].iter().zip(&gyro_x.points) {
+    for (line, point) in heard.lines[2..].iter().zip(&gyro_x.octaves) {
         let n = point.n as f64;
         let tau = n / 204.8;
         let deviation = 0.05 * (point.sum as f64 / (2.0 * n * n * point.count as f64)).sqrt();
         let cells: Vec<&str> = line.split_whitespace().collect();
         assert_eq!(
             (cells.len(), cells[0], cells[1]),
-            (7, &*format!("{}", Short(tau)), &*format!("{}", Short(deviation)))
+            (7, &*format!("{}", ShortFloat(tau)), &*format!("{}", ShortFloat(deviation)))
         );
     }
     let coefficients: Vec<&String> = heard.lines.iter().filter(|line| line.starts_with("gyro_x")).collect();
-    let value = format!("{}", Short(gyro_x.coefficients[0].value));
+    let value = format!("{}", ShortFloat(gyro_x.coefficients[0].value));
     assert!(coefficients.len() == 1 && coefficients[0].contains(&value), "{coefficients:?}, {value}");
 }
 
@@ -205,7 +205,7 @@ fn the_raw_stream_is_complete() {
     after(&mut device, "i0\r", SECOND);
     let heard = after(&mut device, "w1\r", 5 * SECOND);
     let raw = |message: &Message| if let Message::Raw(raw) = message { Some(raw.clone()) } else { None };
-    let raws: Vec<Raw> = heard.messages.iter().filter_map(raw).collect();
+    let raws: Vec<RawMessage> = heard.messages.iter().filter_map(raw).collect();
     let counts: Vec<i16> = raws
         .iter()
         .flat_map(|raw| &raw.bursts)
@@ -263,9 +263,9 @@ fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
         .collect();
     for (index, report) in channels.iter().enumerate() {
         let inertial = index % 8 < 6;
-        assert_eq!(report.unseen.is_some(), index >= 8 && inertial, "{report:?}");
+        assert_eq!(report.unseen_error.is_some(), index >= 8 && inertial, "{report:?}");
         assert!(report.samples.abs_diff(20 * 2048 / 10) < 40, "{}", report.samples);
-        if let Some(error) = report.unseen {
+        if let Some(error) = report.unseen_error {
             // 1 is expected of a true model, with a spread of the same size: 10 octaves that hang together.
             assert!((0.0..5.0).contains(&error.deviance_per_point), "{error:?}");
             assert!((0.0..30.0).contains(&error.rms_percent), "{error:?}");
@@ -277,7 +277,7 @@ fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
 fn forgetting_begins_again() {
     let mut device = device();
     after(&mut device, "", 5 * SECOND);
-    assert_eq!(after(&mut device, "zero\r", 6 * SECOND).lines, ["statistics forgotten"]);
+    assert_eq!(after(&mut device, "clear\r", 6 * SECOND).lines, ["statistics reset"]);
     let health = *after(&mut device, "r", 6 * SECOND + 1).health();
     assert!((190..=210).contains(&health.used), "{health:?}");
 }
@@ -298,7 +298,7 @@ fn a_restart_keeps_statistics_and_settings() {
     let mut second = Device::new(part, memory);
     let heard = after(&mut second, "r", start + SECOND / 2);
     let hello = heard.hellos()[0];
-    assert_eq!((hello.boot.starts, hello.boot.kept_channels), (2, 8));
+    assert_eq!((hello.boot.starts, hello.boot.restored_channels), (2, 8));
     assert_eq!((hello.sample_rate_hz, hello.epoch_s), (819.2, 100));
     let samples = heard.messages.iter().filter_map(|message| match message {
         Message::Channel(report) => Some(report.samples),

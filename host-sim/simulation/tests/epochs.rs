@@ -1,7 +1,7 @@
 //! The loop on the device: an epoch teaches, the next one shows what that was worth on data that it had not seen.
 
 use adis16405_driver::Channel;
-use link::{ChannelReport, Checked, Decoder, Health, Learnt, Message, Received};
+use link::{ChannelMessage, Decoder, Health, LearnedMessage, Message, Received, ValidationMessage};
 use simulation::device::Device;
 use virtual_sensor::effect::surroundings::TemperatureCourse;
 use virtual_sensor::{Effect, Hidden, NoiseModel, OutputRegister, Surroundings, VirtualAdis16405};
@@ -23,9 +23,9 @@ fn part(hidden: bool) -> VirtualAdis16405 {
 
 #[derive(Default)]
 struct Heard {
-    checked: Vec<Checked>,
-    learnt: Vec<Learnt>,
-    channels: Vec<ChannelReport>,
+    checked: Vec<ValidationMessage>,
+    learnt: Vec<LearnedMessage>,
+    channels: Vec<ChannelMessage>,
     health: Option<Health>,
     lines: Vec<String>,
 }
@@ -35,12 +35,12 @@ impl Heard {
         let (mut decoder, mut heard) = (Decoder::new(), Self::default());
         for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
             match received {
-                Received::Message { message: Message::Checked(checked), .. } => heard.checked.push(checked),
-                Received::Message { message: Message::Learnt(learnt), .. } => heard.learnt.push(learnt),
+                Received::Message { message: Message::Validation(checked), .. } => heard.checked.push(checked),
+                Received::Message { message: Message::Learned(learnt), .. } => heard.learnt.push(learnt),
                 Received::Message { message: Message::Channel(report), .. } => heard.channels.push(report),
                 Received::Message { message: Message::Health(health), .. } => heard.health = Some(health),
                 Received::Message { .. } => {}
-                Received::Line(line) => heard.lines.push(line.as_str().to_owned()),
+                Received::Text(line) => heard.lines.push(line.as_str().to_owned()),
             }
         }
         assert_eq!((decoder.counters().bad_frames, decoder.counters().missing), (0, 0));
@@ -63,10 +63,10 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
     assert_eq!((heard.learnt.len(), heard.checked.len()), (18, 12), "the first epoch has nothing to check");
     for learnt in &heard.learnt {
         if learnt.channel != Channel::GyroX as u8 {
-            assert_eq!(learnt.causes, [], "{learnt:?}");
+            assert_eq!(learnt.regressors, [], "{learnt:?}");
             continue;
         }
-        let [cause] = learnt.causes[..] else { panic!("{learnt:?}") };
+        let [cause] = learnt.regressors[..] else { panic!("{learnt:?}") };
         assert_eq!(cause.covariate, Channel::Temp as u8);
         assert!((cause.low..=cause.high).contains(&SENSITIVITY), "{cause:?}");
         // The part is at 36 °C and warms.
@@ -76,7 +76,7 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
     let taught = heard.learnt.iter().filter(|learnt| learnt.channel == 1);
     for ((checked, twin), learnt) in of_gyro_x(&heard).iter().zip(&of_gyro_x(&twin)).zip(taught) {
         assert_eq!(checked.epoch, learnt.epoch + 1);
-        let doubt = (learnt.causes[0].high - learnt.causes[0].low) / 2.0 / SENSITIVITY;
+        let doubt = (learnt.regressors[0].high - learnt.regressors[0].low) / 2.0 / SENSITIVITY;
         for (drift, without) in checked.drift.iter().zip(&twin.drift) {
             println!("epoch {}, n = {}: {:.2e} -> {:.2e}", checked.epoch, drift.n, drift.raw, drift.compensated);
             // What would be left with nothing hidden, and a part of the effect that the interval leaves open. A tenth more
@@ -96,7 +96,7 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
         device.press(b"t");
         Heard::of(&device.run_until((3 * EPOCH_S + 2) * SECOND)).lines
     };
-    for expected in ["gyro_x follows temp: 5.", "gyro_x unseen: drift at "] {
+    for expected in ["gyro_x sensitivity to temp: 5.", "gyro_x unseen: drift at "] {
         assert!(lines.iter().any(|line| line.starts_with(expected)), "{expected}: {lines:#?}");
     }
 }
@@ -104,7 +104,7 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
 #[test]
 fn where_nothing_is_hidden_nothing_is_subtracted() {
     let (_, heard) = epochs(part(false), 3);
-    assert!(heard.learnt.iter().all(|learnt| learnt.causes.is_empty()));
+    assert!(heard.learnt.iter().all(|learnt| learnt.regressors.is_empty()));
     for checked in &heard.checked {
         assert!(checked.drift.iter().all(|drift| drift.raw == drift.compensated), "{checked:?}");
         assert!(checked.shift.is_some_and(|shift| shift.raw == shift.compensated), "{checked:?}");
@@ -134,6 +134,6 @@ fn an_epoch_with_a_restart_in_it_subtracts_nothing() {
     let start_us = part.now() / 1000;
     let mut restarted = Device::new(part, memory);
     let heard = Heard::of(&restarted.run_until(start_us + (2 * EPOCH_S + 1) * SECOND));
-    let causes: Vec<usize> = heard.learnt.iter().filter(|l| l.channel == 1).map(|l| l.causes.len()).collect();
+    let causes: Vec<usize> = heard.learnt.iter().filter(|l| l.channel == 1).map(|l| l.regressors.len()).collect();
     assert_eq!(causes, [0, 1], "{:?}", heard.learnt);
 }

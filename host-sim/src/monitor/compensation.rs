@@ -1,14 +1,14 @@
 //! What the device has learnt, applied to its raw stream.
 
 use adis16405_driver::{Channel, GyroRange, OutputWord};
-use link::{Cause, Learnt, RawBurst};
+use link::{LearnedMessage, RawBurst, ReportedRegressor};
 use std::collections::BTreeMap;
 
 /// What each channel follows, as the device said last.
 #[derive(Default)]
 pub struct Compensation {
     /// By the channel's place in the burst.
-    causes: BTreeMap<u8, Vec<Cause>>,
+    causes: BTreeMap<u8, Vec<ReportedRegressor>>,
 }
 
 /// A sample before and after, in the channel's unit.
@@ -24,8 +24,8 @@ pub struct Compensated {
 
 impl Compensation {
     /// Takes what an epoch has taught of a channel in the place of what was known.
-    pub fn learn(&mut self, learnt: &Learnt) {
-        self.causes.insert(learnt.channel, learnt.causes.to_vec());
+    pub fn learn(&mut self, learnt: &LearnedMessage) {
+        self.causes.insert(learnt.channel, learnt.regressors.to_vec());
     }
 
     /// The compensated channels of a burst that was read at this setting of SENS_AVG; those that follow nothing are left
@@ -37,9 +37,10 @@ impl Compensation {
             let word = OutputWord(u16::from_be_bytes(burst.words[usize::from(place)]));
             Some((channel, f64::from(word.counts(channel)) * channel.lsb(range) + channel.offset()))
         };
-        let compensated = |(&place, causes): (&u8, &Vec<Cause>)| {
+        let compensated = |(&place, causes): (&u8, &Vec<ReportedRegressor>)| {
             let (channel, raw) = value(place).filter(|_| !causes.is_empty())?;
-            let followed = |cause: &Cause| Some(cause.value * (value(cause.covariate)?.1 - cause.reference));
+            let followed =
+                |cause: &ReportedRegressor| Some(cause.value * (value(cause.covariate)?.1 - cause.reference));
             let compensated = raw - causes.iter().filter_map(followed).sum::<f64>();
             Some(Compensated { channel, raw, compensated })
         };

@@ -3,7 +3,7 @@
 use super::compensation::{Compensated, Compensation};
 use super::lesson;
 use adis16405_driver::Channel;
-use link::{BootCause, ChannelReport, Health, Hello, Message, Raw, Received};
+use link::{BootCause, ChannelMessage, Health, Hello, Message, RawMessage, Received};
 
 /// Says in words what is received, and remembers what later messages need to be understood.
 #[derive(Default)]
@@ -17,7 +17,7 @@ impl Narrator {
     /// What a message or line says to a person.
     pub fn lines(&mut self, received: &Received) -> Vec<String> {
         let message = match received {
-            Received::Line(line) => return vec![line.as_str().to_owned()],
+            Received::Text(line) => return vec![line.as_str().to_owned()],
             Received::Message { message, .. } => message,
         };
         match message {
@@ -32,8 +32,8 @@ impl Narrator {
             Message::Health(report) => vec![health(report)],
             Message::Log(line) => vec![line.as_str().to_owned()],
             Message::Raw(raw) => vec![self.raw(raw)],
-            Message::Checked(checked) => vec![lesson::checked(checked, self.sample_rate_hz)],
-            Message::Learnt(learnt) => {
+            Message::Validation(checked) => vec![lesson::checked(checked, self.sample_rate_hz)],
+            Message::Learned(learnt) => {
                 self.compensation.learn(learnt);
                 lesson::learnt(learnt)
             }
@@ -41,7 +41,7 @@ impl Narrator {
     }
 
     /// The last burst is shown as it is and compensated, where anything is.
-    fn raw(&self, raw: &Raw) -> String {
+    fn raw(&self, raw: &RawMessage) -> String {
         let mut text = format!("raw: {} bursts from number {}", raw.bursts.len(), raw.first);
         let values = raw.bursts.last().map(|burst| self.compensation.of(burst, raw.sens_avg));
         for Compensated { channel, raw, compensated } in values.into_iter().flatten() {
@@ -65,15 +65,15 @@ fn hello(report: &Hello) -> Vec<String> {
     };
     let mut lines = vec![
         format!(
-            "-- firmware {major}.{minor}.{patch}, up {:.1} s, started {cause} (start {}, {} channels kept)",
+            "-- firmware {major}.{minor}.{patch}, up {:.1} s, started {cause} (start {}, {} channels restored)",
             report.uptime_us as f64 * 1e-6,
             report.boot.starts,
-            report.boot.kept_channels
+            report.boot.restored_channels
         ),
         format!(
             "   ADIS{}, {}, ±{} deg/s, filter 2^{}, {:.1} SPS, measured {measured}, SCK {} Hz; epoch {} {epoch}",
             report.product_id,
-            if report.sampling { "sampled" } else { "sought" },
+            if report.sampling { "sampled" } else { "being probed" },
             report.gyro_full_scale,
             report.filter_taps_log2,
             report.sample_rate_hz,
@@ -81,20 +81,20 @@ fn hello(report: &Hello) -> Vec<String> {
             report.epoch,
         ),
     ];
-    if !report.boot.last_words.is_empty() {
-        lines.push(format!("   last words: {}", report.boot.last_words));
+    if !report.boot.crash_record.is_empty() {
+        lines.push(format!("   crash record: {}", report.boot.crash_record));
     }
     lines
 }
 
-fn channel(report: &ChannelReport) -> Vec<String> {
+fn channel(report: &ChannelMessage) -> Vec<String> {
     let name = name(report.channel);
     let mut text = format!("   {name}: {} samples, {} missing", report.samples, report.missing);
     for coefficient in &report.coefficients {
         let (value, low, high) = (coefficient.value, coefficient.low, coefficient.high);
         text += &format!(", {} {value:.3e} ({low:.3e} to {high:.3e})", lesson::symbol(coefficient.term));
     }
-    if let Some(error) = &report.unseen {
+    if let Some(error) = &report.unseen_error {
         text += &format!(", model of the epoch before {:.1} % off", error.rms_percent);
     }
     vec![text]
@@ -120,7 +120,7 @@ fn health(health: &Health) -> String {
         ("bus errors", health.bus_errors),
         ("queue full", health.queue_full),
         ("lost edges", health.lost_edges),
-        ("stray edges", health.stray_edges),
+        ("spurious edges", health.spurious_edges),
         ("unchecked", health.unchecked),
         ("recoveries", health.recoveries),
         ("raw messages dropped", health.raw_dropped),

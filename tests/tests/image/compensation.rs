@@ -5,10 +5,12 @@ use crate::decoded::Decoded;
 use crate::sensor::Sensor;
 use crate::{SCK_HZ, image};
 use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
-use firmware::compensation::learn;
-use firmware::lesson::{Taught, check};
-use firmware::{Arrival, CHANNELS, Epoch, Estimators, FIRST_CONFIG, Retained, Statistics};
-use link::{Bounded, Checked, Decoder, Drift, Learnt, Message, Received, Term};
+use firmware::epoch::estimate_regressors;
+use firmware::learner::{EpochFit, validate};
+use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Statistics, TimedBurst};
+use link::{
+    Decoder, LearnedMessage, Message, Received, ReportedDrift, ReportedParameter, ReportedTerm, ValidationMessage,
+};
 use simulation::device::Device;
 use virtual_sensor::effect::surroundings::TemperatureCourse;
 use virtual_sensor::{Effect, Hidden, NoiseModel, OutputRegister, Surroundings, VirtualAdis16405};
@@ -31,9 +33,9 @@ fn part(effects: Vec<Effect>) -> Sensor {
 /// What two epochs have brought.
 struct Heard {
     /// From the first, by channel.
-    learnt: Vec<Learnt>,
+    learnt: Vec<LearnedMessage>,
     /// What the second says to it.
-    checked: Vec<Checked>,
+    checked: Vec<ValidationMessage>,
     /// Seconds that the first took to teach.
     taught_s: f64,
     /// Seconds that one channel took of it, at most.
@@ -64,8 +66,8 @@ fn two_epochs(effects: Vec<Effect>) -> Heard {
     let (mut learnt, mut checked) = (Vec::new(), Vec::new());
     for message in &decoded.messages {
         match message {
-            Message::Learnt(message) if message.epoch == 0 => learnt.push(message.clone()),
-            Message::Checked(message) => checked.push(message.clone()),
+            Message::Learned(message) if message.epoch == 0 => learnt.push(message.clone()),
+            Message::Validation(message) => checked.push(message.clone()),
             _ => {}
         }
     }
@@ -77,20 +79,20 @@ fn two_epochs(effects: Vec<Effect>) -> Heard {
         received.iter().filter(|(_, byte)| found(*byte)).map(|(at, _)| *at as f64 * 1e-9).collect()
     };
     let taught = times(|received| matches!(received, Received::Message { message: Message::Health(_), .. }));
-    let lessons = times(|received| matches!(received, Received::Message { message: Message::Learnt(_), .. }));
-    let answered = times(|received| matches!(received, Received::Line(line) if line.contains("observatory")));
+    let lessons = times(|received| matches!(received, Received::Message { message: Message::Learned(_), .. }));
+    let answered = times(|received| matches!(received, Received::Text(line) if line.contains("observatory")));
     let longest_s = lessons.windows(2).map(|pair| pair[1] - pair[0]).take(5).fold(0.0, f64::max);
     let (taught_s, waited_s) = (taught[0] - EPOCH_S, answered[0] - PRESSED_S);
     Heard { learnt, checked, taught_s, longest_s, waited_s }
 }
 
 /// The same from the bursts that the sensor sent; `samples` of both epochs, channel by channel.
-fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learnt>, Vec<Checked>) {
+fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
     assert_eq!(FIRST_CONFIG.sample_period(), SamplePeriod::nearest(RATE_HZ).expect("a rate"));
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
     let at_us = |sample: u64| (sample as f64 * 1e6 / RATE_HZ) as u64;
-    estimators.trust(at_us(bursts[0].0));
+    estimators.mark_probed(at_us(bursts[0].0));
     let mut bursts = bursts.iter();
     let mut epochs = Vec::new();
     for (number, samples) in (0..).zip(samples.chunks(CHANNELS.len())) {
@@ -99,22 +101,22 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learnt>
             "all channels of an epoch have taken the same samples"
         );
         for (sample, bytes) in bursts.by_ref().take(samples[0] as usize) {
-            let arrival = Arrival { at_us: at_us(*sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) };
-            estimators.take(arrival, 0);
+            let arrival = TimedBurst { at_us: at_us(*sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) };
+            estimators.process(arrival, 0);
         }
-        let mut epoch = Epoch::EMPTY;
+        let mut epoch = FinishedEpoch::EMPTY;
         epoch.number = number;
-        estimators.finish_epoch(&mut Retained::open(Device::blank_memory()), &mut epoch);
+        epoch.fill(&mut estimators, &mut RetainedRam::open(Device::blank_memory()));
         epochs.push(epoch);
     }
     let [first, second] = &epochs[..] else { panic!("two epochs") };
     let means = first.covariances().expect("no restart").means;
     let taught = |index: usize| {
-        let mut taught = Taught::of(learn(first, index, FIRST_CONFIG, &mut || true)?);
-        taught.study(first, index, FIRST_CONFIG, &mut || true).then_some(taught)
+        let mut taught = EpochFit::new(estimate_regressors(first, index, FIRST_CONFIG, &mut || true)?);
+        taught.run(first, index, FIRST_CONFIG, &mut || true).then_some(taught)
     };
-    let taught: Vec<Taught> = (0..6).map(|index| taught(index).expect("nobody says no")).collect();
-    let check = |index: usize| check(&taught[index].lesson(), Some(&means), second, index, FIRST_CONFIG);
+    let taught: Vec<EpochFit> = (0..6).map(|index| taught(index).expect("nobody says no")).collect();
+    let check = |index: usize| validate(&taught[index].model(), Some(&means), second, index, FIRST_CONFIG);
     let learnt = taught.iter().enumerate().map(|(index, taught)| taught.message(index, first.number)).collect();
     (learnt, (0..6).filter_map(check).collect())
 }
@@ -130,19 +132,19 @@ fn a_hidden_temperature_effect_is_learnt_and_subtracted() {
     assert!(waited_s < 2.0, "an answer after {waited_s} s");
     for (learnt, checked) in learnt.iter().zip(&checked) {
         let gyro_x = learnt.channel == Channel::GyroX as u8;
-        let causes: Vec<u8> = learnt.causes.iter().map(|cause| cause.covariate).collect();
+        let causes: Vec<u8> = learnt.regressors.iter().map(|cause| cause.covariate).collect();
         assert_eq!(causes, if gyro_x { vec![Channel::Temp as u8] } else { vec![] }, "{learnt:?}");
         let same = checked.drift.iter().all(|drift| drift.raw == drift.compensated);
         assert_eq!(same, !gyro_x, "{checked:?}");
     }
 
-    let cause = learnt[0].causes[0];
+    let cause = learnt[0].regressors[0];
     assert!((cause.low..=cause.high).contains(&SENSITIVITY), "{cause:?}");
     println!(
         "gyro x follows temp: {:.4} ({:.4} to {:.4}) deg/s/degC, truth {SENSITIVITY}",
         cause.value, cause.low, cause.high
     );
-    for Drift { n, raw, compensated } in &checked[0].drift {
+    for ReportedDrift { n, raw, compensated } in &checked[0].drift {
         println!("unseen, at {:5.1} s: {raw:.4} -> {compensated:.4} deg/s", *n as f64 / RATE_HZ);
     }
     // A cycle of amplitude A and period T has σ = A·sin²(πτ/T)/(πτ/T): 0.082 deg/s at 10 s. The noise of the gyro has
@@ -153,9 +155,9 @@ fn a_hidden_temperature_effect_is_learnt_and_subtracted() {
     assert!(ten.compensated < 0.025 && ten.raw > 3.0 * ten.compensated, "{ten:?}");
 
     // The line on gyro z is no cause that could be subtracted; the model has it.
-    let [line, ..] = &learnt[2].effects[..] else { panic!("{:?}", learnt[2]) };
-    assert!(matches!(line.coefficient.term, Term::Sinusoid | Term::Resonance), "{line:?}");
-    let Bounded { value, low, high } = line.shape[0];
+    let [line, ..] = &learnt[2].added_terms[..] else { panic!("{:?}", learnt[2]) };
+    assert!(matches!(line.coefficient.term, ReportedTerm::Sinusoid | ReportedTerm::Resonance), "{line:?}");
+    let ReportedParameter { value, low, high } = line.shape[0];
     println!("gyro z has a line at {value:.2} Hz ({low:.2} to {high:.2}), truth {LINE_HZ}");
     assert!((value / LINE_HZ - 1.0).abs() < 0.1, "octaves place a line to ten percent: {line:?}");
     let (before, after) = (checked[2].before.expect("a model"), checked[2].after.expect("a model"));
@@ -167,7 +169,7 @@ fn a_hidden_temperature_effect_is_learnt_and_subtracted() {
 fn where_nothing_is_hidden_nothing_is_subtracted() {
     let Heard { learnt, checked, .. } = two_epochs(vec![]);
     assert_eq!((learnt.len(), checked.len()), (6, 6));
-    assert!(learnt.iter().all(|learnt| learnt.causes.is_empty()), "{learnt:?}");
+    assert!(learnt.iter().all(|learnt| learnt.regressors.is_empty()), "{learnt:?}");
     assert!(
         checked.iter().flat_map(|checked| &checked.drift).all(|drift| drift.raw == drift.compensated),
         "{checked:?}"

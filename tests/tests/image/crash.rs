@@ -34,8 +34,8 @@ fn after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
 fn the_watchdog_ends_a_hang() {
     let (hello, _) = after(Event::LoseBurstEnd, 3.0, 15.0);
     assert_eq!(hello.boot.cause, BootCause::Watchdog);
-    assert_eq!((hello.boot.starts, hello.boot.kept_channels), (2, 8), "{:?}", hello.boot);
-    assert_eq!(hello.boot.last_words, "");
+    assert_eq!((hello.boot.starts, hello.boot.restored_channels), (2, 8), "{:?}", hello.boot);
+    assert_eq!(hello.boot.crash_record, "");
     // 8 s by an oscillator of 32 kHz; the part's may be 47 % faster or slower.
     let up_s = hello.uptime_us as f64 * 1e-6;
     assert!((15.0 - REPORT_S - 3.0 - up_s - 8.0).abs() < 0.6, "up for {up_s} s");
@@ -47,15 +47,15 @@ fn a_panic_leaves_its_place() {
     const PERIOD: u64 = 8 * 156_250; // 8 ticks of 1/1638.4 s in 1/256 us
     let (hello, _) = after(Event::Lose(PERIOD), 0.25, 4.0);
     assert_eq!((hello.boot.cause, hello.boot.starts), (BootCause::Software, 2));
-    let words = hello.boot.last_words.as_str();
-    assert!(words.starts_with("panic at ") && words.contains("cadence.rs:"), "{words}");
+    let words = hello.boot.crash_record.as_str();
+    assert!(words.starts_with("panic at ") && words.contains("acquisition.rs:"), "{words}");
 }
 
 #[test]
 fn a_fault_leaves_its_place() {
     let (hello, _) = after(Event::BusError, 3.0, 6.5);
-    assert_eq!((hello.boot.cause, hello.boot.starts, hello.boot.kept_channels), (BootCause::Software, 2, 8));
-    let words = hello.boot.last_words.as_str();
+    assert_eq!((hello.boot.cause, hello.boot.starts, hello.boot.restored_channels), (BootCause::Software, 2, 8));
+    let words = hello.boot.crash_record.as_str();
     assert!(words.starts_with("hard fault at 0x0800") || words.starts_with("hard fault at 0x0801"), "{words}");
 }
 
@@ -63,7 +63,7 @@ fn a_fault_leaves_its_place() {
 #[test]
 fn a_brown_out_is_a_clean_start() {
     let (hello, health) = after(Event::BrownOut, 3.0, 6.5);
-    assert_eq!((hello.boot.cause, hello.boot.starts, hello.boot.kept_channels), (BootCause::BrownOut, 1, 0));
-    assert_eq!((hello.boot.last_words.as_str(), hello.epoch, hello.sample_rate_hz), ("", 0, RATE_HZ));
+    assert_eq!((hello.boot.cause, hello.boot.starts, hello.boot.restored_channels), (BootCause::BrownOut, 1, 0));
+    assert_eq!((hello.boot.crash_record.as_str(), hello.epoch, hello.sample_rate_hz), ("", 0, RATE_HZ));
     assert_eq!(health.recoveries, 0);
 }

@@ -1,13 +1,13 @@
 //! What the image said, decoded by the host's decoder, and what the host makes of the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
-use firmware::{Arrival, CHANNELS, Estimator, Estimators, Statistics, Sums, channel_model, channel_report};
-use link::{ChannelReport, Counters, Decoder, Health, Hello, Message, Raw, Received};
+use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, Statistics, TimedBurst};
+use link::{ChannelMessage, Decoder, DecoderCounters, Health, Hello, Message, RawMessage, Received};
 
 pub(crate) struct Decoded {
     pub(crate) messages: Vec<Message>,
     pub(crate) lines: Vec<String>,
-    pub(crate) counters: Counters,
+    pub(crate) counters: DecoderCounters,
 }
 
 impl Decoded {
@@ -17,7 +17,7 @@ impl Decoded {
         for received in received.iter().filter_map(|&(_, byte)| decoder.push(byte)) {
             match received {
                 Received::Message { message, .. } => messages.push(message),
-                Received::Line(line) => lines.push(line.as_str().to_owned()),
+                Received::Text(line) => lines.push(line.as_str().to_owned()),
             }
         }
         Self { messages, lines, counters: decoder.counters() }
@@ -38,7 +38,7 @@ impl Decoded {
         self.messages.iter().filter_map(|m| if let Message::Health(health) = m { Some(health) } else { None }).collect()
     }
 
-    pub(crate) fn channels(&self) -> Vec<&ChannelReport> {
+    pub(crate) fn channels(&self) -> Vec<&ChannelMessage> {
         self.messages
             .iter()
             .filter_map(|m| if let Message::Channel(report) = m { Some(report) } else { None })
@@ -49,7 +49,7 @@ impl Decoded {
     pub(crate) fn raw(&self) -> Vec<(u64, Burst)> {
         let mut bursts = Vec::new();
         for message in &self.messages {
-            let Message::Raw(Raw { first, bursts: stream, .. }) = message else { continue };
+            let Message::Raw(RawMessage { first, bursts: stream, .. }) = message else { continue };
             let mut number = *first;
             for burst in stream {
                 number += u64::from(burst.periods);
@@ -63,7 +63,7 @@ impl Decoded {
 }
 
 /// The same estimators on the host, fed with `bursts` until as many samples were taken as `report` says.
-pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], rate_hz: f64, report: &ChannelReport) -> ChannelReport {
+pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], rate_hz: f64, report: &ChannelMessage) -> ChannelMessage {
     in_stretches(&[bursts], rate_hz, report)
 }
 
@@ -71,28 +71,29 @@ pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], rate_hz: f64, report:
 pub(crate) fn in_stretches(
     stretches: &[&[(u64, [u8; BURST_BYTES])]],
     rate_hz: f64,
-    report: &ChannelReport,
-) -> ChannelReport {
+    report: &ChannelMessage,
+) -> ChannelMessage {
     let index = CHANNELS.iter().position(|&channel| channel as u8 == report.channel).expect("a channel");
     let period = SamplePeriod::nearest(rate_hz).expect("a rate");
     let config = adis16405_driver::Config::new(GyroRange::Dps300, 0, period).expect("no filter");
-    let mut estimator = Estimator::new();
+    let mut estimator = ChannelEstimator::new();
     for bursts in stretches {
         let mut statistics = Statistics::new();
         let mut estimators = Estimators::new(&mut statistics, config);
-        estimators.resume(index, &Sums::of(&estimator));
+        estimators.restore(index, &ChannelSums::from_estimator(&estimator));
         let at_us = |sample: u64| (sample as f64 * 1e6 / rate_hz) as u64;
-        estimators.trust(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
+        estimators.mark_probed(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
         for &(sample, ref bytes) in *bursts {
-            if estimators.get(index).is_some_and(|estimator| estimator.len() == report.samples) {
+            if estimators.channel(index).is_some_and(|estimator| estimator.len() == report.samples) {
                 break;
             }
-            estimators.take(Arrival { at_us: at_us(sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) }, 0);
+            estimators
+                .process(TimedBurst { at_us: at_us(sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) }, 0);
         }
-        estimator.clone_from(estimators.get(index).expect("a channel"));
+        estimator.clone_from(estimators.channel(index).expect("a channel"));
     }
     let channel = CHANNELS[index];
-    let sums = Sums::of(&estimator);
-    let model = (index < 6).then(|| channel_model(channel, &sums, config));
-    channel_report(channel, &sums, model.as_ref(), None)
+    let sums = ChannelSums::from_estimator(&estimator);
+    let model = (index < 6).then(|| sums.fit_baseline(channel, config));
+    sums.report(channel, model.as_ref(), None)
 }

@@ -62,7 +62,7 @@ fn at_full_speed_for(seconds: f64) {
 
     // The last report: nothing lost, equal to the host's bit for bit.
     let health = **decoded.healths().last().expect("a report");
-    assert_eq!((health.used, health.lost_edges + health.stray_edges + health.queue_full), (health.bursts, 0));
+    assert_eq!((health.used, health.lost_edges + health.spurious_edges + health.queue_full), (health.bursts, 0));
     assert_eq!((health.recoveries, health.raw_dropped, health.serial_overruns), (0, 0, 0), "{health:?}");
     let channels = decoded.channels();
     for report in &channels[channels.len() - 8..] {

@@ -18,7 +18,7 @@ mod terminal;
 use bench::{Outcome, Scenario, run};
 use decoded::{Decoded, on_host};
 use firmware::CHANNELS;
-use link::{Boot, BootCause, Counters, Health, Hello, Message};
+use link::{Boot, BootCause, DecoderCounters, Health, Hello, Message};
 use sensor::Sensor;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -70,7 +70,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     assert!(sensor.part.samples() - last <= 1);
 
     let Decoded { messages, counters, .. } = Decoded::of(&received);
-    assert_eq!(counters, Counters { frames: messages.len() as u64, ..Counters::default() });
+    assert_eq!(counters, DecoderCounters { frames: messages.len() as u64, ..DecoderCounters::default() });
     let [Message::Log(log), Message::Hello(hello), channels @ .., Message::Health(health)] = messages.as_slice() else {
         panic!("a report goes from hello to health: {messages:?}");
     };
@@ -106,7 +106,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
         least = report.samples;
         assert_eq!(report.missing, 0);
         let factors: Vec<u64> = (0..24).map(|octave| 1 << octave).filter(|n| 2 * n <= report.samples).collect();
-        assert!(report.points.iter().map(|point| point.n).eq(factors));
+        assert!(report.octaves.iter().map(|point| point.n).eq(factors));
         assert_eq!(report.coefficients.len(), if channel.unit() == "degC" || channel.unit() == "V" { 0 } else { 3 });
         assert_eq!(*report, on_host(&sensor.bursts, 204.8, report), "bit for bit");
     }

@@ -38,7 +38,7 @@ fn an_overflow_faults_and_the_next_start_says_so() {
     let lines = Decoded::of(&received).lines;
     println!("{used} B of stack would do; {complaints:?}; {lines:#?}");
     assert_eq!(complaints.iter().filter(|complaint| complaint.starts_with("reset")).count(), 1, "{complaints:?}");
-    for expected in ["start 2: Software, 8 channels kept", "last words: stack overflow", "sensor sampled"] {
+    for expected in ["start 2: Software, 8 channels restored", "crash record: stack overflow", "sensor sampled"] {
         assert!(lines.iter().any(|line| line.contains(expected)), "{expected}: {lines:?}");
     }
     // Bursts at 204.8 SPS since a restart that took less than a quarter of a second, all of them used.

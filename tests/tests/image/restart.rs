@@ -17,7 +17,7 @@ fn a_reset_costs_a_second_of_statistics_and_no_more() {
     let sensor = sensor.expect("a sensor");
     let decoded = Decoded::of(&received);
     let hello = decoded.hellos()[decoded.hellos().len() - 1].clone();
-    assert_eq!((hello.boot.cause, hello.boot.starts, hello.boot.kept_channels), (BootCause::Pin, 2, 8));
+    assert_eq!((hello.boot.cause, hello.boot.starts, hello.boot.restored_channels), (BootCause::Pin, 2, 8));
     assert_eq!(hello.epoch_s, 3600, "settings are kept");
 
     // The statistics are those of the first stretch, up to where they were kept, and of the second one.
@@ -29,7 +29,7 @@ fn a_reset_costs_a_second_of_statistics_and_no_more() {
         // The report is made channel by channel while samples come: some of the second stretch's last may be missing.
         let kept = (0..used).map(|fewer| report.samples as usize - (used - fewer)).find(|&kept| {
             let stretches = [&before[..kept.min(before.len())], after];
-            kept <= before.len() && in_stretches(&stretches, 204.8, report).points == report.points
+            kept <= before.len() && in_stretches(&stretches, 204.8, report).octaves == report.octaves
         });
         let kept = kept.expect("the sums of two stretches");
         assert!((before.len() - kept) as f64 <= 1.2 * 204.8, "{kept} of {} samples kept", before.len());

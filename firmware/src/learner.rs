@@ -1,0 +1,296 @@
+//! Learning from epoch to epoch: the model of every inertial channel is fitted to a finished epoch and validated on the next
+//! one, which the fit has not seen.
+
+use crate::epoch::{FinishedEpoch, Regressor, Regressors, mean_shift, rebuild_compensated_curve};
+use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL, model_error, reported_term};
+use adis16405_driver::Config;
+use allan_core::confidence::NORMAL_975;
+use allan_core::fit::fit;
+use allan_core::model::{MAX_TERMS, Term};
+use allan_core::trace::{Found, Lines, MAX_ADDED, Trace, trace_while};
+use allan_core::{Curve, Kind, Model};
+use heapless::Vec;
+use link::{
+    LearnedMessage, MAX_DRIFTS, ReportedAddedTerm, ReportedCoefficient, ReportedDrift, ReportedModelError,
+    ReportedParameter, ReportedRegressor, ValidationMessage,
+};
+
+/// p-value of the residual under N, B and K above which no further term is searched.
+///
+/// The search adds a term only if it lowers the deviance by 14 of its standard deviations or more. At a p-value of 0.2 the
+/// deviance itself is below 14 for up to 10 degrees of freedom, which is what curves of a dozen octaves have.
+const P_VALUE_SUFFICIENT: f64 = 0.2;
+
+const _: () = assert!(MAX_ADDED == link::MAX_ADDED_TERMS);
+
+/// The model of one channel: only coefficients, since the device stores six of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpochModel {
+    /// N, B and K of the stream itself; `None` before the first fit.
+    baseline: Option<BaselineCoefficients>,
+    /// All terms of the compensated stream.
+    full: Vec<(Kind, f64), MAX_TERMS>,
+    /// What is subtracted from the stream.
+    pub(crate) regressors: Regressors,
+}
+
+type BaselineCoefficients = [f64; Kind::DECLARED.len()];
+
+impl EpochModel {
+    /// The model before the first fit.
+    pub(crate) const EMPTY: Self = Self { baseline: None, full: Vec::new(), regressors: Vec::new() };
+
+    /// N, B and K of the stream itself; `None` before the first fit.
+    #[must_use]
+    pub(crate) fn baseline(&self, config: Config) -> Option<Model> {
+        Some(model(Kind::DECLARED.into_iter().zip(self.baseline?), config))
+    }
+
+    /// All terms of the compensated stream; `None` before the first fit.
+    #[must_use]
+    fn full(&self, config: Config) -> Option<Model> {
+        (!self.full.is_empty()).then(|| model(self.full.iter().copied(), config))
+    }
+}
+
+fn model(terms: impl Iterator<Item = (Kind, f64)>, config: Config) -> Model {
+    Model::new(1.0 / config.sample_period().hz(), terms.map(|(kind, value)| Term::exact(kind, value)))
+}
+
+fn baseline_coefficients(model: &Model) -> Option<BaselineCoefficients> {
+    let mut values = model.terms().iter().map(|term| term.value);
+    Some([values.next()?, values.next()?, values.next()?])
+}
+
+/// The fit of one channel's model to an epoch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpochFit {
+    baseline: Option<BaselineCoefficients>,
+    regressors: Regressors,
+    /// Search for the terms that N, B and K lack in the compensated stream.
+    trace: Trace,
+}
+
+impl EpochFit {
+    /// The fit of a channel with these [regressors](crate::epoch::estimate_regressors), before it is [run](Self::run).
+    #[must_use]
+    pub fn new(regressors: Regressors) -> Self {
+        Self { baseline: None, regressors, trace: Trace::empty() }
+    }
+
+    /// Fits the model of the inertial channel [`CHANNELS`]`[index]` to an epoch.
+    ///
+    /// This takes seconds on a microcontroller. `keep_on` is called before every step and may do other work meanwhile; if it
+    /// returns false, the fit is cancelled, which returns false.
+    #[must_use]
+    pub fn run(
+        &mut self,
+        epoch: &FinishedEpoch,
+        index: usize,
+        config: Config,
+        keep_on: &mut dyn FnMut() -> bool,
+    ) -> bool {
+        let done = self.search(epoch, index, config, keep_on);
+        self.baseline = if self.regressors.is_empty() {
+            baseline_coefficients(&self.trace.before)
+        } else {
+            refit_baseline(epoch, index, config)
+        };
+        done
+    }
+
+    /// Not inlined, here and below: frames of 2.0 to 3.3 kB (curves, models) would otherwise be part of every caller's.
+    #[inline(never)]
+    fn search(
+        &mut self,
+        epoch: &FinishedEpoch,
+        index: usize,
+        config: Config,
+        keep_on: &mut dyn FnMut() -> bool,
+    ) -> bool {
+        let mut curve = Curve::empty();
+        // Without covariances there are no regressors, and the curve is that of the stream itself.
+        let _ = rebuild_compensated_curve(&mut curve, epoch, index, config, &self.regressors);
+        self.trace.declare(&curve);
+        let sufficient = self.trace.before_goodness.p_value > P_VALUE_SUFFICIENT;
+        sufficient || trace_while(&mut self.trace, &curve, Lines::InTheCurve, keep_on)
+    }
+
+    /// The model that was fitted.
+    #[must_use]
+    pub fn model(&self) -> EpochModel {
+        let full = self.trace.after.terms().iter().map(|term| (term.kind, term.value)).collect();
+        EpochModel { baseline: self.baseline, full, regressors: self.regressors.clone() }
+    }
+
+    /// The message on the fit of [`CHANNELS`]`[index]` to the epoch with the number `epoch`.
+    #[must_use]
+    pub fn message(&self, index: usize, epoch: u32) -> LearnedMessage {
+        let Self { regressors, trace, .. } = self;
+        LearnedMessage {
+            channel: CHANNELS[index] as u8,
+            epoch,
+            regressors: regressors.iter().map(reported_regressor).collect(),
+            added_terms: trace.found.iter().map(|found| reported_added_term(found, &trace.after)).collect(),
+            p_before: trace.before_goodness.p_value,
+            p_after: trace.after_goodness.p_value,
+        }
+    }
+}
+
+#[inline(never)]
+fn refit_baseline(epoch: &FinishedEpoch, index: usize, config: Config) -> Option<BaselineCoefficients> {
+    let mut curve = Curve::empty();
+    epoch.rebuild_curve(&mut curve, index, config);
+    baseline_coefficients(&fit(&curve, &Kind::DECLARED))
+}
+
+/// Validates on an epoch the model of [`CHANNELS`]`[index]` from the epoch before, whose means are `means`. `None` before the
+/// first fit, or if the compensated stream cannot be reconstructed because the epoch has no covariances.
+#[must_use]
+pub fn validate(
+    model: &EpochModel,
+    means: Option<&ChannelMeans>,
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+) -> Option<ValidationMessage> {
+    let mut message = ValidationMessage {
+        channel: CHANNELS[index] as u8,
+        epoch: epoch.number,
+        before: baseline_error(model, epoch, index, config)?,
+        after: None,
+        shift: means.and_then(|means| mean_shift(epoch, index, config, &model.regressors, means)),
+        drift: Vec::new(),
+    };
+    fill_compensated(model, epoch, index, config, &mut message)?;
+    Some(message)
+}
+
+/// Error of N, B and K on the stream itself; the outer `None` before the first fit.
+#[inline(never)]
+fn baseline_error(
+    model: &EpochModel,
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+) -> Option<Option<ReportedModelError>> {
+    let mut curve = Curve::empty();
+    epoch.rebuild_curve(&mut curve, index, config);
+    Some(model_error(&model.baseline(config)?, &curve))
+}
+
+/// Fills in the error of the full model on the compensated stream, and the Allan deviations of both streams.
+#[inline(never)]
+fn fill_compensated(
+    model: &EpochModel,
+    epoch: &FinishedEpoch,
+    index: usize,
+    config: Config,
+    message: &mut ValidationMessage,
+) -> Option<()> {
+    let mut curve = Curve::empty();
+    epoch.rebuild_curve(&mut curve, index, config);
+    let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE).take(MAX_DRIFTS);
+    message.drift.extend(slow.map(|raw| ReportedDrift { n: raw.n, raw: libm::sqrt(raw.avar), compensated: 0.0 }));
+    rebuild_compensated_curve(&mut curve, epoch, index, config, &model.regressors)?;
+    let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE);
+    message.drift.iter_mut().zip(slow).for_each(|(drift, point)| drift.compensated = libm::sqrt(point.avar));
+    message.after = model_error(&model.full(config)?, &curve);
+    Some(())
+}
+
+fn reported_regressor(regressor: &Regressor) -> ReportedRegressor {
+    let half_width = NORMAL_975 * regressor.error;
+    ReportedRegressor {
+        covariate: CHANNELS[regressor.covariate] as u8,
+        value: regressor.value,
+        low: regressor.value - half_width,
+        high: regressor.value + half_width,
+        reference: regressor.reference,
+    }
+}
+
+fn reported_added_term(found: &Found, model: &Model) -> ReportedAddedTerm {
+    let Term { kind, value, low, high, shape } = model.terms()[found.term];
+    let named = kind.shape().into_iter().zip(shape).filter(|((name, _), _)| !name.is_empty());
+    ReportedAddedTerm {
+        coefficient: ReportedCoefficient { term: reported_term(kind), value, low, high },
+        shape: named.map(|((_, value), (low, high))| ReportedParameter { value, low, high }).collect(),
+        score: found.score,
+        n: found.residual.n,
+        excess: found.residual.excess,
+        sigmas: found.residual.sigmas,
+    }
+}
+
+/// The models of all inertial channels, and the finished epoch from which they are learned.
+pub(crate) struct Learner {
+    /// The last finished epoch; `None` while a model is being fitted to it.
+    pub(crate) finished: Option<&'static mut FinishedEpoch>,
+    pub(crate) models: [EpochModel; INERTIAL],
+    /// Channel means of the epoch that the models were fitted to.
+    means: Option<ChannelMeans>,
+    /// Results on the last finished epoch.
+    pub(crate) results: [Option<ValidationResult>; INERTIAL],
+}
+
+/// Main figures of a validation.
+#[derive(Clone, Copy)]
+pub(crate) struct ValidationResult {
+    /// Deviance per point of N, B and K on the stream, and of the full model on the compensated stream.
+    pub(crate) deviance_per_point: (f64, f64),
+    /// Allan deviations at the longest averaging time that the epoch holds eight times.
+    pub(crate) drift: ReportedDrift,
+}
+
+impl ValidationResult {
+    fn from_message(message: &ValidationMessage, samples: u64) -> Option<Self> {
+        let deviance_per_point = (message.before?.deviance_per_point, message.after?.deviance_per_point);
+        let drift = *message.drift.iter().rfind(|drift| drift.n <= samples / 8)?;
+        Some(Self { deviance_per_point, drift })
+    }
+}
+
+impl Learner {
+    /// A learner without models; `finished` is the memory for finished epochs.
+    pub(crate) fn new(finished: &'static mut FinishedEpoch) -> Self {
+        Self {
+            finished: Some(finished),
+            models: [const { EpochModel::EMPTY }; INERTIAL],
+            means: None,
+            results: [const { None }; INERTIAL],
+        }
+    }
+
+    /// Discards the models and the results.
+    pub(crate) fn reset(&mut self) {
+        self.models = [const { EpochModel::EMPTY }; INERTIAL];
+        self.results = [const { None }; INERTIAL];
+        self.means = None;
+    }
+
+    /// The last finished epoch; `None` while a model is being fitted to it.
+    pub(crate) fn finished(&self) -> Option<&FinishedEpoch> {
+        self.finished.as_deref()
+    }
+
+    /// Validates the model of a channel on the finished epoch.
+    pub(crate) fn validate(&mut self, index: usize, config: Config) -> Option<ValidationMessage> {
+        let epoch = self.finished.as_deref()?;
+        let message = validate(&self.models[index], self.means.as_ref(), epoch, index, config);
+        self.results[index] =
+            message.as_ref().and_then(|message| ValidationResult::from_message(message, epoch.samples(index)));
+        message
+    }
+
+    /// Replaces the model of a channel by one that was fitted to `epoch`.
+    pub(crate) fn learn(&mut self, fit: &EpochFit, epoch: &FinishedEpoch, index: usize) {
+        if index + 1 == INERTIAL {
+            self.means = epoch.covariances().map(|covariances| covariances.means);
+        }
+        self.models[index] = fit.model();
+    }
+}
+
+const _: () = assert!(CHANNELS.len() >= INERTIAL);

@@ -1,0 +1,185 @@
+//! The report in frames: device and settings, every channel, health. A report is sent message by message; one that ends an epoch also has the validation and the learned model of every inertial channel.
+
+use crate::board::Board;
+use crate::device::DeviceState;
+use crate::learner::EpochModel;
+use crate::statistics::{CHANNELS, ChannelSums, INERTIAL};
+use adis16405_driver::{Channel, GyroRange};
+use allan_core::Model;
+use link::{Hello, MessageRef, ReportedModelError};
+
+/// Version of the firmware, from the manifest.
+const VERSION: (u8, u8, u8) = (
+    decimal(env!("CARGO_PKG_VERSION_MAJOR")),
+    decimal(env!("CARGO_PKG_VERSION_MINOR")),
+    decimal(env!("CARGO_PKG_VERSION_PATCH")),
+);
+
+/// Parses a version number of the manifest; one above 255 fails the compilation.
+const fn decimal(digits: &str) -> u8 {
+    match u8::from_str_radix(digits, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("a version number above 255"),
+    }
+}
+
+impl DeviceState {
+    /// Device and settings, for a report on the finished epoch (`ends_epoch`) or on the running one.
+    fn hello(&self, ends_epoch: bool, board: &mut impl Board) -> Hello {
+        Hello {
+            firmware: VERSION,
+            product_id: self.product_id,
+            gyro_full_scale: match self.config.range() {
+                GyroRange::Dps300 => 300,
+                GyroRange::Dps150 => 150,
+                GyroRange::Dps75 => 75,
+            },
+            filter_taps_log2: self.config.filter_taps_log2(),
+            sample_rate_hz: self.config.sample_period().hz(),
+            measured_rate_hz: board.estimators(|estimators| estimators.measured_hz()),
+            spi_clock_hz: self.spi_clock_hz,
+            uptime_us: board.now_us(),
+            sampling: self.is_sampled(),
+            epoch: self.learner.finished().filter(|_| ends_epoch).map_or(self.settings.epoch, |epoch| epoch.number),
+            epoch_s: self.settings.epoch_s,
+            boot: self.boot.clone(),
+        }
+    }
+
+    // None of the following is inlined: a message and its sums take 1.2 to 2.5 kB of stack, and only the one that is being
+    // made shall take it.
+
+    #[inline(never)]
+    pub(crate) fn send_hello(&self, ends_epoch: bool, board: &mut impl Board) {
+        let hello = self.hello(ends_epoch, board);
+        send(board, MessageRef::Hello(&hello));
+    }
+
+    #[inline(never)]
+    pub(crate) fn send_health(&self, board: &mut impl Board) {
+        let health = self.health(board);
+        send(board, MessageRef::Health(&health));
+    }
+
+    #[inline(never)]
+    pub(crate) fn send_channel(&self, index: usize, ends_epoch: bool, board: &mut impl Board) {
+        let (channel, sums) = (CHANNELS[index], &self.reported_sums(index, ends_epoch, board));
+        let model = self.learner.models.get(index);
+        let unseen_error = model.and_then(|model| self.unseen_error(model, channel, sums));
+        let baseline = model.map(|_| sums.fit_baseline(channel, self.config));
+        send_channel_message(board, channel, sums, baseline.as_ref(), unseen_error);
+    }
+
+    #[inline(never)]
+    fn reported_sums(&self, index: usize, ends_epoch: bool, board: &mut impl Board) -> ChannelSums {
+        match self.learner.finished().filter(|_| ends_epoch) {
+            Some(epoch) => epoch.sums(index),
+            None => running_sums(board, index),
+        }
+    }
+
+    /// Error of the previous epoch's N, B and K on the sums.
+    #[inline(never)]
+    fn unseen_error(&self, model: &EpochModel, channel: Channel, sums: &ChannelSums) -> Option<ReportedModelError> {
+        sums.error_of(&model.baseline(self.config)?, channel, self.config)
+    }
+
+    /// Validates the model of an inertial channel on the finished epoch and sends the result, if there is one.
+    #[inline(never)]
+    pub(crate) fn send_validation(&mut self, index: usize, board: &mut impl Board) {
+        if let Some(message) = self.learner.validate(index, self.config) {
+            send(board, MessageRef::Validation(&message));
+        }
+    }
+}
+
+#[inline(never)]
+fn send_channel_message(
+    board: &mut impl Board,
+    channel: Channel,
+    sums: &ChannelSums,
+    baseline: Option<&Model>,
+    unseen_error: Option<ReportedModelError>,
+) {
+    let report = sums.report(channel, baseline, unseen_error);
+    send(board, MessageRef::Channel(&report));
+}
+
+/// The sums of [`CHANNELS`]`[index]` of the running epoch. Not inlined: they take 0.6 kB of stack.
+#[inline(never)]
+pub(crate) fn running_sums(board: &mut impl Board, index: usize) -> ChannelSums {
+    board.estimators(|estimators| estimators.channel(index).map_or(ChannelSums::EMPTY, ChannelSums::from_estimator))
+}
+
+/// Sends a message, for which the caller has checked that there is room.
+#[inline(never)]
+pub(crate) fn send(board: &mut impl Board, message: MessageRef<'_>) {
+    board.transmit_queue(|queue| queue.send(message));
+}
+
+/// A message of a report.
+#[derive(Clone, Copy)]
+pub(crate) enum ReportPart {
+    Hello,
+    /// Sums and baseline model of a channel.
+    Channel(usize),
+    /// Validation, on the finished epoch, of an inertial channel's model.
+    Validation(usize),
+    /// Model that an inertial channel learns from the finished epoch.
+    Learned(usize),
+    Health,
+}
+
+/// Progress of the report that is being sent.
+#[derive(Default)]
+pub(crate) struct ReportProgress {
+    /// Position of the next message; `None` if no report is being sent.
+    next: Option<usize>,
+    /// Whether the report ends an epoch: then its sums are those of the finished epoch.
+    ends_epoch: bool,
+}
+
+impl ReportProgress {
+    /// Starts a report on the running epoch. A report that is being sent already serves as this one.
+    pub(crate) fn start(&mut self) {
+        self.next.get_or_insert(0);
+    }
+
+    /// Starts the report that ends an epoch; a report that is being sent is abandoned.
+    pub(crate) fn start_epoch_end(&mut self) {
+        *self = Self { next: Some(0), ends_epoch: true };
+    }
+
+    pub(crate) fn is_active(&self) -> bool {
+        self.next.is_some()
+    }
+
+    pub(crate) fn ends_epoch(&self) -> bool {
+        self.ends_epoch
+    }
+
+    /// The next message; `None` if no report is being sent or the last message was sent, which ends the report.
+    pub(crate) fn part(&mut self) -> Option<ReportPart> {
+        let learners = if self.ends_epoch { INERTIAL } else { 0 };
+        let channels = 1 + CHANNELS.len();
+        Some(match self.next? {
+            0 => ReportPart::Hello,
+            index if index < channels => ReportPart::Channel(index - 1),
+            index if index < channels + learners => ReportPart::Validation(index - channels),
+            index if index < channels + 2 * learners => ReportPart::Learned(index - channels - learners),
+            index if index == channels + 2 * learners => ReportPart::Health,
+            _ => {
+                *self = Self::default();
+                return None;
+            }
+        })
+    }
+
+    /// Advances to the next message, unless the report that was sent has been replaced or abandoned meanwhile, which shows
+    /// in `ended_epoch`, its kind.
+    pub(crate) fn advance(&mut self, ended_epoch: bool) {
+        if self.ends_epoch == ended_epoch {
+            self.next = self.next.map(|next| next + 1);
+        }
+    }
+}
