@@ -4,7 +4,7 @@ use adis16405_driver::GyroRange;
 use benchmarks::undeclared::{self, Kind, Plan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recordings::serial;
-use simulation::record::Simulation;
+use simulation::Simulation;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -201,11 +201,7 @@ impl Simulate {
     /// With `default_s` seconds unless told otherwise.
     pub fn simulation(&self, default_s: f64) -> Simulation {
         let seconds = self.seconds.unwrap_or(default_s);
-        if self.plain {
-            Simulation::of_paper(seconds, self.seed)
-        } else {
-            Simulation::of_demonstration(seconds, self.seed)
-        }
+        if self.plain { Simulation::paper(seconds, self.seed) } else { Simulation::demonstration(seconds, self.seed) }
     }
 }
 

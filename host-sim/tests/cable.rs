@@ -1,7 +1,7 @@
 //! The command line at the end of a cable: a pseudo-terminal with the firmware's application behind it.
 
 use serialport::{SerialPort, TTYPort};
-use simulation::device::Device;
+use simulation::Device;
 use std::io::{ErrorKind, Read, Write};
 use std::process::{Command, Output};
 use std::sync::Arc;

@@ -6,7 +6,7 @@ use allan_core::{Kind, Model};
 use noise_analysis::grid::Grid;
 use noise_analysis::innovation::{Innovations, innovations};
 use noise_analysis::navigation::drifts;
-use virtual_sensor::noise::NoiseSource;
+use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
 const PERIOD: f64 = 0.02;
@@ -15,7 +15,7 @@ const SAMPLES: usize = 150_000;
 const NOISE: [f64; 3] = [0.0368, 0.0093, 0.0013];
 
 fn simulated(noise: [f64; 3], seed: u64) -> Vec<f64> {
-    let mut model = NoiseModel::still();
+    let mut model = NoiseModel::noiseless();
     let gyro = model.channel_mut(OutputRegister::GyroZ);
     gyro.bias = 3.0;
     [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = noise;
@@ -81,7 +81,7 @@ fn the_innovations_of_a_true_model_are_white_and_as_large_as_it_says() {
 fn the_innovations_of_a_wrong_model_are_not() {
     // A Markov process that the model lacks: of 0.03 deg/s, over 2 s.
     let time_constant = 2.0;
-    let mut source = NoiseModel::still();
+    let mut source = NoiseModel::noiseless();
     source.channel_mut(OutputRegister::GyroX).angle_random_walk = 1.0;
     let mut white = NoiseSource::new(&source, 5, 1.0);
     let decay = f64::exp(-PERIOD / time_constant);

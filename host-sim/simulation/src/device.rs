@@ -1,7 +1,6 @@
-//! The firmware's application on the host: the very code of the image, over the virtual sensor, in virtual time.
+//! The firmware's application on the host: the same code as in the image, with the virtual sensor, in virtual time.
 
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
-use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::{
@@ -11,22 +10,23 @@ use firmware::{
 use heapless::spsc::Consumer;
 use link::Boot;
 use std::collections::VecDeque;
-use virtual_sensor::{EmulatedBus, VirtualAdis16405};
+use virtual_sensor::{EmulatedBus, VirtualAdis16405, VirtualDelay};
 
-/// Serial clock of the sensor's bus, Hz.
-pub const SCK_HZ: u32 = 1_000_000;
+/// SCK of the sensor's bus, Hz.
+const SCK_HZ: u32 = 1_000_000;
 
-/// The main loop goes round at least so often.
+/// Longest time between two passes of the main loop, µs.
 const WAKE_US: u64 = 100_000;
 
-/// A device that is not there: the application, its sensor, and both ends of its serial line, which takes no time.
+/// A simulated device: the application, the virtual sensor, and both ends of the serial link, whose transfers take no
+/// virtual time.
 pub struct Device {
     app: App,
-    board: VirtualBoard,
+    board: SimulatedBoard,
 }
 
-/// Everything but the application.
-struct VirtualBoard {
+/// The simulated board: all but the application.
+struct SimulatedBoard {
     bus: EmulatedBus,
     now_us: u64,
     sampler: Sampler<'static>,
@@ -40,14 +40,14 @@ struct VirtualBoard {
 }
 
 impl Device {
-    /// Starts the application with a sensor, and with what `memory` retains.
+    /// Starts the application with a sensor and the contents of the retained memory.
     ///
-    /// The queues and statistics, 50 kB, are never given back: on the target they are statics.
+    /// Queues and statistics, 50 kB, are leaked: on the target they are statics.
     pub fn new(part: VirtualAdis16405, memory: &'static RetainedMemory) -> Self {
         let (to_estimators, arrivals) = Box::leak(Box::new(BurstQueue::new())).split();
         let (to_port, outgoing) = Box::leak(Box::new(TransmitBuffer::new())).split();
         let statistics = Box::leak(Box::new(Statistics::new()));
-        let mut board = VirtualBoard {
+        let mut board = SimulatedBoard {
             now_us: part.now() / 1000,
             bus: EmulatedBus::with_sck_hz(part, SCK_HZ),
             sampler: Sampler::new(to_estimators),
@@ -68,17 +68,17 @@ impl Device {
         Self { app: App::new(start, &mut board), board }
     }
 
-    /// Memory in which nothing is retained.
+    /// Retained memory without valid contents.
     pub fn blank_memory() -> &'static RetainedMemory {
         Box::leak(Box::new(blank_memory()))
     }
 
-    /// What is typed at the far end of the line.
+    /// Sends `keys` to the device, as a terminal does.
     pub fn press(&mut self, keys: &[u8]) {
         self.board.received.extend(keys);
     }
 
-    /// Lets virtual time pass until `until_us` and returns the bytes that the device sent meanwhile.
+    /// Advances virtual time to `until_us` and returns the bytes that the device sent meanwhile.
     pub fn run_until(&mut self, until_us: u64) -> Vec<u8> {
         self.turn();
         while self.board.now_us < until_us {
@@ -99,7 +99,7 @@ impl Device {
         &self.board.bus
     }
 
-    /// How often the application asked to be restarted.
+    /// Number of restarts that the application requested.
     pub fn restarts(&self) -> u32 {
         self.board.restarts
     }
@@ -112,13 +112,13 @@ impl Device {
     }
 }
 
-impl VirtualBoard {
+impl SimulatedBoard {
     fn advance_to(&mut self, us: u64) {
         self.bus.advance_to(us * 1000);
         self.now_us = us;
     }
 
-    /// What the two sampling interrupts and the one of the estimators do.
+    /// The two sampling interrupts and the one of the estimators.
     fn data_ready(&mut self) {
         if self.sampler.data_ready(self.now_us) {
             let mut answer = [0; BURST_BYTES];
@@ -134,18 +134,18 @@ impl VirtualBoard {
     }
 }
 
-impl Board for VirtualBoard {
+impl Board for SimulatedBoard {
     type Bus<'a> = EmulatedBus;
-    type Delay<'a> = BoardDelay;
+    type Delay<'a> = VirtualDelay;
 
     fn now_us(&mut self) -> u64 {
-        // Frames on the bus take virtual time.
+        // Transactions of the driver advance the part's time.
         self.now_us = self.now_us.max(self.bus.part().now() / 1000);
         self.now_us
     }
 
-    fn sensor_bus(&mut self) -> (EmulatedBus, BoardDelay) {
-        (self.bus.clone(), BoardDelay(self.bus.clone()))
+    fn sensor_bus(&mut self) -> (EmulatedBus, VirtualDelay) {
+        (self.bus.clone(), self.bus.delay())
     }
 
     fn set_sampling(&mut self, enabled: bool) {
@@ -172,15 +172,5 @@ impl Board for VirtualBoard {
 
     fn restart(&mut self) {
         self.restarts += 1;
-    }
-}
-
-/// Lets virtual time pass.
-struct BoardDelay(EmulatedBus);
-
-impl DelayNs for BoardDelay {
-    fn delay_ns(&mut self, ns: u32) {
-        let until = self.0.part().now() + u64::from(ns);
-        self.0.advance_to(until);
     }
 }

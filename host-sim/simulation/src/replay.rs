@@ -1,37 +1,36 @@
-//! A recording back through the emulated bus and the real driver.
+//! A recording, replayed over an SPI bus to the real driver.
 //!
-//! What a file holds is turned into burst transactions. The driver asks for each as it would ask a part, and what it
-//! decodes becomes the recording.
-
-mod bus;
-
-pub use bus::{ReplayBus, ReplayError};
+//! Each burst of a frame log, or each row of a table as the burst that the part would have sent, is one transaction. The
+//! driver requests and decodes it as from a part; the decoded samples become the recording.
 
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
+use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::csv::Rows;
 use recordings::frame_log::{Frame, Frames};
 use recordings::recording::{Clock, Recorder, Recording};
 use recordings::{InputError, Reason};
+use std::cell::RefCell;
 use std::path::Path;
+use std::rc::Rc;
 
-/// A replayed recording and what else was on the bus.
+/// A replayed recording.
 #[derive(Debug)]
 pub struct Replay {
-    /// As the driver read it.
+    /// The samples that the driver decoded.
     pub recording: Recording,
-    /// Transactions that were no bursts; they are not decoded.
+    /// Number of transactions that were no burst reads; they are not decoded.
     pub other_transactions: u64,
 }
 
-/// Replays a table of counts or a frame log; which of them `file` is, its header says.
+/// Replays a table of counts or a frame log, told apart by the header of `file`.
 ///
 /// # Errors
-/// The file cannot be read, or the driver meets a transaction that it did not ask for.
+/// The file cannot be read, or a transaction differs from the one that the driver requests.
 pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
     if recordings::is_frame_log(file)? { replay_log(file, range) } else { replay_table(file, range) }
 }
 
-/// Replays a table: every row as the burst in which the part would have sent it.
+/// Replays a table of counts: every row as the burst that the part would have sent.
 ///
 /// # Errors
 /// As [`replay`].
@@ -48,10 +47,10 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
     Ok(Replay { recording: recorder.finish(), other_transactions: 0 })
 }
 
-/// Replays a frame log. A write of the range to SENS_AVG in the log sets the range from there on, else it is `range`.
+/// Replays a frame log. The range is `range` until a write to SENS_AVG in the log selects another.
 ///
 /// # Errors
-/// As [`replay`].
+/// As [`replay`], or the log has no burst.
 pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
     let mut frames = Frames::open(file)?;
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
@@ -78,7 +77,7 @@ pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
     Ok(Replay { recording: recorder.finish(), other_transactions })
 }
 
-/// The driver on a bus that plays back.
+/// The driver on a replay bus.
 struct Player {
     bus: ReplayBus,
     driver: Adis16405<ReplayBus>,
@@ -90,7 +89,7 @@ impl Player {
         Self { driver: Adis16405::new(bus.clone(), Config::default()), bus }
     }
 
-    /// Plays one transaction and has the driver read it.
+    /// Lets the driver read one recorded transaction.
     fn burst(&mut self, mosi: &[u8], miso: &[u8]) -> Result<Burst, Reason> {
         self.bus.load(mosi, miso);
         self.driver.burst().map_err(|e| Reason::Bus(e.to_string()))
@@ -101,7 +100,7 @@ fn is_burst(frame: &Frame) -> bool {
     frame.mosi.len() == BURST_BYTES && frame.mosi.starts_with(&BURST_REQUEST[..2])
 }
 
-/// The range that a write to the upper byte of SENS_AVG selects; undefined codes change nothing.
+/// The range that a write to the upper byte of SENS_AVG selects; `None` for other transactions and undefined codes.
 fn range_written(frame: &Frame) -> Option<GyroRange> {
     let [address, code] = frame.mosi[..] else {
         return None;
@@ -114,5 +113,111 @@ fn range_written(frame: &Frame) -> Option<GyroRange> {
         0x02 => Some(GyroRange::Dps150),
         0x01 => Some(GyroRange::Dps75),
         _ => None,
+    }
+}
+
+/// An SPI bus that plays back one recorded transaction at a time. Clones are handles on the same bus.
+#[derive(Debug, Clone, Default)]
+struct ReplayBus(Rc<RefCell<Recorded>>);
+
+#[derive(Debug, Default)]
+struct Recorded {
+    mosi: Vec<u8>,
+    miso: Vec<u8>,
+    played: bool,
+}
+
+/// A difference of the driver's transaction from the recorded one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ReplayError {
+    /// Nothing was loaded since the last transaction.
+    NothingLoaded,
+    /// A byte from the host differs from the recorded one.
+    OtherRequest {
+        /// Position in the transaction, from 0.
+        at: usize,
+    },
+    /// More or fewer bytes than were recorded.
+    OtherLength {
+        /// Bytes recorded.
+        recorded: usize,
+    },
+}
+
+impl Error for ReplayError {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Other
+    }
+}
+
+impl ReplayBus {
+    /// Loads the next transaction: the request that the host must send, and the answer.
+    fn load(&self, mosi: &[u8], miso: &[u8]) {
+        let mut recorded = self.0.borrow_mut();
+        recorded.mosi.clear();
+        recorded.mosi.extend_from_slice(mosi);
+        recorded.miso.clear();
+        recorded.miso.extend_from_slice(miso);
+        recorded.played = false;
+    }
+}
+
+impl Recorded {
+    /// The answer to byte `at` of the transaction.
+    fn exchange(&self, at: usize, byte: u8) -> Result<u8, ReplayError> {
+        match (self.mosi.get(at), self.miso.get(at)) {
+            (Some(&expected), Some(&answer)) if expected == byte => Ok(answer),
+            (Some(_), Some(_)) => Err(ReplayError::OtherRequest { at }),
+            _ => Err(ReplayError::OtherLength { recorded: self.mosi.len() }),
+        }
+    }
+}
+
+impl ErrorType for ReplayBus {
+    type Error = ReplayError;
+}
+
+impl SpiDevice<u8> for ReplayBus {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ReplayError> {
+        let mut recorded = self.0.borrow_mut();
+        if recorded.played || recorded.mosi.is_empty() {
+            return Err(ReplayError::NothingLoaded);
+        }
+        recorded.played = true;
+        let mut at = 0;
+        for operation in operations {
+            match operation {
+                Operation::Read(words) => {
+                    for word in words.iter_mut() {
+                        *word = recorded.exchange(at, 0)?;
+                        at += 1;
+                    }
+                }
+                Operation::Write(words) => {
+                    for word in words.iter() {
+                        recorded.exchange(at, *word)?;
+                        at += 1;
+                    }
+                }
+                Operation::Transfer(read, write) => {
+                    // The shorter side is padded: zeros go out, surplus answers are dropped (rule of embedded-hal).
+                    for i in 0..read.len().max(write.len()) {
+                        let answer = recorded.exchange(at, write.get(i).copied().unwrap_or(0))?;
+                        if let Some(word) = read.get_mut(i) {
+                            *word = answer;
+                        }
+                        at += 1;
+                    }
+                }
+                Operation::TransferInPlace(words) => {
+                    for word in words.iter_mut() {
+                        *word = recorded.exchange(at, *word)?;
+                        at += 1;
+                    }
+                }
+                Operation::DelayNs(_) => {}
+            }
+        }
+        if at == recorded.mosi.len() { Ok(()) } else { Err(ReplayError::OtherLength { recorded: recorded.mosi.len() }) }
     }
 }

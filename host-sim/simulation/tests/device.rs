@@ -5,7 +5,7 @@ use embedded_hal::spi::SpiDevice;
 use firmware::CHANNELS;
 use firmware::console::ShortFloat;
 use link::{Decoder, Health, Hello, Message, RawMessage, Received};
-use simulation::device::Device;
+use simulation::Device;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
 const SECOND: u64 = 1_000_000;
@@ -305,4 +305,24 @@ fn a_restart_keeps_statistics_and_settings() {
         _ => None,
     });
     assert!(samples.clone().count() == 8 && samples.clone().all(|samples| samples >= u64::from(used)), "{used}");
+}
+
+/// XGYRO_OFF = −100, byte by byte (data sheet Rev. B, table 8: address 0x1A, 13 bits).
+const NEGATIVE_BIAS: [u16; 2] = [0x9A9C, 0x9B1F];
+
+/// The part's erratum: a negative bias of gyro x in the sensor would cost every burst the sign of negative rates. The
+/// firmware takes that bias out of the sensor before it uses samples.
+#[test]
+fn a_negative_x_bias_in_the_sensor_costs_no_sample() {
+    let mut part = VirtualAdis16405::new(NoiseModel::paper(), 11);
+    for (k, word) in (1..).zip(NEGATIVE_BIAS) {
+        part.advance_to(k * 100_000);
+        part.select();
+        part.transfer(word);
+        part.deselect();
+    }
+    let mut device = Device::new(part, Device::blank_memory());
+    let health = *after(&mut device, "", 11 * SECOND).health();
+    assert!(health.bursts > 2_000, "{health:?}");
+    assert_eq!(health.used, health.bursts, "{health:?}");
 }

@@ -1,20 +1,19 @@
 //! Each effect against its definition: moments and covariances from the textbook formulas, at seeds fixed in advance.
 
-use adis16405_driver::Faults;
+use adis16405_driver::{Channel, Faults};
 use recordings::recording::Recording;
-use simulation::record::Simulation;
-use virtual_sensor::NoiseModel;
-use virtual_sensor::effect::EffectSource;
-use virtual_sensor::effect::surroundings::{Motion, SupplyCourse, TemperatureCourse};
-use virtual_sensor::noise::NoiseSource;
-use virtual_sensor::{Effect, Hidden, OutputRegister, Surroundings};
+use simulation::Simulation;
+use virtual_sensor::{
+    EffectSource, Environment, InjectedEffect, Motion, NoiseModel, NoiseSource, OutputRegister, SensorScenario,
+    SupplyProfile, TemperatureProfile,
+};
 
 const PERIOD_S: f64 = 0.01;
 const GYRO: OutputRegister = OutputRegister::GyroX;
 
 /// `count` values of gyro X with `effect` and nothing else.
-fn values(effect: Effect, surroundings: Surroundings, seed: u64, count: usize) -> Vec<[f64; 12]> {
-    let mut source = EffectSource::new(&Hidden { surroundings, effects: vec![effect] }, seed);
+fn values(effect: InjectedEffect, environment: Environment, seed: u64, count: usize) -> Vec<[f64; 12]> {
+    let mut source = EffectSource::new(&SensorScenario { environment, effects: vec![effect] }, seed);
     (0..count)
         .map(|k| {
             let mut values = [0.0; 12];
@@ -24,8 +23,8 @@ fn values(effect: Effect, surroundings: Surroundings, seed: u64, count: usize) -
         .collect()
 }
 
-fn gyro(effect: Effect, count: usize) -> Vec<f64> {
-    values(effect, Surroundings::default(), 1, count).iter().map(|all| all[GYRO as usize]).collect()
+fn gyro(effect: InjectedEffect, count: usize) -> Vec<f64> {
+    values(effect, Environment::default(), 1, count).iter().map(|all| all[GYRO as usize]).collect()
 }
 
 fn covariance(values: &[f64], lag: usize) -> f64 {
@@ -33,9 +32,9 @@ fn covariance(values: &[f64], lag: usize) -> f64 {
 }
 
 /// Simulates a still part, without noise or with that of the paper.
-fn record(noise: NoiseModel, effects: Vec<Effect>, seconds: f64) -> Recording {
-    let hidden = Hidden { effects, ..Hidden::default() };
-    Simulation { noise, hidden, ..Simulation::of_paper(seconds, 5) }.run(|_| ()).unwrap()
+fn record(noise: NoiseModel, effects: Vec<InjectedEffect>, seconds: f64) -> Recording {
+    let scenario = SensorScenario { effects, ..SensorScenario::default() };
+    Simulation { noise, scenario, ..Simulation::paper(seconds, 5) }.run(|_| ()).unwrap()
 }
 
 fn counts(recording: &Recording, channel: OutputRegister) -> Vec<f64> {
@@ -44,9 +43,10 @@ fn counts(recording: &Recording, channel: OutputRegister) -> Vec<f64> {
 
 #[test]
 fn deterministic_effects_follow_their_formulas() {
-    let line = gyro(Effect::Sinusoid { channel: GYRO, frequency_hz: 3.0, amplitude: 2.0, phase_rad: 0.4 }, 1000);
-    let ramp = gyro(Effect::RateRamp { channel: GYRO, slope: 0.5 }, 1000);
-    let step = gyro(Effect::BiasStep { channel: GYRO, time_s: 4.0, size: -1.5 }, 1000);
+    let line =
+        gyro(InjectedEffect::Sinusoid { channel: GYRO, frequency_hz: 3.0, amplitude: 2.0, phase_rad: 0.4 }, 1000);
+    let ramp = gyro(InjectedEffect::RateRamp { channel: GYRO, slope: 0.5 }, 1000);
+    let step = gyro(InjectedEffect::BiasStep { channel: GYRO, time_s: 4.0, size: -1.5 }, 1000);
     for k in 0..1000 {
         let time = k as f64 / 100.0;
         assert!((line[k] - 2.0 * (6.0 * std::f64::consts::PI * time + 0.4).sin()).abs() < 1e-12);
@@ -58,16 +58,17 @@ fn deterministic_effects_follow_their_formulas() {
 /// The standard error of a covariance over `count` samples of correlation time `T` is at most `σ²·√(2T/(count·dt))`
 /// for a Gaussian process (Bartlett); six of them are allowed.
 #[test]
-fn random_effects_have_the_covariance_that_they_say() {
+fn random_effects_have_the_covariance_of_their_definition() {
     const COUNT: usize = 400_000;
     let (deviation, time_constant_s) = (0.7, 0.2);
     let tolerance = |time_s: f64| 6.0 * deviation * deviation * (2.0 * time_s / (COUNT as f64 * PERIOD_S)).sqrt();
 
-    let markov = gyro(Effect::Markov { channel: GYRO, time_constant_s, deviation }, COUNT);
+    let markov = gyro(InjectedEffect::Markov { channel: GYRO, time_constant_s, deviation }, COUNT);
     let amplitude = 2.0 * deviation;
-    let telegraph = gyro(Effect::Telegraph { channel: GYRO, time_constant_s, amplitude }, COUNT);
+    let telegraph = gyro(InjectedEffect::Telegraph { channel: GYRO, time_constant_s, amplitude }, COUNT);
     let bandwidth_hz = 1.0 / (std::f64::consts::PI * time_constant_s);
-    let resonance = gyro(Effect::Resonance { channel: GYRO, frequency_hz: 7.0, bandwidth_hz, deviation }, COUNT);
+    let resonance =
+        gyro(InjectedEffect::Resonance { channel: GYRO, frequency_hz: 7.0, bandwidth_hz, deviation }, COUNT);
     for lag in [0, 3, 10, 20, 50] {
         let time = lag as f64 * PERIOD_S;
         let decay = deviation * deviation * (-time / time_constant_s).exp();
@@ -81,7 +82,7 @@ fn random_effects_have_the_covariance_that_they_say() {
 
 #[test]
 fn spikes_are_single_and_as_frequent_as_they_say() {
-    let spikes = gyro(Effect::Spikes { channel: GYRO, rate_per_hour: 3600.0, size: 4.0 }, 400_000);
+    let spikes = gyro(InjectedEffect::Spikes { channel: GYRO, rate_per_hour: 3600.0, size: 4.0 }, 400_000);
     let up = spikes.iter().filter(|value| **value == 4.0).count() as f64;
     let down = spikes.iter().filter(|value| **value == -4.0).count() as f64;
     // One a second: a Poisson number of mean 4000 less the 0.5 % that fall on another, six deviations.
@@ -91,16 +92,16 @@ fn spikes_are_single_and_as_frequent_as_they_say() {
 }
 
 #[test]
-fn measured_causes_act_in_proportion_to_what_the_outputs_show() {
-    let surroundings = Surroundings {
-        temperature: TemperatureCourse { rise_c: 6.0, cycle_c: 1.0, ..Default::default() },
-        supply: SupplyCourse { load_v: 0.1, cycle_v: 0.02, ..Default::default() },
+fn sensitivities_multiply_what_the_outputs_show() {
+    let environment = Environment {
+        temperature: TemperatureProfile { rise_c: 6.0, cycle_c: 1.0, ..Default::default() },
+        supply: SupplyProfile { load_v: 0.1, cycle_v: 0.02, ..Default::default() },
         motion: Motion { deviation_g: 0.3, ..Default::default() },
     };
     let sensitivity = [0.2, -0.1, 0.05];
-    let warm = values(Effect::Temperature { channel: GYRO, sensitivity: 0.03 }, surroundings, 2, 50_000);
-    let fed = values(Effect::Supply { channel: GYRO, sensitivity: -2.0 }, surroundings, 2, 50_000);
-    let moved = values(Effect::Acceleration { channel: GYRO, sensitivity }, surroundings, 2, 50_000);
+    let warm = values(InjectedEffect::Temperature { channel: GYRO, sensitivity: 0.03 }, environment, 2, 50_000);
+    let fed = values(InjectedEffect::Supply { channel: GYRO, sensitivity: -2.0 }, environment, 2, 50_000);
+    let moved = values(InjectedEffect::Acceleration { channel: GYRO, sensitivity }, environment, 2, 50_000);
     for ((warm, fed), moved) in warm.iter().zip(&fed).zip(&moved) {
         let gyro = GYRO as usize;
         assert!((warm[gyro] - 0.03 * warm[OutputRegister::Temp as usize]).abs() < 1e-12);
@@ -117,8 +118,8 @@ fn measured_causes_act_in_proportion_to_what_the_outputs_show() {
 #[test]
 fn a_common_mode_is_the_same_in_every_channel() {
     let channels = vec![OutputRegister::GyroX, OutputRegister::GyroZ];
-    let effect = Effect::CommonMode { channels, time_constant_s: 1.0, deviation: 0.5 };
-    for all in values(effect, Surroundings::default(), 3, 1000) {
+    let effect = InjectedEffect::CommonMode { channels, time_constant_s: 1.0, deviation: 0.5 };
+    for all in values(effect, Environment::default(), 3, 1000) {
         assert_eq!(all[OutputRegister::GyroX as usize], all[OutputRegister::GyroZ as usize]);
         assert_eq!(all[OutputRegister::GyroY as usize], 0.0);
     }
@@ -129,20 +130,23 @@ fn a_quantized_angle_has_the_allan_variance_of_quantization_noise() {
     // White noise dithers the angle: its step of a sample is half as large as the quantum.
     let coefficient = 0.2 * PERIOD_S;
     let quantum = 12f64.sqrt() * coefficient;
-    let mut noise = NoiseModel::still();
+    let mut noise = NoiseModel::noiseless();
     noise.channel_mut(GYRO).angle_random_walk = 0.5 * quantum / PERIOD_S.sqrt();
     let mut source = NoiseSource::new(&noise, 4, PERIOD_S);
-    let mut hidden = EffectSource::new(
-        &Hidden { effects: vec![Effect::Quantization { channel: GYRO, coefficient }], ..Hidden::default() },
+    let mut scenario = EffectSource::new(
+        &SensorScenario {
+            effects: vec![InjectedEffect::Quantization { channel: GYRO, coefficient }],
+            ..SensorScenario::default()
+        },
         4,
     );
     let (mut error, mut errors) = (0.0, Vec::new());
     for _ in 0..200_000 {
         let rate = source.sample()[GYRO as usize];
-        let shown = hidden.digitize(GYRO, rate, PERIOD_S);
+        let shown = scenario.digitize(GYRO, rate, PERIOD_S);
         let angle = shown * PERIOD_S / quantum;
         assert!((angle - angle.round()).abs() < 1e-9, "whole steps");
-        assert_eq!(hidden.digitize(OutputRegister::GyroY, rate, PERIOD_S), rate);
+        assert_eq!(scenario.digitize(OutputRegister::GyroY, rate, PERIOD_S), rate);
         error += (shown - rate) * PERIOD_S;
         errors.push(error);
     }
@@ -154,8 +158,8 @@ fn a_quantized_angle_has_the_allan_variance_of_quantization_noise() {
 }
 
 #[test]
-fn the_noise_underneath_is_the_same() {
-    let step = Effect::BiasStep { channel: GYRO, time_s: 5.0, size: 10.0 };
+fn an_effect_does_not_change_the_noise() {
+    let step = InjectedEffect::BiasStep { channel: GYRO, time_s: 5.0, size: 10.0 };
     let plain = record(NoiseModel::paper(), Vec::new(), 10.0);
     let stepped = record(NoiseModel::paper(), vec![step.clone()], 10.0);
     assert_eq!(stepped, record(NoiseModel::paper(), vec![step], 10.0));
@@ -168,8 +172,8 @@ fn the_noise_underneath_is_the_same() {
 }
 
 #[test]
-fn the_filter_takes_the_variance_that_a_triangle_leaves() {
-    let filtered = record(NoiseModel::paper(), vec![Effect::FilterBandwidth { taps_log2: 2 }], 200.0);
+fn the_filter_reduces_the_variance_as_a_triangle_does() {
+    let filtered = record(NoiseModel::paper(), vec![InjectedEffect::FilterBandwidth { taps_log2: 2 }], 200.0);
     let plain = record(NoiseModel::paper(), Vec::new(), 200.0);
     let difference_variance = |recording: &Recording| {
         let counts = counts(recording, GYRO);
@@ -183,16 +187,24 @@ fn the_filter_takes_the_variance_that_a_triangle_leaves() {
 #[test]
 fn samples_go_missing_repeat_and_come_at_another_rate() {
     const SAMPLES: f64 = 204.8 * 200.0;
-    let missing = record(NoiseModel::paper(), vec![Effect::DroppedSamples { fraction: 0.01 }], 200.0);
+    let missing = record(NoiseModel::paper(), vec![InjectedEffect::DroppedSamples { fraction: 0.01 }], 200.0);
     let lost = SAMPLES - missing.samples.len() as f64;
     assert!((lost - 0.01 * SAMPLES).abs() < 6.0 * (0.01 * SAMPLES).sqrt(), "{lost}");
 
-    let stale = record(NoiseModel::paper(), vec![Effect::RepeatedSamples { fraction: 0.01 }], 200.0);
+    let stale = record(NoiseModel::paper(), vec![InjectedEffect::RepeatedSamples { fraction: 0.01 }], 200.0);
     let repeated = stale.samples.iter().filter(|sample| sample.faults.contains(Faults::REPEATED)).count() as f64;
     assert!((repeated - 0.01 * SAMPLES).abs() < 6.0 * (0.01 * SAMPLES).sqrt(), "{repeated}");
     assert!(stale.samples.iter().all(|sample| !sample.faults.contains(Faults::NO_NEW_DATA)));
 
-    let fast = record(NoiseModel::still(), vec![Effect::SampleClock { ratio: 1.001 }], 20.0);
+    let fast = record(NoiseModel::noiseless(), vec![InjectedEffect::SampleClock { ratio: 1.001 }], 20.0);
     let time = |at: usize| fast.samples[at].clock.time_s.unwrap();
     assert!(((time(4095) - time(0)) * 204.8 * 1.001 / 4095.0 - 1.0).abs() < 1e-8);
+}
+
+#[test]
+fn each_output_register_is_the_channel_of_the_same_name() {
+    for (index, output) in OutputRegister::ALL.into_iter().enumerate() {
+        assert_eq!(format!("{output:?}"), format!("{:?}", simulation::channel(output)));
+        assert_eq!(simulation::output_register(Channel::ALL[index]), output);
+    }
 }

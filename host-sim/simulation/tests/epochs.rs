@@ -2,9 +2,10 @@
 
 use adis16405_driver::Channel;
 use link::{ChannelMessage, Decoder, Health, LearnedMessage, Message, Received, ValidationMessage};
-use simulation::device::Device;
-use virtual_sensor::effect::surroundings::TemperatureCourse;
-use virtual_sensor::{Effect, Hidden, NoiseModel, OutputRegister, Surroundings, VirtualAdis16405};
+use simulation::Device;
+use virtual_sensor::{
+    Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario, TemperatureProfile, VirtualAdis16405,
+};
 
 const SECOND: u64 = 1_000_000;
 const EPOCH_S: u64 = 100;
@@ -14,11 +15,11 @@ const SENSITIVITY: f64 = 0.05;
 
 /// A part that warms up by 8 °C in a room that is heated in turns of 80 s, and whose gyro x follows if `hidden`.
 fn part(hidden: bool) -> VirtualAdis16405 {
-    let temperature = TemperatureCourse { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 80.0 };
-    let effect = Effect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY };
-    let surroundings = Surroundings { temperature, ..Surroundings::default() };
+    let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 80.0 };
+    let effect = InjectedEffect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY };
+    let environment = Environment { temperature, ..Environment::default() };
     let effects = if hidden { vec![effect] } else { vec![] };
-    VirtualAdis16405::hiding(&Hidden { surroundings, effects }, NoiseModel::paper(), SEED)
+    VirtualAdis16405::with_scenario(&SensorScenario { environment, effects }, NoiseModel::paper(), SEED)
 }
 
 #[derive(Default)]

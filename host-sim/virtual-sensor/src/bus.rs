@@ -7,14 +7,14 @@ use std::rc::Rc;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-use super::part::VirtualAdis16405;
+use crate::part::VirtualAdis16405;
 
-/// SCK unless told otherwise: the highest that a burst read allows.
-pub const DEFAULT_SCK_HZ: u32 = 1_000_000;
+/// The highest SCK that a burst read allows, Hz.
+const DEFAULT_SCK_HZ: u32 = 1_000_000;
 
 /// An SPI bus with the virtual part on it. Clones are handles on the same part.
 ///
-/// A byte takes eight SCK periods of virtual time, a delay its length; nothing else takes time.
+/// A byte takes eight SCK periods of virtual time, a delay its duration; nothing else takes time.
 #[derive(Clone, Debug)]
 pub struct EmulatedBus {
     part: Rc<RefCell<VirtualAdis16405>>,
@@ -32,22 +32,22 @@ impl EmulatedBus {
         Self { part: Rc::new(RefCell::new(part)) }
     }
 
-    /// A look at the part. Let go of it before the bus is used again.
+    /// The part. The borrow must end before the bus is used again, which would panic.
     pub fn part(&self) -> Ref<'_, VirtualAdis16405> {
         self.part.borrow()
     }
 
-    /// The part, to be changed: broken, unplugged, its pins driven. Let go of it before the bus is used again.
+    /// The part, to inject faults or to drive pins. The borrow must end before the bus is used again, which would panic.
     pub fn part_mut(&self) -> RefMut<'_, VirtualAdis16405> {
         self.part.borrow_mut()
     }
 
-    /// A delay on the part's time.
+    /// A delay in the part's virtual time.
     pub fn delay(&self) -> VirtualDelay {
         VirtualDelay { part: Rc::clone(&self.part) }
     }
 
-    /// Waits until the data-ready line rises and returns the time in ns; `None` if it will not.
+    /// Advances time to the next data-ready pulse and returns that time, ns; `None` if no pulse is to come.
     pub fn wait_for_data(&self) -> Option<u64> {
         let mut part = self.part.borrow_mut();
         let at_ns = part.next_data_ready();
@@ -58,7 +58,7 @@ impl EmulatedBus {
         Some(at_ns)
     }
 
-    /// Lets virtual time pass until `ns`.
+    /// Advances virtual time to `ns`.
     pub fn advance_to(&self, ns: u64) {
         self.part.borrow_mut().advance_to(ns);
     }
@@ -104,14 +104,14 @@ impl SpiDevice<u8> for EmulatedBus {
     }
 }
 
-/// Asynchronous use: every future is ready at once, as virtual time waits for nobody.
+/// Every future is ready at once: the transaction advances virtual time itself.
 impl embedded_hal_async::spi::SpiDevice<u8> for EmulatedBus {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
         SpiDevice::transaction(self, operations)
     }
 }
 
-/// A delay that lets virtual time pass.
+/// A delay that advances virtual time.
 #[derive(Clone, Debug)]
 pub struct VirtualDelay {
     part: Rc<RefCell<VirtualAdis16405>>,

@@ -1,11 +1,13 @@
-//! Noise with declared coefficients: white noise, flicker noise, random walk and a constant, per channel.
+//! Noise with declared coefficients (white noise, flicker noise, random walk and a constant value, by channel), and the
+//! random processes that effects and environment are made of.
 
-use crate::output::OutputRegister;
+use crate::registers::OutputRegister;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use std::f64::consts::PI;
 
-/// The noise of one channel, in the channel's unit U (deg/s, g, …) and seconds.
+/// The noise of one channel, in the channel's unit U (°/s, g, …) and seconds; coefficients of IEEE Std 952.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChannelNoise {
     /// Constant value, U.
@@ -14,7 +16,7 @@ pub struct ChannelNoise {
     pub angle_random_walk: f64,
     /// B, U: flicker noise of one-sided density B²/(πf), whose Allan deviation is B·√(2 ln2/π) at every τ.
     pub bias_instability: f64,
-    /// K, U/√s: random walk that grows by K·√Δt a step.
+    /// K, U/√s: random walk whose steps have standard deviation K·√Δt.
     pub rate_random_walk: f64,
 }
 
@@ -28,8 +30,8 @@ pub struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// No noise at all: a level part at 5 V and 36 °C. z points so that it senses −1 g.
-    pub fn still() -> Self {
+    /// No noise: a level part at 5 V and 36 °C whose z accelerometer senses −1 g.
+    pub fn noiseless() -> Self {
         let mut model = Self { channels: [ChannelNoise::default(); 12], longest_tau_s: 10_000.0 };
         for (channel, bias) in [
             (OutputRegister::Supply, 5.0),
@@ -44,14 +46,14 @@ impl NoiseModel {
         model
     }
 
-    /// A part at rest whose gyros have the coefficients of the paper (N = 0.0368 deg/√s, B = 0.0093 deg/s,
-    /// K = 0.0013 deg/s^1.5).
+    /// A part at rest whose gyros have the coefficients of L. Hristov, E. Iontchev, R. Miletiev, "Error modeling of MEMS
+    /// ADIS 16405": N = 0.0368 °/√s, B = 0.0093 °/s, K = 0.0013 °/s^1.5.
     ///
     /// The accelerometers have the data sheet's velocity random walk (0.2 m/s/√h) and in-run bias (0.2 mg), the
-    /// magnetometers its density (0.066 mgauss/√Hz); the rest are plausible values without a source.
+    /// magnetometers its density (0.066 mgauss/√Hz); the other values are assumptions without a source.
     pub fn paper() -> Self {
-        let mut model = Self::still();
-        for channel in [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ] {
+        let mut model = Self::noiseless();
+        for channel in OutputRegister::GYROS {
             let noise = model.channel_mut(channel);
             noise.angle_random_walk = 0.0368;
             noise.bias_instability = 0.0093;
@@ -64,7 +66,7 @@ impl NoiseModel {
             noise.rate_random_walk = 1e-5;
         }
         for channel in [OutputRegister::MagnX, OutputRegister::MagnY, OutputRegister::MagnZ] {
-            // A one-sided density is √2·N.
+            // The one-sided density of white noise is √2·N.
             model.channel_mut(channel).angle_random_walk = 0.066e-3 / std::f64::consts::SQRT_2;
         }
         model.channel_mut(OutputRegister::Supply).angle_random_walk = 1e-4;
@@ -79,7 +81,7 @@ impl NoiseModel {
         &self.channels[channel as usize]
     }
 
-    /// The noise of one channel, to be changed.
+    /// The noise of one channel, for changes.
     pub fn channel_mut(&mut self, channel: OutputRegister) -> &mut ChannelNoise {
         &mut self.channels[channel as usize]
     }
@@ -93,7 +95,7 @@ pub struct NoiseSource {
 }
 
 impl NoiseSource {
-    /// One ChaCha8 stream a channel, so that a channel's noise does not depend on that of the others.
+    /// Each channel has a ChaCha8 stream of its own, so its noise does not depend on that of the others.
     pub fn new(model: &NoiseModel, seed: u64, sample_period_s: f64) -> Self {
         let channels = std::array::from_fn(|index| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -132,7 +134,7 @@ struct ChannelSource {
     walk: f64,
     white: f64,
     step: f64,
-    flicker: Vec<GaussMarkov>,
+    flicker: Vec<FlickerOctave>,
 }
 
 impl ChannelSource {
@@ -143,7 +145,7 @@ impl ChannelSource {
         if self.noise.bias_instability != 0.0 {
             let mut correlation_time_s = sample_period_s;
             while correlation_time_s <= 4.0 * longest_tau_s {
-                let process = GaussMarkov::octave_of_flicker(
+                let process = FlickerOctave::new(
                     self.noise.bias_instability,
                     sample_period_s / correlation_time_s,
                     &mut self.random,
@@ -157,121 +159,113 @@ impl ChannelSource {
     fn sample(&mut self) -> f64 {
         let mut value = self.noise.bias;
         if self.white != 0.0 {
-            value += self.white * gauss(&mut self.random);
+            value += self.white * standard_normal(&mut self.random);
         }
         for process in &mut self.flicker {
-            process.state = process.decay * process.state + process.drive * gauss(&mut self.random);
+            process.state = process.decay * process.state + process.drive * standard_normal(&mut self.random);
             value += process.state;
         }
         if self.step != 0.0 {
-            self.walk += self.step * gauss(&mut self.random);
+            self.walk += self.step * standard_normal(&mut self.random);
             value += self.walk;
         }
         value
     }
 }
 
-/// First-order Gauss-Markov process.
+/// One of the Gauss-Markov processes, an octave of correlation time apart, that sum to flicker noise.
 #[derive(Clone, Copy, Debug)]
-struct GaussMarkov {
+struct FlickerOctave {
     state: f64,
     decay: f64,
     drive: f64,
 }
 
-impl GaussMarkov {
-    /// One of the processes, an octave of correlation time apart, that sum to flicker noise.
-    ///
+impl FlickerOctave {
     /// A process of variance v and correlation time T has the one-sided density 4vT/(1 + (2πfT)²). Summed over
     /// d(ln T)/ln 2 processes that is v/(f·ln 2); equal to B²/(πf) if v = B²·ln 2/π.
-    fn octave_of_flicker(bias_instability: f64, periods_per_correlation: f64, random: &mut ChaCha8Rng) -> Self {
-        let sigma = bias_instability * (std::f64::consts::LN_2 / std::f64::consts::PI).sqrt();
+    fn new(bias_instability: f64, periods_per_correlation: f64, random: &mut ChaCha8Rng) -> Self {
+        let sigma = bias_instability * (std::f64::consts::LN_2 / PI).sqrt();
         let decay = (-periods_per_correlation).exp();
         // 1 − decay², without cancellation for long correlation times.
         let drive = sigma * (-(-2.0 * periods_per_correlation).exp_m1()).sqrt();
-        Self { state: sigma * gauss(random), decay, drive }
+        Self { state: sigma * standard_normal(random), decay, drive }
     }
 }
 
-/// A standard normal number.
-pub(super) fn gauss(random: &mut ChaCha8Rng) -> f64 {
+/// First-order Gauss-Markov process of standard deviation 1.
+#[derive(Clone, Debug)]
+pub(crate) struct GaussMarkovProcess {
+    time_constant_s: f64,
+    state: Option<f64>,
+}
+
+impl GaussMarkovProcess {
+    pub(crate) fn new(time_constant_s: f64) -> Self {
+        Self { time_constant_s, state: None }
+    }
+
+    /// The value one period after the one before.
+    pub(crate) fn next(&mut self, period_s: f64, random: &mut ChaCha8Rng) -> f64 {
+        let periods = period_s / self.time_constant_s;
+        let state = match self.state {
+            // √(1 − decay²) by exp_m1, without cancellation for long correlation times.
+            Some(state) => (-periods).exp() * state + (-(-2.0 * periods).exp_m1()).sqrt() * standard_normal(random),
+            None => standard_normal(random),
+        };
+        self.state = Some(state);
+        state
+    }
+}
+
+/// Narrow-band noise of standard deviation 1: a carrier with Gauss-Markov noise in phase and in quadrature.
+#[derive(Clone, Debug)]
+pub(crate) struct NarrowBandProcess {
+    frequency_hz: f64,
+    quadratures: [GaussMarkovProcess; 2],
+}
+
+impl NarrowBandProcess {
+    /// `bandwidth_hz` is the width at half of the peak density.
+    pub(crate) fn new(frequency_hz: f64, bandwidth_hz: f64) -> Self {
+        // The covariance exp(−t/T) has a density of half width 1/(2πT).
+        let envelope = GaussMarkovProcess::new(1.0 / (PI * bandwidth_hz));
+        Self { frequency_hz, quadratures: [envelope.clone(), envelope] }
+    }
+
+    /// The value at `time_s`, one period after the one before.
+    pub(crate) fn next(&mut self, time_s: f64, period_s: f64, random: &mut ChaCha8Rng) -> f64 {
+        let (sin, cos) = (2.0 * PI * (self.frequency_hz * time_s).fract()).sin_cos();
+        let [in_phase, quadrature] = &mut self.quadratures;
+        in_phase.next(period_s, random) * cos + quadrature.next(period_s, random) * sin
+    }
+}
+
+/// Symmetric random telegraph signal of levels −½ and ½.
+#[derive(Clone, Debug)]
+pub(crate) struct TelegraphProcess {
+    time_constant_s: f64,
+    high: Option<bool>,
+}
+
+impl TelegraphProcess {
+    pub(crate) fn new(time_constant_s: f64) -> Self {
+        Self { time_constant_s, high: None }
+    }
+
+    /// The value one period after the one before.
+    pub(crate) fn next(&mut self, period_s: f64, random: &mut ChaCha8Rng) -> f64 {
+        // Probability of an odd number of jumps in a period: the covariance is exp(−t/T) for T of any length.
+        let odd = -0.5 * (-period_s / self.time_constant_s).exp_m1();
+        let high = match self.high {
+            Some(high) => high ^ random.random_bool(odd),
+            None => random.random_bool(0.5),
+        };
+        self.high = Some(high);
+        if high { 0.5 } else { -0.5 }
+    }
+}
+
+fn standard_normal(random: &mut ChaCha8Rng) -> f64 {
     random.sample(StandardNormal)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{NoiseModel, NoiseSource, OutputRegister};
-
-    const SAMPLES: usize = 1 << 14;
-    const SEEDS: u64 = 60;
-
-    /// Allan variance at averaging factor `n`, sample period 1 s, by its definition (IEEE Std 952), no overlap.
-    fn allan_variance(values: &[f64], n: usize) -> f64 {
-        let means: Vec<f64> = values.chunks_exact(n).map(|chunk| chunk.iter().sum::<f64>() / n as f64).collect();
-        let differences = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
-        differences.sum::<f64>() / (2.0 * (means.len() - 1) as f64)
-    }
-
-    /// Mean over the seeds, and its standard error.
-    fn mean_allan_variance(model: &NoiseModel, n: usize) -> (f64, f64) {
-        let variances: Vec<f64> = (0..SEEDS)
-            .map(|seed| {
-                let mut source = NoiseSource::new(model, seed, 1.0);
-                let values: Vec<f64> = (0..SAMPLES).map(|_| source.sample()[OutputRegister::GyroX as usize]).collect();
-                allan_variance(&values, n)
-            })
-            .collect();
-        let mean = variances.iter().sum::<f64>() / SEEDS as f64;
-        let spread = variances.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (SEEDS - 1) as f64;
-        (mean, (spread / SEEDS as f64).sqrt())
-    }
-
-    fn check(model: &NoiseModel, n: usize, expected: f64, bias: f64) {
-        let (mean, error) = mean_allan_variance(model, n);
-        assert!(
-            (mean - expected).abs() < 5.0 * error + bias * expected,
-            "n = {n}: {mean:e} ± {error:e}, expected {expected:e}"
-        );
-    }
-
-    #[test]
-    fn each_coefficient_is_what_it_says() {
-        let mut model = NoiseModel::still();
-        let gyro = model.channel_mut(OutputRegister::GyroX);
-        gyro.angle_random_walk = 2.0;
-        for n in [1, 16, 128] {
-            check(&model, n, 4.0 / n as f64, 0.0);
-        }
-
-        let mut model = NoiseModel::still();
-        model.channel_mut(OutputRegister::GyroX).rate_random_walk = 0.5;
-        for n in [1, 16, 128] {
-            // K²τ/3 for a continuous walk; sampled at n points a factor 1 + 1/(2n²).
-            let tau = n as f64;
-            check(&model, n, 0.25 * tau / 3.0 * (1.0 + 0.5 / (tau * tau)), 0.0);
-        }
-
-        let mut model = NoiseModel::still();
-        model.channel_mut(OutputRegister::GyroX).bias_instability = 3.0;
-        for n in [32, 256] {
-            // Processes an octave apart ripple by less than 1 %; those shorter than the sample period are missing, as
-            // is aliasing: about 1/n each.
-            let expected = 9.0 * 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI;
-            check(&model, n, expected, 0.01 + 2.0 / n as f64);
-        }
-    }
-
-    #[test]
-    fn channels_and_seeds_are_independent_and_repeatable() {
-        let model = NoiseModel::paper();
-        let first: Vec<_> = (0..3).map(|seed| NoiseSource::new(&model, seed, 1.0).sample()).collect();
-        assert_eq!(first[0], NoiseSource::new(&model, 0, 1.0).sample());
-        assert_ne!(first[0], first[1]);
-        assert_ne!(first[0][OutputRegister::GyroX as usize], first[0][OutputRegister::GyroY as usize]);
-
-        let mut quiet = model.clone();
-        *quiet.channel_mut(OutputRegister::GyroX) = Default::default();
-        let changed = NoiseSource::new(&quiet, 0, 1.0).sample();
-        assert_eq!(changed[OutputRegister::GyroY as usize], first[0][OutputRegister::GyroY as usize]);
-    }
 }

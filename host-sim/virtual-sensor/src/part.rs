@@ -1,93 +1,77 @@
-//! The virtual part: its state, and how time passes in it.
+//! The virtual part: its state, how time passes in it, its procedures, and the faults that a test can give it.
 
-mod access;
-mod activity;
-mod alarm;
-mod faults;
-mod pins;
-mod sensing;
-mod wire;
+use crate::activity::Activity;
+use crate::diagnosis::{self, Alarms};
+use crate::effects::SensorScenario;
+use crate::noise::NoiseModel;
+use crate::registers::{self, OutputRegister, RegisterFile};
+use crate::signal_chain::{AutoNull, SensAvg, SignalChain};
+use crate::spi::{SpiPort, Violation, ViolationKind, ViolationLog};
 
-pub use activity::Activity;
-
-use super::output::OutputRegister;
-
-use super::effect::Hidden;
-use super::noise::NoiseModel;
-use super::police::{self, Record, Violation, ViolationKind};
-use super::registers::{self, RegisterFile};
-use alarm::Alarms;
-use sensing::{Null, Sensing, Setting};
-use wire::Wire;
-
-/// One tick of the sample clock, 1/1638.4 s, in sixteenths of a ns: an integer, so that samples never drift.
+/// One tick of the sample clock, 1/1638.4 s, in sixteenths of a ns: an integer, so that sample times have no rounding error.
 const TICK_SIXTEENTHS: u64 = 9_765_625;
 /// Ticks in the slow time base of SMPL_PRD, 18.921 ms.
 const SLOW_TICKS: u64 = 31;
+/// A greater SMPL_PRD selects low-power mode.
+const NORMAL_MODE_MAX_SMPL_PRD: u16 = 0x08;
 /// Data ready enabled, MSC_CTRL.
 const DATA_READY_ENABLED: u16 = 1 << 2;
 
-/// Size of a count of SUPPLY_OUT, V.
-const SUPPLY_LSB: f64 = OutputRegister::Supply.lsb(0.0);
-
-const DIAG_SUPPLY_LOW: u16 = 1 << 0;
-const DIAG_SUPPLY_HIGH: u16 = 1 << 1;
-const DIAG_FLASH_UPDATE: u16 = 1 << 2;
-const DIAG_SELF_TEST: u16 = 1 << 5;
-const DIAG_FLASH_CHECKSUM: u16 = 1 << 6;
-
-/// An ADIS16405 that exists only in virtual time.
+/// An ADIS16405 in virtual time.
 ///
-/// Time is the caller's: [`advance_to`](Self::advance_to) moves it, samples appear at the programmed rate. On the bus
-/// side a harness calls [`select`](Self::select), [`transfer`](Self::transfer) or
-/// [`transfer_byte`](Self::transfer_byte), and [`deselect`](Self::deselect); each acts at [`now`](Self::now). With a
-/// known SCK ([`set_sck_hz`](Self::set_sck_hz)) every bit takes its time; without, words take none and the clock is not
-/// judged.
+/// The caller moves time with [`advance_to`](Self::advance_to); samples are taken at the programmed rate. A bus calls
+/// [`select`](Self::select), [`transfer`](Self::transfer) or [`transfer_byte`](Self::transfer_byte), and
+/// [`deselect`](Self::deselect); each acts at [`now`](Self::now). With a known SCK ([`set_sck_hz`](Self::set_sck_hz)) every
+/// byte takes eight of its periods; without, words take no time and the clock is not checked.
 #[derive(Clone, Debug)]
 pub struct VirtualAdis16405 {
-    now_ns: u64,
+    pub(crate) now_ns: u64,
+    /// Sixteenths of a ns; `None` while the part does not sample by itself.
     next_sample_sixteenths: Option<u64>,
-    sampled_at_ns: Option<u64>,
-    powered: bool,
-    /// What keeps the part busy, and until when.
-    activity: Option<(Activity, u64)>,
-    sensing: Sensing,
+    pub(crate) sampled_at_ns: Option<u64>,
+    pub(crate) powered: bool,
+    /// The procedure under way and its end, ns.
+    pub(crate) activity: Option<(Activity, u64)>,
+    pub(crate) signal_chain: SignalChain,
     alarms: Alarms,
-    null: Null,
-    registers: RegisterFile,
+    auto_null: AutoNull,
+    pub(crate) registers: RegisterFile,
     flash: RegisterFile,
     flash_damaged: bool,
-    /// Bits of DIAG_STAT that a self-test raises.
+    /// Bits of DIAG_STAT that a self-test sets.
     self_test_failures: u16,
-    new_data: [bool; 12],
-    diagnosis: u16,
-    burst_since_reset: bool,
+    /// Outputs that have not been read since the latest sample.
+    pub(crate) new_data: [bool; 12],
+    /// DIAG_STAT.
+    pub(crate) diagnosis: u16,
+    pub(crate) burst_since_reset: bool,
     samples: u64,
-    driven: u16,
-    latched_dac: u16,
-    wire: Wire,
-    record: Record,
+    /// Levels that DIO1 (bit 0) to DIO4 are driven to from outside.
+    pub(crate) driven: u16,
+    pub(crate) latched_dac: u16,
+    pub(crate) spi: SpiPort,
+    pub(crate) violations: ViolationLog,
 }
 
 impl VirtualAdis16405 {
     /// A part just after its start-up, with reset values, at time 0. The same model and seed give the same samples.
     pub fn new(model: NoiseModel, seed: u64) -> Self {
-        Self::hiding(&Hidden::default(), model, seed)
+        Self::with_scenario(&SensorScenario::default(), model, seed)
     }
 
-    /// The same part with effects that its noise model does not declare.
-    pub fn hiding(hidden: &Hidden, model: NoiseModel, seed: u64) -> Self {
+    /// The same part in an environment and with effects that its noise model does not declare.
+    pub fn with_scenario(scenario: &SensorScenario, model: NoiseModel, seed: u64) -> Self {
         let mut part = Self {
             now_ns: 0,
             next_sample_sixteenths: None,
             sampled_at_ns: None,
             powered: true,
             activity: None,
-            sensing: Sensing::new(hidden, &model, seed),
+            signal_chain: SignalChain::new(scenario, &model, seed),
             alarms: Alarms::default(),
-            null: Null::default(),
-            registers: RegisterFile::reset(),
-            flash: RegisterFile::reset(),
+            auto_null: AutoNull::default(),
+            registers: RegisterFile::new(),
+            flash: RegisterFile::new(),
             flash_damaged: false,
             self_test_failures: 0,
             new_data: [false; 12],
@@ -96,8 +80,8 @@ impl VirtualAdis16405 {
             samples: 0,
             driven: 0,
             latched_dac: 0,
-            wire: Wire::new(),
-            record: Record::default(),
+            spi: SpiPort::new(),
+            violations: ViolationLog::default(),
         };
         part.reset();
         part.restart_sampling(0);
@@ -109,8 +93,8 @@ impl VirtualAdis16405 {
         self.now_ns
     }
 
-    /// Lets time pass until `ns`, taking the samples that fall due. Time never runs backwards: an earlier `ns` does
-    /// nothing.
+    /// Advances time to `ns`: takes the samples and ends the procedure that fall due. Without effect if `ns` is earlier than
+    /// [`now`](Self::now).
     pub fn advance_to(&mut self, ns: u64) {
         loop {
             let sample = self.next_sample();
@@ -127,8 +111,8 @@ impl VirtualAdis16405 {
         self.now_ns = self.now_ns.max(ns);
     }
 
-    /// When data ready is next raised, in ns; `u64::MAX` if it is switched off, or if the part sleeps or waits for an
-    /// external clock (SMPL_PRD = 0).
+    /// Time of the next data-ready pulse, ns; `u64::MAX` if the signal is switched off, or if the part sleeps or waits for
+    /// an external clock (SMPL_PRD = 0).
     pub fn next_data_ready(&self) -> u64 {
         let enabled = self.registers.read(registers::MSC_CTRL) & DATA_READY_ENABLED != 0;
         if enabled { self.next_sample() } else { u64::MAX }
@@ -136,7 +120,7 @@ impl VirtualAdis16405 {
 
     /// The counts of the latest sample, in the order of a burst; zeros before the first.
     pub fn counts(&self) -> &[i16; 12] {
-        self.sensing.counts()
+        self.signal_chain.counts()
     }
 
     /// Samples taken since time 0.
@@ -144,57 +128,59 @@ impl VirtualAdis16405 {
         self.samples
     }
 
-    /// What the controller did wrong, oldest first; the first thousand are kept.
+    /// The first thousand violations of the data sheet's rules by the controller, oldest first.
     pub fn violations(&self) -> &[Violation] {
-        self.record.violations()
+        &self.violations.first
     }
 
-    /// How often the controller did wrong.
+    /// Number of all violations.
     pub fn violation_count(&self) -> u64 {
-        self.record.count()
+        self.violations.count
     }
 
     fn next_sample(&self) -> u64 {
         self.next_sample_sixteenths.map_or(u64::MAX, |sixteenths| sixteenths.div_ceil(16))
     }
 
-    fn low_power(&self) -> bool {
-        self.registers.read(registers::SMPL_PRD) > police::NORMAL_MODE_MAX_SMPL_PRD
+    pub(crate) fn is_low_power(&self) -> bool {
+        self.registers.read(registers::SMPL_PRD) > NORMAL_MODE_MAX_SMPL_PRD
     }
 
-    /// Starts from what is in flash.
-    fn reset(&mut self) {
-        self.registers = RegisterFile::reset();
-        self.registers.keep(&self.flash);
-        self.sensing.forget();
-        self.sensing.restart_filters(&self.registers);
-        self.alarms.forget();
+    /// Loads the registers from flash and clears the rest of the state; time, samples and violations go on.
+    pub(crate) fn reset(&mut self) {
+        self.registers = RegisterFile::new();
+        self.registers.copy_flash_registers(&self.flash);
+        self.signal_chain.clear();
+        self.signal_chain.restart_filters(&self.registers);
+        self.alarms = Alarms::default();
         self.new_data = [false; 12];
         self.diagnosis = 0;
         self.burst_since_reset = false;
         self.latched_dac = 0;
     }
 
-    fn begin(&mut self, activity: Activity) {
-        self.begin_until(activity, self.now_ns + activity.length_ns(self.low_power()));
+    /// Begins a procedure of the usual duration.
+    pub(crate) fn begin(&mut self, activity: Activity) {
+        self.begin_until(activity, self.now_ns + activity.duration_ns(self.is_low_power()));
     }
 
-    fn begin_until(&mut self, activity: Activity, until_ns: u64) {
+    /// Begins a procedure that ends at `until_ns`.
+    pub(crate) fn begin_until(&mut self, activity: Activity, until_ns: u64) {
         self.activity = Some((activity, until_ns));
-        self.null = Null::default();
-        if !activity.samples() {
+        self.auto_null = AutoNull::default();
+        if !activity.keeps_sampling() {
             self.next_sample_sixteenths = None;
         }
     }
 
-    /// A low pulse on chip select ends a sleep.
-    fn wake(&mut self) {
+    /// Ends a sleep.
+    pub(crate) fn wake(&mut self) {
         if matches!(self.activity, Some((Activity::Sleep, _))) {
             self.begin(Activity::WakeUp);
         }
     }
 
-    /// The end of what kept the part busy.
+    /// Ends the procedure under way, with its results.
     fn finish(&mut self) {
         let Some((activity, until_ns)) = self.activity.take() else {
             return;
@@ -203,39 +189,40 @@ impl VirtualAdis16405 {
         self.registers.store(registers::MSC_CTRL, control & !activity.test_bit());
         match activity {
             Activity::SelfTest if self.self_test_failures != 0 => {
-                self.diagnosis |= self.self_test_failures | DIAG_SELF_TEST;
+                self.diagnosis |= self.self_test_failures | diagnosis::SELF_TEST;
             }
-            Activity::FlashTest if self.flash_damaged => self.diagnosis |= DIAG_FLASH_CHECKSUM,
-            Activity::FlashUpdate if self.flash_damaged => self.diagnosis |= DIAG_FLASH_UPDATE,
+            Activity::FlashTest if self.flash_damaged => self.diagnosis |= diagnosis::FLASH_CHECKSUM,
+            Activity::FlashUpdate if self.flash_damaged => self.diagnosis |= diagnosis::FLASH_UPDATE,
             Activity::FlashUpdate => {
                 let writes = self.registers.read(registers::FLASH_CNT).wrapping_add(1);
                 self.registers.store(registers::FLASH_CNT, writes);
-                self.flash.keep(&self.registers);
+                self.flash.copy_flash_registers(&self.registers);
             }
             Activity::FactoryRestore => self.registers.restore_calibration(),
-            Activity::AutoNull | Activity::PrecisionAutoNull => self.null.apply(&mut self.registers),
+            Activity::AutoNull | Activity::PrecisionAutoNull => self.auto_null.apply(&mut self.registers),
             Activity::Sleep => self.begin(Activity::WakeUp),
             _ => {}
         }
-        if !activity.samples() && activity != Activity::Sleep {
+        if !activity.keeps_sampling() && activity != Activity::Sleep {
             self.restart_sampling(until_ns);
         }
     }
 
-    /// The first sample comes one period after `from_ns`.
-    fn restart_sampling(&mut self, from_ns: u64) {
-        let idle = self.activity.is_none_or(|(activity, _)| activity.samples());
-        self.next_sample_sixteenths = self.period_sixteenths().filter(|_| idle && self.powered).map(|period| {
-            self.sensing.set_sample_period(period as f64 / 16e9);
+    /// Starts the sample clock anew, unless it is external: the first sample comes one period after `from_ns`.
+    pub(crate) fn restart_sampling(&mut self, from_ns: u64) {
+        let may_sample = self.activity.is_none_or(|(activity, _)| activity.keeps_sampling());
+        self.next_sample_sixteenths = self.period_sixteenths().filter(|_| may_sample && self.powered).map(|period| {
+            self.signal_chain.set_sample_period(period as f64 / 16e9);
             from_ns * 16 + period
         });
     }
 
+    /// Sample period by SMPL_PRD and the true rate of the clock; `None` for the external clock.
     fn period_sixteenths(&self) -> Option<u64> {
         let smpl_prd = u64::from(self.registers.read(registers::SMPL_PRD));
         let base = if smpl_prd & 0x80 == 0 { 1 } else { SLOW_TICKS };
         let nominal = (smpl_prd % 0x80 + 1) * base * TICK_SIXTEENTHS;
-        (smpl_prd != 0).then(|| (nominal as f64 / self.sensing.clock_ratio()).round() as u64)
+        (smpl_prd != 0).then(|| (nominal as f64 / self.signal_chain.clock_ratio()).round() as u64)
     }
 
     fn take_sample(&mut self) {
@@ -247,32 +234,63 @@ impl VirtualAdis16405 {
     }
 
     fn sample(&mut self, time_s: f64, period_s: f64) {
-        if !Setting::of(&self.registers).valid {
+        if !SensAvg::decode(&self.registers).valid {
             let sens_avg = self.registers.read(registers::SENS_AVG);
-            self.record.add(self.now_ns, ViolationKind::Configuration { sens_avg });
+            self.violations.add(self.now_ns, ViolationKind::Configuration { sens_avg });
         }
-        self.sensing.sample(&self.registers, time_s, period_s);
-        self.null.add(self.sensing.rates());
+        self.signal_chain.sample(&self.registers, time_s, period_s);
+        self.auto_null.add(self.signal_chain.rates());
         self.new_data = [true; 12];
         self.samples += 1;
         self.sampled_at_ns = Some(self.now_ns);
-        let supply = f64::from(self.sensing.counts()[0]) * SUPPLY_LSB;
-        if supply < 4.75 {
-            self.diagnosis |= DIAG_SUPPLY_LOW;
-        } else if supply > 5.25 {
-            self.diagnosis |= DIAG_SUPPLY_HIGH;
-        }
-        self.diagnosis |= self.alarms.observe(&self.registers, self.sensing.counts(), self.sensing.unfiltered());
+        let (counts, unfiltered) = (self.signal_chain.counts(), self.signal_chain.unfiltered());
+        self.diagnosis |= diagnosis::check_supply(counts) | self.alarms.check(&self.registers, counts, unfiltered);
     }
 
-    /// A sample of the external clock, with the time since the one before as its period.
-    fn sample_externally(&mut self) {
-        if self.activity.is_some_and(|(activity, _)| !activity.samples()) || !self.powered {
+    /// Takes a sample by the external clock; its period is the time since the sample before.
+    pub(crate) fn sample_externally(&mut self) {
+        if self.activity.is_some_and(|(activity, _)| !activity.keeps_sampling()) || !self.powered {
             return;
         }
         let since_ns = self.now_ns - self.sampled_at_ns.unwrap_or(0);
         let period_s = since_ns.max(1) as f64 * 1e-9;
-        self.sensing.set_sample_period(period_s);
+        self.signal_chain.set_sample_period(period_s);
         self.sample(self.now_ns as f64 * 1e-9, period_s);
+    }
+}
+
+/// Faults.
+impl VirtualAdis16405 {
+    /// Breaks the sensor of an inertial channel: its self-test fails. Without effect for other channels, which have none.
+    pub fn break_sensor(&mut self, channel: OutputRegister) {
+        if let Some(index) = OutputRegister::INERTIAL.iter().position(|&inertial| inertial == channel) {
+            self.self_test_failures |= diagnosis::GYRO_X << index;
+        }
+    }
+
+    /// Damages the flash memory: its test and its update fail.
+    pub fn damage_flash(&mut self) {
+        self.flash_damaged = true;
+    }
+
+    /// Sets the answer of PROD_ID, also after a reset: another part of the family.
+    pub fn set_prod_id(&mut self, prod_id: u16) {
+        self.registers.store(registers::PROD_ID, prod_id);
+        self.flash.store(registers::PROD_ID, prod_id);
+    }
+
+    /// Switches the power off, or disconnects the part: it does not sample, and the controller reads ones.
+    pub fn power_off(&mut self) {
+        self.powered = false;
+        self.activity = None;
+        self.next_sample_sixteenths = None;
+        self.reset();
+    }
+
+    /// Switches the power on: the part starts up.
+    pub fn power_on(&mut self) {
+        self.powered = true;
+        self.reset();
+        self.begin(Activity::StartUp);
     }
 }

@@ -1,13 +1,103 @@
-//! The register map, as the data sheet lists it. Declared apart from the driver's table, so that a wrong address in either
-//! shows.
+//! The register map of the data sheet, and the contents of the registers. It is written down independently of the
+//! driver's, so that the tests of one against the other show a wrong entry in either.
 
-/// A register and what is known of it.
-struct Row {
+/// An output register, in the order of a burst read (SUPPLY_OUT at 0x02 to AUX_ADC at 0x18).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum OutputRegister {
+    /// SUPPLY_OUT, V.
+    Supply,
+    /// XGYRO_OUT, °/s.
+    GyroX,
+    /// YGYRO_OUT, °/s.
+    GyroY,
+    /// ZGYRO_OUT, °/s.
+    GyroZ,
+    /// XACCL_OUT, g.
+    AcclX,
+    /// YACCL_OUT, g.
+    AcclY,
+    /// ZACCL_OUT, g.
+    AcclZ,
+    /// XMAGN_OUT, gauss.
+    MagnX,
+    /// YMAGN_OUT, gauss.
+    MagnY,
+    /// ZMAGN_OUT, gauss.
+    MagnZ,
+    /// TEMP_OUT, °C.
+    Temp,
+    /// AUX_ADC, V.
+    AuxAdc,
+}
+
+impl OutputRegister {
+    /// All output registers in burst order.
+    pub const ALL: [Self; 12] = [
+        Self::Supply,
+        Self::GyroX,
+        Self::GyroY,
+        Self::GyroZ,
+        Self::AcclX,
+        Self::AcclY,
+        Self::AcclZ,
+        Self::MagnX,
+        Self::MagnY,
+        Self::MagnZ,
+        Self::Temp,
+        Self::AuxAdc,
+    ];
+
+    /// The gyros.
+    pub const GYROS: [Self; 3] = [Self::GyroX, Self::GyroY, Self::GyroZ];
+
+    /// The gyros, then the accelerometers.
+    pub const INERTIAL: [Self; 6] = [Self::GyroX, Self::GyroY, Self::GyroZ, Self::AcclX, Self::AcclY, Self::AcclZ];
+
+    /// Width of the data field: 14 bits, but 12 for supply, temperature and auxiliary input.
+    pub(crate) const fn bits(self) -> u32 {
+        match self {
+            Self::Supply | Self::Temp | Self::AuxAdc => 12,
+            _ => 14,
+        }
+    }
+
+    /// Least and greatest count: two's complement, but offset binary for supply and auxiliary input.
+    pub(crate) const fn limits(self) -> (i16, i16) {
+        match self {
+            Self::Supply | Self::AuxAdc => (0, (1 << self.bits()) - 1),
+            _ => (-1 << (self.bits() - 1), (1 << (self.bits() - 1)) - 1),
+        }
+    }
+
+    /// Size of one count in the unit of the output; `gyro_lsb` is that of the gyros, °/s, which the range sets.
+    pub(crate) const fn lsb(self, gyro_lsb: f64) -> f64 {
+        match self {
+            Self::Supply => 2.418e-3,
+            Self::GyroX | Self::GyroY | Self::GyroZ => gyro_lsb,
+            Self::AcclX | Self::AcclY | Self::AcclZ => 3.33e-3,
+            Self::MagnX | Self::MagnY | Self::MagnZ => 0.5e-3,
+            Self::Temp => 0.14,
+            Self::AuxAdc => 0.806e-3,
+        }
+    }
+
+    /// Value at count 0 in the unit of the output: 25 °C for the temperature, else 0.
+    pub(crate) const fn zero(self) -> f64 {
+        match self {
+            Self::Temp => 25.0,
+            _ => 0.0,
+        }
+    }
+}
+
+/// A register: its entry in the register map.
+struct Entry {
     address: u8,
     bits: u32,
     reset: u16,
     access: Access,
-    kind: Kind,
+    storage: Storage,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -18,164 +108,164 @@ enum Access {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// A plain number, lost in a reset.
+enum Storage {
+    /// Lost in a reset.
     Volatile,
-    /// A plain number, kept in flash.
-    Kept,
-    /// Two's complement, kept in flash, reads back sign-extended to 16 bits.
-    KeptSigned,
+    /// Backed up in flash.
+    Flash,
+    /// Backed up in flash; two's complement, which reads back sign-extended to 16 bits.
+    FlashSigned,
 }
 
-const fn row(address: u8, bits: u32, reset: u16, access: Access, kind: Kind) -> Row {
-    Row { address, bits, reset, access, kind }
+const fn entry(address: u8, bits: u32, reset: u16, access: Access, storage: Storage) -> Entry {
+    Entry { address, bits, reset, access, storage }
 }
 
-/// First output, SUPPLY_OUT; the others follow in the order of a burst.
-pub(super) const SUPPLY_OUT: u8 = 0x02;
-/// Last output.
-pub(super) const AUX_ADC: u8 = 0x18;
-pub(super) const FLASH_CNT: u8 = 0x00;
-pub(super) const XGYRO_OFF: u8 = 0x1A;
-pub(super) const XACCL_OFF: u8 = 0x20;
-pub(super) const XMAGN_HIF: u8 = 0x26;
-pub(super) const XMAGN_SIF: u8 = 0x2C;
-pub(super) const GPIO_CTRL: u8 = 0x32;
-pub(super) const MSC_CTRL: u8 = 0x34;
-pub(super) const MSC_CTRL_UPPER: u8 = 0x35;
-pub(super) const SMPL_PRD: u8 = 0x36;
-pub(super) const SENS_AVG: u8 = 0x38;
-pub(super) const SLP_CNT: u8 = 0x3A;
-pub(super) const SLP_CNT_UPPER: u8 = 0x3B;
-pub(super) const DIAG_STAT: u8 = 0x3C;
-pub(super) const GLOB_CMD: u8 = 0x3E;
-pub(super) const ALM_MAG1: u8 = 0x40;
-pub(super) const ALM_SMPL1: u8 = 0x44;
-pub(super) const ALM_CTRL: u8 = 0x48;
-pub(super) const AUX_DAC: u8 = 0x4A;
-pub(super) const PROD_ID: u8 = 0x56;
+/// The first output register; the others follow in the order of a burst read.
+pub(crate) const SUPPLY_OUT: u8 = 0x02;
+/// The last output register.
+pub(crate) const AUX_ADC: u8 = 0x18;
+pub(crate) const FLASH_CNT: u8 = 0x00;
+pub(crate) const XGYRO_OFF: u8 = 0x1A;
+pub(crate) const XACCL_OFF: u8 = 0x20;
+pub(crate) const XMAGN_HIF: u8 = 0x26;
+pub(crate) const XMAGN_SIF: u8 = 0x2C;
+pub(crate) const GPIO_CTRL: u8 = 0x32;
+pub(crate) const MSC_CTRL: u8 = 0x34;
+pub(crate) const MSC_CTRL_UPPER: u8 = 0x35;
+pub(crate) const SMPL_PRD: u8 = 0x36;
+pub(crate) const SENS_AVG: u8 = 0x38;
+pub(crate) const SLP_CNT: u8 = 0x3A;
+pub(crate) const SLP_CNT_UPPER: u8 = 0x3B;
+pub(crate) const DIAG_STAT: u8 = 0x3C;
+pub(crate) const GLOB_CMD: u8 = 0x3E;
+pub(crate) const ALM_MAG1: u8 = 0x40;
+pub(crate) const ALM_SMPL1: u8 = 0x44;
+pub(crate) const ALM_CTRL: u8 = 0x48;
+pub(crate) const AUX_DAC: u8 = 0x4A;
+pub(crate) const PROD_ID: u8 = 0x56;
 
-const ROWS: [Row; 39] = {
+const REGISTER_MAP: [Entry; 39] = {
     use Access::{Read, ReadWrite, Write};
-    use Kind::{Kept, KeptSigned, Volatile};
+    use Storage::{Flash, FlashSigned, Volatile};
     [
-        row(FLASH_CNT, 16, 0x0000, Read, Kept),
-        row(SUPPLY_OUT, 16, 0x0000, Read, Volatile),
-        row(0x04, 16, 0x0000, Read, Volatile),
-        row(0x06, 16, 0x0000, Read, Volatile),
-        row(0x08, 16, 0x0000, Read, Volatile),
-        row(0x0A, 16, 0x0000, Read, Volatile),
-        row(0x0C, 16, 0x0000, Read, Volatile),
-        row(0x0E, 16, 0x0000, Read, Volatile),
-        row(0x10, 16, 0x0000, Read, Volatile),
-        row(0x12, 16, 0x0000, Read, Volatile),
-        row(0x14, 16, 0x0000, Read, Volatile),
-        row(0x16, 16, 0x0000, Read, Volatile),
-        row(AUX_ADC, 16, 0x0000, Read, Volatile),
-        row(XGYRO_OFF, 13, 0x0000, ReadWrite, KeptSigned),
-        row(0x1C, 13, 0x0000, ReadWrite, KeptSigned),
-        row(0x1E, 13, 0x0000, ReadWrite, KeptSigned),
-        row(XACCL_OFF, 12, 0x0000, ReadWrite, KeptSigned),
-        row(0x22, 12, 0x0000, ReadWrite, KeptSigned),
-        row(0x24, 12, 0x0000, ReadWrite, KeptSigned),
-        row(XMAGN_HIF, 14, 0x0000, ReadWrite, KeptSigned),
-        row(0x28, 14, 0x0000, ReadWrite, KeptSigned),
-        row(0x2A, 14, 0x0000, ReadWrite, KeptSigned),
-        row(XMAGN_SIF, 12, 0x0800, ReadWrite, Kept),
-        row(0x2E, 12, 0x0800, ReadWrite, Kept),
-        row(0x30, 12, 0x0800, ReadWrite, Kept),
-        row(GPIO_CTRL, 12, 0x0000, ReadWrite, Volatile),
-        row(MSC_CTRL, 12, 0x0006, ReadWrite, Kept),
-        row(SMPL_PRD, 8, 0x0001, ReadWrite, Kept),
-        row(SENS_AVG, 11, 0x0402, ReadWrite, Kept),
-        row(SLP_CNT, 9, 0x0000, Write, Volatile),
-        row(DIAG_STAT, 16, 0x0000, Read, Volatile),
-        row(GLOB_CMD, 8, 0x0000, Write, Volatile),
-        row(ALM_MAG1, 16, 0x0000, ReadWrite, Kept),
-        row(0x42, 16, 0x0000, ReadWrite, Kept),
-        row(ALM_SMPL1, 8, 0x0000, ReadWrite, Kept),
-        row(0x46, 8, 0x0000, ReadWrite, Kept),
-        row(ALM_CTRL, 16, 0x0000, ReadWrite, Kept),
-        row(AUX_DAC, 12, 0x0000, ReadWrite, Volatile),
-        row(PROD_ID, 16, 16405, Read, Kept),
+        entry(FLASH_CNT, 16, 0x0000, Read, Flash),
+        entry(SUPPLY_OUT, 16, 0x0000, Read, Volatile),
+        entry(0x04, 16, 0x0000, Read, Volatile),
+        entry(0x06, 16, 0x0000, Read, Volatile),
+        entry(0x08, 16, 0x0000, Read, Volatile),
+        entry(0x0A, 16, 0x0000, Read, Volatile),
+        entry(0x0C, 16, 0x0000, Read, Volatile),
+        entry(0x0E, 16, 0x0000, Read, Volatile),
+        entry(0x10, 16, 0x0000, Read, Volatile),
+        entry(0x12, 16, 0x0000, Read, Volatile),
+        entry(0x14, 16, 0x0000, Read, Volatile),
+        entry(0x16, 16, 0x0000, Read, Volatile),
+        entry(AUX_ADC, 16, 0x0000, Read, Volatile),
+        entry(XGYRO_OFF, 13, 0x0000, ReadWrite, FlashSigned),
+        entry(0x1C, 13, 0x0000, ReadWrite, FlashSigned),
+        entry(0x1E, 13, 0x0000, ReadWrite, FlashSigned),
+        entry(XACCL_OFF, 12, 0x0000, ReadWrite, FlashSigned),
+        entry(0x22, 12, 0x0000, ReadWrite, FlashSigned),
+        entry(0x24, 12, 0x0000, ReadWrite, FlashSigned),
+        entry(XMAGN_HIF, 14, 0x0000, ReadWrite, FlashSigned),
+        entry(0x28, 14, 0x0000, ReadWrite, FlashSigned),
+        entry(0x2A, 14, 0x0000, ReadWrite, FlashSigned),
+        entry(XMAGN_SIF, 12, 0x0800, ReadWrite, Flash),
+        entry(0x2E, 12, 0x0800, ReadWrite, Flash),
+        entry(0x30, 12, 0x0800, ReadWrite, Flash),
+        entry(GPIO_CTRL, 12, 0x0000, ReadWrite, Volatile),
+        entry(MSC_CTRL, 12, 0x0006, ReadWrite, Flash),
+        entry(SMPL_PRD, 8, 0x0001, ReadWrite, Flash),
+        entry(SENS_AVG, 11, 0x0402, ReadWrite, Flash),
+        entry(SLP_CNT, 9, 0x0000, Write, Volatile),
+        entry(DIAG_STAT, 16, 0x0000, Read, Volatile),
+        entry(GLOB_CMD, 8, 0x0000, Write, Volatile),
+        entry(ALM_MAG1, 16, 0x0000, ReadWrite, Flash),
+        entry(0x42, 16, 0x0000, ReadWrite, Flash),
+        entry(ALM_SMPL1, 8, 0x0000, ReadWrite, Flash),
+        entry(0x46, 8, 0x0000, ReadWrite, Flash),
+        entry(ALM_CTRL, 16, 0x0000, ReadWrite, Flash),
+        entry(AUX_DAC, 12, 0x0000, ReadWrite, Volatile),
+        entry(PROD_ID, 16, 16405, Read, Flash),
     ]
 };
 
-/// Offsets, hard and soft iron: what a factory restore resets.
+/// Offsets, hard-iron and soft-iron corrections: the registers that a factory restore resets.
 const CALIBRATION: std::ops::RangeInclusive<u8> = XGYRO_OFF..=0x30;
 
-fn row_of(address: u8) -> Option<&'static Row> {
-    ROWS.iter().find(|row| row.address == address & 0x7E)
+fn find(address: u8) -> Option<&'static Entry> {
+    REGISTER_MAP.iter().find(|entry| entry.address == address & 0x7E)
 }
 
 /// True if the register at `address` (of either byte) exists and can be read.
-pub(super) fn readable(address: u8) -> bool {
-    row_of(address).is_some_and(|row| row.access != Access::Write)
+pub(crate) fn readable(address: u8) -> bool {
+    find(address).is_some_and(|entry| entry.access != Access::Write)
 }
 
 /// True if the byte at `address` exists and can be written.
-pub(super) fn writable(address: u8) -> bool {
-    row_of(address).is_some_and(|row| row.access != Access::Read && (address & 1 == 0 || row.bits > 8))
+pub(crate) fn writable(address: u8) -> bool {
+    find(address).is_some_and(|entry| entry.access != Access::Read && (address & 1 == 0 || entry.bits > 8))
 }
 
 /// The contents of the registers.
 #[derive(Clone, Debug)]
-pub(super) struct RegisterFile {
+pub(crate) struct RegisterFile {
     words: [u16; 0x40],
 }
 
 impl RegisterFile {
-    /// The values that a new part has.
-    pub(super) fn reset() -> Self {
+    /// Every register with the factory default of the data sheet.
+    pub(crate) fn new() -> Self {
         let mut words = [0; 0x40];
-        for row in &ROWS {
-            words[usize::from(row.address / 2)] = row.reset;
+        for entry in &REGISTER_MAP {
+            words[usize::from(entry.address / 2)] = entry.reset;
         }
         Self { words }
     }
 
-    /// What the register at `address` (of either byte) reads; 0 where there is none.
-    pub(super) fn read(&self, address: u8) -> u16 {
+    /// The word that a read of `address` (of either byte) gives; 0 where there is no register.
+    pub(crate) fn read(&self, address: u8) -> u16 {
         let word = self.words[usize::from(address & 0x7F) / 2];
-        match row_of(address) {
-            Some(row) if row.kind == Kind::KeptSigned => {
-                let shift = 16 - row.bits;
+        match find(address) {
+            Some(entry) if entry.storage == Storage::FlashSigned => {
+                let shift = 16 - entry.bits;
                 (((word << shift) as i16) >> shift) as u16
             }
             _ => word,
         }
     }
 
-    /// The register as a signed number: an offset or hard-iron correction.
-    pub(super) fn signed(&self, address: u8) -> f64 {
+    /// The value of a signed register (an offset or a hard-iron correction), in its counts.
+    pub(crate) fn read_signed(&self, address: u8) -> f64 {
         f64::from(self.read(address) as i16)
     }
 
-    /// Writes one byte, as the bus does; bits that the register does not have are lost.
-    pub(super) fn write(&mut self, address: u8, byte: u8) {
+    /// Writes one byte, as a write frame does; bits outside the width of the register are dropped.
+    pub(crate) fn write_byte(&mut self, address: u8, byte: u8) {
         let [upper, lower] = self.words[usize::from(address & 0x7F) / 2].to_be_bytes();
         let written = if address & 1 == 0 { [upper, byte] } else { [byte, lower] };
         self.store(address, u16::from_be_bytes(written));
     }
 
-    /// Sets a register, as the part itself does.
-    pub(super) fn store(&mut self, address: u8, word: u16) {
-        if let Some(row) = row_of(address) {
-            self.words[usize::from(row.address / 2)] = word & (u16::MAX >> (16 - row.bits));
+    /// Sets a whole register, as the part itself does; bits outside the width of the register are dropped.
+    pub(crate) fn store(&mut self, address: u8, word: u16) {
+        if let Some(entry) = find(address) {
+            self.words[usize::from(entry.address / 2)] = word & (u16::MAX >> (16 - entry.bits));
         }
     }
 
-    /// Takes over what `other` keeps in flash.
-    pub(super) fn keep(&mut self, other: &Self) {
-        for row in ROWS.iter().filter(|row| row.kind != Kind::Volatile) {
-            self.words[usize::from(row.address / 2)] = other.words[usize::from(row.address / 2)];
+    /// Copies the registers that are backed up in flash from `other`.
+    pub(crate) fn copy_flash_registers(&mut self, other: &Self) {
+        for entry in REGISTER_MAP.iter().filter(|entry| entry.storage != Storage::Volatile) {
+            self.words[usize::from(entry.address / 2)] = other.words[usize::from(entry.address / 2)];
         }
     }
 
-    /// Forgets the user's calibration.
-    pub(super) fn restore_calibration(&mut self) {
-        for row in ROWS.iter().filter(|row| CALIBRATION.contains(&row.address)) {
-            self.words[usize::from(row.address / 2)] = row.reset;
+    /// Resets offsets, hard-iron and soft-iron corrections to their factory defaults.
+    pub(crate) fn restore_calibration(&mut self) {
+        for entry in REGISTER_MAP.iter().filter(|entry| CALIBRATION.contains(&entry.address)) {
+            self.words[usize::from(entry.address / 2)] = entry.reset;
         }
     }
 }

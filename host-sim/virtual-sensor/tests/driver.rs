@@ -1,4 +1,4 @@
-//! The virtual part and the real driver against each other. Numbers are those of the data sheet.
+//! The real driver reads the virtual part: configuration, samples, timing and violations. Numbers are those of the data sheet.
 
 use adis16405_driver::{Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, Register, SamplePeriod};
 
@@ -62,7 +62,7 @@ fn the_driver_reads_what_the_part_sampled() {
 #[test]
 fn samples_come_at_the_programmed_instants() {
     // SMPL_PRD is not written (reset value 1), so sample k is at k·2/1638.4 s = k·1220703.125 ns.
-    let (bus, _) = on_bus(NoiseModel::still(), config(GyroRange::Dps300, 2, 1));
+    let (bus, _) = on_bus(NoiseModel::noiseless(), config(GyroRange::Dps300, 2, 1));
     let taken = bus.part().samples();
     for k in taken + 1..=100_000 {
         let expected = (u128::from(k) * 2_000_000_000 * 10).div_ceil(16_384);
@@ -72,7 +72,7 @@ fn samples_come_at_the_programmed_instants() {
 
 #[test]
 fn a_new_period_counts_from_the_write() {
-    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);
     for (smpl_prd, period_ns) in [(0x07, 4_882_812.5), (0x81, 2.0 * 31.0 * 610_351.562_5)] {
         part.select();
         part.transfer(0xB600 | smpl_prd);
@@ -87,7 +87,7 @@ fn a_new_period_counts_from_the_write() {
 }
 
 #[test]
-fn new_data_is_shown_once() {
+fn the_new_data_flag_shows_once() {
     let (bus, mut imu) = on_bus(NoiseModel::paper(), Config::default());
     bus.wait_for_data();
     assert_eq!(imu.burst().unwrap().faults(), Faults::empty());
@@ -101,7 +101,7 @@ fn new_data_is_shown_once() {
 
 #[test]
 fn answers_come_one_frame_later() {
-    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);
     let mut answers = Vec::new();
     for word in [0x5600, 0x3800, 0x5700, 0x0000] {
         part.select();
@@ -115,7 +115,7 @@ fn answers_come_one_frame_later() {
 
 #[test]
 fn offsets_read_back_sign_extended_and_act_on_the_output() {
-    let (bus, mut imu) = on_bus(NoiseModel::still(), Config::default());
+    let (bus, mut imu) = on_bus(NoiseModel::noiseless(), Config::default());
     imu.write_register(Register::YgyroOff, (-56i16) as u16).unwrap();
     imu.write_register(Register::ZacclOff, 10).unwrap();
     assert_eq!(imu.read_register(Register::YgyroOff), Ok(0xFFC8));
@@ -126,8 +126,8 @@ fn offsets_read_back_sign_extended_and_act_on_the_output() {
 }
 
 #[test]
-fn a_software_reset_restores_and_takes_time() {
-    let (bus, mut imu) = on_bus(NoiseModel::still(), config(GyroRange::Dps75, 4, 7));
+fn a_software_reset_restores_the_flash_values_and_takes_time() {
+    let (bus, mut imu) = on_bus(NoiseModel::noiseless(), config(GyroRange::Dps75, 4, 7));
     imu.write_register(Register::GlobCmd, 0x80).unwrap();
     imu.read_register(Register::ProdId).unwrap();
     let at = bus.part().now();
@@ -145,8 +145,8 @@ fn a_software_reset_restores_and_takes_time() {
 }
 
 #[test]
-fn diagnosis_alarms_and_clears_on_read() {
-    let mut model = NoiseModel::still();
+fn a_supply_alarm_sets_diag_stat_which_clears_on_read() {
+    let mut model = NoiseModel::noiseless();
     model.channel_mut(OutputRegister::Supply).bias = 4.5;
     let (bus, mut imu) = on_bus(model, Config::default());
     bus.wait_for_data();
@@ -158,14 +158,14 @@ fn diagnosis_alarms_and_clears_on_read() {
 }
 
 #[test]
-fn bad_use_of_the_bus_is_recorded() {
-    let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::still(), 1));
-    let mut hasty = Adis16405::new(bus.clone(), Config::default()).with_stall_ns(8_999);
-    hasty.read_register(Register::ProdId).unwrap();
+fn violations_of_the_bus_timing_are_recorded() {
+    let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::noiseless(), 1));
+    let mut too_fast = Adis16405::new(bus.clone(), Config::default()).with_stall_ns(8_999);
+    too_fast.read_register(Register::ProdId).unwrap();
     let kind = ViolationKind::Stall { stall_ns: 8_999, least_ns: 9_000 };
     assert_eq!(bus.part().violations().iter().map(|violation| violation.kind).collect::<Vec<_>>(), [kind]);
 
-    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+    let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);
     part.transfer(0x5600);
     part.select();
     part.transfer_byte(0x56);
@@ -193,8 +193,8 @@ fn bad_use_of_the_bus_is_recorded() {
 }
 
 #[test]
-fn an_invalid_range_and_filter_is_recorded_with_the_sample() {
-    let mut part = VirtualAdis16405::new(NoiseModel::still(), 1);
+fn a_sample_with_an_invalid_range_and_filter_is_a_violation() {
+    let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);
     part.select();
     part.transfer(0xB901);
     part.deselect();
@@ -205,7 +205,7 @@ fn an_invalid_range_and_filter_is_recorded_with_the_sample() {
 
 #[test]
 fn the_range_scales_the_gyros_only() {
-    let mut model = NoiseModel::still();
+    let mut model = NoiseModel::noiseless();
     model.channel_mut(OutputRegister::GyroZ).bias = -12.5;
     for (range, expected) in [(GyroRange::Dps300, -250), (GyroRange::Dps150, -500), (GyroRange::Dps75, -1000)] {
         let (bus, mut imu) = on_bus(model.clone(), config(range, 4, 1));
@@ -217,8 +217,8 @@ fn the_range_scales_the_gyros_only() {
 }
 
 #[test]
-fn white_noise_has_the_declared_size() {
-    let mut model = NoiseModel::still();
+fn white_noise_has_the_declared_variance() {
+    let mut model = NoiseModel::noiseless();
     for channel in OutputRegister::GYROS {
         model.channel_mut(channel).angle_random_walk = 0.0368;
     }

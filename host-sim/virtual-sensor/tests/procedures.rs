@@ -1,5 +1,5 @@
-//! Whole procedures of the real driver on the virtual part: their outcome, their side effects, and a silent bus where the
-//! part wants one. Every script runs through the blocking and through the asynchronous shell.
+//! Procedures of the real driver on the virtual part: results, side effects, and a silent bus where the part needs one.
+//! Every script runs through the blocking and through the asynchronous driver.
 
 use std::num::NonZeroU8;
 use std::pin::pin;
@@ -13,11 +13,11 @@ use adis16405_driver::{
 
 use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
 
-/// Nothing in virtual time is ever pending.
+/// Runs a future that is ready at once, as all futures of the emulated bus are.
 fn block_on<T>(future: impl Future<Output = T>) -> T {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(output) => output,
-        Poll::Pending => panic!("a future of virtual time is pending"),
+        Poll::Pending => panic!("the future is pending"),
     }
 }
 
@@ -61,7 +61,7 @@ macro_rules! both_shells {
 }
 
 fn with_rates(rates: [f64; 3]) -> NoiseModel {
-    let mut model = NoiseModel::still();
+    let mut model = NoiseModel::noiseless();
     for (channel, rate) in OutputRegister::GYROS.into_iter().zip(rates) {
         model.channel_mut(channel).bias = rate;
     }
@@ -69,8 +69,8 @@ fn with_rates(rates: [f64; 3]) -> NoiseModel {
 }
 
 #[test]
-fn self_tests_name_the_sensor_that_fails_and_leave_the_configuration() {
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+fn self_tests_name_the_failed_sensor_and_keep_the_configuration() {
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.set_data_ready(None) => Ok(());
         expect imu.set_compensation(OnChipCompensation { linear_acceleration: true, origin_alignment: false }) => Ok(());
         // Compensation, polarity and no data ready: bit 2 and with it bit 1 and 0 are cleared.
@@ -96,8 +96,8 @@ fn self_tests_name_the_sensor_that_fails_and_leave_the_configuration() {
 }
 
 #[test]
-fn what_was_diagnosed_before_a_test_is_not_lost_in_it() {
-    let mut model = NoiseModel::still();
+fn a_self_test_keeps_the_diagnosis_from_before() {
+    let mut model = NoiseModel::noiseless();
     model.channel_mut(OutputRegister::Supply).bias = 5.5;
     both_shells!(model.clone(), |bus, imu, delay|
         take test = imu.self_test(&mut delay);
@@ -113,7 +113,7 @@ fn what_was_diagnosed_before_a_test_is_not_lost_in_it() {
 fn a_stimulus_moves_every_inertial_sensor_both_ways() {
     // The virtual part moves by 40 °/s and 0.5 g: 800 and 150.15 counts.
     let expected = [800, 800, 800, 150, 150, 150];
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.stimulus_response(Stimulus::Positive, &mut delay) => Ok(expected);
         expect imu.stimulus_response(Stimulus::Negative, &mut delay) => Ok(expected.map(|counts| -counts));
         expect imu.read_register(Register::MscCtrl) => Ok(0x0006);
@@ -136,7 +136,7 @@ fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
 }
 
 #[test]
-fn the_precision_null_averages_for_thirty_silent_seconds() {
+fn the_precision_auto_null_averages_for_thirty_silent_seconds() {
     let mut model = with_rates([-0.5, 0.25, 0.0]);
     for channel in OutputRegister::GYROS {
         model.channel_mut(channel).angle_random_walk = 0.05;
@@ -151,7 +151,7 @@ fn the_precision_null_averages_for_thirty_silent_seconds() {
 }
 
 #[test]
-fn a_factory_restore_says_what_it_took() {
+fn a_factory_restore_returns_the_calibration_it_erased() {
     let lost = FactoryRestore {
         gyro: GyroBias { part: [0, 1, -2], host_x: -3 },
         accl: [4, -5, 6],
@@ -160,7 +160,7 @@ fn a_factory_restore_says_what_it_took() {
     };
     let restored =
         FactoryRestore { gyro: GyroBias::default(), accl: [0; 3], hard_iron: [0; 3], soft_iron: [0x0800; 3] };
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.set_gyro_offsets([-3, 1, -2]) => Ok(lost.gyro);
         expect imu.set_accl_offsets(lost.accl) => Ok(());
         expect imu.set_hard_iron(lost.hard_iron) => Ok(());
@@ -171,8 +171,8 @@ fn a_factory_restore_says_what_it_took() {
 }
 
 #[test]
-fn flash_and_reset() {
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+fn a_flash_update_outlives_a_reset() {
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.flash_writes() => Ok(0);
         expect imu.set_accl_offsets([1, 2, 3]) => Ok(());
         expect imu.flash_update(&mut delay) => Ok(1);
@@ -191,7 +191,7 @@ fn flash_and_reset() {
 
 #[test]
 fn sleep_and_wake() {
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.sleep(Sleep::HalfSeconds(NonZeroU8::new(3).unwrap())) => Ok(());
         given slept = bus.part().now();
         // Asleep for 1.5 s, 4 ms to recover, one period to the first sample.
@@ -214,7 +214,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
     let cold = Alarm { source: Channel::Temp, watch: AlarmWatch::Level, threshold: AlarmThreshold::Below(-10) };
     let change =
         Alarm { source: Channel::GyroY, watch: AlarmWatch::RateOfChange(4), threshold: AlarmThreshold::Above(99) };
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.set_alarm_output(Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
         expect imu.set_alarm(AlarmNumber::One, Some(above)) => Ok(());
         expect imu.set_alarm(AlarmNumber::Two, Some(cold)) => Ok(());
@@ -248,8 +248,8 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
 }
 
 #[test]
-fn lines_and_levels() {
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+fn lines_show_data_ready_and_gpio_levels() {
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.data_ready() => Ok(Some(DioSignal { line: DioLine::Dio1, polarity: Polarity::ActiveHigh }));
         then bus.wait_for_data();
         then assert!(bus.part().pin(1));
@@ -270,8 +270,8 @@ fn lines_and_levels() {
 }
 
 #[test]
-fn an_external_clock_is_obeyed() {
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+fn an_external_clock_triggers_the_samples() {
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.configure(Config::default().with_external_clock()) => Ok(());
         given taken = bus.part().samples();
         given now = bus.part().now();
@@ -285,8 +285,8 @@ fn an_external_clock_is_obeyed() {
 }
 
 #[test]
-fn another_part_or_none_is_told_from_this_one() {
-    both_shells!(NoiseModel::still(), |bus, imu, delay|
+fn another_product_or_a_missing_part_is_an_error() {
+    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         then bus.part_mut().set_prod_id(16400);
         expect imu.identity() => Ok(Product::Adis16400);
         then bus.part_mut().set_prod_id(16448);
@@ -304,13 +304,13 @@ fn another_part_or_none_is_told_from_this_one() {
 
 /// EngineerZone, thread 81805: −8 read as 0x9FF8 instead of 0xBFF8, by burst and then by single reads.
 #[test]
-fn the_x_gyro_erratum_strikes_and_is_avoided() {
+fn the_x_gyro_erratum_occurs_and_is_avoided() {
     both_shells!(with_rates([-0.2, -0.2, -0.2]), |bus, imu, delay|
         // −16 counts of 0.0125 °/s: with −0.2 °/s the rate is −0.4 °/s, −8 counts.
         expect imu.write_register(Register::XgyroOff, 0xFFF0) => Ok(());
         then bus.wait_for_data();
         expect imu.read_register(Register::XgyroOut) => Ok(0xBFF8);
-        take _struck = imu.burst();
+        take _burst = imu.burst();
         then bus.wait_for_data();
         expect imu.read_register(Register::XgyroOut) => Ok(0x9FF8);
         then bus.wait_for_data();

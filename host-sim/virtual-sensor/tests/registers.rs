@@ -1,4 +1,4 @@
-//! Every register as the data sheet has it: address, width, reset value, sign extension, access, flash.
+//! Every register against the data sheet: address, width, reset value, sign extension, access, flash.
 
 use virtual_sensor::{NoiseModel, ViolationKind, VirtualAdis16405};
 
@@ -24,7 +24,7 @@ const WRITABLE: [(u8, u32, u16, bool, bool); 23] = [
     (0x46, 8, 0x0000, false, true),
     (0x48, 16, 0x0000, false, true),
     (0x4A, 12, 0x0000, false, false),
-    // Directions only: levels of inputs are the pins'.
+    // The directions only: the levels of inputs come from the pins.
     (0x32, 4, 0x0000, false, false),
     // The upper byte starts self-tests.
     (0x34, 8, 0x0006, false, true),
@@ -32,10 +32,10 @@ const WRITABLE: [(u8, u32, u16, bool, bool); 23] = [
 ];
 
 fn part() -> VirtualAdis16405 {
-    VirtualAdis16405::new(NoiseModel::still(), 1)
+    VirtualAdis16405::new(NoiseModel::noiseless(), 1)
 }
 
-/// One frame, and time enough for any stall.
+/// Exchanges one frame after a pause longer than any stall time.
 fn frame(part: &mut VirtualAdis16405, word: u16) -> u16 {
     part.advance_to(part.now() + 100_000);
     part.select();
@@ -59,7 +59,7 @@ fn extended(word: u16, bits: u32, signed: bool) -> u16 {
 }
 
 #[test]
-fn reset_values() {
+fn registers_have_their_reset_values() {
     let mut part = part();
     for (address, _, reset, ..) in WRITABLE {
         assert_eq!(read(&mut part, address), reset, "{address:#04x}");
@@ -86,7 +86,7 @@ fn bytes_are_written_one_by_one_into_the_width_of_the_register() {
 }
 
 #[test]
-fn what_cannot_be_accessed_is_a_violation() {
+fn access_to_what_cannot_be_read_or_written_is_a_violation() {
     let plain: Vec<u8> = WRITABLE.iter().filter(|row| row.1 > 0).map(|row| row.0).collect();
     for address in 0..0x80u8 {
         let row = WRITABLE.iter().find(|row| row.0 == address & 0x7E && plain.contains(&row.0));
@@ -116,7 +116,7 @@ fn what_cannot_be_accessed_is_a_violation() {
 }
 
 #[test]
-fn flash_keeps_what_a_reset_would_lose() {
+fn a_flash_update_preserves_registers_over_a_reset() {
     for (address, bits, reset, signed, kept) in WRITABLE.into_iter().filter(|(_, bits, ..)| *bits > 0) {
         let mut part = part();
         write(&mut part, address, 0x07);

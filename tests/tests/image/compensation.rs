@@ -11,9 +11,9 @@ use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, S
 use link::{
     Decoder, LearnedMessage, Message, Received, ReportedDrift, ReportedParameter, ReportedTerm, ValidationMessage,
 };
-use simulation::device::Device;
-use virtual_sensor::effect::surroundings::TemperatureCourse;
-use virtual_sensor::{Effect, Hidden, NoiseModel, OutputRegister, Surroundings, VirtualAdis16405};
+use simulation::Device;
+use virtual_sensor::TemperatureProfile;
+use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario, VirtualAdis16405};
 
 const EPOCH_S: f64 = 60.0;
 const RATE_HZ: f64 = 204.8;
@@ -23,11 +23,11 @@ const SENSITIVITY: f64 = 0.05;
 const LINE_HZ: f64 = 20.5;
 
 /// A part that warms up by 8 °C in a room that is heated in turns of 50 s; its gyro x follows if `effects` say so.
-fn part(effects: Vec<Effect>) -> Sensor {
-    let temperature = TemperatureCourse { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 50.0 };
-    let surroundings = Surroundings { temperature, ..Surroundings::default() };
-    let hidden = Hidden { surroundings, effects };
-    Sensor::new(VirtualAdis16405::hiding(&hidden, NoiseModel::paper(), 1), SCK_HZ)
+fn part(effects: Vec<InjectedEffect>) -> Sensor {
+    let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 50.0 };
+    let surroundings = Environment { temperature, ..Environment::default() };
+    let hidden = SensorScenario { environment: surroundings, effects };
+    Sensor::new(VirtualAdis16405::with_scenario(&hidden, NoiseModel::paper(), 1), SCK_HZ)
 }
 
 /// What two epochs have brought.
@@ -44,7 +44,7 @@ struct Heard {
     waited_s: f64,
 }
 
-fn two_epochs(effects: Vec<Effect>) -> Heard {
+fn two_epochs(effects: Vec<InjectedEffect>) -> Heard {
     const PRESSED_S: f64 = EPOCH_S + 5.0;
     let keys = vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (PRESSED_S, b"v".to_vec())];
     let scenario = Scenario { sensor: Some(part(effects)), keys, seconds: 2.0 * EPOCH_S + 5.0, ..Scenario::default() };
@@ -124,8 +124,13 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learned
 #[test]
 fn a_hidden_temperature_effect_is_learnt_and_subtracted() {
     let Heard { learnt, checked, taught_s, longest_s, waited_s } = two_epochs(vec![
-        Effect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY },
-        Effect::Sinusoid { channel: OutputRegister::GyroZ, frequency_hz: LINE_HZ, amplitude: 0.4, phase_rad: 0.0 },
+        InjectedEffect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY },
+        InjectedEffect::Sinusoid {
+            channel: OutputRegister::GyroZ,
+            frequency_hz: LINE_HZ,
+            amplitude: 0.4,
+            phase_rad: 0.0,
+        },
     ]);
     println!("an epoch taught for {taught_s:.1} s, of one channel for {longest_s:.1} s at most");
     println!("a key press waited {waited_s:.2} s meanwhile");

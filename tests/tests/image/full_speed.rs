@@ -9,7 +9,7 @@ use noise_analysis::analysis::analyze;
 use recordings::frame_log::{Frame, FrameLog};
 use recordings::serial::Tape;
 use recordings::timeline::measurement;
-use simulation::replay::replay_log;
+use simulation::replay_log;
 use std::path::Path;
 
 const RATE_HZ: f64 = 819.2;

@@ -157,7 +157,7 @@ fn confidence(truth: &Model, octave: usize) -> f64 {
 }
 
 fn hour(seed: u64) -> Hour {
-    let mut noise = NoiseModel::still();
+    let mut noise = NoiseModel::noiseless();
     let gyro = noise.channel_mut(OutputRegister::GyroZ);
     [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = TRUTH;
     let mut part = VirtualAdis16405::new(noise, seed);

@@ -12,9 +12,9 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use simulation::record::{Host, SAMPLE_RATE_HZ, Simulation};
-use virtual_sensor::effect::surroundings::{Motion, SupplyCourse, TemperatureCourse};
-use virtual_sensor::{Hidden, NoiseModel, OutputRegister, Surroundings};
+use simulation::{HostClock, SAMPLE_RATE_HZ, Simulation};
+use virtual_sensor::{Environment, NoiseModel, OutputRegister, SensorScenario};
+use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
 /// Strength of a single effect: from undetectable to gross.
 const STRENGTH: (f64, f64) = (0.3, 30.0);
@@ -47,7 +47,7 @@ impl Case {
         let noise = noise(&mut random);
         let surroundings = surroundings(&mut random, kinds.contains(&Kind::Acceleration));
         let host =
-            Host { latency_s: LATENCY_S, clock_ratio: 1.0 + HOST_CLOCK * random.sample::<f64, _>(StandardNormal) };
+            HostClock { latency_s: LATENCY_S, clock_ratio: 1.0 + HOST_CLOCK * random.sample::<f64, _>(StandardNormal) };
         let scene =
             Scene { noise: &noise, surroundings, record: Record { seconds, period_s: 1.0 / SAMPLE_RATE_HZ }, seed };
         // An accelerometer that moves shows nothing else.
@@ -62,8 +62,13 @@ impl Case {
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
         let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
         let (effects, strengths) = hide(kinds, range, at_least, &scene, channel, &mut random);
-        let hidden = Hidden { surroundings, effects };
-        Self { seed, kinds: kinds.to_vec(), strengths, simulation: Simulation { seconds, seed, noise, hidden, host } }
+        let hidden = SensorScenario { environment: surroundings, effects };
+        Self {
+            seed,
+            kinds: kinds.to_vec(),
+            strengths,
+            simulation: Simulation { seconds, seed, noise, scenario: hidden, host },
+        }
     }
 
     /// Two different kinds.
@@ -94,14 +99,14 @@ fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     noise
 }
 
-fn surroundings(random: &mut ChaCha8Rng, moved: bool) -> Surroundings {
-    let temperature = TemperatureCourse {
+fn surroundings(random: &mut ChaCha8Rng, moved: bool) -> Environment {
+    let temperature = TemperatureProfile {
         rise_c: log_uniform(random, 2.0, 12.0),
         time_constant_s: log_uniform(random, 200.0, 1200.0),
         cycle_c: log_uniform(random, 0.3, 2.0),
         period_s: log_uniform(random, 400.0, 1500.0),
     };
-    let supply = SupplyCourse {
+    let supply = SupplyProfile {
         load_v: log_uniform(random, 0.02, 0.1),
         load_time_s: log_uniform(random, 10.0, 60.0),
         cycle_v: log_uniform(random, 0.01, 0.05),
@@ -112,5 +117,5 @@ fn surroundings(random: &mut ChaCha8Rng, moved: bool) -> Surroundings {
         deviation_g: if moves { log_uniform(random, 0.03, 0.3) } else { 0.0 },
         time_constant_s: log_uniform(random, 1.0, 20.0),
     };
-    Surroundings { temperature, supply, motion }
+    Environment { temperature, supply, motion }
 }

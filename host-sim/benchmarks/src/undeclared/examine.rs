@@ -9,8 +9,8 @@ use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, Report};
 use recordings::timeline::{TimelineError, measurement};
 use serde::Serialize;
-use simulation::record::RecordError;
-use virtual_sensor::Effect;
+use simulation::SimulationError;
+use virtual_sensor::InjectedEffect;
 
 /// Channels that are recorded: those that are scored, and what may move them.
 const RECORDED: [Channel; 8] = [
@@ -34,7 +34,7 @@ pub enum ExamineError {
         /// Of the recording.
         seed: u64,
         /// What went wrong.
-        reason: RecordError,
+        reason: SimulationError,
     },
     /// It has no timeline.
     #[error("seed {seed}: {reason}")]
@@ -122,7 +122,7 @@ pub fn examine(case: &Case) -> Result<Outcome, ExamineError> {
     let report = analyze(&measurement);
     let begin_s = recording.samples.first().and_then(|sample| sample.clock.time_s).unwrap_or(0.0);
     let mut outcome = score(case, &report, begin_s);
-    let effects = &case.simulation.hidden.effects;
+    let effects = &case.simulation.scenario.effects;
     if let ([answer], [effect]) = (&mut outcome.answers[..], &effects[..]) {
         answer.shape_known = unknown_noise::sees(effect, &measurement, begin_s);
     }
@@ -147,7 +147,7 @@ pub fn examine(case: &Case) -> Result<Outcome, ExamineError> {
 
 /// Compares a report with the truth. `begin_s` is when the recording begins, counted from the part's start.
 pub(super) fn score(case: &Case, report: &Report, begin_s: f64) -> Outcome {
-    let moved = case.simulation.hidden.surroundings.motion.deviation_g > 0.0;
+    let moved = case.simulation.scenario.environment.motion.deviation_g > 0.0;
     // An accelerometer that is moved shows the motion, whatever that may look like.
     let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
     let scored: Vec<(Channel, &ChannelReport)> = Channel::INERTIAL
@@ -155,7 +155,7 @@ pub(super) fn score(case: &Case, report: &Report, begin_s: f64) -> Outcome {
         .filter(is_scored)
         .filter_map(|channel| Some((channel, report.channels.iter().find(|of| of.name == channel.name())?)))
         .collect();
-    let effects = &case.simulation.hidden.effects;
+    let effects = &case.simulation.scenario.effects;
     let answers = case
         .kinds
         .iter()
@@ -177,13 +177,13 @@ pub(super) fn score(case: &Case, report: &Report, begin_s: f64) -> Outcome {
 }
 
 /// What concerns all samples alike shows in every channel.
-fn shows_in(effect: &Effect, channel: Channel) -> bool {
+fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
     effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }
 
 /// An effect is named when at least half of the channels that show it list it; what concerns the samples, not their
 /// values, may be listed once.
-fn answer(kind: Kind, effect: &Effect, strength: f64, scored: &[(Channel, &ChannelReport)]) -> Answer {
+fn answer(kind: Kind, effect: &InjectedEffect, strength: f64, scored: &[(Channel, &ChannelReport)]) -> Answer {
     let affected: Vec<&ChannelReport> =
         scored.iter().filter(|(channel, _)| shows_in(effect, *channel)).map(|(_, report)| *report).collect();
     let listing = affected.iter().filter(|report| report.effects.iter().any(|found| found.kind == kind.name())).count();
@@ -200,7 +200,7 @@ fn answer(kind: Kind, effect: &Effect, strength: f64, scored: &[(Channel, &Chann
 }
 
 /// The parameters of `effect` in the first channel that lists it.
-fn estimates(kind: Kind, effect: &Effect, scored: &[(Channel, &ChannelReport)], begin_s: f64) -> Vec<Estimate> {
+fn estimates(kind: Kind, effect: &InjectedEffect, scored: &[(Channel, &ChannelReport)], begin_s: f64) -> Vec<Estimate> {
     let found = scored
         .iter()
         .filter(|(channel, _)| shows_in(effect, *channel))

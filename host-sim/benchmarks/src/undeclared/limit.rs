@@ -29,7 +29,7 @@ use super::shape::GYROS;
 use noise_analysis::trace::normal::quantile;
 use noise_analysis::trace::sample_clock::HOST_CLOCK;
 use std::f64::consts::PI;
-use virtual_sensor::{Effect, OutputRegister};
+use virtual_sensor::{InjectedEffect, OutputRegister};
 
 /// Probability of a false alarm at which the limit is set.
 const FALSE_ALARM: f64 = 0.01;
@@ -41,38 +41,38 @@ const TIMES: f64 = 40.0;
 const AXES: f64 = 3.0;
 
 /// The size that an effect shaped like `shape` has at the limit, `others` being there already.
-pub(super) fn smallest(shape: &Effect, scene: &Scene<'_>, others: &[Effect]) -> f64 {
+pub(super) fn smallest(shape: &InjectedEffect, scene: &Scene<'_>, others: &[InjectedEffect]) -> f64 {
     let record = scene.record;
     let (seconds, period_s) = (record.seconds, record.period_s);
     let samples = seconds / period_s;
     let in_channel = |channel: OutputRegister| Place::of(scene, channel, others);
     match *shape {
-        Effect::Sinusoid { channel, frequency_hz, .. } => {
+        InjectedEffect::Sinusoid { channel, frequency_hz, .. } => {
             (needed(0.5 * samples) / record.line(in_channel(channel).sensed(frequency_hz))).sqrt()
         }
-        Effect::Resonance { channel, frequency_hz, bandwidth_hz, .. } => {
+        InjectedEffect::Resonance { channel, frequency_hz, bandwidth_hz, .. } => {
             let density = |frequency: f64| spectrum::resonance(frequency_hz, bandwidth_hz, period_s, frequency);
             let looks = 0.5 / period_s / bandwidth_hz;
             deviation(&in_channel(channel), looks, Some((frequency_hz, bandwidth_hz)), density)
         }
-        Effect::Markov { channel, time_constant_s, .. } => markov(&in_channel(channel), time_constant_s),
-        Effect::Telegraph { channel, time_constant_s, .. } => {
+        InjectedEffect::Markov { channel, time_constant_s, .. } => markov(&in_channel(channel), time_constant_s),
+        InjectedEffect::Telegraph { channel, time_constant_s, .. } => {
             telegraph(&in_channel(channel), time_constant_s, scene.seed)
         }
-        Effect::CommonMode { time_constant_s, .. } => {
+        InjectedEffect::CommonMode { time_constant_s, .. } => {
             let places = GYROS.map(in_channel);
             let alone = places.each_ref().map(|place| |frequency: f64| place.sensed(frequency));
             let alone: [&dyn Fn(f64) -> f64; 3] = [&alone[0], &alone[1], &alone[2]];
             let shape = |frequency: f64| spectrum::markov(time_constant_s, period_s, frequency);
             size(needed(TIME_CONSTANTS), |size| record.coherent(|frequency| size * size * shape(frequency), &alone))
         }
-        Effect::Quantization { channel, .. } => {
+        InjectedEffect::Quantization { channel, .. } => {
             let place = in_channel(channel);
             // It comes behind the filter.
             let density = |frequency: f64| spectrum::quantization(period_s, frequency) / place.gain(frequency);
             deviation(&place, 1.0, None, density)
         }
-        Effect::FilterBandwidth { taps_log2 } => {
+        InjectedEffect::FilterBandwidth { taps_log2 } => {
             let place = in_channel(OutputRegister::GyroX);
             let truth = |frequency: f64| {
                 let rounding = place.rounding(frequency);
@@ -81,40 +81,40 @@ pub(super) fn smallest(shape: &Effect, scene: &Scene<'_>, others: &[Effect]) -> 
             // There is no half a filter: how far it is from the limit is its strength.
             (needed(1.0) / against_declared(&place, None, truth)).sqrt()
         }
-        Effect::RateRamp { channel, .. } => {
+        InjectedEffect::RateRamp { channel, .. } => {
             waveform::smallest(1.0, &in_channel(channel), |block| block as f64 * waveform::block_s(record))
         }
-        Effect::BiasStep { channel, time_s, .. } => {
+        InjectedEffect::BiasStep { channel, time_s, .. } => {
             let at = time_s / waveform::block_s(record);
             waveform::smallest(TIMES, &in_channel(channel), |block| (1.0 - (at - block as f64)).clamp(0.0, 1.0))
         }
-        Effect::Temperature { channel, .. } => {
+        InjectedEffect::Temperature { channel, .. } => {
             let course = waveform::course(scene, OutputRegister::Temp);
             waveform::smallest(1.0, &in_channel(channel), |block| course[block])
         }
-        Effect::Supply { channel, .. } => {
+        InjectedEffect::Supply { channel, .. } => {
             let course = waveform::course(scene, OutputRegister::Supply);
             waveform::smallest(1.0, &in_channel(channel), |block| course[block])
         }
-        Effect::Acceleration { channel, .. } => {
+        InjectedEffect::Acceleration { channel, .. } => {
             let (place, motion) = (in_channel(channel), scene.surroundings.motion);
             let force = |frequency: f64| {
                 motion.deviation_g.powi(2) * spectrum::markov(motion.time_constant_s, period_s, frequency)
             };
             (needed(AXES) / record.matched(force, |frequency| place.sensed(frequency))).sqrt()
         }
-        Effect::Spikes { channel, rate_per_hour, .. } => {
+        InjectedEffect::Spikes { channel, rate_per_hour, .. } => {
             let place = in_channel(channel);
             let probability = rate_per_hour * period_s / 3600.0;
             let of_noise = size(needed(1.0), |size| events::spikes(samples, probability, size));
             of_noise / record.mean(|frequency| period_s / place.sensed(frequency)).sqrt()
         }
-        Effect::DroppedSamples { .. } => events::count(0.0) / samples,
-        Effect::RepeatedSamples { .. } => {
+        InjectedEffect::DroppedSamples { .. } => events::count(0.0) / samples,
+        InjectedEffect::RepeatedSamples { .. } => {
             let equal = |&channel: &OutputRegister| in_channel(channel).equal_by_chance();
             events::count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
         }
-        Effect::SampleClock { .. } => size(needed(1.0), |off| events::clock(off * HOST_CLOCK)) * HOST_CLOCK,
+        InjectedEffect::SampleClock { .. } => size(needed(1.0), |off| events::clock(off * HOST_CLOCK)) * HOST_CLOCK,
     }
 }
 

@@ -3,7 +3,7 @@
 use super::limit::spectrum::{self, Record};
 use adis16405_driver::GyroRange;
 use std::f64::consts::PI;
-use virtual_sensor::{ChannelNoise, Effect, NoiseModel, OutputRegister, Surroundings};
+use virtual_sensor::{ChannelNoise, Environment, InjectedEffect, NoiseModel, OutputRegister};
 
 /// A filter's null lets nothing through to tell of, and no less than this.
 const LEAST_GAIN: f64 = 1e-3;
@@ -11,7 +11,7 @@ const LEAST_GAIN: f64 = 1e-3;
 /// A recording to hide effects in.
 pub(super) struct Scene<'a> {
     pub(super) noise: &'a NoiseModel,
-    pub(super) surroundings: Surroundings,
+    pub(super) surroundings: Environment,
     pub(super) record: Record,
     pub(super) seed: u64,
 }
@@ -21,11 +21,11 @@ pub(super) struct Place<'a> {
     pub(super) channel: OutputRegister,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: Record,
-    others: &'a [Effect],
+    others: &'a [InjectedEffect],
 }
 
 impl<'a> Place<'a> {
-    pub(super) fn of(scene: &Scene<'a>, channel: OutputRegister, others: &'a [Effect]) -> Self {
+    pub(super) fn of(scene: &Scene<'a>, channel: OutputRegister, others: &'a [InjectedEffect]) -> Self {
         Self { channel, noise: scene.noise.channel(channel), record: scene.record, others }
     }
 
@@ -33,14 +33,16 @@ impl<'a> Place<'a> {
         simulation::channel(self.channel).lsb(GyroRange::Dps300)
     }
 
-    fn others(&self) -> impl Iterator<Item = &Effect> {
+    fn others(&self) -> impl Iterator<Item = &InjectedEffect> {
         self.others.iter().filter(|effect| effect.channels().contains(&self.channel))
     }
 
     /// Power that the part's filter lets through.
     pub(super) fn gain(&self, frequency: f64) -> f64 {
-        let filter = |effect: &Effect| match *effect {
-            Effect::FilterBandwidth { taps_log2 } => spectrum::filter(taps_log2, self.record.period_s, frequency),
+        let filter = |effect: &InjectedEffect| match *effect {
+            InjectedEffect::FilterBandwidth { taps_log2 } => {
+                spectrum::filter(taps_log2, self.record.period_s, frequency)
+            }
             _ => 1.0,
         };
         self.others.iter().map(filter).product()
@@ -49,9 +51,11 @@ impl<'a> Place<'a> {
     /// Correlation time and variance of the slow processes among the others.
     pub(super) fn processes(&self) -> impl Iterator<Item = (f64, f64)> {
         self.others().filter_map(|effect| match *effect {
-            Effect::Markov { time_constant_s, deviation, .. }
-            | Effect::CommonMode { time_constant_s, deviation, .. } => Some((time_constant_s, deviation * deviation)),
-            Effect::Telegraph { time_constant_s, amplitude, .. } => {
+            InjectedEffect::Markov { time_constant_s, deviation, .. }
+            | InjectedEffect::CommonMode { time_constant_s, deviation, .. } => {
+                Some((time_constant_s, deviation * deviation))
+            }
+            InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
                 Some((time_constant_s, 0.25 * amplitude * amplitude))
             }
             _ => None,
@@ -61,8 +65,10 @@ impl<'a> Place<'a> {
     /// Density of the spikes among the others.
     fn spikes(&self) -> f64 {
         let period_s = self.record.period_s;
-        let spikes = |effect: &Effect| match *effect {
-            Effect::Spikes { rate_per_hour, size, .. } => size * size * rate_per_hour * period_s / 3600.0 * period_s,
+        let spikes = |effect: &InjectedEffect| match *effect {
+            InjectedEffect::Spikes { rate_per_hour, size, .. } => {
+                size * size * rate_per_hour * period_s / 3600.0 * period_s
+            }
             _ => 0.0,
         };
         self.others().map(spikes).sum()
@@ -79,7 +85,7 @@ impl<'a> Place<'a> {
         let slow: f64 =
             self.processes().map(|(time_s, variance)| variance * spectrum::markov(time_s, period_s, frequency)).sum();
         let resonances = self.others().map(|effect| match *effect {
-            Effect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+            InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
                 deviation * deviation * spectrum::resonance(frequency_hz, bandwidth_hz, period_s, frequency)
             }
             _ => 0.0,
@@ -90,8 +96,8 @@ impl<'a> Place<'a> {
     /// Density of what comes on top behind the filter: the rounding to counts, and to coarser steps of an angle.
     pub(super) fn rounding(&self, frequency: f64) -> f64 {
         let period_s = self.record.period_s;
-        let angle = |effect: &Effect| match *effect {
-            Effect::Quantization { coefficient, .. } => {
+        let angle = |effect: &InjectedEffect| match *effect {
+            InjectedEffect::Quantization { coefficient, .. } => {
                 coefficient * coefficient * spectrum::quantization(period_s, frequency)
             }
             _ => 0.0,

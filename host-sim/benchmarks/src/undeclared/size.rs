@@ -6,7 +6,7 @@ use super::limit::smallest;
 use super::place::Scene;
 use super::shape::{self, scaled, size};
 use rand_chacha::ChaCha8Rng;
-use virtual_sensor::{Effect, OutputRegister};
+use virtual_sensor::{InjectedEffect, OutputRegister};
 
 /// Largest quantum of an angle, in white angle steps of a sample: with coarser ones the error is not white.
 const COARSEST: f64 = 1.0;
@@ -27,10 +27,10 @@ pub(super) fn hide(
     scene: &Scene<'_>,
     channel: impl Fn(&mut ChaCha8Rng) -> OutputRegister,
     random: &mut ChaCha8Rng,
-) -> (Vec<Effect>, Vec<f64>) {
+) -> (Vec<InjectedEffect>, Vec<f64>) {
     let mut hidden = (Vec::new(), Vec::new());
     for _ in 0..DRAWS {
-        let mut effects: Vec<Effect> = Vec::new();
+        let mut effects: Vec<InjectedEffect> = Vec::new();
         for &kind in kinds {
             let channel = channel(random);
             let strength = log_uniform(random, range.0, range.1);
@@ -48,22 +48,22 @@ pub(super) fn hide(
 }
 
 /// Of the effect `at`, beside the others.
-fn strength(effects: &[Effect], at: usize, scene: &Scene<'_>) -> f64 {
-    let others: Vec<Effect> =
+fn strength(effects: &[InjectedEffect], at: usize, scene: &Scene<'_>) -> f64 {
+    let others: Vec<InjectedEffect> =
         effects.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, effect)| effect.clone()).collect();
     size(&effects[at]) / smallest(&effects[at], scene, &others)
 }
 
-fn of_strength(shape: Effect, strength: f64, limit: f64, scene: &Scene<'_>) -> Effect {
+fn of_strength(shape: InjectedEffect, strength: f64, limit: f64, scene: &Scene<'_>) -> InjectedEffect {
     // Numbers of events scatter by their root: twice the sigmas is four times the number.
     let squared = strength * strength * limit;
     let size = match shape {
-        Effect::Quantization { channel, .. } => {
+        InjectedEffect::Quantization { channel, .. } => {
             let white = scene.noise.channel(channel).angle_random_walk * scene.record.period_s.sqrt();
             (strength * limit).min(COARSEST * white / 12f64.sqrt())
         }
-        Effect::DroppedSamples { .. } | Effect::RepeatedSamples { .. } => squared.min(MOST),
-        Effect::SampleClock { .. } => squared.min(FARTHEST),
+        InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => squared.min(MOST),
+        InjectedEffect::SampleClock { .. } => squared.min(FARTHEST),
         _ => strength * limit,
     };
     scaled(shape, size)

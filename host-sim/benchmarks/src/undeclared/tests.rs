@@ -17,7 +17,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use virtual_sensor::{ChannelNoise, Effect, NoiseModel, OutputRegister, Surroundings};
+use virtual_sensor::{ChannelNoise, Environment, InjectedEffect, NoiseModel, OutputRegister};
 
 const PERIOD_S: f64 = 1.0 / 204.8;
 const RECORD: Record = Record { seconds: 1800.0, period_s: PERIOD_S };
@@ -92,7 +92,7 @@ fn limits_in_white_noise_are_those_of_the_textbook() {
     let expected = 0.5 * 1800.0 / 4.0 / 0.25;
     let mut model = NoiseModel::paper();
     *model.channel_mut(OutputRegister::GyroX) = white;
-    let scene = Scene { noise: &model, surroundings: Surroundings::default(), record: RECORD, seed: 1 };
+    let scene = Scene { noise: &model, surroundings: Environment::default(), record: RECORD, seed: 1 };
     // Rounding adds a thousandth of the noise.
     let rounding = 0.05f64.powi(2) / 12.0 * PERIOD_S / 0.25;
     let place = Place::of(&scene, OutputRegister::GyroX, &[]);
@@ -110,34 +110,39 @@ fn limits_in_white_noise_are_those_of_the_textbook() {
 fn a_limit_knows_the_other_effect() {
     let mut noise = NoiseModel::paper();
     *noise.channel_mut(OutputRegister::GyroX) = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
-    let scene = Scene { noise: &noise, surroundings: Surroundings::default(), record: RECORD, seed: 1 };
+    let scene = Scene { noise: &noise, surroundings: Environment::default(), record: RECORD, seed: 1 };
     let channel = OutputRegister::GyroX;
     let near = |ratio: f64, expected: f64| assert!((ratio / expected - 1.0).abs() < 0.01, "{ratio}, {expected}");
-    let larger = |shape: &Effect, other: Effect| smallest(shape, &scene, &[other]) / smallest(shape, &scene, &[]);
+    let larger = |shape: &InjectedEffect, other: InjectedEffect| {
+        smallest(shape, &scene, &[other]) / smallest(shape, &scene, &[])
+    };
 
     // A line in the middle of a resonance stands in both densities.
-    let line = Effect::Sinusoid { channel, frequency_hz: 20.0, amplitude: 1.0, phase_rad: 0.0 };
-    let resonance = Effect::Resonance { channel, frequency_hz: 20.0, bandwidth_hz: 1.0, deviation: 2.0 };
+    let line = InjectedEffect::Sinusoid { channel, frequency_hz: 20.0, amplitude: 1.0, phase_rad: 0.0 };
+    let resonance = InjectedEffect::Resonance { channel, frequency_hz: 20.0, bandwidth_hz: 1.0, deviation: 2.0 };
     near(larger(&line, resonance), ((0.25 + 0.5 * 4.0 * 2.0 / (PI * 1.0)) / 0.25f64).sqrt());
     // A filter takes as much off the noise as off the line: only rounding, 1 % of the noise here and there, is left.
     let rounding = |gain: f64| (0.25 + 0.05f64.powi(2) / 12.0 * PERIOD_S / gain) / 0.25;
     let gain = spectrum::filter(2, PERIOD_S, 20.0);
-    near(larger(&line, Effect::FilterBandwidth { taps_log2: 2 }), (rounding(gain) / rounding(1.0)).sqrt());
+    near(larger(&line, InjectedEffect::FilterBandwidth { taps_log2: 2 }), (rounding(gain) / rounding(1.0)).sqrt());
     // For a ramp, a process that forgets within a block is white noise of the density 2·σ²·T.
-    let ramp = Effect::RateRamp { channel, slope: 1.0 };
-    let markov = Effect::Markov { channel, time_constant_s: 0.5, deviation: 1.0 };
+    let ramp = InjectedEffect::RateRamp { channel, slope: 1.0 };
+    let markov = InjectedEffect::Markov { channel, time_constant_s: 0.5, deviation: 1.0 };
     near(larger(&ramp, markov), ((0.25 + 2.0 * 0.5) / 0.25f64).sqrt());
     // Spikes are more white noise, and a known waveform is nothing.
-    let spikes = Effect::Spikes { channel, rate_per_hour: 3600.0, size: 10.0 };
+    let spikes = InjectedEffect::Spikes { channel, rate_per_hour: 3600.0, size: 10.0 };
     near(larger(&ramp, spikes.clone()), ((0.25 + 100.0 * PERIOD_S * PERIOD_S) / 0.25f64).sqrt());
     near(larger(&spikes, ramp), 1.0);
     // What shows elsewhere is nothing either.
-    near(larger(&line, Effect::Markov { channel: OutputRegister::GyroY, time_constant_s: 1.0, deviation: 9.0 }), 1.0);
+    near(
+        larger(&line, InjectedEffect::Markov { channel: OutputRegister::GyroY, time_constant_s: 1.0, deviation: 9.0 }),
+        1.0,
+    );
 }
 
 #[test]
 fn sizes_scale() {
-    let scene = Scene { noise: &NoiseModel::paper(), surroundings: Surroundings::default(), record: RECORD, seed: 1 };
+    let scene = Scene { noise: &NoiseModel::paper(), surroundings: Environment::default(), record: RECORD, seed: 1 };
     let mut random = ChaCha8Rng::seed_from_u64(5);
     for kind in Kind::ALL {
         let unit = shape::draw(kind, OutputRegister::GyroY, &scene, &mut random);
@@ -182,7 +187,7 @@ fn a_seed_says_everything_and_sealed_seeds_are_others() {
     for kind in Kind::ALL {
         let drawn = case(Group::Single(kind), 1800.0, 7);
         assert_eq!(drawn, Case::draw(&[kind], 1800.0, 7));
-        assert_eq!(drawn.simulation.hidden.effects[0].name(), kind.name());
+        assert_eq!(drawn.simulation.scenario.effects[0].name(), kind.name());
         assert!(drawn.strengths[0] > 0.0, "{kind:?}");
         assert_ne!(drawn, case(Group::Single(kind), 1800.0, 8));
     }
@@ -250,9 +255,10 @@ fn report(found: &[Found<'_>]) -> Report {
 #[test]
 fn an_answer_counts_where_the_effect_is_and_a_false_alarm_everywhere() {
     let mut case = Case::draw(&[Kind::Sinusoid], 60.0, 1);
-    case.simulation.hidden.surroundings.motion.deviation_g = 0.0;
+    case.simulation.scenario.environment.motion.deviation_g = 0.0;
     let (channel, frequency_hz, amplitude) = (OutputRegister::GyroY, 20.0, 0.5);
-    case.simulation.hidden.effects = vec![Effect::Sinusoid { channel, frequency_hz, amplitude, phase_rad: 0.0 }];
+    case.simulation.scenario.effects =
+        vec![InjectedEffect::Sinusoid { channel, frequency_hz, amplitude, phase_rad: 0.0 }];
 
     let parameters: &[_] = &[("frequency", 20.1), ("amplitude", 0.4)];
     let right = score(&case, &report(&[(Channel::GyroY, "sinusoid", parameters)]), 0.0);
@@ -270,14 +276,14 @@ fn an_answer_counts_where_the_effect_is_and_a_false_alarm_everywhere() {
     assert_eq!(otherwise.false_alarms, ["gyro_y: markov"]);
 
     // What a moved accelerometer shows is the motion.
-    case.simulation.hidden.surroundings.motion.deviation_g = 0.1;
+    case.simulation.scenario.environment.motion.deviation_g = 0.1;
     assert_eq!(score(&case, &report(&[(Channel::AcclX, "markov", &[])]), 0.0).false_alarms, [""; 0]);
 }
 
 #[test]
 fn a_common_effect_needs_half_of_its_channels() {
     let mut case = Case::draw(&[Kind::FilterBandwidth], 60.0, 1);
-    case.simulation.hidden.surroundings.motion.deviation_g = 0.0;
+    case.simulation.scenario.environment.motion.deviation_g = 0.0;
     let listed = |count: usize| {
         let found: Vec<_> =
             Channel::INERTIAL[..count].iter().map(|&channel| (channel, "filter_bandwidth", &[][..])).collect();
@@ -291,7 +297,7 @@ fn a_common_effect_needs_half_of_its_channels() {
 /// beside ten octaves, less than twice the true model's error on average.
 #[test]
 fn the_truth_scores_one_and_its_terms_fitted_little_more() {
-    let channel = |case: &Case| simulation::channel(case.simulation.hidden.effects[0].channels()[0]);
+    let channel = |case: &Case| simulation::channel(case.simulation.scenario.effects[0].channels()[0]);
     let errors: Vec<_> = (0..8)
         .map(|seed| Case::draw(&[Kind::Sinusoid], 60.0, seed))
         .map(|case| truth::unseen_error(&case, channel(&case)).unwrap().unwrap())

@@ -10,51 +10,54 @@ use allan_core::{Cascade, Kind, Model};
 use firmware::{OCTAVES, OVERLAP};
 use recordings::recording::Sample;
 use simulation::output_register;
-use simulation::record::{RecordError, SAMPLE_RATE_HZ, Simulation};
-use virtual_sensor::{ChannelNoise, Effect, Hidden, OutputRegister};
+use simulation::{SAMPLE_RATE_HZ, Simulation, SimulationError};
+use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister, SensorScenario};
 
 /// Names and values of the parameters of `effect` as a report calls them; times count from the part's start.
-pub(super) fn parameters(effect: &Effect) -> Vec<(&'static str, f64)> {
+pub(super) fn parameters(effect: &InjectedEffect) -> Vec<(&'static str, f64)> {
     match *effect {
-        Effect::Sinusoid { frequency_hz, amplitude, .. } => {
+        InjectedEffect::Sinusoid { frequency_hz, amplitude, .. } => {
             vec![("frequency", frequency_hz), ("amplitude", amplitude)]
         }
-        Effect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+        InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
             vec![("frequency", frequency_hz), ("bandwidth", bandwidth_hz), ("deviation", deviation)]
         }
-        Effect::Markov { time_constant_s, deviation, .. } | Effect::CommonMode { time_constant_s, deviation, .. } => {
+        InjectedEffect::Markov { time_constant_s, deviation, .. }
+        | InjectedEffect::CommonMode { time_constant_s, deviation, .. } => {
             vec![("time_constant", time_constant_s), ("deviation", deviation)]
         }
-        Effect::Telegraph { time_constant_s, amplitude, .. } => {
+        InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
             vec![("time_constant", time_constant_s), ("amplitude", amplitude)]
         }
-        Effect::Quantization { coefficient, .. } => vec![("value", coefficient)],
-        Effect::RateRamp { slope, .. } => vec![("slope", slope)],
-        Effect::FilterBandwidth { taps_log2 } => vec![("taps", f64::from(1u32 << taps_log2))],
-        Effect::Temperature { sensitivity, .. } | Effect::Supply { sensitivity, .. } => {
+        InjectedEffect::Quantization { coefficient, .. } => vec![("value", coefficient)],
+        InjectedEffect::RateRamp { slope, .. } => vec![("slope", slope)],
+        InjectedEffect::FilterBandwidth { taps_log2 } => vec![("taps", f64::from(1u32 << taps_log2))],
+        InjectedEffect::Temperature { sensitivity, .. } | InjectedEffect::Supply { sensitivity, .. } => {
             vec![("sensitivity", sensitivity)]
         }
-        Effect::Acceleration { sensitivity: [x, y, z], .. } => {
+        InjectedEffect::Acceleration { sensitivity: [x, y, z], .. } => {
             vec![("sensitivity_x", x), ("sensitivity_y", y), ("sensitivity_z", z)]
         }
-        Effect::Spikes { rate_per_hour, size, .. } => vec![("rate", rate_per_hour), ("size", size)],
-        Effect::BiasStep { time_s, size, .. } => vec![("time", time_s), ("size", size)],
-        Effect::DroppedSamples { fraction } | Effect::RepeatedSamples { fraction } => vec![("fraction", fraction)],
-        Effect::SampleClock { ratio } => vec![("rate_hz", SAMPLE_RATE_HZ * ratio)],
+        InjectedEffect::Spikes { rate_per_hour, size, .. } => vec![("rate", rate_per_hour), ("size", size)],
+        InjectedEffect::BiasStep { time_s, size, .. } => vec![("time", time_s), ("size", size)],
+        InjectedEffect::DroppedSamples { fraction } | InjectedEffect::RepeatedSamples { fraction } => {
+            vec![("fraction", fraction)]
+        }
+        InjectedEffect::SampleClock { ratio } => vec![("rate_hz", SAMPLE_RATE_HZ * ratio)],
     }
 }
 
 /// Whether the effect can be taken out of the data; else it is a term of the true model.
-fn can_be_taken_out(effect: &Effect) -> bool {
+fn can_be_taken_out(effect: &InjectedEffect) -> bool {
     !matches!(
         effect,
-        Effect::Sinusoid { .. }
-            | Effect::Resonance { .. }
-            | Effect::Markov { .. }
-            | Effect::Telegraph { .. }
-            | Effect::Quantization { .. }
-            | Effect::RateRamp { .. }
-            | Effect::FilterBandwidth { .. }
+        InjectedEffect::Sinusoid { .. }
+            | InjectedEffect::Resonance { .. }
+            | InjectedEffect::Markov { .. }
+            | InjectedEffect::Telegraph { .. }
+            | InjectedEffect::Quantization { .. }
+            | InjectedEffect::RateRamp { .. }
+            | InjectedEffect::FilterBandwidth { .. }
     )
 }
 
@@ -72,16 +75,16 @@ pub(super) struct UnseenError {
 ///
 /// # Errors
 /// The recording without the effects cannot be made.
-pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<UnseenError>, RecordError> {
-    let effects: Vec<Effect> =
-        case.simulation.hidden.effects.iter().filter(|effect| !can_be_taken_out(effect)).cloned().collect();
+pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<UnseenError>, SimulationError> {
+    let effects: Vec<InjectedEffect> =
+        case.simulation.scenario.effects.iter().filter(|effect| !can_be_taken_out(effect)).cloned().collect();
     let model = model(case.simulation.noise.channel(output_register(channel)), channel, &effects);
     // Random streams go by the order of the effects, so the place of those that are taken out is kept by size 0.
-    let hidden = Hidden {
-        effects: case.simulation.hidden.effects.iter().map(nothing_if_taken_out).collect(),
-        ..case.simulation.hidden.clone()
+    let hidden = SensorScenario {
+        effects: case.simulation.scenario.effects.iter().map(nothing_if_taken_out).collect(),
+        ..case.simulation.scenario.clone()
     };
-    let recording = Simulation { hidden, ..case.simulation.clone() }.run(|_| ())?;
+    let recording = Simulation { scenario: hidden, ..case.simulation.clone() }.run(|_| ())?;
     let (first, second) = recording.samples.split_at(recording.samples.len() / 2);
     let curve = |samples: &[Sample]| curve(samples, channel, recording.range);
     let mut kinds: Vec<Kind> = model.terms().iter().map(|term| term.kind).collect();
@@ -91,16 +94,16 @@ pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<Unsee
     Ok(error(&model).zip(error(&fitted)).map(|(model, fitted)| UnseenError { model, fitted }))
 }
 
-fn nothing_if_taken_out(effect: &Effect) -> Effect {
+fn nothing_if_taken_out(effect: &InjectedEffect) -> InjectedEffect {
     let channel = effect.channels().first().copied().unwrap_or(OutputRegister::AuxAdc);
-    if can_be_taken_out(effect) { Effect::RateRamp { channel, slope: 0.0 } } else { effect.clone() }
+    if can_be_taken_out(effect) { InjectedEffect::RateRamp { channel, slope: 0.0 } } else { effect.clone() }
 }
 
-fn model(noise: &ChannelNoise, channel: Channel, effects: &[Effect]) -> Model {
+fn model(noise: &ChannelNoise, channel: Channel, effects: &[InjectedEffect]) -> Model {
     let period_s = 1.0 / SAMPLE_RATE_HZ;
     let rounding = channel.lsb(GyroRange::Dps300) * (period_s / 12.0).sqrt();
     let taps = effects.iter().find_map(|effect| match effect {
-        Effect::FilterBandwidth { taps_log2 } => Some(1u16 << taps_log2),
+        InjectedEffect::FilterBandwidth { taps_log2 } => Some(1u16 << taps_log2),
         _ => None,
     });
     let white = taps.map_or(Kind::AngleRandomWalk, |taps| Kind::Filtered(Filter::bartlett(taps)));
@@ -114,22 +117,22 @@ fn model(noise: &ChannelNoise, channel: Channel, effects: &[Effect]) -> Model {
     Model::new(period_s, declared.into_iter().chain(own.filter_map(term)))
 }
 
-fn term(effect: &Effect) -> Option<Term> {
+fn term(effect: &InjectedEffect) -> Option<Term> {
     let (kind, value) = match *effect {
-        Effect::Sinusoid { frequency_hz, amplitude, .. } => {
+        InjectedEffect::Sinusoid { frequency_hz, amplitude, .. } => {
             (Kind::Sinusoid(Sinusoid { frequency: frequency_hz }), amplitude)
         }
-        Effect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+        InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
             (Kind::Resonance(Resonance { frequency: frequency_hz, bandwidth: bandwidth_hz }), deviation)
         }
-        Effect::Markov { time_constant_s, deviation, .. } => {
+        InjectedEffect::Markov { time_constant_s, deviation, .. } => {
             (Kind::Markov(Markov { time_constant: time_constant_s }), deviation)
         }
-        Effect::Telegraph { time_constant_s, amplitude, .. } => {
+        InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
             (Kind::Markov(Markov { time_constant: time_constant_s }), 0.5 * amplitude)
         }
-        Effect::Quantization { coefficient, .. } => (Kind::Quantization, coefficient),
-        Effect::RateRamp { slope, .. } => (Kind::RateRamp, slope.abs()),
+        InjectedEffect::Quantization { coefficient, .. } => (Kind::Quantization, coefficient),
+        InjectedEffect::RateRamp { slope, .. } => (Kind::RateRamp, slope.abs()),
         _ => return None,
     };
     Some(Term::exact(kind, value))

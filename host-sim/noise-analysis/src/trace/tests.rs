@@ -9,9 +9,9 @@ use super::{
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use adis16405_driver::Channel;
 use measurement::Measurement;
-use simulation::record::{Host, Simulation};
-use virtual_sensor::effect::surroundings::TemperatureCourse;
-use virtual_sensor::{Effect, Hidden, OutputRegister, Surroundings};
+use simulation::{HostClock, Simulation};
+use virtual_sensor::TemperatureProfile;
+use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario};
 
 const GYRO: Channel = Channel::GyroY;
 const SENSED_GYRO: OutputRegister = OutputRegister::GyroY;
@@ -26,11 +26,11 @@ struct Case {
 }
 
 impl Case {
-    fn hiding(effects: Vec<Effect>, seconds: f64, seed: u64) -> Self {
+    fn hiding(effects: Vec<InjectedEffect>, seconds: f64, seed: u64) -> Self {
         Self::of(Simulation {
-            hidden: Hidden { effects, surroundings: Surroundings::default() },
-            host: Host { latency_s: 30e-6, clock_ratio: 1.0 },
-            ..Simulation::of_paper(seconds, seed)
+            scenario: SensorScenario { effects, environment: Environment::default() },
+            host: HostClock { latency_s: 30e-6, clock_ratio: 1.0 },
+            ..Simulation::paper(seconds, seed)
         })
     }
 
@@ -79,7 +79,7 @@ fn noise_alone_is_not_an_effect() {
 #[test]
 fn a_walk_ten_times_as_strong_is_no_step() {
     for seed in 10..13 {
-        let mut simulation = Simulation::of_paper(400.0, seed);
+        let mut simulation = Simulation::paper(400.0, seed);
         for channel in OutputRegister::INERTIAL {
             simulation.noise.channel_mut(channel).rate_random_walk *= 10.0;
         }
@@ -90,7 +90,8 @@ fn a_walk_ten_times_as_strong_is_no_step() {
 #[test]
 fn spikes_are_counted_measured_and_taken_out() {
     let size = 9.0 * white();
-    let case = Case::hiding(vec![Effect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
+    let case =
+        Case::hiding(vec![InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
     let series = case.series(GYRO);
     let finding = spikes::find(&series).unwrap();
     assert_eq!(finding.effect.kind, "spikes");
@@ -110,7 +111,7 @@ fn spikes_are_counted_measured_and_taken_out() {
 #[test]
 fn spikes_show_in_filtered_noise_where_a_difference_would_drown_them() {
     // A disturbance after the filter, so it is added to what was read.
-    let case = Case::hiding(vec![Effect::FilterBandwidth { taps_log2: 3 }], 200.0, 3);
+    let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 3 }], 200.0, 3);
     let mut series = case.series(GYRO);
     assert_eq!(spikes::find(&series), None);
     // Two averages of 8 leave 0.29 of the white noise: 1.7 of its σ, but much more beside such like neighbours.
@@ -121,7 +122,7 @@ fn spikes_show_in_filtered_noise_where_a_difference_would_drown_them() {
 
 #[test]
 fn a_step_is_placed_measured_and_taken_out() {
-    let step = Effect::BiasStep { channel: SENSED_GYRO, time_s: 333.0, size: -0.15 };
+    let step = InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 333.0, size: -0.15 };
     let case = Case::hiding(vec![step], 600.0, 4);
     let series = case.series(GYRO);
     let finding = level(&series).step.unwrap();
@@ -135,23 +136,23 @@ fn a_step_is_placed_measured_and_taken_out() {
 
 #[test]
 fn a_level_that_moves_otherwise_is_no_step() {
-    let ramp = Effect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 };
+    let ramp = InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 };
     assert_eq!(level(&Case::hiding(vec![ramp], 600.0, 5).series(GYRO)).step, None);
 
-    let telegraph = Effect::Telegraph { channel: SENSED_GYRO, time_constant_s: 20.0, amplitude: 0.3 };
+    let telegraph = InjectedEffect::Telegraph { channel: SENSED_GYRO, time_constant_s: 20.0, amplitude: 0.3 };
     assert_eq!(level(&Case::hiding(vec![telegraph], 600.0, 6).series(GYRO)).step, None);
 
-    let mut simulation = Simulation::of_paper(600.0, 7);
-    simulation.hidden.effects = vec![Effect::Temperature { channel: SENSED_GYRO, sensitivity: 0.05 }];
-    simulation.hidden.surroundings.temperature =
-        TemperatureCourse { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureCourse::default() };
+    let mut simulation = Simulation::paper(600.0, 7);
+    simulation.scenario.effects = vec![InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: 0.05 }];
+    simulation.scenario.environment.temperature =
+        TemperatureProfile { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureProfile::default() };
     let case = Case::of(simulation);
     assert_eq!(level::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &NoiseTable::default()).step, None);
 }
 
 #[test]
 fn a_ramp_is_measured_and_told_from_a_step() {
-    let case = Case::hiding(vec![Effect::RateRamp { channel: SENSED_GYRO, slope: -1e-3 }], 600.0, 14);
+    let case = Case::hiding(vec![InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: -1e-3 }], 600.0, 14);
     let series = case.series(GYRO);
     let finding = level(&series).ramp.unwrap();
     assert_covers(&finding, "slope", -1e-3);
@@ -163,15 +164,15 @@ fn a_ramp_is_measured_and_told_from_a_step() {
     }
     assert_eq!(level(&levelled).ramp, None);
 
-    let step = Effect::BiasStep { channel: SENSED_GYRO, time_s: 300.0, size: 0.3 };
+    let step = InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 300.0, size: 0.3 };
     assert_eq!(level(&Case::hiding(vec![step], 600.0, 15).series(GYRO)).ramp, None);
 }
 
 #[test]
 fn a_ramp_and_a_step_are_found_beside_each_other() {
     let effects = vec![
-        Effect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 },
-        Effect::BiasStep { channel: SENSED_GYRO, time_s: 200.0, size: 0.3 },
+        InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 },
+        InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 200.0, size: 0.3 },
     ];
     let Level { step, ramp, .. } = level(&Case::hiding(effects, 600.0, 16).series(GYRO));
     assert_covers(&ramp.unwrap(), "slope", 1e-3);
@@ -183,14 +184,14 @@ fn a_ramp_and_a_step_are_found_beside_each_other() {
 
 #[test]
 fn a_slow_cause_is_told_from_a_ramp() {
-    let warming = |effect: Effect, rise_c: f64, seed: u64| {
-        let mut simulation = Simulation::of_paper(600.0, seed);
-        simulation.hidden.effects = vec![effect];
-        simulation.hidden.surroundings.temperature =
-            TemperatureCourse { rise_c, time_constant_s: 100.0, ..TemperatureCourse::default() };
+    let warming = |effect: InjectedEffect, rise_c: f64, seed: u64| {
+        let mut simulation = Simulation::paper(600.0, seed);
+        simulation.scenario.effects = vec![effect];
+        simulation.scenario.environment.temperature =
+            TemperatureProfile { rise_c, time_constant_s: 100.0, ..TemperatureProfile::default() };
         Case::of(simulation)
     };
-    let case = warming(Effect::Temperature { channel: SENSED_GYRO, sensitivity: -0.05 }, 8.0, 17);
+    let case = warming(InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: -0.05 }, 8.0, 17);
     let follows = |case: &Case, channel: Channel| {
         level::find(&case.series(channel), &[&case.series(Channel::Temp)], &NoiseTable::default())
     };
@@ -201,11 +202,11 @@ fn a_slow_cause_is_told_from_a_ramp() {
     assert!(followed.error < 0.005, "{followed:?}");
     assert_eq!(follows(&case, Channel::GyroX), Level::default());
     // A temperature that stays within half a count of 0.14 °C has not been seen to move.
-    let still = warming(Effect::Temperature { channel: SENSED_GYRO, sensitivity: -5.0 }, 0.07, 17);
+    let still = warming(InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: -5.0 }, 0.07, 17);
     assert_eq!(follows(&still, GYRO).followed, []);
 
     let Level { ramp, followed, .. } =
-        follows(&warming(Effect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 }, 8.0, 18), GYRO);
+        follows(&warming(InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 }, 8.0, 18), GYRO);
     assert!(ramp.is_some() && followed.is_empty(), "{ramp:?} {followed:?}");
 }
 
@@ -227,16 +228,16 @@ fn values_that_skip_counts_have_a_coarser_step() {
 
 #[test]
 fn lost_and_repeated_samples_are_counted() {
-    let lossy = Case::hiding(vec![Effect::DroppedSamples { fraction: 2e-3 }], 200.0, 8);
+    let lossy = Case::hiding(vec![InjectedEffect::DroppedSamples { fraction: 2e-3 }], 200.0, 8);
     let finding = deliveries::dropped(&lossy.measurement).unwrap();
     assert_covers(&finding, "fraction", 2e-3);
     assert_eq!(deliveries::repeated(&lossy.measurement), None);
 
     // Neighbours are equal all the time behind a long filter, and none is repeated.
-    let slow = Case::hiding(vec![Effect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
+    let slow = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
     assert_eq!(deliveries::repeated(&slow.measurement), None);
 
-    let stale = Case::hiding(vec![Effect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
+    let stale = Case::hiding(vec![InjectedEffect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
     let finding = deliveries::repeated(&stale.measurement).unwrap();
     assert_covers(&finding, "fraction", 2e-3);
     assert_eq!(deliveries::dropped(&stale.measurement), None);
@@ -247,14 +248,14 @@ fn lost_and_repeated_samples_are_counted() {
 
 #[test]
 fn a_clock_that_is_off_is_told_from_a_host_that_is() {
-    let simulation = |effects: Vec<Effect>, clock_ratio: f64| Simulation {
-        hidden: Hidden { effects, ..Hidden::default() },
-        host: Host { latency_s: 30e-6, clock_ratio },
-        ..Simulation::of_paper(100.0, 10)
+    let simulation = |effects: Vec<InjectedEffect>, clock_ratio: f64| Simulation {
+        scenario: SensorScenario { effects, ..SensorScenario::default() },
+        host: HostClock { latency_s: 30e-6, clock_ratio },
+        ..Simulation::paper(100.0, 10)
     };
     let find = |case: Case| sample_clock::find(&case.measurement);
     // The data sheet's tolerance is parts in a hundred, a host's parts in a hundred thousand.
-    let off = find(Case::of(simulation(vec![Effect::SampleClock { ratio: 0.997 }], 1.0 + 20e-6))).unwrap();
+    let off = find(Case::of(simulation(vec![InjectedEffect::SampleClock { ratio: 0.997 }], 1.0 + 20e-6))).unwrap();
     assert_covers(&off, "rate_hz", 204.8 * 0.997);
     assert_eq!(find(Case::of(simulation(Vec::new(), 1.0 + 40e-6))), None);
 }

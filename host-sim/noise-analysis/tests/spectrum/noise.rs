@@ -5,8 +5,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::f64::consts::{PI, TAU};
-use virtual_sensor::filter::Bartlett;
-use virtual_sensor::noise::NoiseSource;
+use virtual_sensor::BartlettFilter;
+use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
 pub(crate) const RATE_HZ: f64 = 204.8;
@@ -25,11 +25,11 @@ pub(crate) const PAPER: Output<'static> = Output { noise: [0.0368, 0.0093, 0.001
 
 impl Output<'_> {
     pub(crate) fn samples(&self, samples: usize, seed: u64) -> Grid {
-        let mut model = NoiseModel::still();
+        let mut model = NoiseModel::noiseless();
         let gyro = model.channel_mut(OutputRegister::GyroX);
         [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = self.noise;
         let mut source = NoiseSource::new(&model, seed, 1.0 / RATE_HZ);
-        let mut filter = Bartlett::new(self.taps_log2);
+        let mut filter = BartlettFilter::new(self.taps_log2);
         let value = |at: usize| {
             let added = self.added.get(at).copied().unwrap_or(0.0);
             (filter.filter(source.sample()[OutputRegister::GyroX as usize] + added) / LSB).round() * LSB

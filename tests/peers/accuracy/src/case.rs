@@ -1,6 +1,6 @@
 //! The three cases: series whose noise is known.
 
-use virtual_sensor::noise::NoiseSource;
+use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
 /// Samples of a series.
@@ -32,7 +32,7 @@ impl Case {
     /// [`BATCH`] independent series of [`SAMPLES`] samples.
     pub(crate) fn series(&self, seed: u64) -> Vec<Vec<f64>> {
         let channels = &OutputRegister::ALL[1..=BATCH];
-        let mut model = NoiseModel::still();
+        let mut model = NoiseModel::noiseless();
         for &channel in channels {
             let noise = model.channel_mut(channel);
             noise.bias = 0.0;

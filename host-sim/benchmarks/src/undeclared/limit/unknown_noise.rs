@@ -10,19 +10,19 @@ use noise_analysis::trace::block::Blocks;
 use noise_analysis::trace::evidence::Evidence;
 use noise_analysis::trace::level::SIGNIFICANCE;
 use noise_analysis::trace::noises::NoiseTable;
-use virtual_sensor::Effect;
+use virtual_sensor::InjectedEffect;
 
 /// Whether such a test sees `effect` at the probability of chance that the analysis asks for; `None` for effects that are
 /// not a known course of the level. `begin_s` is when the recording begins, counted from the part's start.
-pub(crate) fn sees(effect: &Effect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
+pub(crate) fn sees(effect: &InjectedEffect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
     let series = |channel: Channel| Series::of(measurement, &measurement.profile.channels[channel as usize]);
     let own = series(simulation::channel(*effect.channels().first()?));
     let blocks = Blocks::of(&own)?;
     let shape = match effect {
-        Effect::RateRamp { .. } => blocks.ramp(),
-        Effect::BiasStep { time_s, .. } => blocks.step_at(((time_s - begin_s) / own.period_s).max(0.0) as u64),
-        Effect::Temperature { .. } => Blocks::of(&series(Channel::Temp))?.means,
-        Effect::Supply { .. } => Blocks::of(&series(Channel::Supply))?.means,
+        InjectedEffect::RateRamp { .. } => blocks.ramp(),
+        InjectedEffect::BiasStep { time_s, .. } => blocks.step_at(((time_s - begin_s) / own.period_s).max(0.0) as u64),
+        InjectedEffect::Temperature { .. } => Blocks::of(&series(Channel::Temp))?.means,
+        InjectedEffect::Supply { .. } => Blocks::of(&series(Channel::Supply))?.means,
         _ => return None,
     };
     let noises = NoiseTable::default().of(&blocks);
@@ -39,19 +39,19 @@ mod tests {
     /// Far above the limit it sees what is there; of what is no course it says nothing.
     #[test]
     fn a_gross_course_is_seen_and_an_absent_one_is_not() {
-        let seen = |effect: &Effect| {
+        let seen = |effect: &InjectedEffect| {
             let mut simulation = case(Group::Nothing, 100.0, 3).simulation;
-            simulation.hidden.effects = vec![effect.clone()];
+            simulation.scenario.effects = vec![effect.clone()];
             let recording = simulation.run(|_| ()).unwrap();
             sees(effect, &recordings::timeline::measurement(&recording, None).unwrap(), 0.2)
         };
         let channel = OutputRegister::GyroX;
-        let step = |size: f64| Effect::BiasStep { channel, time_s: 50.0, size };
+        let step = |size: f64| InjectedEffect::BiasStep { channel, time_s: 50.0, size };
         assert_eq!([seen(&step(1.0)), seen(&step(0.0))], [Some(true), Some(false)]);
-        let ramp = |slope: f64| Effect::RateRamp { channel, slope };
+        let ramp = |slope: f64| InjectedEffect::RateRamp { channel, slope };
         assert_eq!([seen(&ramp(0.05)), seen(&ramp(0.0))], [Some(true), Some(false)]);
-        assert_eq!(seen(&Effect::Supply { channel, sensitivity: 100.0 }), Some(true));
-        assert_eq!(seen(&Effect::Temperature { channel, sensitivity: 10.0 }), Some(true));
-        assert_eq!(seen(&Effect::FilterBandwidth { taps_log2: 2 }), None);
+        assert_eq!(seen(&InjectedEffect::Supply { channel, sensitivity: 100.0 }), Some(true));
+        assert_eq!(seen(&InjectedEffect::Temperature { channel, sensitivity: 10.0 }), Some(true));
+        assert_eq!(seen(&InjectedEffect::FilterBandwidth { taps_log2: 2 }), None);
     }
 }

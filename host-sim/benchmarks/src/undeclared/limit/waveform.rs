@@ -6,8 +6,8 @@ use crate::undeclared::place::{Place, Scene};
 use nalgebra::DVector;
 use noise_analysis::trace::block::BLOCKS;
 use noise_analysis::trace::noises::{Noise, flicker_covariance, markov_covariance};
-use virtual_sensor::effect::EffectSource;
-use virtual_sensor::{Hidden, OutputRegister};
+use virtual_sensor::EffectSource;
+use virtual_sensor::{OutputRegister, SensorScenario};
 
 /// The size at the limit of a waveform of block means `shape`, for size 1, that could be at `looks` places.
 pub(crate) fn smallest(looks: f64, place: &Place<'_>, shape: impl Fn(usize) -> f64) -> f64 {
@@ -43,7 +43,8 @@ pub(crate) fn ratio(values: &[f64], place: &Place<'_>) -> f64 {
 /// What the surroundings do to `channel`, as means of blocks.
 pub(crate) fn course(scene: &Scene<'_>, channel: OutputRegister) -> Vec<f64> {
     let Record { seconds, period_s } = scene.record;
-    let mut source = EffectSource::new(&Hidden { surroundings: scene.surroundings, effects: Vec::new() }, scene.seed);
+    let mut source =
+        EffectSource::new(&SensorScenario { environment: scene.surroundings, effects: Vec::new() }, scene.seed);
     let width = (seconds / period_s / BLOCKS as f64) as usize;
     (0..BLOCKS)
         .map(|block| {

@@ -1,10 +1,10 @@
-//! What keeps the part busy, and for how long. Times are those of Linux and of KU Leuven's driver; where sources disagree,
-//! the longer one.
+//! The procedures of the part that take time. Durations are those of the Linux driver and of KU Leuven's; where the two
+//! disagree, the longer one.
 
-/// Something that takes the part a while.
+/// A procedure that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// Power was switched on.
+    /// After power-on.
     StartUp,
     /// GLOB_CMD bit 7.
     Reset,
@@ -27,8 +27,8 @@ pub enum Activity {
 }
 
 impl Activity {
-    /// How long it lasts, ns; sleep lasts as long as it is told.
-    pub(super) const fn length_ns(self, low_power: bool) -> u64 {
+    /// Duration, ns; 0 for sleep, whose duration SLP_CNT sets.
+    pub(crate) const fn duration_ns(self, low_power: bool) -> u64 {
         let ms = match self {
             Activity::StartUp if low_power => 290,
             Activity::StartUp => 220,
@@ -47,18 +47,18 @@ impl Activity {
         ms * 1_000_000
     }
 
-    /// True if the bus must be left alone meanwhile.
-    pub(super) const fn silent(self) -> bool {
+    /// True if the controller must not use the bus meanwhile.
+    pub(crate) const fn needs_silent_bus(self) -> bool {
         !matches!(self, Activity::SelfTest | Activity::FlashTest)
     }
 
-    /// True if samples are taken meanwhile.
-    pub(super) const fn samples(self) -> bool {
+    /// True if the part goes on sampling meanwhile.
+    pub(crate) const fn keeps_sampling(self) -> bool {
         matches!(self, Activity::SelfTest | Activity::FlashTest | Activity::AutoNull | Activity::PrecisionAutoNull)
     }
 
-    /// The bit of MSC_CTRL that clears at its end.
-    pub(super) const fn test_bit(self) -> u16 {
+    /// The bit of MSC_CTRL that starts the procedure and clears at its end; 0 for those of other registers.
+    pub(crate) const fn test_bit(self) -> u16 {
         match self {
             Activity::SelfTest => 1 << 10,
             Activity::FlashTest => 1 << 11,

@@ -1,6 +1,5 @@
-//! A layer over the emulated bus that writes every transaction to a frame log.
+//! The emulated bus with a frame log of every transaction.
 
-use super::seconds;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::frame_log::{Frame, FrameLog};
 use std::cell::RefCell;
@@ -8,18 +7,18 @@ use std::io;
 use std::rc::Rc;
 use virtual_sensor::EmulatedBus;
 
-/// The emulated bus, logged.
+/// The emulated bus; every transaction is written to a frame log.
 #[derive(Debug)]
-pub struct LoggedBus {
+pub(crate) struct LoggedBus {
     bus: EmulatedBus,
     log: Rc<RefCell<FrameLog>>,
     failure: Rc<RefCell<Option<io::Error>>>,
     frame: Frame,
 }
 
-/// The log could not be written; [`LoggedBus::failure`] has the operating system's answer.
+/// The log could not be written; [`LoggedBus::failure`] has the error of the operating system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LoggedBusError;
+pub(crate) struct LoggedBusError;
 
 impl Error for LoggedBusError {
     fn kind(&self) -> ErrorKind {
@@ -28,13 +27,13 @@ impl Error for LoggedBusError {
 }
 
 impl LoggedBus {
-    /// Logs what crosses `bus` to `log`.
-    pub fn new(bus: EmulatedBus, log: Rc<RefCell<FrameLog>>) -> Self {
+    /// Logs the transactions of `bus` to `log`.
+    pub(crate) fn new(bus: EmulatedBus, log: Rc<RefCell<FrameLog>>) -> Self {
         Self { bus, log, failure: Rc::default(), frame: Frame::default() }
     }
 
-    /// Where the reason of a failed write is left.
-    pub fn failure(&self) -> Rc<RefCell<Option<io::Error>>> {
+    /// The latest error of writing the log; shared, so that it can be read after a driver has taken the bus.
+    pub(crate) fn failure(&self) -> Rc<RefCell<Option<io::Error>>> {
         Rc::clone(&self.failure)
     }
 }
@@ -49,7 +48,7 @@ impl SpiDevice<u8> for LoggedBus {
         frame.time_s = seconds(self.bus.part().now());
         frame.mosi.clear();
         frame.miso.clear();
-        // What goes out must be noted before the answer overwrites it.
+        // MOSI is copied before the transaction, which overwrites it in place.
         for operation in operations.iter() {
             match operation {
                 Operation::Read(words) => frame.mosi.resize(frame.mosi.len() + words.len(), 0),
@@ -67,7 +66,7 @@ impl SpiDevice<u8> for LoggedBus {
         for operation in operations.iter() {
             match operation {
                 Operation::Read(words) => frame.miso.extend_from_slice(words),
-                // The answer to bytes that are only written is not kept by anyone: the log shows zeros.
+                // A write discards the answer; the log has zeros.
                 Operation::Write(words) => frame.miso.resize(frame.miso.len() + words.len(), 0),
                 Operation::Transfer(read, write) => {
                     let end = frame.miso.len() + read.len().max(write.len());
@@ -83,4 +82,9 @@ impl SpiDevice<u8> for LoggedBus {
             LoggedBusError
         })
     }
+}
+
+/// Virtual time in s.
+pub(crate) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
 }

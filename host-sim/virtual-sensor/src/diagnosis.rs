@@ -1,0 +1,91 @@
+//! The bits of DIAG_STAT, and the checks of each sample that set them: supply voltage and the two alarms.
+
+use crate::registers::{self, OutputRegister, RegisterFile};
+use std::collections::VecDeque;
+
+const SUPPLY_LOW: u16 = 1 << 0;
+const SUPPLY_HIGH: u16 = 1 << 1;
+pub(crate) const FLASH_UPDATE: u16 = 1 << 2;
+pub(crate) const SPI: u16 = 1 << 3;
+pub(crate) const SELF_TEST: u16 = 1 << 5;
+pub(crate) const FLASH_CHECKSUM: u16 = 1 << 6;
+const ALARM_1: u16 = 1 << 8;
+/// Either alarm.
+pub(crate) const ALARMS: u16 = ALARM_1 | ALARM_1 << 1;
+/// Self-test failure of gyro x; gyros y and z and the accelerometers follow.
+pub(crate) const GYRO_X: u16 = 1 << 10;
+
+/// Limits of the supply voltage, V.
+const SUPPLY_RANGE_V: (f64, f64) = (4.75, 5.25);
+/// Size of a count of SUPPLY_OUT, V.
+const SUPPLY_LSB: f64 = OutputRegister::Supply.lsb(0.0);
+
+/// The bit of DIAG_STAT that the latest sample sets for its supply voltage.
+pub(crate) fn check_supply(counts: &[i16; 12]) -> u16 {
+    let supply_v = f64::from(counts[OutputRegister::Supply as usize]) * SUPPLY_LSB;
+    if supply_v < SUPPLY_RANGE_V.0 {
+        SUPPLY_LOW
+    } else if supply_v > SUPPLY_RANGE_V.1 {
+        SUPPLY_HIGH
+    } else {
+        0
+    }
+}
+
+/// ALM_MAG: alarm above the threshold, not below it.
+const ABOVE: u16 = 1 << 15;
+/// ALM_CTRL: compare filtered outputs.
+const COMPARE_FILTERED: u16 = 1 << 4;
+/// Length of the history: the latest output and as many as ALM_SMPL can count back.
+const HISTORY: usize = 256;
+
+/// The two alarms on the level or the rate of change of any output. Their registers have the layout of the older ADIS16203;
+/// no available source confirms it for the ADIS16405.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Alarms {
+    /// Of each alarm the latest outputs of its source, the newest first.
+    history: [VecDeque<i16>; 2],
+}
+
+impl Alarms {
+    /// Compares the latest sample, in counts, with the thresholds; returns the bits of DIAG_STAT that it sets.
+    pub(crate) fn check(&mut self, registers: &RegisterFile, filtered: &[i16; 12], unfiltered: &[i16; 12]) -> u16 {
+        let control = registers.read(registers::ALM_CTRL);
+        let counts = if control & COMPARE_FILTERED != 0 { filtered } else { unfiltered };
+        let mut raised = 0;
+        for (index, history) in self.history.iter_mut().enumerate() {
+            let source = usize::from(control >> (8 + 4 * index) & 0xF);
+            let Some(&value) = source.checked_sub(1).and_then(|output| counts.get(output)) else {
+                history.clear();
+                continue;
+            };
+            history.push_front(value);
+            history.truncate(HISTORY);
+            let rate_of_change = control >> (6 + index) & 1 != 0;
+            let address = 2 * index as u8;
+            let back = usize::from(registers.read(registers::ALM_SMPL1 + address));
+            let watched = match (rate_of_change, history.get(back)) {
+                (false, _) => Some(i32::from(value)),
+                (true, Some(&before)) => Some(i32::from(value) - i32::from(before)),
+                (true, None) => None,
+            };
+            let magnitude = registers.read(registers::ALM_MAG1 + address);
+            let threshold = threshold(magnitude, source - 1);
+            let beyond = |watched| if magnitude & ABOVE != 0 { watched > threshold } else { watched < threshold };
+            if watched.is_some_and(beyond) {
+                raised |= ALARM_1 << index;
+            }
+        }
+        raised
+    }
+}
+
+/// Bits 13:0 of ALM_MAG in the format of the output: two's complement of 14 or 12 bits, or offset binary of 12.
+fn threshold(magnitude: u16, output: usize) -> i32 {
+    let field = i32::from(magnitude & 0x3FFF);
+    match output {
+        0 | 11 => field & 0x0FFF,
+        10 => (field & 0x0FFF) - (field & 0x0800) * 2,
+        _ => field - (field & 0x2000) * 2,
+    }
+}

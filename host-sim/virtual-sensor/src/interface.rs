@@ -1,0 +1,249 @@
+//! The part as its controller meets it: SPI words, registers with the side effects of reading and writing them, and pins.
+
+use crate::activity::Activity;
+use crate::diagnosis;
+use crate::part::VirtualAdis16405;
+use crate::registers::{self, OutputRegister};
+use crate::spi::{FLOATING, UNDEFINED, ViolationKind};
+
+/// Bit 15 of an output register: new data.
+const NEW_DATA: u16 = 0x8000;
+/// Bit 14 of an output register: a bit of DIAG_STAT is set.
+const ERROR_ALARM: u16 = 0x4000;
+/// Sign of a 14-bit field.
+const SIGN: u16 = 1 << 13;
+/// SLP_CNT: sleep until a pulse on chip select.
+const INDEFINITE_SLEEP: u16 = 1 << 8;
+/// Unit of SLP_CNT, ns.
+const HALF_SECOND_NS: u64 = 500_000_000;
+/// Length of a data-ready pulse, ns. Assumed: no available source gives it; it must be shorter than a sample period.
+const PULSE_NS: u64 = 100_000;
+/// Size of a count of AUX_DAC, V.
+const AUX_DAC_LSB: f64 = 0.8059e-3;
+
+/// SPI.
+impl VirtualAdis16405 {
+    /// Sets SCK, Hz (at least 1); with `None` words take no time and the clock is not checked.
+    pub fn set_sck_hz(&mut self, sck_hz: Option<u32>) {
+        self.spi.sck_hz = sck_hz.map(|hz| hz.max(1));
+    }
+
+    /// Chip select falls.
+    pub fn select(&mut self) {
+        self.spi.select();
+    }
+
+    /// Chip select rises. An incomplete burst or frame is dropped; a pulse without a byte ends a sleep.
+    pub fn deselect(&mut self) {
+        let end = self.spi.deselect();
+        if self.powered {
+            if end.in_frame {
+                self.diagnosis |= diagnosis::SPI;
+            }
+            if end.in_frame || end.in_burst {
+                let bytes = end.bytes.unwrap_or(0);
+                self.violations.add(self.now_ns, ViolationKind::FrameLength { bytes });
+            }
+            if end.bytes == Some(0) {
+                self.wake();
+            }
+        }
+    }
+
+    /// Exchanges one 16-bit word.
+    pub fn transfer(&mut self, word: u16) -> u16 {
+        u16::from_be_bytes(word.to_be_bytes().map(|byte| self.transfer_byte(byte)))
+    }
+
+    /// Exchanges half a word, the upper byte first.
+    pub fn transfer_byte(&mut self, byte: u8) -> u8 {
+        if !self.spi.is_selected() {
+            self.violations.add(self.now_ns, ViolationKind::NotSelected);
+            return FLOATING;
+        }
+        if self.spi.at_word_begin() && self.powered {
+            self.spi.begin_word(self.now_ns, self.is_low_power(), &mut self.violations);
+            if let Some(activity) = self.silent_activity() {
+                self.violations.add(self.now_ns, ViolationKind::Busy { activity });
+            }
+        }
+        self.advance_to(self.now_ns + self.spi.byte_ns());
+        let shifted = self.spi.shift(byte);
+        if !self.powered {
+            return FLOATING;
+        }
+        if let Some(word) = shifted.word
+            && self.spi.end_word(self.now_ns)
+        {
+            self.execute(word);
+        }
+        shifted.answer
+    }
+
+    /// The procedure under way, if it needs a silent bus.
+    fn silent_activity(&self) -> Option<Activity> {
+        self.activity.map(|(activity, _)| activity).filter(|activity| activity.needs_silent_bus())
+    }
+
+    /// Executes a frame: a write (bit 15), a burst read (a read of GLOB_CMD), or a read.
+    fn execute(&mut self, word: u16) {
+        let [upper, lower] = word.to_be_bytes();
+        let address = upper & 0x7F;
+        if self.silent_activity().is_some() {
+            self.spi.answer(0);
+        } else if upper & 0x80 != 0 {
+            self.spi.answer(UNDEFINED);
+            self.write(address, lower);
+        } else if address & 0x7E == registers::GLOB_CMD {
+            let words = self.read_burst();
+            self.spi.begin_burst(words);
+        } else {
+            let answer = self.read(address);
+            self.spi.answer(answer);
+        }
+    }
+}
+
+/// Registers.
+impl VirtualAdis16405 {
+    fn read(&mut self, address: u8) -> u16 {
+        if !registers::readable(address) {
+            self.violations.add(self.now_ns, ViolationKind::Address { address, write: false });
+            return UNDEFINED;
+        }
+        match address & 0x7E {
+            output @ registers::SUPPLY_OUT..=registers::AUX_ADC => {
+                self.read_output(usize::from((output - registers::SUPPLY_OUT) / 2))
+            }
+            registers::DIAG_STAT => std::mem::take(&mut self.diagnosis),
+            registers::GPIO_CTRL => self.levels() << 8 | self.registers.read(address) & 0xF,
+            _ => self.registers.read(address),
+        }
+    }
+
+    /// All outputs, and from now on the erratum of [`read_output`](Self::read_output).
+    fn read_burst(&mut self) -> [u16; 12] {
+        self.burst_since_reset = true;
+        std::array::from_fn(|index| self.read_output(index))
+    }
+
+    /// Bit 15 new data, bit 14 error or alarm, below them the field. The erratum: after a burst read, a negative x rate
+    /// loses its sign while XGYRO_OFF is negative (EngineerZone, thread 81805).
+    fn read_output(&mut self, index: usize) -> u16 {
+        let output = OutputRegister::ALL[index];
+        let mut field = self.signal_chain.counts()[index] as u16 & (u16::MAX >> (16 - output.bits()));
+        let is_gyro_x = output == OutputRegister::GyroX;
+        if is_gyro_x && self.burst_since_reset && self.registers.read_signed(registers::XGYRO_OFF) < 0.0 {
+            field &= !SIGN;
+        }
+        let new_data = std::mem::take(&mut self.new_data[index]);
+        let flag = |set, bit| if set { bit } else { 0 };
+        field | flag(new_data, NEW_DATA) | flag(self.diagnosis != 0, ERROR_ALARM)
+    }
+
+    fn write(&mut self, address: u8, byte: u8) {
+        if !registers::writable(address) {
+            self.violations.add(self.now_ns, ViolationKind::Address { address, write: true });
+            return;
+        }
+        if address == registers::GLOB_CMD {
+            self.command(byte);
+            return;
+        }
+        let before = self.registers.clone();
+        self.registers.write_byte(address, byte);
+        let changed = |register| before.read(register) != self.registers.read(register);
+        let (filter, period) = (changed(registers::SENS_AVG), changed(registers::SMPL_PRD));
+        if filter {
+            self.signal_chain.restart_filters(&self.registers);
+        }
+        if period {
+            self.restart_sampling(self.now_ns);
+        }
+        match address {
+            registers::SLP_CNT | registers::SLP_CNT_UPPER => self.sleep(),
+            registers::MSC_CTRL_UPPER => self.start_test(),
+            _ => {}
+        }
+    }
+
+    /// Starts the self-test or flash test whose bit of MSC_CTRL is set.
+    fn start_test(&mut self) {
+        let control = self.registers.read(registers::MSC_CTRL);
+        let tests = [Activity::SelfTest, Activity::FlashTest];
+        if let Some(test) = tests.into_iter().find(|test| control & test.test_bit() != 0) {
+            self.begin(test);
+        }
+    }
+
+    fn sleep(&mut self) {
+        let count = self.registers.read(registers::SLP_CNT);
+        self.registers.store(registers::SLP_CNT, 0);
+        if count & INDEFINITE_SLEEP != 0 {
+            self.begin_until(Activity::Sleep, u64::MAX);
+        } else if count != 0 {
+            self.begin_until(Activity::Sleep, self.now_ns + u64::from(count) * HALF_SECOND_NS);
+        }
+    }
+
+    /// Executes a write to GLOB_CMD. Of several bits the first in this order counts: reset, precision auto-null, flash
+    /// update, DAC latch, factory restore, auto-null.
+    fn command(&mut self, byte: u8) {
+        match byte {
+            reset if reset & 1 << 7 != 0 => {
+                self.reset();
+                self.begin(Activity::Reset);
+            }
+            null if null & 1 << 4 != 0 => self.begin(Activity::PrecisionAutoNull),
+            update if update & 1 << 3 != 0 => self.begin(Activity::FlashUpdate),
+            latch if latch & 1 << 2 != 0 => self.latched_dac = self.registers.read(registers::AUX_DAC),
+            restore if restore & 1 << 1 != 0 => self.begin(Activity::FactoryRestore),
+            null if null & 1 != 0 => self.begin(Activity::AutoNull),
+            _ => {}
+        }
+    }
+}
+
+/// Pins.
+impl VirtualAdis16405 {
+    /// Level of DIO`line`, 1 to 4: the data-ready or alarm signal if one is assigned to the line, else the level that the
+    /// part or the outside drives. Other numbers read low.
+    pub fn pin(&self, line: u8) -> bool {
+        let signal = |control: u16, active: bool| {
+            let here = control & 0b100 != 0 && control & 1 == u16::from(line == 2) && (line == 1 || line == 2);
+            here.then_some((control & 0b010 != 0) == active)
+        };
+        let pulse = self.sampled_at_ns.is_some_and(|at| self.now_ns < at + PULSE_NS);
+        let alarm = self.diagnosis & diagnosis::ALARMS != 0;
+        signal(self.registers.read(registers::MSC_CTRL), pulse)
+            .or_else(|| signal(self.registers.read(registers::ALM_CTRL), alarm))
+            .unwrap_or_else(|| (1..=4).contains(&line) && self.levels() >> (line - 1) & 1 != 0)
+    }
+
+    /// Drives DIO`line`, 1 to 4, from outside. Without effect on a line that the part drives.
+    pub fn drive_pin(&mut self, line: u8, high: bool) {
+        if let 1..=4 = line {
+            let bit = 1 << (line - 1);
+            self.driven = if high { self.driven | bit } else { self.driven & !bit };
+        }
+    }
+
+    /// An edge of the external sample clock. Takes a sample if SMPL_PRD selects that clock (0).
+    pub fn external_clock_edge(&mut self) {
+        if self.registers.read(registers::SMPL_PRD) == 0 {
+            self.sample_externally();
+        }
+    }
+
+    /// Voltage of the auxiliary analog output, V: AUX_DAC when it was last latched.
+    pub fn aux_output_v(&self) -> f64 {
+        f64::from(self.latched_dac) * AUX_DAC_LSB
+    }
+
+    /// Levels of the lines, bit 0 for DIO1: driven by the part where GPIO_CTRL makes them outputs, else from outside.
+    fn levels(&self) -> u16 {
+        let control = self.registers.read(registers::GPIO_CTRL);
+        let outputs = control & 0xF;
+        control >> 8 & outputs | self.driven & !outputs & 0xF
+    }
+}
