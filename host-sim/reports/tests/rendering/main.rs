@@ -4,7 +4,7 @@ mod fixture;
 
 use fixture::{channel, empty, report};
 use noise_analysis::report::{ChannelReport, Report};
-use reports::{page, plot, terminal};
+use reports::{figure, page, terminal};
 
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
@@ -21,7 +21,7 @@ fn html(report: &Report) -> String {
 
 /// Circles and texts of the picture, which must be XML.
 fn picture(channel: &ChannelReport) -> (usize, Vec<String>) {
-    let svg = plot::allan(channel).expect("a picture");
+    let svg = figure::allan_deviation(channel).expect("a picture");
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     let named = |name| document.descendants().filter(move |node| node.has_tag_name(name));
     for node in named("text") {
@@ -49,7 +49,7 @@ fn the_picture_says_what_it_shows() {
         "averaging time τ, s",
         "σ / model − 1, %",
         "measured, 95 % interval",
-        "declared model (N, B, K)",
+        "baseline model (N, B, K)",
         "with traced effects",
         "N = 0.03714 °/√s",
         "B = 0.01430 °/s",
@@ -69,11 +69,11 @@ fn without_effects_there_is_one_model_line() {
 
 #[test]
 fn every_colour_of_the_picture_has_a_dark_counterpart() {
-    let svg = plot::allan(&report().channels[2]).expect("a picture");
+    let svg = figure::allan_deviation(&report().channels[2]).expect("a picture");
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     for node in document.descendants() {
         for colour in [node.attribute("fill"), node.attribute("stroke")].into_iter().flatten() {
-            let known = plot::DARK.iter().any(|(light, _)| *light == colour);
+            let known = figure::DARK_COLOURS.iter().any(|(light, _)| *light == colour);
             assert!(known || colour == "none", "{colour}");
         }
     }
@@ -155,7 +155,7 @@ fn labels_of_slopes_do_not_cover_each_other() {
         // Both lines pass 0.0095 deg/s at 58 s.
         value.value = 0.0095 * if value.unit == "deg/sqrt(s)" { 58f64.sqrt() } else { (3.0 / 58.0f64).sqrt() };
     }
-    let svg = plot::allan(&close).expect("a picture");
+    let svg = figure::allan_deviation(&close).expect("a picture");
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     let height = |symbol: &str| -> i32 {
         let mut texts = document.descendants().filter(|node| node.has_tag_name("text"));
@@ -186,7 +186,7 @@ fn the_terminal_stays_within_a_hundred_columns() {
     }
 }
 
-/// What both the terminal and the page must hold of [`report`], in the format of [`reports::wording`].
+/// What both the terminal and the page must hold of [`report`], in the format of [`reports::formatting`].
 const TOLD: [&str; 33] = [
     "gyro_x",
     "gyro_y",
