@@ -81,7 +81,7 @@ fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String
 }
 
 fn coefficient_table(channel: &ChannelReport) -> TextTable {
-    let header = ["coefficient", "unit", "slope method", "slope found, s", "fit", "95 % interval"];
+    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit", "95 % interval"];
     let row = |row: CoefficientRow<'_>| {
         let (by_slope, found) = match (row.slope_value, row.slope) {
             (Some(value), _) => (number(value.value), interval(value.from_s, value.to_s)),
