@@ -56,7 +56,7 @@ fn run(mut cli: Cli) -> Result<()> {
         }
         Some(Command::Uf2 { elf, out }) => {
             let image = fs::read(elf).with_context(|| elf.display().to_string())?;
-            let uf2 = uf2::of_elf(&image).with_context(|| elf.display().to_string())?;
+            let uf2 = uf2::from_elf(&image).with_context(|| elf.display().to_string())?;
             return fs::write(out, uf2).with_context(|| out.display().to_string());
         }
         Some(Command::Monitor { port, baud, send, seconds }) => {
@@ -134,7 +134,7 @@ fn explain_all(arguments: &Explain, output: &Output) -> Result<()> {
             let mut out = BufWriter::new(io::stdout().lock());
             writeln!(out, "\n══ {}", file.display())?;
             let explanation = explain::explain(&measurement);
-            reports::explain::text::write(&explanation, &mut out)?;
+            reports::explanation::write(&explanation, &mut out)?;
             out.flush()?;
             if let Some(folder) = &arguments.pictures {
                 draw(&explanation, &file, folder)?;
@@ -151,7 +151,8 @@ fn draw(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for channel in &explanation.channels {
         let file = folder.join(format!("{stem}-{}.svg", channel.channel.name));
-        std::fs::write(&file, reports::explain::picture(channel)?).with_context(|| file.display().to_string())?;
+        std::fs::write(&file, reports::figure::explained_channel(channel)?)
+            .with_context(|| file.display().to_string())?;
     }
     Ok(())
 }

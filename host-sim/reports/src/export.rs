@@ -1,9 +1,10 @@
-//! The coefficients as the files that calibration and navigation programs read.
+//! The coefficients in the file formats of calibration and navigation programs.
 
 use noise_analysis::report::{ChannelReport, Parameter, Report};
 use std::fmt::Write;
 
-/// The four numbers of Kalibr's IMU model: key, channels, coefficient, unit (continuous, all of them).
+/// The four numbers of Kalibr's IMU model: key, prefix of the channel names, kind of coefficient, unit. All are those of
+/// the continuous process.
 const KALIBR: [(&str, &str, &str, &str); 4] = [
     ("accelerometer_noise_density", "accl_", "angle_random_walk", "m/s^2/sqrt(Hz)"),
     ("accelerometer_random_walk", "accl_", "rate_random_walk", "m/s^3/sqrt(Hz)"),
@@ -11,10 +12,11 @@ const KALIBR: [(&str, &str, &str, &str); 4] = [
     ("gyroscope_random_walk", "gyro_", "rate_random_walk", "rad/s^2/sqrt(Hz)"),
 ];
 
-/// The IMU noise model as Kalibr, VINS and their kin read it (YAML): the root mean square over the axes of each sensor.
+/// The IMU noise model in the YAML of Kalibr, which VINS-Fusion and others read too: of each sensor the root mean square
+/// over its axes.
 ///
-/// These programs divide by every number: a term that an axis does not show counts with its upper bound. A sensor
-/// without channels in the report is left out, and a comment says so.
+/// These programs divide by every number, so the upper bound stands for a term whose estimate is zero. A sensor without
+/// channels in the report is left out, with a comment.
 #[must_use]
 pub fn kalibr(report: &Report) -> String {
     let mut text = String::from(
@@ -26,12 +28,10 @@ pub fn kalibr(report: &Report) -> String {
             .channels
             .iter()
             .filter(|channel| channel.name.starts_with(channels))
-            .filter_map(|channel| coefficient(channel, kind, unit).map(|found| (channel, found)))
-            .map(
-                |(channel, found)| {
-                    if found.value > 0.0 { (channel, found.value, true) } else { (channel, found.high, false) }
-                },
-            )
+            .filter_map(|channel| coefficient(channel, kind, unit).map(|parameter| (channel, parameter)))
+            .map(|(channel, parameter)| {
+                if parameter.value > 0.0 { (channel, parameter.value, true) } else { (channel, parameter.high, false) }
+            })
             .collect();
         if axes.is_empty() {
             let _ = writeln!(text, "# {key}: no channel of the record tells it");
@@ -48,8 +48,9 @@ pub fn kalibr(report: &Report) -> String {
     text
 }
 
+/// The coefficient of the continuous process in `unit`, unless its upper bound is zero.
 fn coefficient<'a>(channel: &'a ChannelReport, kind: &str, unit: &str) -> Option<&'a Parameter> {
-    let found =
-        channel.practice.coefficients.iter().find(|of| of.kind == kind && !of.discrete && of.value.unit == unit);
-    found.map(|of| &of.value).filter(|value| value.high > 0.0)
+    let mut coefficients = channel.practice.coefficients.iter();
+    let continuous = coefficients.find(|of| of.kind == kind && !of.discrete && of.value.unit == unit)?;
+    Some(&continuous.value).filter(|value| value.high > 0.0)
 }

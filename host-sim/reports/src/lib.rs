@@ -1,9 +1,10 @@
-//! Reports of a noise analysis: terminal, page, figures and exports.
+//! Reports of a noise analysis: the text of the terminal, the HTML page with its figures, exports for other programs,
+//! and the text that explains a recording.
 
 pub mod coefficients;
-pub mod explain;
+pub mod explanation;
 pub mod export;
+pub mod figure;
+pub mod formatting;
 pub mod page;
-pub mod plot;
 pub mod terminal;
-pub mod wording;

@@ -1,21 +1,23 @@
 //! The report as text: at most 100 columns, the same in a terminal and in a file.
 
-mod practice;
-
-pub(crate) use practice::advice;
-
-use crate::coefficients::{self, Row};
-use crate::wording::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
-use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use crate::coefficients::{self, CoefficientRow};
+use crate::formatting::{
+    NONE, TextTable, count, duration, filter_consistency, interval, number, optional, parameter_name, percent,
+    recording_advice, unit, words, wrap,
+};
 use noise_analysis::navigation::CALIBRATION_S;
+use noise_analysis::practice::{Coefficient, Drift, Practice};
 use noise_analysis::report::{ChannelReport, Parameter, Report, Term};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Widest line, columns.
-pub const WIDTH: u16 = 100;
+/// Columns of the longest line.
+const WIDTH: u16 = 100;
 
-/// The whole report.
+/// Writes the whole report.
+///
+/// # Errors
+/// `out` cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "ADIS16405 noise report")?;
     writeln!(out, "══════════════════════")?;
@@ -37,14 +39,14 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// By cause, on one line unless there are very many.
+/// Numbers of samples by cause, as a list.
 fn by_cause(counts: &BTreeMap<String, u64>) -> String {
     if counts.values().all(|&samples| samples == 0) {
         return "none".to_owned();
     }
     let causes = counts.iter().filter(|(_, samples)| **samples > 0);
-    let told: Vec<String> = causes.map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
-    told.join(", ")
+    let listed: Vec<String> = causes.map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
+    listed.join(", ")
 }
 
 fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
@@ -61,67 +63,35 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     }
     writeln!(out, "{}", error_table(channel))?;
     for effect in &channel.effects {
-        writeln!(out, "{}", wrapped(&format!("• {}: {}", words(&effect.kind), effect.evidence)))?;
+        writeln!(out, "{}", wrap(&format!("• {}: {}", words(&effect.kind), effect.evidence), WIDTH.into()))?;
     }
     if same && channel.effects.is_empty() {
-        writeln!(out, "No effect was added to the declared model: after equals before.")?;
+        writeln!(out, "No effect was added to the baseline model: after equals before.")?;
     }
-    practice::write(&channel.practice, out)?;
+    write_assessment(&channel.practice, out)?;
     if channel.curve.is_empty() {
         return writeln!(out, "The record is too short for a point of the curve.");
     }
     writeln!(out, "{}", curve_table(channel))
 }
 
-/// `text` broken between words before the last column; longer words stay whole.
-fn wrapped(text: &str) -> String {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let full = lines.last().is_some_and(|line| {
-            let length = line.chars().count() + 1 + word.chars().count();
-            length > usize::from(WIDTH) && !line.trim().is_empty()
-        });
-        if full {
-            lines.push(" ".to_owned());
-        }
-        if let Some(line) = lines.last_mut() {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines.join("\n")
+/// A table whose first `left` columns are text and the others numbers.
+fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> TextTable {
+    TextTable::new(header.iter().copied(), left, rows).within(WIDTH)
 }
 
-/// A table whose first `left` columns are words and the rest numbers.
-fn table(header: &[&str], left: usize, rows: Vec<Vec<String>>) -> Table {
-    let mut table = Table::new();
-    table
-        .load_preset(presets::UTF8_FULL_CONDENSED)
-        .apply_modifier(modifiers::UTF8_ROUND_CORNERS)
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_width(WIDTH)
-        .set_header(header.iter().copied())
-        .add_rows(rows);
-    for column in table.column_iter_mut().skip(left) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
-}
-
-fn coefficient_table(channel: &ChannelReport) -> Table {
-    let header = ["coefficient", "unit", "read off", "slope found, s", "fit", "95 % interval"];
-    let row = |row: Row<'_>| {
-        let (read_off, found) = match (row.read_off, row.rule) {
+fn coefficient_table(channel: &ChannelReport) -> TextTable {
+    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit", "95 % interval"];
+    let row = |row: CoefficientRow<'_>| {
+        let (by_slope, found) = match (row.slope_value, row.slope) {
             (Some(value), _) => (number(value.value), interval(value.from_s, value.to_s)),
             (None, "") => (NONE.to_owned(), NONE.to_owned()),
             (None, _) => (NONE.to_owned(), "no such slope".to_owned()),
         };
         let [fit, bounds] = fitted(row.fit);
-        vec![words(row.kind), unit(row.unit), read_off, found, fit, bounds]
+        vec![words(row.kind), unit(row.unit), by_slope, found, fit, bounds]
     };
-    table(&header, 2, coefficients::rows(channel).into_iter().map(row).collect())
+    table(&header, 2, coefficients::rows(channel).into_iter().map(row))
 }
 
 /// Estimate and interval.
@@ -132,7 +102,7 @@ fn fitted(parameter: Option<&Parameter>) -> [String; 2] {
     }
 }
 
-fn term_table(terms: &[Term]) -> Table {
+fn term_table(terms: &[Term]) -> TextTable {
     let rows = terms.iter().flat_map(|term| {
         term.parameters.iter().map(|(name, parameter)| {
             let [fit, bounds] = fitted(Some(parameter));
@@ -140,10 +110,10 @@ fn term_table(terms: &[Term]) -> Table {
         })
     });
     let header = ["with the effects", "parameter", "unit", "fit", "95 % interval"];
-    table(&header, 3, rows.collect())
+    table(&header, 3, rows)
 }
 
-fn error_table(channel: &ChannelReport) -> Table {
+fn error_table(channel: &ChannelReport) -> TextTable {
     let rows = [("before", &channel.before), ("after", &channel.after)].map(|(name, model)| {
         vec![
             name.to_owned(),
@@ -154,10 +124,10 @@ fn error_table(channel: &ChannelReport) -> Table {
         ]
     });
     let header = ["model error", "rms, fitted", "rms, unseen", "deviance, fitted", "deviance, unseen"];
-    table(&header, 1, rows.to_vec())
+    table(&header, 1, rows)
 }
 
-fn curve_table(channel: &ChannelReport) -> Table {
+fn curve_table(channel: &ChannelReport) -> TextTable {
     let same = channel.after == channel.before;
     let mut header = vec!["n", "τ, s", "σ(τ)", "low", "high", "edf", "accuracy, %"];
     header.extend(if same { &["model"][..] } else { &["before", "after"] });
@@ -177,24 +147,62 @@ fn curve_table(channel: &ChannelReport) -> Table {
         }
         row
     });
-    table(&header, 0, rows.collect())
+    table(&header, 0, rows)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::wrapped;
-
-    #[test]
-    fn evidence_is_broken_between_words() {
-        let text = "• sinusoid: ".to_owned() + &"word ".repeat(60);
-        let broken = wrapped(&text);
-        assert!(broken.lines().count() > 2);
-        assert!(broken.lines().all(|line| line.chars().count() <= 100));
-        assert_eq!(broken.split_whitespace().count(), text.split_whitespace().count());
+/// What the model is good for: other units, drift, a filter's innovations, longer records.
+fn write_assessment(assessment: &Practice, out: &mut impl Write) -> io::Result<()> {
+    if !assessment.coefficients.is_empty() {
+        writeln!(out, "{}", unit_table(&assessment.coefficients))?;
     }
-
-    #[test]
-    fn a_short_sentence_stays_as_it_is() {
-        assert_eq!(wrapped("• step: at 3 s"), "• step: at 3 s");
+    if !assessment.drift.is_empty() {
+        writeln!(out, "{}", drift_table(&assessment.drift))?;
     }
+    if let Some(innovations) = &assessment.innovations {
+        let text = format!(
+            "• Kalman filter of the model on the unseen half: {} innovations, {} of the expected variance ({} for a true \
+             model), whiteness p = {}: {}.",
+            innovations.count,
+            number(innovations.normalised),
+            interval(innovations.low, innovations.high),
+            number(innovations.whiteness_p),
+            filter_consistency(innovations)
+        );
+        writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
+    }
+    if let Some(by_spectrum) = &assessment.angle_random_walk_by_spectrum {
+        let value = format!("{} {}", number(by_spectrum.value), unit(&by_spectrum.unit));
+        writeln!(out, "• N by the spectrum: {value} ({}).", interval(by_spectrum.low, by_spectrum.high))?;
+    }
+    if let Some(time) = &assessment.markov_time_by_autocorrelation {
+        let value = format!("{} {}", number(time.value), unit(&time.unit));
+        writeln!(out, "• Markov time by the autocorrelation: {value} ({}).", interval(time.low, time.high))?;
+    }
+    assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
+}
+
+fn unit_table(coefficients: &[Coefficient]) -> TextTable {
+    let row = |coefficient: &Coefficient| {
+        let value = &coefficient.value;
+        let sense = if coefficient.discrete { "discrete, of samples" } else { "continuous" };
+        let kind = words(&coefficient.kind);
+        vec![kind, sense.to_owned(), unit(&value.unit), number(value.value), interval(value.low, value.high)]
+    };
+    let header = ["in other units", "", "unit", "value", "95 % interval"];
+    table(&header, 3, coefficients.iter().map(row))
+}
+
+fn drift_table(drifts: &[Drift]) -> TextTable {
+    let row = |drift: &Drift| {
+        let observed = drift.observed.as_ref();
+        vec![
+            duration(drift.seconds),
+            unit(&drift.unit),
+            number(drift.predicted),
+            observed.map_or_else(|| "too short".to_owned(), |observed| number(observed.value)),
+            observed.map_or_else(String::new, |observed| interval(observed.low, observed.high)),
+        ]
+    };
+    let header = ["error after", "unit", "predicted", "unseen half", "95 % interval"];
+    table(&header, 1, drifts.iter().map(row))
 }

@@ -22,7 +22,7 @@ fn bench() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
         let elf = build::image("pico", "thumbv6m-none-eabi");
-        let blocks = uf2::of_elf(&std::fs::read(&elf).expect("the image")).expect("an image for the Pico");
+        let blocks = uf2::from_elf(&std::fs::read(&elf).expect("the image")).expect("an image for the Pico");
         let uf2 = elf.with_extension("uf2");
         std::fs::write(&uf2, blocks).expect("room");
         Bench { emulator: emulator(), elf, uf2 }

@@ -2,7 +2,7 @@
 
 use super::{INTERVALS, Outcome, SYMBOLS, TRUTH};
 use comfy_table::{CellAlignment, Table, presets};
-use reports::wording::number;
+use reports::formatting::number;
 use std::io::{self, Write};
 
 impl Outcome {

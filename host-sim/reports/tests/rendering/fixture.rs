@@ -91,12 +91,12 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         before: declared.clone(),
         effects: vec![],
         after: declared,
-        practice: practice(scale),
+        practice: assessment(scale),
     }
 }
 
-/// Numbers that occur nowhere else.
-fn practice(scale: f64) -> Practice {
+/// An assessment whose numbers occur nowhere else in the report.
+fn assessment(scale: f64) -> Practice {
     let parameter = |value: f64, unit: &str| Parameter {
         value: scale * value,
         low: scale * value * 0.9,

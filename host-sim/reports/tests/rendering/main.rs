@@ -1,10 +1,10 @@
-//! The three renderings of a report whose numbers are known.
+//! Terminal, figure and page of a report whose numbers are known.
 
 mod fixture;
 
 use fixture::{channel, empty, report};
 use noise_analysis::report::{ChannelReport, Report};
-use reports::{page, plot, terminal};
+use reports::{figure, page, terminal};
 
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
@@ -19,9 +19,9 @@ fn html(report: &Report) -> String {
     std::fs::read_to_string(path).expect("the page that was written")
 }
 
-/// Circles and texts of the picture, which must be XML.
-fn picture(channel: &ChannelReport) -> (usize, Vec<String>) {
-    let svg = plot::allan(channel).expect("a picture");
+/// Circles and texts of the figure, which must be XML.
+fn figure_content(channel: &ChannelReport) -> (usize, Vec<String>) {
+    let svg = figure::allan_deviation(channel).expect("a figure");
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     let named = |name| document.descendants().filter(move |node| node.has_tag_name(name));
     for node in named("text") {
@@ -32,24 +32,24 @@ fn picture(channel: &ChannelReport) -> (usize, Vec<String>) {
 }
 
 #[test]
-fn every_point_has_a_marker_above_and_beneath() {
+fn every_point_has_a_marker_in_both_panels() {
     let legend = 1;
     for channel in &report().channels {
-        let (circles, _) = picture(channel);
+        let (circles, _) = figure_content(channel);
         assert_eq!(circles, 2 * channel.curve.len() + legend, "{}", channel.name);
     }
 }
 
 #[test]
-fn the_picture_says_what_it_shows() {
-    let (_, texts) = picture(&report().channels[2]);
+fn the_figure_is_labelled() {
+    let (_, texts) = figure_content(&report().channels[2]);
     for label in [
         "gyro_z · Allan deviation",
         "Allan deviation σ(τ), °/s",
         "averaging time τ, s",
         "σ / model − 1, %",
         "measured, 95 % interval",
-        "declared model (N, B, K)",
+        "baseline model (N, B, K)",
         "with traced effects",
         "N = 0.03714 °/√s",
         "B = 0.01430 °/s",
@@ -63,17 +63,17 @@ fn the_picture_says_what_it_shows() {
 
 #[test]
 fn without_effects_there_is_one_model_line() {
-    let (_, texts) = picture(&report().channels[0]);
+    let (_, texts) = figure_content(&report().channels[0]);
     assert!(!texts.iter().any(|text| text == "with traced effects"));
 }
 
 #[test]
-fn every_colour_of_the_picture_has_a_dark_counterpart() {
-    let svg = plot::allan(&report().channels[2]).expect("a picture");
+fn every_colour_of_the_figure_has_a_dark_counterpart() {
+    let svg = figure::allan_deviation(&report().channels[2]).expect("a figure");
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     for node in document.descendants() {
         for colour in [node.attribute("fill"), node.attribute("stroke")].into_iter().flatten() {
-            let known = plot::DARK.iter().any(|(light, _)| *light == colour);
+            let known = figure::DARK_COLOURS.iter().any(|(light, _)| *light == colour);
             assert!(known || colour == "none", "{colour}");
         }
     }
@@ -97,7 +97,7 @@ fn numbers_that_an_axis_cannot_show_are_left_out() {
     if let Some(value) = odd.read_off.rate_random_walk.as_mut() {
         value.to_s = f64::INFINITY;
     }
-    let (circles, _) = picture(&odd);
+    let (circles, _) = figure_content(&odd);
     let beneath = [3, 4, 6, 7].len();
     assert_eq!(circles, total - 3 + beneath + 1);
     let mut whole = report();
@@ -109,23 +109,23 @@ fn numbers_that_an_axis_cannot_show_are_left_out() {
 }
 
 #[test]
-fn extreme_curves_are_drawn() {
+fn curves_of_extreme_values_are_drawn() {
     for (low, high) in [(1e-300, 1e300), (1.0, 1.0), (5e-324, f64::MAX)] {
         let mut odd = channel("gyro_x", "deg/s");
         odd.curve.truncate(2);
         for (point, adev) in odd.curve.iter_mut().zip([low, high]) {
             (point.adev, point.low, point.high) = (adev, adev / 2.0, adev * 2.0);
         }
-        picture(&odd);
+        figure_content(&odd);
         odd.curve.truncate(1);
-        picture(&odd);
+        figure_content(&odd);
     }
 }
 
 #[test]
-fn a_record_without_a_curve_is_reported_in_words() {
+fn a_record_without_a_curve_is_reported_in_a_sentence() {
     let report = empty();
-    let (circles, texts) = picture(&report.channels[0]);
+    let (circles, texts) = figure_content(&report.channels[0]);
     assert_eq!(circles, 0);
     assert!(texts.iter().any(|text| text.contains("too short")));
     assert!(text(&report).contains("too short for a point of the curve"));
@@ -134,12 +134,12 @@ fn a_record_without_a_curve_is_reported_in_words() {
 }
 
 #[test]
-fn a_channel_that_never_changes_is_reported_in_words() {
+fn a_channel_that_never_changes_is_reported_in_a_sentence() {
     let mut still = channel("aux_adc", "V");
     for point in &mut still.curve {
         (point.adev, point.low, point.high) = (0.0, 0.0, 0.0);
     }
-    let (circles, texts) = picture(&still);
+    let (circles, texts) = figure_content(&still);
     assert_eq!(circles, 0);
     assert!(texts.iter().any(|text| text.contains("did not change")));
 }
@@ -155,7 +155,7 @@ fn labels_of_slopes_do_not_cover_each_other() {
         // Both lines pass 0.0095 deg/s at 58 s.
         value.value = 0.0095 * if value.unit == "deg/sqrt(s)" { 58f64.sqrt() } else { (3.0 / 58.0f64).sqrt() };
     }
-    let svg = plot::allan(&close).expect("a picture");
+    let svg = figure::allan_deviation(&close).expect("a figure");
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     let height = |symbol: &str| -> i32 {
         let mut texts = document.descendants().filter(|node| node.has_tag_name("text"));
@@ -181,13 +181,13 @@ fn the_terminal_stays_within_a_hundred_columns() {
     for report in [report(), empty()] {
         for line in text(&report).lines() {
             assert!(line.chars().count() <= 100, "{line}");
-            assert!(!line.contains('\u{1b}'), "no colour codes in a file");
+            assert!(!line.contains('\u{1b}'), "colour codes in the text: {line}");
         }
     }
 }
 
-/// What both the terminal and the page must hold of [`report`], in the format of [`reports::wording`].
-const TOLD: [&str; 33] = [
+/// Texts that both the terminal and the page must contain for [`report`], in the format of [`reports::formatting`].
+const EXPECTED: [&str; 33] = [
     "gyro_x",
     "gyro_y",
     "gyro_z",
@@ -224,10 +224,10 @@ const TOLD: [&str; 33] = [
 ];
 
 #[test]
-fn the_terminal_tells_every_channel_and_coefficient() {
+fn the_terminal_shows_every_channel_and_coefficient() {
     let text = text(&report());
-    for told in TOLD {
-        assert!(text.contains(told), "{told}\n{text}");
+    for expected in EXPECTED {
+        assert!(text.contains(expected), "{expected}\n{text}");
     }
     assert!(text.contains("no new data 3"));
     // Only accl_x lacks a slope.
@@ -235,10 +235,10 @@ fn the_terminal_tells_every_channel_and_coefficient() {
 }
 
 #[test]
-fn the_page_tells_every_channel_and_coefficient() {
+fn the_page_shows_every_channel_and_coefficient() {
     let page = html(&report());
-    for told in TOLD {
-        assert!(page.contains(told), "{told}");
+    for expected in EXPECTED {
+        assert!(page.contains(expected), "{expected}");
     }
     assert_eq!(page.matches("<svg").count(), 6);
     assert_eq!(page.matches("no such slope").count(), 1);
@@ -246,7 +246,7 @@ fn the_page_tells_every_channel_and_coefficient() {
 }
 
 #[test]
-fn the_page_needs_nothing_else_and_is_the_same_each_time() {
+fn the_page_needs_no_other_file_and_is_reproducible() {
     let page = html(&report());
     assert_eq!(page, html(&report()));
     let addresses = page.replace("http://www.w3.org/2000/svg", "");
@@ -263,7 +263,7 @@ fn text_from_outside_is_escaped() {
     let page = html(&report);
     assert!(!page.contains("<b>&"));
     assert!(!page.contains("<i>,"));
-    picture(&report.channels[0]);
+    figure_content(&report.channels[0]);
 }
 
 #[test]

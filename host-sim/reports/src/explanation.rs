@@ -1,9 +1,8 @@
-//! An explanation as tables for a terminal.
+//! The explanation of a recording as text: a sentence for each fault of its sampling, then tables.
 
-use crate::wording::{NONE, count, duration, interval, number, words};
+use crate::formatting::{NONE, TextTable, count, duration, interval, number, words};
 use allan_core::Kind;
 use allan_core::model::Term;
-use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::explain::slow_part::SlowPart;
 use noise_analysis::explain::{ChannelExplanation, Explanation};
 use noise_analysis::time_course::companion::Companion;
@@ -11,10 +10,10 @@ use noise_analysis::time_course::moving::Free;
 use noise_analysis::time_course::stationarity::Part;
 use std::io::{self, Write};
 
-/// Writes all tables.
+/// Writes the explanation. Lines are as long as the tables need.
 ///
 /// # Errors
-/// As `out`.
+/// `out` cannot be written.
 pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> {
     let Explanation { sample_rate_hz, samples, deliveries, channels, slow_part, .. } = explanation;
     let length = duration(*samples as f64 / sample_rate_hz);
@@ -25,12 +24,12 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
     if channels.is_empty() {
         return writeln!(out, "No inertial channel has enough samples to be cut into epochs.");
     }
-    writeln!(out, "\nWhat the declared model lacks, by the first half")?;
-    writeln!(out, "{}", found(channels))?;
-    writeln!(out, "\nWhether the noise stands still: the two quarters of the first half, where they differ most")?;
-    writeln!(out, "{}", quarters(channels))?;
+    writeln!(out, "\nWhat the baseline model lacks, by the first half")?;
+    writeln!(out, "{}", added_term_table(channels))?;
+    writeln!(out, "\nNon-stationarity of the noise: the two quarters of the first half, where they differ most")?;
+    writeln!(out, "{}", stationarity_table(channels))?;
     writeln!(out, "\nDeviance per point (1: a true model on its own data)")?;
-    writeln!(out, "{}", errors(channels))?;
+    writeln!(out, "{}", error_table(channels))?;
     writeln!(
         out,
         "N, B, K and traced: fitted to the first half. Predictive: the traced terms fitted to the part named"
@@ -48,62 +47,48 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
         "and line may have gone as far as the epochs of the first half let expect, (x/σ)² being added for it. Degrees"
     )?;
     writeln!(out, "of freedom are those of the kind of noise at each octave, whatever the model.")?;
-    writeln!(out, "\nThe second half foretold epoch by epoch, each from those before it")?;
-    writeln!(out, "{}", followed(channels))?;
+    writeln!(out, "\nThe second half predicted epoch by epoch, each from those before it")?;
+    writeln!(out, "{}", tracking_table(channels))?;
     writeln!(
         out,
-        "Shapes and gains by the first half; what moves is corrected by each epoch after it was foretold. All"
+        "Shapes and gains by the first half; tracked parameters are corrected by each epoch after it was predicted. All"
     )?;
     writeln!(
         out,
-        "epochs: the mean of what was foretold, against the curve of the second half. One epoch: the mean of"
+        "epochs: the mean of what was predicted, against the curve of the second half. One epoch: the mean of"
     )?;
-    writeln!(out, "every epoch's own deviance, with what moves followed and with the predictive model as it stands.")?;
+    writeln!(out, "every epoch's own deviance, with tracked parameters and with the predictive model as it stands.")?;
     for of in channels {
         if let Some(companion) = &of.companion {
-            writeln!(out, "{}", beside(explanation, of, companion))?;
+            writeln!(out, "{}", related_line(explanation, of, companion))?;
         }
     }
     writeln!(out, "\nWhite noise (change of its variance, %) and moving line (Hz), epoch by epoch")?;
-    writeln!(out, "{}", courses(*sample_rate_hz, channels))?;
+    writeln!(out, "{}", profile_table(*sample_rate_hz, channels))?;
     writeln!(
         out,
         "By the curves alone: how a line moves, they show well; where it is, octaves tell to some ten percent."
     )?;
     if let Some(slow_part) = slow_part {
-        writeln!(out, "\nShare of each channel's variance that the others foretell, %, first half")?;
-        writeln!(out, "{}", shares(slow_part))?;
-        let learnt = number(slow_part.learnt_at as f64 / sample_rate_hz);
-        writeln!(out, "\nBias drift after over before, second half; weights learnt in the first at τ = {learnt} s")?;
-        writeln!(out, "{}", bought(slow_part))?;
+        writeln!(out, "\nFraction of each channel's variance that the others predict, %, first half")?;
+        writeln!(out, "{}", variance_fraction_table(slow_part))?;
+        let learned = number(slow_part.learnt_at as f64 / sample_rate_hz);
+        writeln!(out, "\nBias drift after over before, second half; weights learned in the first at τ = {learned} s")?;
+        writeln!(out, "{}", gain_table(slow_part))?;
         writeln!(out, "Trusted: weights of the first quarter made the second quarter better.")?;
     }
     Ok(())
 }
 
-fn table<H: Into<String>>(header: impl IntoIterator<Item = H>, left: usize, rows: Vec<Vec<String>>) -> Table {
-    let mut table = Table::new();
-    table
-        .load_preset(presets::UTF8_FULL_CONDENSED)
-        .apply_modifier(modifiers::UTF8_ROUND_CORNERS)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header.into_iter().map(Into::into).collect::<Vec<String>>())
-        .add_rows(rows);
-    for column in table.column_iter_mut().skip(left) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
-}
-
-/// What was added, in the order in which it was found, as it is in the final model.
-fn found(channels: &[ChannelExplanation]) -> Table {
+/// The added terms in the order in which they were added, with their values in the final model.
+fn added_term_table(channels: &[ChannelExplanation]) -> TextTable {
     let of = |channel: &ChannelExplanation| {
         let row = |found: &allan_core::trace::Found| {
             let term = &channel.trace.after.terms()[found.term];
             vec![
                 channel.channel.name.to_owned(),
                 words(term.kind.name()),
-                shape(term),
+                shape_parameters(term),
                 format!("{} [{}]", number(term.value), interval(term.low, term.high)),
                 format!("{:.0}", found.score),
                 format!(
@@ -116,10 +101,11 @@ fn found(channels: &[ChannelExplanation]) -> Table {
         channel.trace.found.iter().map(row).collect::<Vec<_>>()
     };
     let header = ["channel", "term", "shape", "coefficient", "score", "residual before"];
-    table(header, 3, channels.iter().flat_map(of).collect())
+    TextTable::new(header, 3, channels.iter().flat_map(of))
 }
 
-fn shape(term: &Term) -> String {
+/// Names, values and intervals of the parameters of a term's shape.
+fn shape_parameters(term: &Term) -> String {
     let parameters = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
     let of = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
         let bounds = if low < high { format!(" [{}]", interval(low, high)) } else { String::new() };
@@ -132,7 +118,8 @@ fn shape(term: &Term) -> String {
     stages.into_iter().chain(parameters.map(of)).collect::<Vec<_>>().join(", ")
 }
 
-fn quarters(channels: &[ChannelExplanation]) -> Table {
+/// The octave at which the variances of the two quarters differ most, and what the predictive model is fitted to.
+fn stationarity_table(channels: &[ChannelExplanation]) -> TextTable {
     let row = |channel: &ChannelExplanation| {
         let mut row = vec![channel.channel.name.to_owned()];
         match channel.stationarity {
@@ -150,10 +137,11 @@ fn quarters(channels: &[ChannelExplanation]) -> Table {
         row
     };
     let header = ["channel", "at τ, s", "σ² later/earlier", "chance", "predictive model from"];
-    table(header, 1, channels.iter().map(row).collect())
+    TextTable::new(header, 1, channels.iter().map(row))
 }
 
-fn errors(channels: &[ChannelExplanation]) -> Table {
+/// Deviance per point of every model, on what it was fitted to and on the unseen half.
+fn error_table(channels: &[ChannelExplanation]) -> TextTable {
     let row = |channel: &ChannelExplanation| {
         let errors = &channel.errors;
         let [declared, traced, predictive] =
@@ -173,14 +161,16 @@ fn errors(channels: &[ChannelExplanation]) -> Table {
         "beyond drift",
         "still",
     ];
-    table(header, 1, channels.iter().map(row).collect())
+    TextTable::new(header, 1, channels.iter().map(row))
 }
 
+/// Two decimals below 100, none above.
 fn deviance(value: f64) -> String {
     if value < 100.0 { format!("{value:.2}") } else { format!("{value:.0}") }
 }
 
-fn followed(channels: &[ChannelExplanation]) -> Table {
+/// Deviance per point of predictions that follow the tracked parameters, beside two baselines.
+fn tracking_table(channels: &[ChannelExplanation]) -> TextTable {
     let row = |channel: &ChannelExplanation| {
         let (tracked, controls) = (&channel.tracked, &channel.controls);
         let what = match channel.free {
@@ -199,17 +189,18 @@ fn followed(channels: &[ChannelExplanation]) -> Table {
     };
     let header = [
         "channel",
-        "what moves",
+        "tracked",
         "all epochs",
         "one epoch",
         "… as it stands",
-        "control: N, B, K",
-        "control: epoch before",
+        "baseline: N, B, K",
+        "baseline: epoch before",
     ];
-    table(header, 2, channels.iter().map(row).collect())
+    TextTable::new(header, 2, channels.iter().map(row))
 }
 
-fn beside(explanation: &Explanation, of: &ChannelExplanation, companion: &Companion) -> String {
+/// A line of another channel whose frequency is in a fixed ratio to that of the channel's line.
+fn related_line(explanation: &Explanation, of: &ChannelExplanation, companion: &Companion) -> String {
     let (name, other) = (of.channel.name, explanation.searched[companion.channel].name);
     let (mean, deviation) = companion.measured_ratio;
     let ((above, below), path) = (companion.ratio, [&companion.line, &companion.companion[0], &companion.companion[1]]);
@@ -217,13 +208,14 @@ fn beside(explanation: &Explanation, of: &ChannelExplanation, companion: &Compan
     format!(
         "\nThe line of {name} shows in {other} at {above}/{below} of its frequency: ratio {mean:.4} ± {deviation:.4} epoch by\n\
          epoch, correlation of the steps {:.3}, chance {:.0e} (first half). Where {other} has it in the second half\n\
-         foretells {name} with a deviance per point of {:.2}; {name} itself is not looked at there. Hz, by the spectra:\n\
+         predicts {name} with a deviance per point of {:.2}; {name} itself is not looked at there. Hz, by the spectra:\n\
          {name}, first half: {line}\n{other}, first half: {seen}\n{other}, second half: {unseen}",
         companion.correlation, companion.p_value, companion.unseen,
     )
 }
 
-fn courses(rate: f64, channels: &[ChannelExplanation]) -> Table {
+/// White noise and line frequency of each channel in each epoch, with standard errors.
+fn profile_table(rate: f64, channels: &[ChannelExplanation]) -> TextTable {
     let mut header = vec!["half".to_owned(), "from, min".to_owned()];
     for channel in channels {
         header.push(channel.channel.name.to_owned());
@@ -231,7 +223,7 @@ fn courses(rate: f64, channels: &[ChannelExplanation]) -> Table {
             header.push("Hz".to_owned());
         }
     }
-    let Some(first) = channels.first() else { return table(header, 0, Vec::new()) };
+    let Some(first) = channels.first() else { return TextTable::new(header, 0, Vec::new()) };
     let half = first.parts.fitted.samples() as usize;
     let starts = [half % first.parts.epoch, half];
     let rows = ["first", "second"].iter().enumerate().flat_map(|(at, name)| {
@@ -250,28 +242,31 @@ fn courses(rate: f64, channels: &[ChannelExplanation]) -> Table {
             row
         })
     });
-    table(header, 1, rows.collect())
+    TextTable::new(header, 1, rows)
 }
 
+/// Header of a table with a column for each channel.
 fn by_channel(slow_part: &SlowPart) -> Vec<String> {
     let names = slow_part.channels.iter().map(|channel| channel.name.to_owned());
     ["τ, s".to_owned()].into_iter().chain(names).collect()
 }
 
-fn shares(slow_part: &SlowPart) -> Table {
+/// Fraction of each channel's variance that the others predict, at each octave.
+fn variance_fraction_table(slow_part: &SlowPart) -> TextTable {
     let rows = slow_part.shared.iter().map(|octave| {
         let shares = octave.share.iter().map(|share| format!("{:.0}", 100.0 * share));
-        [number(octave.tau)].into_iter().chain(shares).collect()
+        [number(octave.tau)].into_iter().chain(shares).collect::<Vec<_>>()
     });
-    table(by_channel(slow_part), 0, rows.collect())
+    TextTable::new(by_channel(slow_part), 0, rows)
 }
 
-fn bought(slow_part: &SlowPart) -> Table {
+/// Bias drift after the common-mode correction over that before, at each octave.
+fn gain_table(slow_part: &SlowPart) -> TextTable {
     let rows = slow_part.bought.iter().map(|octave| {
         let ratios = octave.ratio.iter().map(|ratio| format!("{ratio:.2}"));
-        [number(octave.tau)].into_iter().chain(ratios).collect()
+        [number(octave.tau)].into_iter().chain(ratios).collect::<Vec<_>>()
     });
     let trusted = slow_part.trusted.iter().map(|&trusted| if trusted { "yes" } else { "no" }.to_owned());
-    let last = ["trusted".to_owned()].into_iter().chain(trusted).collect();
-    table(by_channel(slow_part), 0, rows.chain([last]).collect())
+    let last: Vec<_> = ["trusted".to_owned()].into_iter().chain(trusted).collect();
+    TextTable::new(by_channel(slow_part), 0, rows.chain([last]))
 }

@@ -1,8 +1,10 @@
-//! How numbers, units and names read in the terminal, in the picture and on the page.
+//! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
-use noise_analysis::practice::Innovations;
+use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use noise_analysis::practice::{Innovations, Record};
+use std::fmt;
 
-/// What stands where there is no number.
+/// Shown in the place of a number that is absent or not finite.
 pub const NONE: &str = "–";
 
 /// `value` with four significant digits: plain from 0.001 to 999,900, else with an exponent that is a multiple
@@ -41,7 +43,7 @@ pub fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), |value| format!("{} %", number(value)))
 }
 
-/// A whole number with its thousands apart: `1,000,000`.
+/// A whole number with its thousands separated: `1,000,000`.
 pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut out = String::with_capacity(digits.len() + digits.len() / 3);
@@ -54,7 +56,7 @@ pub fn count(value: u64) -> String {
     out
 }
 
-/// Seconds as a person says them, such as `2 h 46 min 40 s`; below a minute with four digits.
+/// `seconds` in days, hours, minutes and seconds, such as `2 h 46 min 40 s`; below a minute with four digits.
 pub fn duration(seconds: f64) -> String {
     // Beyond 2^53 s the whole seconds are no longer exact.
     if !(59.5..9.0e15).contains(&seconds) {
@@ -65,12 +67,12 @@ pub fn duration(seconds: f64) -> String {
     }
     let whole = seconds.round() as u64;
     let parts = [(whole / 86_400, "d"), (whole / 3600 % 24, "h"), (whole / 60 % 60, "min"), (whole % 60, "s")];
-    let told: Vec<String> = parts
+    let shown: Vec<String> = parts
         .iter()
         .filter(|(amount, _)| *amount > 0)
         .map(|(amount, unit)| format!("{} {unit}", count(*amount)))
         .collect();
-    told.join(" ")
+    shown.join(" ")
 }
 
 /// A range of numbers, such as `0.03890 … 0.03910`.
@@ -102,25 +104,100 @@ pub fn unit(name: &str) -> String {
     if spelled.starts_with("ug") { spelled.replacen("ug", "µg", 1) } else { spelled }
 }
 
-/// What the innovations say of a model, in a sentence.
-pub fn verdict(innovations: &Innovations) -> &'static str {
-    let size = if innovations.normalised > innovations.high {
-        -1
+/// Smallest p-value of the whiteness test at which innovations are called white.
+const WHITE: f64 = 0.01;
+
+/// Whether a Kalman filter of the model is consistent: its innovations' variance against the expected one, and their
+/// whiteness.
+pub fn filter_consistency(innovations: &Innovations) -> &'static str {
+    let white = innovations.whiteness_p >= WHITE;
+    if innovations.normalised > innovations.high {
+        if white {
+            "white, but larger than the model says: a filter would be too sure"
+        } else {
+            "larger than the model says, and not white: the model is not enough for a filter"
+        }
+    } else if innovations.normalised >= innovations.low {
+        if white {
+            "white and as large as the model says: enough for a filter"
+        } else {
+            "as large as the model says, but not white: something with a memory is missing"
+        }
+    } else if white {
+        "white, but smaller than the model says: a filter would be too cautious"
     } else {
-        i32::from(innovations.normalised >= innovations.low)
-    };
-    match (size, innovations.whiteness_p >= WHITE) {
-        (1, true) => "white and as large as the model says: enough for a filter",
-        (1, false) => "as large as the model says, but not white: something with a memory is missing",
-        (0, true) => "white, but smaller than the model says: a filter would be too cautious",
-        (0, false) => "smaller than the model says, and not white",
-        (_, true) => "white, but larger than the model says: a filter would be too sure",
-        (_, false) => "larger than the model says, and not white: the model is not enough for a filter",
+        "smaller than the model says, and not white"
     }
 }
 
-/// Innovations whose correlation has a smaller chance are not called white.
-const WHITE: f64 = 0.01;
+/// How much longer to record for a coefficient with an interval of ±20 %.
+pub fn recording_advice(record: &Record) -> String {
+    let kind = words(&record.kind);
+    match record.more_hours {
+        Some(0.0) => format!("{kind}: known to ±20 % and better"),
+        Some(hours) => format!("{kind} to ±20 %: record {} more", duration(3600.0 * hours)),
+        None => format!("{kind}: not shown by this record, or a month would not tell it to ±20 %"),
+    }
+}
+
+/// `text` broken between words so that no line is longer than `width` columns, except a single longer word. Lines after
+/// the first are indented by two columns.
+pub fn wrap(text: &str, width: usize) -> String {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let full = lines.last().is_some_and(|line| {
+            let length = line.chars().count() + 1 + word.chars().count();
+            length > width && !line.trim().is_empty()
+        });
+        if full {
+            lines.push(" ".to_owned());
+        }
+        if let Some(line) = lines.last_mut() {
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines.join("\n")
+}
+
+/// A table with a frame of box characters, as wide as its cells. It is written by its `Display`, without a line break
+/// at the end.
+pub struct TextTable(Table);
+
+impl TextTable {
+    /// A table whose first `left` columns are aligned left (text) and the others right (numbers).
+    pub fn new<H: Into<String>>(
+        header: impl IntoIterator<Item = H>,
+        left: usize,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) -> Self {
+        let mut table = Table::new();
+        table
+            .load_preset(presets::UTF8_FULL_CONDENSED)
+            .apply_modifier(modifiers::UTF8_ROUND_CORNERS)
+            .set_content_arrangement(ContentArrangement::Disabled)
+            .set_header(header.into_iter().map(Into::into).collect::<Vec<String>>())
+            .add_rows(rows);
+        for column in table.column_iter_mut().skip(left) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        Self(table)
+    }
+
+    /// The same table, at most `width` columns wide: longer cells are broken into lines.
+    pub fn within(mut self, width: u16) -> Self {
+        self.0.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+        self
+    }
+}
+
+impl fmt::Display for TextTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -157,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_have_their_thousands_apart() {
+    fn counts_have_separated_thousands() {
         for (value, text) in [
             (0, "0"),
             (999, "999"),
@@ -171,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn durations_read_like_a_clock() {
+    fn durations_are_split_into_days_hours_minutes_and_seconds() {
         for (value, text) in [
             (0.01, "0.01000 s"),
             (59.4, "59.40 s"),
@@ -200,5 +277,19 @@ mod tests {
         assert_eq!(unit("ug/sqrt(Hz)"), "µg/√Hz");
         assert_eq!(unit("deg/h/sqrt(h)"), "°/h/√h");
         assert_eq!(unit("m/s^3/sqrt(Hz)"), "m/s³/√Hz");
+    }
+
+    #[test]
+    fn long_text_is_broken_between_words() {
+        let text = "• sinusoid: ".to_owned() + &"word ".repeat(60);
+        let broken = wrap(&text, 100);
+        assert!(broken.lines().count() > 2);
+        assert!(broken.lines().all(|line| line.chars().count() <= 100));
+        assert_eq!(broken.split_whitespace().count(), text.split_whitespace().count());
+    }
+
+    #[test]
+    fn a_short_sentence_is_unchanged() {
+        assert_eq!(wrap("• step: at 3 s", 100), "• step: at 3 s");
     }
 }

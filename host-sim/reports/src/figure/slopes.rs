@@ -1,8 +1,7 @@
-//! The classical slopes, drawn where they were found and on to where they are read.
+//! The straight lines of the slope method: thick where the slope was found, dashed on to where the coefficient is read.
 
-use super::panel::Panel;
-use super::{Drawn, Failed, READ_OFF, shown};
-use crate::wording;
+use super::panel::{DrawError, DrawResult, Panel, SLOPES, has_logarithm};
+use crate::formatting::{number, unit};
 use noise_analysis::report::{ReadOff, ReadOffValue};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -37,18 +36,20 @@ impl Slope {
     }
 }
 
-/// What the axis must reach down to for the flat line and its label.
+/// The deviation that the axis must reach down to for the flat line and its label; absent without a flat line.
 pub(super) fn floor(read_off: &ReadOff) -> Option<f64> {
     let value = read_off.bias_instability.as_ref()?.value * flat_factor();
-    shown(value).then_some(value * 0.9)
+    has_logarithm(value).then_some(value * 0.9)
 }
 
+/// Deviation of the flat line over the bias instability: 0.664.
 fn flat_factor() -> f64 {
     (2.0 * LN_2 / PI).sqrt()
 }
 
-/// −½ through N at 1 s, flat at `B·sqrt(2 ln 2/π)`, +½ through K at 3 s (IEEE Std 952, annex C).
-pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> Drawn {
+/// Draws the lines with the values of their coefficients: −½ through N at 1 s, flat at `B·sqrt(2 ln 2/π)`, +½ through K
+/// at 3 s (IEEE Std 952, annex C).
+pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> DrawResult {
     let lines = [
         ("N", read_off.angle_random_walk.as_ref(), -0.5, 1.0, 1.0),
         ("B", read_off.bias_instability.as_ref(), 0.0, 1.0, flat_factor()),
@@ -56,11 +57,12 @@ pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> Drawn {
     ];
     let mut labels: Vec<Label> = Vec::new();
     for (symbol, value, slope, read_at, factor) in lines {
-        let Some(value) = value.filter(|v| [v.value, v.from_s, v.to_s].iter().all(|&number| shown(number))) else {
+        let Some(value) = value.filter(|v| [v.value, v.from_s, v.to_s].iter().all(|&number| has_logarithm(number)))
+        else {
             continue;
         };
         let line = Slope { slope, at: f64::log10(read_at), height: (value.value * factor).log10() };
-        if let Some(middle) = one(area, &line, value)? {
+        if let Some(middle) = draw_line(area, &line, value)? {
             let label = Label::under(area, &line, middle, symbol, value);
             labels.push(label.below(&labels));
         }
@@ -68,8 +70,8 @@ pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> Drawn {
     labels.iter().try_for_each(|label| label.draw(area))
 }
 
-/// Draws one line, and says where the middle of its visible part is.
-fn one(area: &Panel<'_>, line: &Slope, value: &ReadOffValue) -> Result<Option<f64>, Failed> {
+/// Draws one line. Returns the middle of the visible part of where it was found.
+fn draw_line(area: &Panel<'_>, line: &Slope, value: &ReadOffValue) -> Result<Option<f64>, DrawError> {
     let (from, to) = (value.from_s.log10(), value.to_s.log10());
     let (mut start, mut end) = (from - 0.3, to + 0.3);
     if line.slope != 0.0 {
@@ -82,20 +84,20 @@ fn one(area: &Panel<'_>, line: &Slope, value: &ReadOffValue) -> Result<Option<f6
         while at < end {
             let stop = (at + DASH * 0.6).min(end);
             let dash = vec![(at, line.height_at(at)), (stop, line.height_at(stop))];
-            area.area.draw(&PathElement::new(dash, READ_OFF.mix(0.8).stroke_width(3)))?;
+            area.line(dash, SLOPES.mix(0.8).stroke_width(3))?;
             at += DASH;
         }
     }
     let Some((from, to)) = line.visible(area, from, to) else { return Ok(None) };
     let found = vec![(from, line.height_at(from)), (to, line.height_at(to))];
-    area.area.draw(&PathElement::new(found, READ_OFF.mix(0.3).stroke_width(14)))?;
+    area.line(found, SLOPES.mix(0.3).stroke_width(14))?;
     Ok(Some((from + to) / 2.0))
 }
 
 /// The height of a label with the space below it, pixels.
-const LABEL: i32 = 32;
+const LABEL_HEIGHT: i32 = 32;
 
-/// A value as it stands in the picture.
+/// A coefficient's value beside its line.
 struct Label {
     text: String,
     h_pos: HPos,
@@ -107,9 +109,10 @@ struct Label {
 }
 
 impl Label {
-    /// Under `line`, on the side to which it does not fall, and inside the panel.
+    /// A label below `line` and inside the panel: left of `middle` for a falling line, right of it for a rising one, so
+    /// that the line does not cross it.
     fn under(area: &Panel<'_>, line: &Slope, middle: f64, symbol: &str, value: &ReadOffValue) -> Self {
-        let text = format!("{symbol} = {} {}", wording::number(value.value), wording::unit(&value.unit));
+        let text = format!("{symbol} = {} {}", number(value.value), unit(&value.unit));
         let (width, pixels) = area.text_width(&text);
         let (first, last) = (area.across.start + width, area.across.end - width);
         let (h_pos, at, shift) = match line.slope {
@@ -124,12 +127,12 @@ impl Label {
         Label { text, h_pos, place, shift, across, top: y + shift.1 }
     }
 
-    /// Moved down until it covers none of `others`.
+    /// The label moved down until it covers none of `others`.
     fn below(mut self, others: &[Label]) -> Self {
         // Each step clears at least one of the others.
         for _ in others {
             let covered = others.iter().find(|other| self.covers(other));
-            let Some(distance) = covered.map(|other| other.top + LABEL - self.top) else { break };
+            let Some(distance) = covered.map(|other| other.top + LABEL_HEIGHT - self.top) else { break };
             self.top += distance;
             self.shift.1 += distance;
         }
@@ -137,11 +140,11 @@ impl Label {
     }
 
     fn covers(&self, other: &Label) -> bool {
-        self.across.0 < other.across.1 && other.across.0 < self.across.1 && (self.top - other.top).abs() < LABEL
+        self.across.0 < other.across.1 && other.across.0 < self.across.1 && (self.top - other.top).abs() < LABEL_HEIGHT
     }
 
-    fn draw(&self, area: &Panel<'_>) -> Drawn {
+    fn draw(&self, area: &Panel<'_>) -> DrawResult {
         let anchor = Pos { h_pos: self.h_pos, v_pos: VPos::Top };
-        area.text(self.place, self.shift, self.text.clone(), &READ_OFF, 28, anchor)
+        area.text(self.place, self.shift, self.text.clone(), &SLOPES, 28, anchor)
     }
 }

@@ -1,0 +1,202 @@
+//! The tables of the page.
+
+use crate::coefficients::{self, CoefficientRow};
+use crate::formatting::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
+use maud::{Markup, html};
+use noise_analysis::practice::{Coefficient, Drift};
+use noise_analysis::report::{ChannelReport, ModelError, ModelReport, Parameter, Report};
+
+/// Content of a column's heading, and whether the column holds numbers.
+type Heading = (Markup, bool);
+
+fn text(heading: &str) -> Heading {
+    (html! { (heading) }, false)
+}
+
+fn numbers(heading: &str) -> Heading {
+    (html! { (heading) }, true)
+}
+
+/// A table of the given class, empty for none, with `rows` (`tr` elements).
+fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
+    html! {
+        div.scroll {
+            table class=[(!class.is_empty()).then_some(class)] {
+                thead {
+                    tr {
+                        @for (heading, numeric) in headings {
+                            th class=[numeric.then_some("number")] scope="col" { (heading) }
+                        }
+                    }
+                }
+                tbody { (rows) }
+            }
+        }
+    }
+}
+
+/// An estimate above its interval.
+fn estimate(parameter: &Parameter) -> Markup {
+    html! { (number(parameter.value)) span.under { (interval(parameter.low, parameter.high)) } }
+}
+
+/// An estimate above its interval, or a dash.
+fn estimate_if_any(parameter: Option<&Parameter>) -> Markup {
+    parameter.map_or_else(|| html! { (NONE) }, estimate)
+}
+
+/// One row a channel: the fitted coefficients and the error on unseen data.
+pub(super) fn overview(report: &Report) -> Markup {
+    let coefficient = |(kind, symbol, _): &(&str, &str, &str)| (html! { (words(kind)) " " i { (symbol) } }, true);
+    let headings: Vec<Heading> = [text("channel")]
+        .into_iter()
+        .chain(coefficients::SLOPES.iter().map(coefficient))
+        .chain([numbers("rms error, unseen half"), text("effects traced")])
+        .collect();
+    let rows = html! {
+        @for channel in &report.channels {
+            tr {
+                th scope="row" { a href={ "#" (channel.name) } { (channel.name) } }
+                @for row in coefficients::rows(channel).iter().take(coefficients::SLOPES.len()) {
+                    td.number {
+                        @match row.fit {
+                            Some(p) => { (number(p.value)) " " span.unit { (unit(&p.unit)) } }
+                            None => { (NONE) }
+                        }
+                    }
+                }
+                td.number { (percent(channel.after.unseen.rms_percent)) }
+                td { (effect_names(channel)) }
+            }
+        }
+    };
+    table("", &headings, &rows)
+}
+
+fn effect_names(channel: &ChannelReport) -> String {
+    if channel.effects.is_empty() {
+        return "none".to_owned();
+    }
+    let names: Vec<String> = channel.effects.iter().map(|effect| words(&effect.kind)).collect();
+    names.join(", ")
+}
+
+/// The coefficients by the slope method beside the fit of the baseline model.
+pub(super) fn coefficients(channel: &ChannelReport) -> Markup {
+    let rows = html! {
+        @for row in coefficients::rows(channel) {
+            tr {
+                th scope="row" {
+                    (words(row.kind)) " " i { (row.symbol) }
+                    @if !row.slope.is_empty() { span.under { (row.slope) } }
+                }
+                td { (unit(row.unit)) }
+                td.number { (slope_value(&row)) }
+                td.number { (estimate_if_any(row.fit)) }
+            }
+        }
+    };
+    table("", &[text("coefficient"), text("unit"), numbers("slope method"), numbers("fit")], &rows)
+}
+
+fn slope_value(row: &CoefficientRow<'_>) -> Markup {
+    html! {
+        @match (row.slope_value, row.slope) {
+            (Some(value), _) => {
+                (number(value.value))
+                span.under { "found in " (interval(value.from_s, value.to_s)) " s" }
+            }
+            (None, "") => { (NONE) }
+            (None, _) => { span.absent { "no such slope" } }
+        }
+    }
+}
+
+/// The terms of a model with all their parameters.
+pub(super) fn terms(model: &ModelReport) -> Markup {
+    let rows = html! {
+        @for term in &model.terms {
+            @for (name, parameter) in &term.parameters {
+                tr {
+                    th scope="row" { (words(&term.kind)) span.under { (parameter_name(name)) } }
+                    td { (unit(&parameter.unit)) }
+                    td.number { (estimate(parameter)) }
+                }
+            }
+        }
+    };
+    table("", &[text("term"), text("unit"), numbers("fit")], &rows)
+}
+
+/// Errors of both models on the fitted and on the unseen half.
+pub(super) fn errors(channel: &ChannelReport) -> Markup {
+    let same = channel.after == channel.before;
+    let cell = |error: &ModelError| {
+        html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) } } }
+    };
+    let rows = html! {
+        @for (name, model) in [("before", &channel.before), ("after", &channel.after)] {
+            tr {
+                th scope="row" { span class={ "key " (if same { "before" } else { name }) } {} (name)
+                    span.under { "rms, and deviance a point" } }
+                (cell(&model.fitted))
+                (cell(&model.unseen))
+            }
+        }
+    };
+    table("", &[text("model"), numbers("fitted half"), numbers("unseen half")], &rows)
+}
+
+/// The coefficients in other units.
+pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
+    let rows = html! {
+        @for coefficient in coefficients {
+            tr {
+                th scope="row" { (words(&coefficient.kind)) }
+                td { (unit(&coefficient.value.unit)) }
+                @for discrete in [false, true] {
+                    td.number { @if coefficient.discrete == discrete { (estimate(&coefficient.value)) } }
+                }
+            }
+        }
+    };
+    table("", &[text("coefficient"), text("unit"), numbers("continuous"), numbers("discrete, of samples")], &rows)
+}
+
+/// Predicted and observed error of the integrated channel.
+pub(super) fn drift(drifts: &[Drift]) -> Markup {
+    let rows = html! {
+        @for drift in drifts {
+            tr {
+                th scope="row" { (duration(drift.seconds)) }
+                td { (unit(&drift.unit)) }
+                td.number { (number(drift.predicted)) }
+                td.number { (estimate_if_any(drift.observed.as_ref())) }
+            }
+        }
+    };
+    table("", &[text("error after"), text("unit"), numbers("predicted"), numbers("unseen half")], &rows)
+}
+
+/// The measured curve with its intervals, beside the models.
+pub(super) fn curve(channel: &ChannelReport) -> Markup {
+    let same = channel.after == channel.before;
+    let models = if same { &["model"][..] } else { &["before", "after"] };
+    let names = ["n", "τ, s", "σ(τ)", "95 % low", "95 % high", "edf", "accuracy, %"];
+    let headings: Vec<Heading> = names.iter().chain(models).copied().map(numbers).collect();
+    let rows = html! {
+        @for (index, point) in channel.curve.iter().enumerate() {
+            tr {
+                td.number { (count(point.n)) }
+                @for value in [point.tau_s, point.adev, point.low, point.high, point.edf, point.accuracy_percent] {
+                    td.number { (number(value)) }
+                }
+                td.number { (optional(channel.before.adev.get(index).copied())) }
+                @if !same {
+                    td.number { (optional(channel.after.adev.get(index).copied())) }
+                }
+            }
+        }
+    };
+    table("curve", &headings, &rows)
+}
