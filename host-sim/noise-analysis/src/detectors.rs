@@ -12,10 +12,10 @@
 pub mod bias;
 mod bias_step;
 pub mod block_means;
-pub mod effective_lsb;
+pub(crate) mod effective_lsb;
 pub mod gls_regression;
-pub mod random_telegraph;
-pub mod spikes;
+pub(crate) mod random_telegraph;
+pub(crate) mod spikes;
 mod telegraph_models;
 
 #[cfg(test)]

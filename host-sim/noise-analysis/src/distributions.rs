@@ -14,7 +14,7 @@ pub fn upper_tail(z: f64) -> f64 {
 }
 
 /// Density of the standard normal distribution.
-pub fn density(z: f64) -> f64 {
+pub(crate) fn density(z: f64) -> f64 {
     (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
 }
 
@@ -39,7 +39,7 @@ pub fn poisson_tail(count: u64, mean: f64) -> f64 {
 
 /// 95 % bounds of the mean of a Poisson distribution that has yielded `count` (Byar's approximation of Garwood's exact
 /// bounds).
-pub fn poisson_bounds(count: f64) -> (f64, f64) {
+pub(crate) fn poisson_bounds(count: f64) -> (f64, f64) {
     let bound = |count: f64, z: f64| count * (1.0 - 1.0 / (9.0 * count) + z / (3.0 * count.sqrt())).powi(3);
     let low = if count > 0.0 { bound(count, -NORMAL_975).max(0.0) } else { 0.0 };
     (low, bound(count + 1.0, NORMAL_975))

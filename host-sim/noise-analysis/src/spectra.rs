@@ -10,14 +10,16 @@
 //!               └► autocorrelation                       correlation time of a Markov process
 //! ```
 
-pub mod autocorrelation;
-pub mod common_mode;
+mod autocorrelation;
+pub(crate) mod common_mode;
 mod line_models;
-pub mod lines;
+mod lines;
 mod periodogram;
-pub mod smooth_shape;
-pub mod welch;
+mod smooth_shape;
+mod welch;
 
-pub use autocorrelation::correlation_time;
-pub use lines::{SpectralLine, find_lines, find_lines_over};
+pub(crate) use autocorrelation::correlation_time;
+pub(crate) use lines::find_lines_over;
+pub use lines::{SpectralLine, find_lines};
+pub use smooth_shape::{SpectralBand, SpectralShape};
 pub use welch::Welch;

@@ -29,7 +29,7 @@ const SLOW_FRACTION: f64 = 0.01;
 /// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
 /// in s.
 #[must_use]
-pub fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]) -> Option<Detection> {
+pub(crate) fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]) -> Option<Detection> {
     let samples = series.values().len();
     let known = correlation_times.iter().map(|time| ((time / RESOLVED / series.sample_period()) as usize).max(1));
     let coarse = PARTS.iter().map(|parts| samples / parts).filter(|&size| size > 0);

@@ -24,7 +24,7 @@ const LEAST_DETECTED: f64 = 0.05;
 
 /// Looks for spikes in one channel. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
-pub fn find(series: &Series) -> Option<Detection> {
+pub(crate) fn find(series: &Series) -> Option<Detection> {
     if series.values.len() < 100 * REACH {
         return None;
     }

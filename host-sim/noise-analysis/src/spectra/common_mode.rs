@@ -29,7 +29,7 @@ const FEWEST_BANDS: usize = 16;
 
 /// A Markov process that channels share.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CommonModeDrift {
+pub(crate) struct CommonModeDrift {
     /// Standard deviation, in the unit of the channels.
     pub deviation: BoundedEstimate,
     /// Correlation time, s.
@@ -37,7 +37,7 @@ pub struct CommonModeDrift {
 }
 
 /// Fourier transforms of channels that may share a process, all of one length.
-pub struct CrossSpectra {
+pub(crate) struct CrossSpectra {
     sample_period: f64,
     duration: f64,
     channels: Vec<SineTapered>,
@@ -46,7 +46,7 @@ pub struct CrossSpectra {
 impl CrossSpectra {
     /// Transforms the channels; `None` if there are none, or if their lengths differ.
     #[must_use]
-    pub fn new(channels: &[UniformSeries]) -> Option<Self> {
+    pub(crate) fn new(channels: &[UniformSeries]) -> Option<Self> {
         let first = channels.first()?;
         let transformed: Option<Vec<SineTapered>> =
             channels.iter().map(|channel| SineTapered::new(&channel.detrended())).collect();
@@ -60,7 +60,7 @@ impl CrossSpectra {
 
     /// The set of two or more channels for which a shared process gains most ln likelihood: its members, and the gain.
     #[must_use]
-    pub fn most_likely_set(&self) -> Option<(Vec<usize>, f64)> {
+    pub(crate) fn most_likely_set(&self) -> Option<(Vec<usize>, f64)> {
         let sets = (1..1usize << self.channels.len()).filter(|set| set.count_ones() > 1);
         let gain = |set: usize| {
             let members: Vec<usize> = (0..self.channels.len()).filter(|member| set >> member & 1 == 1).collect();
@@ -79,7 +79,7 @@ impl CrossSpectra {
 
     /// The shared Markov process that makes the spectra of `members` likeliest; `None` if the samples are too few.
     #[must_use]
-    pub fn fit_markov(&self, members: &[usize]) -> Option<CommonModeDrift> {
+    pub(crate) fn fit_markov(&self, members: &[usize]) -> Option<CommonModeDrift> {
         let (_, bands) = self.likeliest_signs(members)?;
         let fits: Vec<ProcessFit> =
             self.time_constants().map(|time| ProcessFit::new(&bands, self.sample_period, time, &[SHARED])).collect();

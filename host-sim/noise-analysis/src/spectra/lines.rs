@@ -71,7 +71,7 @@ pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
 /// As [`find_lines`], over a background of white, flicker and random-walk noise times `known`, a function of the frequency
 /// in Hz.
 #[must_use]
-pub fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
+pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
     let known: &dyn Fn(f64) -> f64 = &known;
     let mut rest = series.clone().averaged_until_dithered().detrended();
     let mut sines = Vec::new();
