@@ -15,12 +15,15 @@ mod spectral;
 mod study;
 mod walk;
 
-use crate::grid::Grid;
+use crate::detectors::block_means::NoiseGrids;
+use crate::detectors::{bias, random_telegraph};
+use crate::findings::Detection;
 use crate::practice::Practice;
 use crate::report::{
     ChannelReport, CurvePoint, Effect, ModelError, ModelReport, ReadOff, ReadOffValue, Report, SCHEMA, Term,
 };
-use crate::trace::{Finding, Series, level, noises::NoiseTable, two_levels};
+use crate::series::Series;
+use crate::uniform_series::UniformSeries;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::term::{CoefficientUnit, Kind, Markov};
 use allan_core::{Cascade, Curve, Model, check, read_off, telegraph};
@@ -73,7 +76,7 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let traced = of([Quantity::AngularRate, Quantity::SpecificForce]);
     let coupled = [traced.clone(), of([Quantity::Temperature, Quantity::SupplyVoltage])].concat();
     let profile = &measurement.profile;
-    let noises = NoiseTable::default();
+    let noises = NoiseGrids::default();
     let repairs = Repairs::find(measurement, &traced, &noises);
     let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
     let parts = Parts::of(measurement, &coupled, &repairs);
@@ -129,9 +132,9 @@ struct Studies {
     /// Of the whole record.
     lines: Vec<Line>,
     /// Two levels between which the whole record jumps.
-    two_levels: Option<Finding>,
+    two_levels: Option<Detection>,
     /// The samples less what they follow, where effects are traced.
-    rest: Option<Grid>,
+    rest: Option<UniformSeries>,
 }
 
 impl Studies {
@@ -141,7 +144,7 @@ impl Studies {
         channel: ChannelProfile,
         own: Option<&Series>,
         repairs: &Repairs,
-        noises: &NoiseTable,
+        noises: &NoiseGrids,
         repaired: &[Series],
     ) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
@@ -154,10 +157,10 @@ impl Studies {
         let causes = parts.both.channels.iter().copied().zip(repaired).filter(|(cause, _)| repairs::is_slow(*cause));
         let (slow, courses): (Vec<ChannelProfile>, Vec<Series>) =
             causes.map(|(cause, series)| (cause, series.first_half())).unzip();
-        let level = level::find(&own_half, &courses.iter().collect::<Vec<_>>(), noises);
+        let level = bias::find(&own_half, &courses.iter().collect::<Vec<_>>(), noises);
         let in_half = |cause: ChannelProfile| {
-            let of = |(number, _): &&(usize, level::Followed)| slow[*number] == cause;
-            level.followed.iter().find(of).map(|(_, followed)| *followed)
+            let of = |(number, _): &&(usize, bias::BiasSensitivity)| slow[*number] == cause;
+            level.sensitivities.iter().find(of).map(|(_, followed)| *followed)
         };
         let ramps = repairs.ramps(channel);
         let first = Following::of(&parts.first, position, ramps, in_half);
@@ -168,8 +171,8 @@ impl Studies {
         let (first, _) = spectral::study(first, &own_half, half.as_ref());
         let (both, lines) = spectral::study(both, own, whole.as_ref());
         let correlated: Vec<f64> = both.correlation_times().collect();
-        let rest = Grid::of(whole.as_ref().unwrap_or(own));
-        let two_levels = two_levels::find(&rest, channel.unit, &correlated);
+        let rest = UniformSeries::from_series(whole.as_ref().unwrap_or(own));
+        let two_levels = random_telegraph::find(&rest, channel.unit, &correlated);
         Self { first, both, lines, two_levels, rest: Some(rest) }
     }
 
@@ -220,7 +223,7 @@ fn named(
     let step = part.step_of(channel);
     let dithered = reaches(profile, study, step, DITHERED_OCTAVES);
     // So much apart are two counts between which the noise decides.
-    let steps_only = |found: &&Finding| {
+    let steps_only = |found: &&Detection| {
         !reaches(profile, study, step, 1) && found.effect.parameters["amplitude"].value < TWO_COUNTS * step
     };
     let two_levels = own.two_levels.as_ref().filter(|found| !steps_only(found));
@@ -286,7 +289,7 @@ fn is_low_pass(model: &Model, markov: Markov, step: f64) -> bool {
 fn commons(studies: &[(ChannelProfile, Studies)]) -> Vec<Common> {
     let common = |quantity: &Quantity| {
         let members = studies.iter().filter(|(channel, _)| channel.quantity == *quantity);
-        let (channels, rests): (Vec<ChannelProfile>, Vec<Grid>) =
+        let (channels, rests): (Vec<ChannelProfile>, Vec<UniformSeries>) =
             members.filter_map(|(channel, own)| Some((*channel, own.rest.clone()?))).unzip();
         common::find(&channels, &rests)
     };

@@ -10,6 +10,7 @@
 pub mod slow_part;
 
 use crate::OCTAVES;
+use crate::series::Series;
 use crate::time_course::companion::Companion;
 use crate::time_course::control::Controls;
 use crate::time_course::drift::{beyond_drift, expected};
@@ -18,7 +19,7 @@ use crate::time_course::stationarity::{Part, Stationarity, predictive_part, stat
 use crate::time_course::tracking::{Tracked, track, what_moves};
 use crate::time_course::typical::typical;
 use crate::time_course::{Parts, deviance_per_point};
-use crate::trace::{Series, deliveries, sample_clock};
+use crate::trace::{deliveries, sample_clock};
 use allan_core::fit::fit_shapes;
 use allan_core::trace::{Lines, Trace, trace};
 use allan_core::{Curve, Kind, Model};

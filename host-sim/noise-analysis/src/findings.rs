@@ -1,11 +1,31 @@
-//! Plain data that every later stage passes on: a number with its bounds, an effect that was found, and the correction that
-//! removes an effect from the samples.
+//! Plain data that every later stage passes on: estimates with their bounds, an effect that was found, and the correction
+//! that removes an effect from the samples.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Highest probability that chance alone produces a [`Finding`] anywhere in the record of one channel.
+/// Highest probability that chance alone produces a [`Detection`] anywhere in the record of one channel.
 pub const SIGNIFICANCE: f64 = 2e-4;
+
+/// An estimate with its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredValue {
+    /// Likeliest value.
+    pub value: f64,
+    /// Standard deviation, in the unit of the value.
+    pub error: f64,
+}
+
+/// An estimate with its 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundedEstimate {
+    /// Likeliest value.
+    pub value: f64,
+    /// Lower 95 % bound.
+    pub low: f64,
+    /// Upper 95 % bound.
+    pub high: f64,
+}
 
 /// An estimated number with its 95 % bounds. A term that the data does not show has the value and the lower bound 0.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,20 +68,20 @@ impl Effect {
 
 /// An effect that a detector found in the samples of one channel or in their time base.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Finding {
+pub struct Detection {
     /// As reported.
     pub effect: Effect,
     /// What removes the effect from the samples; `None` where nothing can, or where the noise model has a term for it.
-    pub repair: Option<Repair>,
+    pub correction: Option<Correction>,
 }
 
 /// What removes an effect from a channel's samples.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Repair {
+pub enum Correction {
     /// These samples become a gap: positions in the series, in ascending order.
-    LeaveOut(Vec<usize>),
+    Exclude(Vec<usize>),
     /// `size` is subtracted from the sample at `from` and from all after it.
-    Level {
+    Offset {
         /// Position in the series.
         from: usize,
         /// In the unit of the series.

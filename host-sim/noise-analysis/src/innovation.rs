@@ -3,7 +3,7 @@
 //! A filter that knows the noise predicts each measurement as well as can be: what it did not predict is white, and as
 //! large as it expects. The measurements are means over [`BLOCK_S`], so that half an hour is some thousand steps.
 
-use crate::grid::Grid;
+use crate::uniform_series::UniformSeries;
 use allan_core::{Kind, Model};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -37,7 +37,7 @@ pub struct Innovations {
 /// Runs the filter of `model` over `unseen` samples; `None` for a record of fewer than some hundred blocks or a model
 /// without noise.
 #[must_use]
-pub fn innovations(model: &Model, unseen: &Grid) -> Option<Innovations> {
+pub fn innovations(model: &Model, unseen: &UniformSeries) -> Option<Innovations> {
     let size = (BLOCK_S / model.sample_period()).round().max(1.0) as usize;
     let blocks = blocks(unseen, size);
     let settling = blocks.len() / SETTLING;
@@ -47,7 +47,7 @@ pub fn innovations(model: &Model, unseen: &Grid) -> Option<Innovations> {
 }
 
 /// Means of whole blocks; `None` where half of the samples or more are missing.
-fn blocks(grid: &Grid, size: usize) -> Vec<Option<f64>> {
+fn blocks(grid: &UniformSeries, size: usize) -> Vec<Option<f64>> {
     let mean = grid.mean();
     let of = |chunk: &[f64]| {
         let present: Vec<f64> = chunk.iter().filter(|value| value.is_finite()).map(|value| value - mean).collect();

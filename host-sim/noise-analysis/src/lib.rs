@@ -1,19 +1,20 @@
 //! Noise analysis: from a recording to findings.
 
 pub mod analysis;
+pub mod detectors;
 pub mod distributions;
 pub mod explain;
 pub mod findings;
-pub mod grid;
 pub mod innovation;
 pub mod navigation;
 pub mod practice;
 pub mod record_length;
 pub mod report;
 pub mod series;
-pub mod spectrum;
+pub mod spectra;
 pub mod time_course;
 pub mod trace;
+pub mod uniform_series;
 pub mod units;
 
 /// Octaves of every estimator of the analysis: averaging factors up to 2²³ samples. The device uses as many.

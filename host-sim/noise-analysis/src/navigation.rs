@@ -6,7 +6,7 @@
 //! that is `2t²` Allan variances. Constants and what second differences do not see cancel, so that it exists for a
 //! random walk too.
 
-use crate::grid::Grid;
+use crate::uniform_series::UniformSeries;
 use allan_core::Model;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -46,7 +46,7 @@ pub struct Observed {
 
 /// The drifts after [`TIMES_S`] that `model` predicts, beside those that `unseen` samples show.
 #[must_use]
-pub fn drifts(model: &Model, unseen: &Grid) -> Vec<Drift> {
+pub fn drifts(model: &Model, unseen: &UniformSeries) -> Vec<Drift> {
     let period = model.sample_period();
     let calibration = samples(CALIBRATION_S, period);
     let sums = Sums::of(unseen);
@@ -122,7 +122,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(grid: &Grid) -> Self {
+    fn of(grid: &UniformSeries) -> Self {
         let mean = grid.mean();
         let running = grid.values().iter().scan((0.0, 0), |state, value| {
             if value.is_finite() {
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn pure_noises_have_closed_forms() {
-        let nothing = Grid::new(0.1, vec![]);
+        let nothing = UniformSeries::new(0.1, vec![]);
         // White noise: N²·t for the time and N²·t²/c for the bias.
         for drift in drifts(&model([0.5, 0.0, 0.0]), &nothing) {
             let expected = 0.5 * (drift.seconds + drift.seconds * drift.seconds / 60.0).sqrt();

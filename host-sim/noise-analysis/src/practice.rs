@@ -1,13 +1,13 @@
 //! Out of a channel's model, something to use: its coefficients in every unit, what it predicts for a vehicle beside what
 //! unseen data shows, whether a filter built from it would be right, and how much longer to record.
 
-use crate::grid::Grid;
 use crate::innovation;
 use crate::navigation::{self, CALIBRATION_S};
 use crate::record_length;
 use crate::report::Parameter;
-use crate::spectrum::{Welch, correlation_time};
-use crate::trace::Series;
+use crate::series::Series;
+use crate::spectra::{Welch, correlation_time};
+use crate::uniform_series::UniformSeries;
 use crate::units::{GRAVITY, conversions};
 use allan_core::{Kind, Model};
 use serde::Serialize;
@@ -94,9 +94,9 @@ impl Practice {
     /// Of a channel, `model` being fitted to the first half of `series`.
     #[must_use]
     pub fn of(series: &Series, model: &Model) -> Self {
-        let whole = Grid::of(series);
+        let whole = UniformSeries::from_series(series);
         let halfway = whole.values().len() / 2;
-        let unseen = Grid::new(whole.sample_period(), whole.values()[halfway..].to_vec());
+        let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
         Self {
             coefficients: coefficients(model, series.unit),
             drift: drift(model, series.unit, &unseen),
@@ -147,7 +147,7 @@ fn coefficients(model: &Model, unit: &str) -> Vec<Coefficient> {
     model.terms().iter().flat_map(of).collect()
 }
 
-fn drift(model: &Model, unit: &str, unseen: &Grid) -> Vec<Drift> {
+fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<Drift> {
     let (unit, factor) = match unit {
         "deg/s" => ("deg", 1.0),
         "g" => ("m/s", GRAVITY),
@@ -169,8 +169,8 @@ fn drift(model: &Model, unit: &str, unseen: &Grid) -> Vec<Drift> {
 }
 
 /// N by the spectrum without the lines of the model.
-fn angle_random_walk(whole: &Grid, model: &Model, unit: &str) -> Option<Parameter> {
-    let welch = Welch::of(whole, WELCH_SAMPLES)?;
+fn angle_random_walk(whole: &UniformSeries, model: &Model, unit: &str) -> Option<Parameter> {
+    let welch = Welch::estimate(whole, WELCH_SAMPLES)?;
     let reach = LINE_WIDTHS / (WELCH_SAMPLES as f64 * whole.sample_period());
     let near = |frequency: f64| {
         model.terms().iter().any(|term| match term.kind {

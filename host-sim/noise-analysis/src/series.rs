@@ -1,6 +1,6 @@
 //! One channel along its timeline.
 
-use crate::findings::Repair;
+use crate::findings::Correction;
 use measurement::{ChannelProfile, Measurement};
 
 /// The samples of one channel in its unit, each with the period in which it was taken.
@@ -53,15 +53,15 @@ impl Series {
 
     /// The series without the effect.
     #[must_use]
-    pub fn repaired(mut self, repair: &Repair) -> Self {
-        match repair {
-            Repair::LeaveOut(positions) => {
+    pub fn corrected(mut self, correction: &Correction) -> Self {
+        match correction {
+            Correction::Exclude(positions) => {
                 let kept = |position: &usize| positions.binary_search(position).is_err();
                 let positions: Vec<usize> = (0..self.values.len()).filter(kept).collect();
                 self.slots = positions.iter().map(|&position| self.slots[position]).collect();
                 self.values = positions.iter().map(|&position| self.values[position]).collect();
             }
-            &Repair::Level { from, size } => {
+            &Correction::Offset { from, size } => {
                 self.values.iter_mut().skip(from).for_each(|value| *value -= size);
             }
         }

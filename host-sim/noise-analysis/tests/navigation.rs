@@ -3,9 +3,9 @@
 use allan_core::model::Term;
 use allan_core::term::Markov;
 use allan_core::{Kind, Model};
-use noise_analysis::grid::Grid;
 use noise_analysis::innovation::{Innovations, innovations};
 use noise_analysis::navigation::drifts;
+use noise_analysis::uniform_series::UniformSeries;
 use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
@@ -34,7 +34,9 @@ fn the_predicted_drift_is_what_simulated_vehicles_show() {
     let mut sums = [(0.0, 0.0); 3];
     let mut inside = 0;
     for seed in 0..12 {
-        for (sum, drift) in sums.iter_mut().zip(drifts(&model(None), &Grid::new(PERIOD, simulated(NOISE, seed)))) {
+        for (sum, drift) in
+            sums.iter_mut().zip(drifts(&model(None), &UniformSeries::new(PERIOD, simulated(NOISE, seed))))
+        {
             let observed = drift.observed.expect("a long record");
             sum.0 += observed.edf * (observed.value / drift.predicted).powi(2);
             sum.1 += observed.edf;
@@ -51,18 +53,20 @@ fn the_predicted_drift_is_what_simulated_vehicles_show() {
 #[test]
 fn a_gap_costs_windows_and_nothing_else() {
     let mut values = simulated(NOISE, 3);
-    let whole = drifts(&model(None), &Grid::new(PERIOD, values.clone()));
+    let whole = drifts(&model(None), &UniformSeries::new(PERIOD, values.clone()));
     values.iter_mut().step_by(50).for_each(|value| *value = f64::NAN);
     values[60_000..70_000].fill(f64::NAN);
-    for (whole, holed) in whole.iter().zip(drifts(&model(None), &Grid::new(PERIOD, values))) {
+    for (whole, holed) in whole.iter().zip(drifts(&model(None), &UniformSeries::new(PERIOD, values))) {
         let (whole, holed) = (whole.observed.expect("long"), holed.observed.expect("long"));
         assert!(holed.edf < whole.edf && (holed.low..holed.high).contains(&whole.value), "{whole:?} {holed:?}");
     }
-    assert!(drifts(&model(None), &Grid::new(PERIOD, vec![1.0; 3000])).iter().all(|drift| drift.observed.is_none()));
+    assert!(
+        drifts(&model(None), &UniformSeries::new(PERIOD, vec![1.0; 3000])).iter().all(|drift| drift.observed.is_none())
+    );
 }
 
 fn of(values: Vec<f64>, model: &Model) -> Innovations {
-    innovations(model, &Grid::new(PERIOD, values)).expect("a long record")
+    innovations(model, &UniformSeries::new(PERIOD, values)).expect("a long record")
 }
 
 #[test]
@@ -101,5 +105,5 @@ fn the_innovations_of_a_wrong_model_are_not() {
     let terms = Kind::DECLARED.into_iter().zip([1.1 * n, b, k]).map(|(kind, value)| Term::exact(kind, value));
     let loud = of(simulated(NOISE, 8), &Model::new(PERIOD, terms));
     assert!(loud.normalised < loud.consistent.0, "{loud:?}");
-    assert_eq!(innovations(&model(None), &Grid::new(PERIOD, vec![0.0; 100])), None);
+    assert_eq!(innovations(&model(None), &UniformSeries::new(PERIOD, vec![0.0; 100])), None);
 }

@@ -26,7 +26,7 @@ pub(super) mod waveform;
 
 use super::place::{Place, Scene};
 use super::shape::GYROS;
-use noise_analysis::trace::normal::quantile;
+use noise_analysis::distributions::quantile;
 use noise_analysis::trace::sample_clock::HOST_CLOCK;
 use std::f64::consts::PI;
 use virtual_sensor::{InjectedEffect, OutputRegister};

@@ -1,7 +1,7 @@
 //! A slow part that channels of a sort share without a measured cause.
 
-use crate::grid::Grid;
-use crate::spectrum::shared::{Shared, Transforms};
+use crate::spectra::common_mode::{CommonModeDrift, CrossSpectra};
+use crate::uniform_series::UniformSeries;
 use measurement::ChannelProfile;
 
 /// By how much the spectra must be likelier with it, in ln likelihood. In 3 channels there are 10 ways to share
@@ -13,13 +13,13 @@ pub(super) struct Common {
     pub channels: Vec<ChannelProfile>,
     /// In ln likelihood.
     pub gain: f64,
-    pub shared: Shared,
+    pub shared: CommonModeDrift,
 }
 
 /// What the channels of one sort share; their samples are less what each follows.
-pub(super) fn find(channels: &[ChannelProfile], samples: &[Grid]) -> Option<Common> {
-    let transforms = Transforms::of(samples)?;
-    let (members, gain) = transforms.clearest().filter(|(_, gain)| *gain > CONVINCING)?;
-    let shared = transforms.markov(&members)?;
+pub(super) fn find(channels: &[ChannelProfile], samples: &[UniformSeries]) -> Option<Common> {
+    let transforms = CrossSpectra::new(samples)?;
+    let (members, gain) = transforms.most_likely_set().filter(|(_, gain)| *gain > CONVINCING)?;
+    let shared = transforms.fit_markov(&members)?;
     Some(Common { channels: members.iter().map(|&member| channels[member]).collect(), gain, shared })
 }

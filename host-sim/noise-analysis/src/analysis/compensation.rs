@@ -1,7 +1,7 @@
 //! A channel's samples without what they follow.
 
 use super::study::Following;
-use crate::trace::Series;
+use crate::series::Series;
 
 /// `series` less the covariates of `following`: `causes` are the samples of all that the part holds.
 ///

@@ -1,8 +1,9 @@
 //! The lines of a spectrum as terms of the model. One that wanders leaves many: they are taken together.
 
-use crate::grid::Grid;
-use crate::spectrum::{self, line::Estimate};
-use crate::trace::Series;
+use crate::findings::MeasuredValue;
+use crate::series::Series;
+use crate::spectra;
+use crate::uniform_series::UniformSeries;
 use allan_core::Model;
 use allan_core::term::{Kind, Resonance, Sinusoid};
 
@@ -27,11 +28,11 @@ const CLOCK: f64 = 5e-5;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     /// Hz.
-    pub frequency: Estimate,
+    pub frequency: MeasuredValue,
     /// Standard deviation of its signal, in the channel's unit.
-    pub deviation: Estimate,
+    pub deviation: MeasuredValue,
     /// Full width at half maximum, Hz; 0 where it is no wider than the record resolves.
-    pub width: Estimate,
+    pub width: MeasuredValue,
     /// −2 log-likelihood ratio.
     pub statistic: f64,
     /// Of the strongest by chance anywhere.
@@ -43,17 +44,17 @@ pub(super) struct Line {
 /// white, flicker and walking noise.
 pub(super) fn of(series: &Series, known: Option<&Model>) -> Vec<Line> {
     let duration_s = series.duration_s();
-    let is_line = |line: &spectrum::Line| {
+    let is_line = |line: &spectra::SpectralLine| {
         let finite = line.frequency.error.is_finite() && line.deviation.error.is_finite();
         // Broader than high up: that is a Markov process, and the curve's.
         finite && line.frequency.value > BROADEST * line.width.map_or(0.0, |width| width.value)
     };
-    let mut rest: Vec<spectrum::Line> = found(series, known).into_iter().filter(is_line).collect();
+    let mut rest: Vec<spectra::SpectralLine> = found(series, known).into_iter().filter(is_line).collect();
     let mut lines = Vec::new();
     while let Some(strongest) = rest.first().copied() {
         let reach = NEAR_WIDTHS * strongest.width.map_or(0.0, |width| width.value);
         let reach = reach.max(NEAR_RESOLUTIONS / duration_s);
-        let same = |line: &spectrum::Line| {
+        let same = |line: &spectra::SpectralLine| {
             let distance = (line.frequency.value - strongest.frequency.value).abs();
             // Two steady lines stay two, however near.
             let wanders = line.width.is_some() || strongest.width.is_some();
@@ -66,11 +67,11 @@ pub(super) fn of(series: &Series, known: Option<&Model>) -> Vec<Line> {
     lines
 }
 
-fn found(series: &Series, known: Option<&Model>) -> Vec<spectrum::Line> {
-    let grid = Grid::of(series);
+fn found(series: &Series, known: Option<&Model>) -> Vec<spectra::SpectralLine> {
+    let grid = UniformSeries::from_series(series);
     match known {
-        Some(model) => spectrum::lines_over(&grid, |frequency| background(model, frequency)),
-        None => spectrum::lines(&grid),
+        Some(model) => spectra::find_lines_over(&grid, |frequency| background(model, frequency)),
+        None => spectra::find_lines(&grid),
     }
 }
 
@@ -93,27 +94,28 @@ pub(super) fn kinds(lines: &[Line]) -> Vec<Kind> {
 
 impl Line {
     /// Of the same power and mean frequency, as wide as what is taken together.
-    fn together(lines: &[spectrum::Line], duration_s: f64) -> Self {
-        let power = |line: &spectrum::Line| line.deviation.value * line.deviation.value;
+    fn together(lines: &[spectra::SpectralLine], duration_s: f64) -> Self {
+        let power = |line: &spectra::SpectralLine| line.deviation.value * line.deviation.value;
         let total: f64 = lines.iter().map(power).sum();
-        let mean =
-            |of: &dyn Fn(&spectrum::Line) -> f64| lines.iter().map(|line| power(line) * of(line)).sum::<f64>() / total;
+        let mean = |of: &dyn Fn(&spectra::SpectralLine) -> f64| {
+            lines.iter().map(|line| power(line) * of(line)).sum::<f64>() / total
+        };
         let frequency = mean(&|line| line.frequency.value);
         let spread = mean(&|line| (line.frequency.value - frequency).powi(2)).sqrt();
         let own = mean(&|line| line.width.map_or(0.0, |width| width.value));
         let width_error = mean(&|line| line.width.map_or(0.0, |width| width.error));
         let strongest = lines[0];
         Self {
-            frequency: Estimate {
+            frequency: MeasuredValue {
                 value: frequency,
                 error: strongest.frequency.error.max(spread).hypot(CLOCK * frequency),
             },
-            deviation: Estimate {
+            deviation: MeasuredValue {
                 value: total.sqrt(),
                 error: strongest.deviation.error * total.sqrt() / strongest.deviation.value,
             },
             // 2.35 standard deviations are the width of a normal bell at half its height.
-            width: Estimate { value: own.hypot(2.35 * spread), error: width_error.hypot(spread) },
+            width: MeasuredValue { value: own.hypot(2.35 * spread), error: width_error.hypot(spread) },
             statistic: lines.iter().map(|line| line.statistic).fold(0.0, f64::max),
             p_value: lines.iter().map(|line| line.p_value).fold(1.0, f64::min),
             duration_s,

@@ -4,9 +4,9 @@ use super::coefficient_unit;
 use super::common::Common;
 use super::lines::Line;
 use super::walk::Unbounded;
+use crate::findings::BoundedEstimate;
+use crate::findings::MeasuredValue;
 use crate::report::{Effect, Parameter};
-use crate::spectrum::line::Estimate;
-use crate::spectrum::shared::Bounded;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::Term;
 use allan_core::regression::Sensitivity;
@@ -65,7 +65,7 @@ fn added_effect(term: &Term, found: &Found, unit: &str, period_s: f64, meaning: 
 }
 
 /// With its normal 95 % bounds; nothing here is negative.
-fn estimated(estimate: Estimate, unit: &str) -> Parameter {
+fn estimated(estimate: MeasuredValue, unit: &str) -> Parameter {
     let half_width = NORMAL_975 * estimate.error;
     let (low, high) = ((estimate.value - half_width).max(0.0), estimate.value + half_width);
     Parameter { value: estimate.value, low, high, unit: unit.to_owned() }
@@ -163,8 +163,8 @@ pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
             vec![("deviation", estimated(line.deviation, unit)), ("bandwidth", estimated(line.width, "Hz"))]
         }
         _ => {
-            let Estimate { value, error } = line.deviation;
-            vec![("amplitude", estimated(Estimate { value: root * value, error: root * error }, unit))]
+            let MeasuredValue { value, error } = line.deviation;
+            vec![("amplitude", estimated(MeasuredValue { value: root * value, error: root * error }, unit))]
         }
     };
     let frequency = ("frequency", estimated(line.frequency, "Hz"));
@@ -187,8 +187,12 @@ pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
 
 /// A slow part that `channel` shares with others.
 pub(super) fn common_effect(common: &Common, channel: ChannelProfile, unit: &str) -> Effect {
-    let parameter =
-        |of: Bounded, unit: &str| Parameter { value: of.value, low: of.low, high: of.high, unit: unit.to_owned() };
+    let parameter = |of: BoundedEstimate, unit: &str| Parameter {
+        value: of.value,
+        low: of.low,
+        high: of.high,
+        unit: unit.to_owned(),
+    };
     let others: Vec<&str> = common.channels.iter().filter(|other| **other != channel).map(|other| other.name).collect();
     Effect {
         kind: "common_mode".to_owned(),

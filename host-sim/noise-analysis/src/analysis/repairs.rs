@@ -2,13 +2,13 @@
 //!
 //! A ramp is named here, where it is clearest, and left in the samples: the model has a term for it.
 
+use crate::detectors::bias::{BiasChanges, BiasSensitivity};
+use crate::detectors::block_means::NoiseGrids;
+use crate::detectors::{bias, effective_lsb, spikes};
+use crate::findings::{Correction, Detection};
 use crate::report::Effect;
-use crate::trace::{
-    Finding, Repair, Series, coarse_counts, deliveries,
-    level::{self, Followed, Level},
-    noises::NoiseTable,
-    sample_clock, spikes,
-};
+use crate::series::Series;
+use crate::trace::{deliveries, sample_clock};
 use allan_core::Kind;
 use measurement::{ChannelProfile, Measurement, Quantity};
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ pub(super) struct Repairs {
     left_out: BTreeSet<usize>,
     levels: Vec<(ChannelProfile, usize, f64)>,
     /// Channels, slow causes that they follow, and how.
-    followed: Vec<(ChannelProfile, ChannelProfile, Followed)>,
+    followed: Vec<(ChannelProfile, ChannelProfile, BiasSensitivity)>,
     /// Counts to a step of a channel's values, where it is more than one.
     coarse: Vec<(ChannelProfile, u32)>,
 }
@@ -30,37 +30,39 @@ pub(super) struct Repairs {
 impl Repairs {
     /// Looks for spikes and for what moves the level in `traced`, and for what became of the samples of the whole
     /// recording.
-    pub(super) fn find(measurement: &Measurement, traced: &[ChannelProfile], noises: &NoiseTable) -> Self {
+    pub(super) fn find(measurement: &Measurement, traced: &[ChannelProfile], noises: &NoiseGrids) -> Self {
         let mut repairs = Self::default();
         let deliveries =
             [deliveries::dropped(measurement), deliveries::repeated(measurement), sample_clock::find(measurement)];
         for finding in deliveries.into_iter().flatten() {
-            repairs.left_out.extend(left_out(&finding.repair));
+            repairs.left_out.extend(left_out(&finding.correction));
             repairs.everywhere.push(finding.effect);
         }
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
         let measured = |channel: ChannelProfile| Series::of(measurement, &channel);
-        let coarse = in_parallel(&recorded, |&channel| coarse_counts::step(&measured(channel)));
+        let coarse = in_parallel(&recorded, |&channel| effective_lsb::counts_per_step(&measured(channel)));
         repairs.coarse = recorded.iter().copied().zip(coarse).filter(|(_, counts)| *counts > 1).collect();
         let of = |channel: ChannelProfile| measured(channel).with_steps(repairs.step(channel));
         let causes: Vec<(ChannelProfile, Series)> = recorded.iter().map(|&channel| (channel, of(channel))).collect();
         let found = in_parallel(traced, |&channel| {
             let series = of(channel);
-            let coarse = coarse_counts::find(&measured(channel));
+            let coarse = effective_lsb::find(&measured(channel));
             let spikes = spikes::find(&series);
-            let left = spikes.as_ref().map(|finding| left_out(&finding.repair)).unwrap_or_default();
-            let cleaned = series.repaired(&Repair::LeaveOut(left.clone()));
+            let left = spikes.as_ref().map(|finding| left_out(&finding.correction)).unwrap_or_default();
+            let cleaned = series.corrected(&Correction::Exclude(left.clone()));
             let may = causes.iter().filter(|(of, _)| may_cause(*of, channel));
             // A cause must have the same samples.
             let others: Vec<(ChannelProfile, Series)> =
-                may.map(|(of, series)| (*of, series.clone().repaired(&Repair::LeaveOut(left.clone())))).collect();
+                may.map(|(of, series)| (*of, series.clone().corrected(&Correction::Exclude(left.clone())))).collect();
             let courses: Vec<&Series> = others.iter().map(|(_, series)| series).collect();
-            let level = level::find(&cleaned, &courses, noises);
+            let level = bias::find(&cleaned, &courses, noises);
             let causes: Vec<ChannelProfile> = others.iter().map(|(cause, _)| *cause).collect();
             (coarse, spikes, level, causes, left)
         });
-        for (&channel, (coarse, spikes, Level { step, ramp, followed }, causes, left)) in traced.iter().zip(found) {
-            if let Some(Finding { repair: Some(Repair::Level { from, size }), .. }) = &step {
+        for (&channel, (coarse, spikes, BiasChanges { step, ramp, sensitivities: followed }, causes, left)) in
+            traced.iter().zip(found)
+        {
+            if let Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) = &step {
                 repairs.levels.push((channel, before_leaving_out(*from, &left), *size));
             }
             // Motion is fast enough for the differences; its slow part is the accelerometers' own drift.
@@ -93,9 +95,9 @@ impl Repairs {
     pub(super) fn series(&self, measurement: &Measurement, channel: ChannelProfile) -> Series {
         let mut series = Series::of(measurement, &channel).with_steps(self.step(channel));
         for &(_, from, size) in self.levels.iter().filter(|(of, ..)| *of == channel) {
-            series = series.repaired(&Repair::Level { from, size });
+            series = series.corrected(&Correction::Offset { from, size });
         }
-        series.repaired(&Repair::LeaveOut(self.left_out.iter().copied().collect()))
+        series.corrected(&Correction::Exclude(self.left_out.iter().copied().collect()))
     }
 
     /// Whether a channel has a ramp.
@@ -104,8 +106,8 @@ impl Repairs {
     }
 
     /// How a channel follows a slow cause.
-    pub(super) fn followed(&self, channel: ChannelProfile, cause: ChannelProfile) -> Option<Followed> {
-        let of = |(follower, followed, _): &&(ChannelProfile, ChannelProfile, Followed)| {
+    pub(super) fn followed(&self, channel: ChannelProfile, cause: ChannelProfile) -> Option<BiasSensitivity> {
+        let of = |(follower, followed, _): &&(ChannelProfile, ChannelProfile, BiasSensitivity)| {
             (*follower, *followed) == (channel, cause)
         };
         self.followed.iter().find(of).map(|(.., followed)| *followed)
@@ -127,9 +129,9 @@ pub(super) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R 
     })
 }
 
-fn left_out(repair: &Option<Repair>) -> Vec<usize> {
-    match repair {
-        Some(Repair::LeaveOut(positions)) => positions.clone(),
+fn left_out(correction: &Option<Correction>) -> Vec<usize> {
+    match correction {
+        Some(Correction::Exclude(positions)) => positions.clone(),
         _ => Vec::new(),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::lines::{self, Line};
 use super::study::{Following, Study};
-use crate::trace::Series;
+use crate::series::Series;
 use allan_core::{Kind, Model};
 
 /// Share of a line's deviation that must be left when what the channel follows is taken off; else it is that's line.

@@ -3,7 +3,7 @@
 use super::parts::Part;
 use super::repairs::is_slow;
 use crate::OCTAVES;
-use crate::trace::level::Followed;
+use crate::detectors::bias::BiasSensitivity;
 use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
 use allan_core::term::Markov;
 use allan_core::trace::{Lines, Trace, trace};
@@ -14,7 +14,7 @@ use measurement::{ChannelProfile, Quantity};
 const UNEXPLAINED: f64 = 1e-3;
 
 /// Degrees of freedom of a course: the stretches that a record is cut into, nearly.
-const FREE: f64 = crate::trace::block::BLOCKS as f64;
+const FREE: f64 = crate::detectors::block_means::BLOCKS as f64;
 
 /// The covariates of a channel in a part, ready for the regression.
 pub(super) struct Surroundings {
@@ -82,13 +82,13 @@ impl Following {
         part: &Part,
         channel: usize,
         ramps: bool,
-        slow: impl Fn(ChannelProfile) -> Option<Followed>,
+        slow: impl Fn(ChannelProfile) -> Option<BiasSensitivity>,
     ) -> Self {
         let surroundings = Surroundings::of(part, channel, None);
         let mut followed: Vec<Sensitivity> = surroundings.beside(|beside| beside.followed()).into_iter().collect();
         for (covariate, &member) in surroundings.members.iter().enumerate() {
             let cause = part.channels[member];
-            let Some(Followed { sensitivity: value, error }) = slow(cause) else {
+            let Some(BiasSensitivity { sensitivity: value, error }) = slow(cause) else {
                 followed.retain(|known| known.covariate != covariate || !ramps || !is_slow(cause));
                 continue;
             };

@@ -8,9 +8,9 @@ use super::moving::{Moving, least};
 use super::parts::Parts;
 use super::{SIGNIFICANCE, deviance_per_point};
 use crate::OCTAVES;
-use crate::grid::Grid;
-use crate::spectrum::Welch;
-use crate::trace::Series;
+use crate::series::Series;
+use crate::spectra::Welch;
+use crate::uniform_series::UniformSeries;
 use allan_core::Curve;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
@@ -102,7 +102,7 @@ fn centroid(series: &Series, range: Range<usize>, near: f64) -> Option<f64> {
         resolution: series.resolution,
         unit: series.unit,
     };
-    let welch = Welch::of(&Grid::of(&stretch), length)?;
+    let welch = Welch::estimate(&UniformSeries::from_series(&stretch), length)?;
     let band: Vec<(f64, f64)> = welch.points().filter(|(f, _)| (f / near - 1.0).abs() < BAND).collect();
     let mut sorted: Vec<f64> = band.iter().map(|point| point.1).collect();
     sorted.sort_by(f64::total_cmp);

@@ -1,6 +1,6 @@
 //! The parts of a channel's record that are compared with each other.
 
-use crate::trace::Series;
+use crate::series::Series;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
 use std::ops::Range;

@@ -6,7 +6,7 @@ use super::stationarity::{Part, predictive_part};
 use super::tracking::{track, what_moves};
 use super::typical::typical;
 use super::{Parts, SIGNIFICANCE, deviance_per_point, stationarity};
-use crate::trace::Series;
+use crate::series::Series;
 use allan_core::fit::{fit, fit_shapes};
 use allan_core::term::{Resonance, Sinusoid};
 use allan_core::{Kind, Model};

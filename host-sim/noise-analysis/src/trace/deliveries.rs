@@ -1,7 +1,7 @@
 //! Samples that never arrived, and samples that arrived twice as if they were new.
 
 use crate::distributions::{poisson_bounds, poisson_tail};
-use crate::findings::{Effect, Finding, Parameter, Repair, SIGNIFICANCE};
+use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
 use measurement::Measurement;
 
 /// By how much equal neighbours by chance may be more frequent than if the channels were independent.
@@ -11,7 +11,7 @@ const DEPENDENCE: f64 = 3.0;
 ///
 /// Nothing but loss leaves such room, so one is enough.
 #[must_use]
-pub fn dropped(measurement: &Measurement) -> Option<Finding> {
+pub fn dropped(measurement: &Measurement) -> Option<Detection> {
     let (gaps, used) = (measurement.gaps(), measurement.len());
     let missing = measurement.dropped.get("gap").copied().unwrap_or(0);
     if missing == 0 {
@@ -26,21 +26,21 @@ pub fn dropped(measurement: &Measurement) -> Option<Finding> {
     let evidence = format!(
         "{missing} of {all} samples never arrived, in {gaps} gaps; a reader that comes too late, or a full queue"
     );
-    Some(Finding {
+    Some(Detection {
         effect: Effect::new(
             "dropped_samples",
             [("fraction", Parameter::new(fraction(missing), fraction(low * per_gap), fraction(high * per_gap), ""))],
             evidence,
         ),
-        repair: None,
+        correction: None,
     })
 }
 
 /// Samples all of whose channels equal the sample before, more often than by chance.
 ///
-/// The repair holds positions in the [`Series`](super::Series) of any channel.
+/// The correction holds positions in the [`Series`](super::Series) of any channel.
 #[must_use]
-pub fn repeated(measurement: &Measurement) -> Option<Finding> {
+pub fn repeated(measurement: &Measurement) -> Option<Detection> {
     let channels = &measurement.channels;
     let mut equal = vec![0u64; channels.len()];
     let mut positions = Vec::new();
@@ -72,13 +72,13 @@ pub fn repeated(measurement: &Measurement) -> Option<Finding> {
         positions.len() as u64 + refused,
         channels.len(),
     );
-    Some(Finding {
+    Some(Detection {
         effect: Effect::new(
             "repeated_samples",
             [("fraction", Parameter::new(count / all, low / all, high / all, ""))],
             evidence,
         ),
-        repair: Some(Repair::LeaveOut(positions)),
+        correction: Some(Correction::Exclude(positions)),
     })
 }
 

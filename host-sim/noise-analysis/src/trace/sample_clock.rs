@@ -1,7 +1,7 @@
 //! A sample clock that does not run at the nominal rate.
 
 use crate::distributions::{NORMAL_975, upper_tail};
-use crate::findings::{Effect, Finding, Parameter, SIGNIFICANCE};
+use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
 use measurement::{Measurement, SensorProfile};
 
 /// Standard deviation of the clock of an ordinary host, which the rate is measured by: 20 parts in a million, as of a
@@ -19,7 +19,7 @@ const FEWEST_SAMPLES: usize = 100 * STRETCHES;
 /// Compares the rate that the time stamps show with the one that is stated, or else with the nearest at which the part
 /// samples or a host reads.
 #[must_use]
-pub fn find(measurement: &Measurement) -> Option<Finding> {
+pub fn find(measurement: &Measurement) -> Option<Detection> {
     let times = measurement.times_s.as_ref()?;
     let slots: Vec<f64> = measurement.slots.iter().map(|&slot| slot as f64).collect();
     if slots.len() < FEWEST_SAMPLES {
@@ -50,13 +50,13 @@ pub fn find(measurement: &Measurement) -> Option<Finding> {
          clock; the tolerance of the part's oscillator",
         1e6 * off,
     );
-    Some(Finding {
+    Some(Detection {
         effect: Effect::new(
             "sample_clock",
             [("rate_hz", Parameter::new(measured, measured - half, measured + half, "Hz"))],
             evidence,
         ),
-        repair: None,
+        correction: None,
     })
 }
 

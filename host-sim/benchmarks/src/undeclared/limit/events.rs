@@ -26,7 +26,7 @@ pub(crate) fn spikes(samples: f64, probability: f64, size: f64) -> f64 {
 /// which a count is as often above as below the largest that chance gives in 99 of 100 recordings.
 pub(crate) fn count(by_chance: f64) -> f64 {
     let mut fewest = 1u64;
-    while noise_analysis::trace::normal::poisson_tail(fewest, by_chance) > super::FALSE_ALARM {
+    while noise_analysis::distributions::poisson_tail(fewest, by_chance) > super::FALSE_ALARM {
         fewest += 1;
     }
     // The median of a Poisson number is nearly its mean less a third; exactly ln 2 for the first event.

@@ -5,11 +5,11 @@
 
 use adis16405_driver::Channel;
 use measurement::Measurement;
-use noise_analysis::trace::Series;
-use noise_analysis::trace::block::Blocks;
-use noise_analysis::trace::evidence::Evidence;
-use noise_analysis::trace::level::SIGNIFICANCE;
-use noise_analysis::trace::noises::NoiseTable;
+use noise_analysis::detectors::bias::SIGNIFICANCE;
+use noise_analysis::detectors::block_means::BlockMeans;
+use noise_analysis::detectors::block_means::NoiseGrids;
+use noise_analysis::detectors::gls_regression::GlsRegression;
+use noise_analysis::series::Series;
 use virtual_sensor::InjectedEffect;
 
 /// Whether such a test sees `effect` at the probability of chance that the analysis asks for; `None` for effects that are
@@ -17,16 +17,16 @@ use virtual_sensor::InjectedEffect;
 pub(crate) fn sees(effect: &InjectedEffect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
     let series = |channel: Channel| Series::of(measurement, &measurement.profile.channels[channel as usize]);
     let own = series(simulation::channel(*effect.channels().first()?));
-    let blocks = Blocks::of(&own)?;
+    let blocks = BlockMeans::from_series(&own)?;
     let shape = match effect {
         InjectedEffect::RateRamp { .. } => blocks.ramp(),
         InjectedEffect::BiasStep { time_s, .. } => blocks.step_at(((time_s - begin_s) / own.period_s).max(0.0) as u64),
-        InjectedEffect::Temperature { .. } => Blocks::of(&series(Channel::Temp))?.means,
-        InjectedEffect::Supply { .. } => Blocks::of(&series(Channel::Supply))?.means,
+        InjectedEffect::Temperature { .. } => BlockMeans::from_series(&series(Channel::Temp))?.means,
+        InjectedEffect::Supply { .. } => BlockMeans::from_series(&series(Channel::Supply))?.means,
         _ => return None,
     };
-    let noises = NoiseTable::default().of(&blocks);
-    let estimate = Evidence::of(&blocks, &noises, &[]).shape(&shape)?;
+    let noises = NoiseGrids::default().get(&blocks);
+    let estimate = GlsRegression::new(&blocks, &noises, &[]).estimate(&shape)?;
     Some(estimate.p_value < SIGNIFICANCE)
 }
 

@@ -4,8 +4,8 @@ use super::needed;
 use super::spectrum::Record;
 use crate::undeclared::place::{Place, Scene};
 use nalgebra::DVector;
-use noise_analysis::trace::block::BLOCKS;
-use noise_analysis::trace::noises::{Noise, flicker_covariance, markov_covariance};
+use noise_analysis::detectors::block_means::BLOCKS;
+use noise_analysis::detectors::block_means::{NoiseCovariance, flicker_covariance, markov_covariance};
 use virtual_sensor::EffectSource;
 use virtual_sensor::{OutputRegister, SensorScenario};
 
@@ -36,8 +36,8 @@ pub(crate) fn ratio(values: &[f64], place: &Place<'_>) -> f64 {
     let numbers: Vec<usize> = (0..BLOCKS).collect();
     let fills = vec![1.0; BLOCKS];
     let values = DVector::from_column_slice(values);
-    let energy = |noise: Noise| values.dot(&noise.whitened(&values));
-    0.5 * Noise::of_covariance(&numbers, &fills, &coloured, walk).map_or(0.0, energy) / white
+    let energy = |noise: NoiseCovariance| values.dot(&noise.weighted(&values));
+    0.5 * NoiseCovariance::with_coloured(&numbers, &fills, &coloured, walk).map_or(0.0, energy) / white
 }
 
 /// What the surroundings do to `channel`, as means of blocks.

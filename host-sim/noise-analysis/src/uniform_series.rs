@@ -1,27 +1,27 @@
-//! A channel on the grid of its sample periods, as transforms and filters take it.
+//! A channel sampled at a constant period, with missing samples as `NaN`: the input of transforms and filters.
 
 use crate::series::Series;
 
-/// Samples one period apart; `NaN` where a sample is missing.
+/// Samples one period apart; `NaN` marks a missing sample.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
+pub struct UniformSeries {
     sample_period: f64,
     values: Vec<f64>,
 }
 
-impl Grid {
-    /// `values` every `sample_period` seconds; those that are not finite count as missing.
+impl UniformSeries {
+    /// `values` taken every `sample_period` seconds; a value that is not finite counts as missing.
     #[must_use]
     pub fn new(sample_period: f64, values: Vec<f64>) -> Self {
         Self { sample_period, values }
     }
 
-    /// The samples of a channel with the places of the missing ones.
+    /// The samples of a channel, with a `NaN` for each missing one.
     ///
-    /// Where more samples are missing in a row than the record has, only the longer side is taken: to lay both on one
-    /// grid would be mostly nothing.
+    /// A gap of more samples than the record holds splits it, and only the longest part is returned: the result would
+    /// otherwise be mostly `NaN`.
     #[must_use]
-    pub fn of(series: &Series) -> Self {
+    pub fn from_series(series: &Series) -> Self {
         let longest_gap = series.values.len() as u64;
         let mut values = Vec::with_capacity(series.values.len());
         let mut longest = Vec::new();
@@ -49,53 +49,55 @@ impl Grid {
         self.sample_period
     }
 
-    /// Samples and missing ones.
+    /// All samples in order, `NaN` for a missing one.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Samples that are there.
+    /// Number of samples that are not missing.
     #[must_use]
     pub fn present(&self) -> usize {
         self.values.iter().filter(|value| value.is_finite()).count()
     }
 
-    /// Seconds from the first to the last place, both included.
+    /// Number of values, missing ones included, times the sample period, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.sample_period * self.values.len() as f64
     }
 
-    /// Mean of the samples that are there; 0 for none.
+    /// Mean of the samples that are not missing; 0 if all are.
     #[must_use]
     pub fn mean(&self) -> f64 {
         mean(self.values.iter().copied())
     }
 
-    /// The same samples less their straight line of least squares.
+    /// The samples minus their least-squares straight line.
     #[must_use]
     pub fn detrended(&self) -> Self {
         let middle = (self.values.len() as f64 - 1.0) / 2.0;
         let present = || self.values.iter().enumerate().filter(|(_, value)| value.is_finite());
-        let mean_place = mean(present().map(|(at, _)| at as f64 - middle));
+        let mean_position = mean(present().map(|(at, _)| at as f64 - middle));
         let mean = self.mean();
         let (xx, xy) = present().fold((0.0, 0.0), |(xx, xy), (at, value)| {
-            let x = at as f64 - middle - mean_place;
+            let x = at as f64 - middle - mean_position;
             (xx + x * x, xy + x * (value - mean))
         });
         let slope = if xx > 0.0 { xy / xx } else { 0.0 };
-        let line = |at: usize| mean + slope * (at as f64 - middle - mean_place);
+        let line = |at: usize| mean + slope * (at as f64 - middle - mean_position);
         let values = self.values.iter().enumerate().map(|(at, value)| value - line(at)).collect();
         Self { sample_period: self.sample_period, values }
     }
 
-    /// The series at a rate at which its quantization is noise: averages over the least power of two of samples whose
-    /// distance makes fewer than half of the values equal.
+    /// Block averages at a rate at which rounding acts as noise. The block is the smallest power of two such that fewer
+    /// than half of all pairs of samples one block apart are equal; no whole block, and so no value, remains of a series
+    /// that never changes.
     ///
-    /// Where a step of the quantizer lasts longer than a sample, it is part of the signal, and not a small one.
+    /// Where the output stays at one step of the quantizer for several samples, the rounding error is correlated and
+    /// would show as lines.
     #[must_use]
-    pub fn dithered(self) -> Self {
+    pub(crate) fn averaged_until_dithered(self) -> Self {
         let equal_apart = |distance: usize| {
             let pairs = self.values.iter().zip(self.values.iter().skip(distance));
             let (equal, count) = pairs
@@ -118,7 +120,7 @@ impl Grid {
     }
 }
 
-/// Mean of what is finite; 0 for nothing.
+/// Mean of the finite values; 0 if there are none.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) =
         values.filter(|value| value.is_finite()).fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
@@ -130,27 +132,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_with_a_gap_leaves_nothing() {
+    fn detrending_removes_a_straight_line_with_gaps() {
         let values = (0..1000).map(|at| if at % 7 == 3 { f64::NAN } else { 5.0 - 0.25 * f64::from(at) }).collect();
-        let rest = Grid::new(0.1, values).detrended();
+        let rest = UniformSeries::new(0.1, values).detrended();
         assert_eq!(rest.present(), 857);
         assert!(rest.values().iter().filter(|value| value.is_finite()).all(|value| value.abs() < 1e-10));
     }
 
     #[test]
-    fn a_step_of_the_quantizer_that_lasts_is_averaged_over() {
+    fn averages_until_neighbours_are_rarely_equal() {
         // Each value lasts ten samples: four samples apart six of ten are equal, eight apart two.
         let values: Vec<f64> = (0..1000).map(|at| f64::from(at / 10 % 3)).collect();
-        let averaged = Grid::new(0.5, values).dithered();
+        let averaged = UniformSeries::new(0.5, values).averaged_until_dithered();
         assert_eq!((averaged.sample_period(), averaged.values().len()), (4.0, 125));
         assert_eq!(averaged.values()[..2], [0.0, 6.0 / 8.0]);
-        let noise = Grid::new(0.5, vec![1.0, 2.0, 4.0, 8.0]);
-        assert_eq!(noise.clone().dithered(), noise);
-        assert!(Grid::new(0.5, vec![1.0; 100]).dithered().values().is_empty());
+        let noise = UniformSeries::new(0.5, vec![1.0, 2.0, 4.0, 8.0]);
+        assert_eq!(noise.clone().averaged_until_dithered(), noise);
+        assert!(UniformSeries::new(0.5, vec![1.0; 100]).averaged_until_dithered().values().is_empty());
     }
 
     #[test]
-    fn gaps_keep_their_places_and_a_wide_one_ends_the_grid() {
+    fn gaps_become_nan_and_a_wide_gap_splits_the_record() {
         let slots = [3, 4, 7];
         let series = |slots: Vec<u64>| Series {
             values: (1..=slots.len()).map(|value| value as f64).collect(),
@@ -159,14 +161,14 @@ mod tests {
             resolution: 1.0,
             unit: "g",
         };
-        let grid = Grid::of(&series(slots.to_vec()));
+        let uniform = UniformSeries::from_series(&series(slots.to_vec()));
         assert_eq!(
-            grid.values().iter().map(|value| value.is_finite()).collect::<Vec<_>>(),
+            uniform.values().iter().map(|value| value.is_finite()).collect::<Vec<_>>(),
             [true, true, false, false, true]
         );
-        assert_eq!((grid.present(), grid.mean()), (3, 2.0));
-        let far = Grid::of(&series(vec![0, 1 << 40, (1 << 40) + 1]));
+        assert_eq!((uniform.present(), uniform.mean()), (3, 2.0));
+        let far = UniformSeries::from_series(&series(vec![0, 1 << 40, (1 << 40) + 1]));
         assert_eq!(far.values(), [2.0, 3.0]);
-        assert!(Grid::of(&series(vec![])).values().is_empty());
+        assert!(UniformSeries::from_series(&series(vec![])).values().is_empty());
     }
 }

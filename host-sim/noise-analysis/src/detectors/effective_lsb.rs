@@ -1,17 +1,18 @@
-//! A channel whose values are whole multiples of more than one count: it was rounded before it came here.
+//! The effective LSB of a channel: the number of counts of which all differences of its values are multiples. More than one
+//! means that the values were rounded before they were recorded.
 //!
-//! Where noise is larger than the step this adds no more than white noise of step²/12, which no curve and no spectrum
-//! tells from any other; the values themselves do.
+//! Where the noise is larger than the step, such rounding adds white noise of variance step²/12, which no curve and no
+//! spectrum distinguishes from other white noise; the values themselves show it.
 
-use crate::findings::{Effect, Finding, Parameter};
+use crate::findings::{Detection, Effect, Parameter};
 use crate::series::Series;
 
-/// Changes of the value that must all be multiples of the step: of a smooth density every other one would be odd.
+/// Fewest changes of the value; all must be multiples of the step. Of a smooth density every second one would be odd.
 const FEWEST_CHANGES: usize = 50;
 
-/// The largest number of counts that divides every difference of two values; 1 where too few differ to tell.
+/// The largest number of counts that divides every difference of two values; 1 if the values change fewer than 50 times.
 #[must_use]
-pub fn step(series: &Series) -> u32 {
+pub(crate) fn counts_per_step(series: &Series) -> u32 {
     let Some(&first) = series.values.first() else { return 1 };
     let count = |value: f64| ((value - first) / series.resolution).round().abs() as u64;
     let divisor = series.values.iter().map(|&value| count(value)).fold(0, greatest_common_divisor);
@@ -19,10 +20,10 @@ pub fn step(series: &Series) -> u32 {
     if changes < FEWEST_CHANGES { 1 } else { u32::try_from(divisor).unwrap_or(1).max(1) }
 }
 
-/// Looks for a step of more than one count.
+/// Reports a step of more than one count.
 #[must_use]
-pub fn find(series: &Series) -> Option<Finding> {
-    let counts = step(series);
+pub(crate) fn find(series: &Series) -> Option<Detection> {
+    let counts = counts_per_step(series);
     if counts == 1 {
         return None;
     }
@@ -33,9 +34,9 @@ pub fn find(series: &Series) -> Option<Finding> {
          a converter of fewer bits, or rounding on the way",
         series.values.len(),
     );
-    Some(Finding {
+    Some(Detection {
         effect: Effect::new("quantization", [("step", Parameter::new(step, step, step, series.unit))], evidence),
-        repair: None,
+        correction: None,
     })
 }
 

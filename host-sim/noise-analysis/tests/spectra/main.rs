@@ -1,10 +1,10 @@
-//! The spectrum of simulated noise: densities that are known, lines that are there, and none that is not.
+//! Spectra of simulated noise: known densities are measured, added lines are found, and pure noise yields none.
 
 mod noise;
 
 use noise::{Output, PAPER, RATE_HZ, gain, resonance, sine};
-use noise_analysis::grid::Grid;
-use noise_analysis::spectrum::{Line, Welch, lines};
+use noise_analysis::spectra::{SpectralLine, Welch, find_lines};
+use noise_analysis::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
 /// About eleven minutes.
@@ -20,24 +20,24 @@ fn pure_noise_shows_no_line() {
     for (case, noise) in mixtures.into_iter().enumerate() {
         for taps_log2 in [0, 2, 4, 6] {
             for seed in 0..20 {
-                let grid = Output { noise, taps_log2, added: &[] }.samples(1 << 14, 100 * case as u64 + seed);
+                let series = Output { noise, taps_log2, added: &[] }.samples(1 << 14, 100 * case as u64 + seed);
                 records += 1;
-                alarms.extend(lines(&grid));
+                alarms.extend(find_lines(&series));
             }
         }
     }
-    // At most one record in a hundred; by design it is one in five hundred.
+    // One record in five hundred is expected.
     assert!(alarms.len() <= records / 100, "{} of {records}: {alarms:?}", alarms.len());
 }
 
-fn nearest(lines: &[Line], frequency: f64) -> Option<&Line> {
+fn nearest(lines: &[SpectralLine], frequency: f64) -> Option<&SpectralLine> {
     lines.iter().min_by(|a, b| {
-        let distance = |line: &Line| (line.frequency.value - frequency).abs();
+        let distance = |line: &SpectralLine| (line.frequency.value - frequency).abs();
         distance(a).total_cmp(&distance(b))
     })
 }
 
-/// A sine of amplitude A in white noise of the density S has, at its best, −2 ln Λ = A²·T/S.
+/// Amplitude of a sinusoid with this −2 ln Λ, which is A²·T/S in noise of the density S.
 fn amplitude_of(statistic: f64, frequency: f64) -> f64 {
     let [n, b, k] = PAPER.noise;
     let density = 2.0 * n * n + b * b / (PI * frequency) + k * k / (2.0 * PI * PI * frequency * frequency);
@@ -45,16 +45,16 @@ fn amplitude_of(statistic: f64, frequency: f64) -> f64 {
 }
 
 #[test]
-fn a_sine_is_found_down_to_what_its_likelihood_allows() {
-    // With 65,536 frequencies and one alarm in a thousand records, −2 ln Λ must pass about 39. It is χ² with two degrees of
-    // freedom around what the sine brings, so 60 is above by 1.3 and 100 by 3 standard deviations.
+fn sinusoids_are_found_down_to_the_limit_of_their_likelihood() {
+    // With 65,536 frequencies and one false alarm in a thousand records, −2 ln Λ must exceed about 39. It is noncentral χ²
+    // with two degrees of freedom, so an expected 60 exceeds that by 1.3 and 100 by 3 standard deviations.
     for (statistic, least) in [(60.0, 13), (100.0, 19)] {
         let mut found = 0;
         for seed in 0..20 {
             let frequency = 0.05 * 1.35f64.powi(seed as i32);
             let amplitude = amplitude_of(statistic, frequency);
             let added = sine(amplitude, frequency, SAMPLES);
-            let lines = lines(&Output { added: &added, ..PAPER }.samples(SAMPLES, 50 + seed));
+            let lines = find_lines(&Output { added: &added, ..PAPER }.samples(SAMPLES, 50 + seed));
             let Some(line) = nearest(&lines, frequency).filter(|line| line.width.is_none()) else { continue };
             if (line.frequency.value - frequency).abs() > 5.0 * line.frequency.error {
                 continue;
@@ -69,13 +69,13 @@ fn a_sine_is_found_down_to_what_its_likelihood_allows() {
 }
 
 #[test]
-fn a_clear_sine_is_measured_within_its_errors() {
+fn a_strong_sinusoid_is_measured_within_its_errors() {
     let (mut frequency_pulls, mut amplitude_pulls) = (Vec::new(), Vec::new());
     for seed in 0..12 {
         let frequency = 0.2 * 1.6f64.powi(seed as i32);
         let amplitude = amplitude_of(2000.0, frequency);
         let added = sine(amplitude, frequency, SAMPLES);
-        let lines = lines(&Output { added: &added, ..PAPER }.samples(SAMPLES, 50 + seed));
+        let lines = find_lines(&Output { added: &added, ..PAPER }.samples(SAMPLES, 50 + seed));
         let [line] = lines[..] else { panic!("{lines:?}") };
         assert!(line.width.is_none() && line.p_value < 1e-9);
         assert!((line.frequency.value / frequency - 1.0).abs() < 2e-4);
@@ -84,14 +84,14 @@ fn a_clear_sine_is_measured_within_its_errors() {
         amplitude_pulls.push((line.amplitude().value - amplitude * gain(frequency, 2)) / line.amplitude().error);
     }
     for pulls in [frequency_pulls, amplitude_pulls] {
-        // χ² with 12 degrees of freedom: 2.2 to 32.9 holds all but one in a thousand.
+        // 99.9 % of χ² with 12 degrees of freedom are between 2.2 and 32.9.
         let square: f64 = pulls.iter().map(|pull| pull * pull).sum();
         assert!((2.2..32.9).contains(&square), "{pulls:?}");
     }
 }
 
 #[test]
-fn lines_are_told_apart_and_gaps_do_not_hurt() {
+fn neighbouring_lines_are_separated_with_and_without_gaps() {
     let mut added = sine(0.04, 10.0, SAMPLES);
     for (frequency, amplitude) in [(10.2, 0.03), (33.3, 0.05)] {
         added.iter_mut().zip(sine(amplitude, frequency, SAMPLES)).for_each(|(sum, value)| *sum += value);
@@ -99,9 +99,9 @@ fn lines_are_told_apart_and_gaps_do_not_hurt() {
     let whole = Output { added: &added, ..PAPER }.samples(SAMPLES, 4);
     let missing = |at: usize| at % 97 == 13 || (40_000..41_000).contains(&at);
     let holed = whole.values().iter().enumerate().map(|(at, &value)| if missing(at) { f64::NAN } else { value });
-    let holed = Grid::new(whole.sample_period(), holed.collect());
-    for grid in [whole, holed] {
-        let mut lines = lines(&grid);
+    let holed = UniformSeries::new(whole.sample_period(), holed.collect());
+    for series in [whole, holed] {
+        let mut lines = find_lines(&series);
         lines.sort_by(|a, b| a.frequency.value.total_cmp(&b.frequency.value));
         assert_eq!(lines.len(), 3, "{lines:?}");
         for (line, (frequency, amplitude)) in lines.iter().zip([(10.0, 0.04), (10.2, 0.03), (33.3, 0.05)]) {
@@ -113,8 +113,8 @@ fn lines_are_told_apart_and_gaps_do_not_hurt() {
 }
 
 #[test]
-fn a_resonance_is_wider_than_a_sine() {
-    // Deviation in units of the white noise's.
+fn frequency_width_and_deviation_of_a_resonance_are_measured() {
+    // Standard deviation of a sample of the white noise; the resonances are given in units of it.
     let white = PAPER.noise[0] * RATE_HZ.sqrt();
     for (frequency, width, strength) in
         [(20.0, 0.05, 0.2), (20.0, 0.5, 0.5), (7.0, 1.0, 0.5), (30.0, 3.0, 0.5), (1.0, 0.1, 0.2)]
@@ -123,7 +123,7 @@ fn a_resonance_is_wider_than_a_sine() {
         for seed in 0..6 {
             let deviation = strength * white;
             let added = resonance(deviation, frequency, width, SAMPLES, 1000 + seed);
-            let lines = lines(&Output { added: &added, ..PAPER }.samples(SAMPLES, 50 + seed));
+            let lines = find_lines(&Output { added: &added, ..PAPER }.samples(SAMPLES, 50 + seed));
             let [line] = lines[..] else { panic!("{frequency} Hz, {width} Hz wide: {lines:?}") };
             let found = line.width.expect("a width");
             let errors = [
@@ -135,52 +135,52 @@ fn a_resonance_is_wider_than_a_sine() {
             pulls.iter_mut().zip(errors).for_each(|(sum, pull)| *sum += pull * pull);
         }
         for pull in pulls {
-            // χ² with six degrees of freedom passes 22.5 once in a thousand; the filter's slope over a wide resonance and
-            // its image add some.
+            // χ² with six degrees of freedom exceeds 22.5 once in a thousand; the filter's slope over a wide resonance and
+            // the line at the negative frequency add to it.
             assert!(pull < 30.0, "{frequency} Hz, {width} Hz wide: {pulls:?}");
         }
     }
 }
 
 #[test]
-fn records_without_a_spectrum_have_no_lines() {
+fn short_constant_and_missing_records_have_no_lines() {
     for values in [vec![], vec![1.0], vec![0.0; 5000], vec![f64::NAN; 300], (0..40).map(f64::from).collect()] {
-        assert_eq!(lines(&Grid::new(0.01, values.clone())), []);
-        assert!(Welch::of(&Grid::new(0.01, values), 1 << 13).is_none());
+        assert_eq!(find_lines(&UniformSeries::new(0.01, values.clone())), []);
+        assert!(Welch::estimate(&UniformSeries::new(0.01, values), 1 << 13).is_none());
     }
 }
 
 #[test]
-fn welch_gives_the_density_and_its_scatter() {
+fn welch_measures_the_density_and_its_variance() {
     // Unfiltered white noise of density 2N², with a tenth of the samples missing.
     let n = 0.5;
-    let grid = Output { noise: [n, 0.0, 0.0], taps_log2: 0, added: &[] }.samples(1 << 18, 3);
-    let holed = grid.values().iter().enumerate().map(|(at, &value)| if at % 10 == 7 { f64::NAN } else { value });
-    for grid in [Grid::new(grid.sample_period(), holed.collect()), grid] {
-        let welch = Welch::of(&grid, 1 << 10).expect("many stretches");
-        assert_eq!(welch.stretches(), 511);
+    let series = Output { noise: [n, 0.0, 0.0], taps_log2: 0, added: &[] }.samples(1 << 18, 3);
+    let holed = series.values().iter().enumerate().map(|(at, &value)| if at % 10 == 7 { f64::NAN } else { value });
+    for series in [UniformSeries::new(series.sample_period(), holed.collect()), series] {
+        let welch = Welch::estimate(&series, 1 << 10).expect("many segments");
+        assert_eq!(welch.segments(), 511);
         let inner: Vec<f64> = welch.points().skip(2).take(500).map(|(_, density)| density / (2.0 * n * n)).collect();
         let mean = inner.iter().sum::<f64>() / 500.0;
         let variance = inner.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 499.0;
-        // 2¹⁸ samples: the mean is good to 1/√2¹⁷.
+        // 2¹⁸ samples: the standard deviation of the mean is 1/√2¹⁷.
         assert!((mean - 1.0).abs() < 5.0 / 2f64.powf(8.5), "{mean}");
-        // Neighbours are correlated, about 260 of 500 independent: the variance is good to a tenth.
+        // Neighbouring points are correlated, about 260 of 500 are independent: the variance is known to a tenth.
         assert!((variance * welch.ordinates() - 1.0).abs() < 0.4, "{variance}");
     }
 }
 
 #[test]
-fn the_spectrum_tells_the_angle_random_walk_without_the_allan_variance() {
+fn welch_measures_the_angle_random_walk() {
     let n = PAPER.noise[0];
     let mut pulls = Vec::new();
     for seed in 0..10 {
-        let welch = Welch::of(&PAPER.samples(1 << 18, seed), 1 << 13).expect("many stretches");
+        let welch = Welch::estimate(&PAPER.samples(1 << 18, seed), 1 << 13).expect("many segments");
         let (shape, bands) = welch.shape(|_| false);
         assert_eq!(shape.taps, 4);
         let error = shape.angle_random_walk_error(&bands).expect("white noise");
         assert!(error < 0.01);
         pulls.push((shape.angle_random_walk() / n - 1.0) / error);
     }
-    // χ² with ten degrees of freedom passes 29.6 once in a thousand.
+    // χ² with ten degrees of freedom exceeds 29.6 once in a thousand.
     assert!(pulls.iter().map(|pull| pull * pull).sum::<f64>() < 29.6, "{pulls:?}");
 }

@@ -1,17 +1,16 @@
-//! Every detector on recordings of the virtual sensor: silent where there is nothing, right where there is something.
+//! Every detector on recordings of the virtual sensor, with and without the effect.
 
-use super::{
-    Finding, Repair, Series, coarse_counts, deliveries,
-    level::{self, Level},
-    noises::NoiseTable,
-    sample_clock, spikes,
-};
+use super::bias::{self, BiasChanges};
+use super::block_means::NoiseGrids;
+use super::{effective_lsb, spikes};
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
+use crate::findings::{Correction, Detection};
+use crate::series::Series;
+use crate::trace::{deliveries, sample_clock};
 use adis16405_driver::Channel;
 use measurement::Measurement;
 use simulation::{HostClock, Simulation};
-use virtual_sensor::TemperatureProfile;
-use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario};
+use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario, TemperatureProfile};
 
 const GYRO: Channel = Channel::GyroY;
 const SENSED_GYRO: OutputRegister = OutputRegister::GyroY;
@@ -43,11 +42,11 @@ impl Case {
         Series::of(&self.measurement, &self.measurement.profile.channels[channel as usize])
     }
 
-    /// Everything that any detector finds.
-    fn findings(&self) -> Vec<Finding> {
+    /// The results of all detectors.
+    fn detections(&self) -> Vec<Detection> {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
-            let Level { step, ramp, .. } = level(&series);
+            let BiasChanges { step, ramp, .. } = bias_changes(&series);
             [spikes::find(&series), step, ramp]
         });
         let common = [
@@ -59,131 +58,131 @@ impl Case {
     }
 }
 
-fn level(series: &Series) -> Level {
-    level::find(series, &[], &NoiseTable::default())
+fn bias_changes(series: &Series) -> BiasChanges {
+    bias::find(series, &[], &NoiseGrids::default())
 }
 
-fn assert_covers(finding: &Finding, name: &str, truth: f64) {
-    let parameter = &finding.effect.parameters[name];
+fn assert_covers(detection: &Detection, name: &str, truth: f64) {
+    let parameter = &detection.effect.parameters[name];
     assert!(parameter.low <= truth && truth <= parameter.high, "{name}: {truth} outside {parameter:?}");
     assert!(parameter.low <= parameter.value && parameter.value <= parameter.high, "{name}: {parameter:?}");
 }
 
 #[test]
-fn noise_alone_is_not_an_effect() {
+fn nothing_is_detected_in_pure_noise() {
     for seed in 0..4 {
-        assert_eq!(Case::hiding(Vec::new(), 400.0, seed).findings(), []);
+        assert_eq!(Case::hiding(Vec::new(), 400.0, seed).detections(), []);
     }
 }
 
 #[test]
-fn a_walk_ten_times_as_strong_is_no_step() {
+fn a_strong_random_walk_is_no_step() {
     for seed in 10..13 {
         let mut simulation = Simulation::paper(400.0, seed);
         for channel in OutputRegister::INERTIAL {
             simulation.noise.channel_mut(channel).rate_random_walk *= 10.0;
         }
-        assert_eq!(Case::of(simulation).findings(), []);
+        assert_eq!(Case::of(simulation).detections(), []);
     }
 }
 
 #[test]
-fn spikes_are_counted_measured_and_taken_out() {
+fn spikes_are_counted_measured_and_removed() {
     let size = 9.0 * white();
     let case =
         Case::hiding(vec![InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
     let series = case.series(GYRO);
-    let finding = spikes::find(&series).unwrap();
-    assert_eq!(finding.effect.kind, "spikes");
-    assert_covers(&finding, "rate", 300.0);
-    assert_covers(&finding, "size", size);
-    assert!((finding.effect.parameters["size"].value / size - 1.0).abs() < 0.05);
+    let detection = spikes::find(&series).unwrap();
+    assert_eq!(detection.effect.kind, "spikes");
+    assert_covers(&detection, "rate", 300.0);
+    assert_covers(&detection, "size", size);
+    assert!((detection.effect.parameters["size"].value / size - 1.0).abs() < 0.05);
 
-    let repaired = series.clone().repaired(finding.repair.as_ref().unwrap());
-    let Some(Repair::LeaveOut(positions)) = &finding.repair else { panic!("{:?}", finding.repair) };
-    assert_eq!(repaired.values.len(), series.values.len() - positions.len());
-    assert_eq!(repaired.slots.last(), series.slots.last());
-    assert_eq!(spikes::find(&repaired), None);
+    let corrected = series.clone().corrected(detection.correction.as_ref().unwrap());
+    let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
+    assert_eq!(corrected.values.len(), series.values.len() - positions.len());
+    assert_eq!(corrected.slots.last(), series.slots.last());
+    assert_eq!(spikes::find(&corrected), None);
     assert_eq!(spikes::find(&case.series(Channel::GyroX)), None);
-    assert_eq!(level(&series).step, None);
+    assert_eq!(bias_changes(&series).step, None);
 }
 
 #[test]
-fn spikes_show_in_filtered_noise_where_a_difference_would_drown_them() {
-    // A disturbance after the filter, so it is added to what was read.
+fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
+    // A disturbance after the filter, so it is added to the samples that were read.
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 3 }], 200.0, 3);
     let mut series = case.series(GYRO);
     assert_eq!(spikes::find(&series), None);
-    // Two averages of 8 leave 0.29 of the white noise: 1.7 of its σ, but much more beside such like neighbours.
+    // Two averages of 8 leave 0.29 of the white noise: 1.7 σ of the samples, but much more than the interpolation error.
     series.values[20_000] += 0.5 * white();
-    let finding = spikes::find(&series).unwrap();
-    assert_eq!(finding.repair, Some(Repair::LeaveOut(vec![20_000])));
+    let detection = spikes::find(&series).unwrap();
+    assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
 }
 
 #[test]
-fn a_step_is_placed_measured_and_taken_out() {
+fn a_step_is_located_measured_and_removed() {
     let step = InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 333.0, size: -0.15 };
     let case = Case::hiding(vec![step], 600.0, 4);
     let series = case.series(GYRO);
-    let finding = level(&series).step.unwrap();
-    assert_covers(&finding, "time", 333.0);
-    assert_covers(&finding, "size", -0.15);
-    assert!((finding.effect.parameters["size"].value / -0.15 - 1.0).abs() < 0.2);
+    let detection = bias_changes(&series).step.unwrap();
+    assert_covers(&detection, "time", 333.0);
+    assert_covers(&detection, "size", -0.15);
+    assert!((detection.effect.parameters["size"].value / -0.15 - 1.0).abs() < 0.2);
     assert_eq!(spikes::find(&series), None);
-    assert_eq!(level(&series.repaired(finding.repair.as_ref().unwrap())).step, None);
-    assert_eq!(level(&case.series(Channel::GyroZ)).step, None);
+    assert_eq!(bias_changes(&series.corrected(detection.correction.as_ref().unwrap())).step, None);
+    assert_eq!(bias_changes(&case.series(Channel::GyroZ)).step, None);
 }
 
 #[test]
-fn a_level_that_moves_otherwise_is_no_step() {
+fn ramps_telegraph_noise_and_temperature_are_no_steps() {
     let ramp = InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 };
-    assert_eq!(level(&Case::hiding(vec![ramp], 600.0, 5).series(GYRO)).step, None);
+    assert_eq!(bias_changes(&Case::hiding(vec![ramp], 600.0, 5).series(GYRO)).step, None);
 
     let telegraph = InjectedEffect::Telegraph { channel: SENSED_GYRO, time_constant_s: 20.0, amplitude: 0.3 };
-    assert_eq!(level(&Case::hiding(vec![telegraph], 600.0, 6).series(GYRO)).step, None);
+    assert_eq!(bias_changes(&Case::hiding(vec![telegraph], 600.0, 6).series(GYRO)).step, None);
 
     let mut simulation = Simulation::paper(600.0, 7);
     simulation.scenario.effects = vec![InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: 0.05 }];
     simulation.scenario.environment.temperature =
         TemperatureProfile { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureProfile::default() };
     let case = Case::of(simulation);
-    assert_eq!(level::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &NoiseTable::default()).step, None);
+    assert_eq!(bias::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &NoiseGrids::default()).step, None);
 }
 
 #[test]
-fn a_ramp_is_measured_and_told_from_a_step() {
+fn a_ramp_is_measured_and_is_no_step() {
     let case = Case::hiding(vec![InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: -1e-3 }], 600.0, 14);
     let series = case.series(GYRO);
-    let finding = level(&series).ramp.unwrap();
-    assert_covers(&finding, "slope", -1e-3);
-    assert!((finding.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
-    let per_slot = finding.effect.parameters["slope"].value * series.period_s;
+    let detection = bias_changes(&series).ramp.unwrap();
+    assert_covers(&detection, "slope", -1e-3);
+    assert!((detection.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
+    let per_slot = detection.effect.parameters["slope"].value * series.period_s;
     let mut levelled = series;
     for (value, &slot) in levelled.values.iter_mut().zip(&levelled.slots) {
         *value -= per_slot * slot as f64;
     }
-    assert_eq!(level(&levelled).ramp, None);
+    assert_eq!(bias_changes(&levelled).ramp, None);
 
     let step = InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 300.0, size: 0.3 };
-    assert_eq!(level(&Case::hiding(vec![step], 600.0, 15).series(GYRO)).ramp, None);
+    assert_eq!(bias_changes(&Case::hiding(vec![step], 600.0, 15).series(GYRO)).ramp, None);
 }
 
 #[test]
-fn a_ramp_and_a_step_are_found_beside_each_other() {
+fn a_ramp_and_a_step_are_found_together() {
     let effects = vec![
         InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 },
         InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 200.0, size: 0.3 },
     ];
-    let Level { step, ramp, .. } = level(&Case::hiding(effects, 600.0, 16).series(GYRO));
+    let BiasChanges { step, ramp, .. } = bias_changes(&Case::hiding(effects, 600.0, 16).series(GYRO));
     assert_covers(&ramp.unwrap(), "slope", 1e-3);
     let step = step.unwrap();
     assert_covers(&step, "size", 0.3);
-    // The part begins a little before the record.
+    // The sensor starts a little before the record.
     assert!((step.effect.parameters["time"].value - 200.0).abs() < 1.0, "{step:?}");
 }
 
 #[test]
-fn a_slow_cause_is_told_from_a_ramp() {
+fn dependence_on_temperature_is_no_ramp() {
     let warming = |effect: InjectedEffect, rise_c: f64, seed: u64| {
         let mut simulation = Simulation::paper(600.0, seed);
         simulation.scenario.effects = vec![effect];
@@ -193,75 +192,75 @@ fn a_slow_cause_is_told_from_a_ramp() {
     };
     let case = warming(InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: -0.05 }, 8.0, 17);
     let follows = |case: &Case, channel: Channel| {
-        level::find(&case.series(channel), &[&case.series(Channel::Temp)], &NoiseTable::default())
+        bias::find(&case.series(channel), &[&case.series(Channel::Temp)], &NoiseGrids::default())
     };
-    let Level { ramp, followed, .. } = follows(&case, GYRO);
+    let BiasChanges { ramp, sensitivities, .. } = follows(&case, GYRO);
     assert_eq!(ramp, None);
-    let (0, followed) = followed[0] else { panic!("{followed:?}") };
-    assert!((followed.sensitivity + 0.05).abs() < 3.0 * followed.error, "{followed:?}");
-    assert!(followed.error < 0.005, "{followed:?}");
-    assert_eq!(follows(&case, Channel::GyroX), Level::default());
-    // A temperature that stays within half a count of 0.14 °C has not been seen to move.
+    let (0, sensitivities) = sensitivities[0] else { panic!("{sensitivities:?}") };
+    assert!((sensitivities.sensitivity + 0.05).abs() < 3.0 * sensitivities.error, "{sensitivities:?}");
+    assert!(sensitivities.error < 0.005, "{sensitivities:?}");
+    assert_eq!(follows(&case, Channel::GyroX), BiasChanges::default());
+    // A temperature that stays within half a count of 0.14 °C is no regressor.
     let still = warming(InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: -5.0 }, 0.07, 17);
-    assert_eq!(follows(&still, GYRO).followed, []);
+    assert_eq!(follows(&still, GYRO).sensitivities, []);
 
-    let Level { ramp, followed, .. } =
+    let BiasChanges { ramp, sensitivities, .. } =
         follows(&warming(InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 }, 8.0, 18), GYRO);
-    assert!(ramp.is_some() && followed.is_empty(), "{ramp:?} {followed:?}");
+    assert!(ramp.is_some() && sensitivities.is_empty(), "{ramp:?} {sensitivities:?}");
 }
 
 #[test]
-fn values_that_skip_counts_have_a_coarser_step() {
+fn values_of_twelve_bits_have_an_lsb_of_four_counts() {
     let series = Case::hiding(Vec::new(), 60.0, 19).series(GYRO);
-    assert_eq!(coarse_counts::find(&series), None);
+    assert_eq!(effective_lsb::find(&series), None);
     // Twelve bits instead of fourteen.
     let count = 0.05;
     let values = series.values.iter().map(|value| (value / count / 4.0).round() * 4.0 * count).collect();
     let coarse = Series { values, slots: series.slots.clone(), ..series };
-    let finding = coarse_counts::find(&coarse).unwrap();
-    assert_eq!(finding.effect.kind, "quantization");
-    assert!((finding.effect.parameters["step"].value - 0.2).abs() < 1e-9);
-    // A channel that hardly ever changes says nothing.
+    let detection = effective_lsb::find(&coarse).unwrap();
+    assert_eq!(detection.effect.kind, "quantization");
+    assert!((detection.effect.parameters["step"].value - 0.2).abs() < 1e-9);
+    // A channel that hardly ever changes has an unknown LSB.
     let values = (0..coarse.values.len()).map(|at| if at % 5_000 < 2_500 { 0.0 } else { 0.2 }).collect();
-    assert_eq!(coarse_counts::find(&Series { values, slots: coarse.slots.clone(), ..coarse }), None);
+    assert_eq!(effective_lsb::find(&Series { values, slots: coarse.slots.clone(), ..coarse }), None);
 }
 
 #[test]
 fn lost_and_repeated_samples_are_counted() {
     let lossy = Case::hiding(vec![InjectedEffect::DroppedSamples { fraction: 2e-3 }], 200.0, 8);
-    let finding = deliveries::dropped(&lossy.measurement).unwrap();
-    assert_covers(&finding, "fraction", 2e-3);
+    let detection = deliveries::dropped(&lossy.measurement).unwrap();
+    assert_covers(&detection, "fraction", 2e-3);
     assert_eq!(deliveries::repeated(&lossy.measurement), None);
 
-    // Neighbours are equal all the time behind a long filter, and none is repeated.
+    // Behind a long filter neighbouring samples are often equal, and none is repeated.
     let slow = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
     assert_eq!(deliveries::repeated(&slow.measurement), None);
 
     let stale = Case::hiding(vec![InjectedEffect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
-    let finding = deliveries::repeated(&stale.measurement).unwrap();
-    assert_covers(&finding, "fraction", 2e-3);
+    let detection = deliveries::repeated(&stale.measurement).unwrap();
+    assert_covers(&detection, "fraction", 2e-3);
     assert_eq!(deliveries::dropped(&stale.measurement), None);
-    let Some(Repair::LeaveOut(positions)) = &finding.repair else { panic!("{:?}", finding.repair) };
+    let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
     let values = stale.series(GYRO).values;
     assert!(positions.iter().all(|&position| values[position] == values[position - 1]));
 }
 
 #[test]
-fn a_clock_that_is_off_is_told_from_a_host_that_is() {
+fn a_deviating_sample_clock_is_distinguished_from_a_deviating_host_clock() {
     let simulation = |effects: Vec<InjectedEffect>, clock_ratio: f64| Simulation {
         scenario: SensorScenario { effects, ..SensorScenario::default() },
         host: HostClock { latency_s: 30e-6, clock_ratio },
         ..Simulation::paper(100.0, 10)
     };
     let find = |case: Case| sample_clock::find(&case.measurement);
-    // The data sheet's tolerance is parts in a hundred, a host's parts in a hundred thousand.
+    // The data sheet's tolerance is parts in a hundred, that of a host's clock parts in a hundred thousand.
     let off = find(Case::of(simulation(vec![InjectedEffect::SampleClock { ratio: 0.997 }], 1.0 + 20e-6))).unwrap();
     assert_covers(&off, "rate_hz", 204.8 * 0.997);
     assert_eq!(find(Case::of(simulation(Vec::new(), 1.0 + 40e-6))), None);
 }
 
 #[test]
-fn tails_are_those_of_the_tables() {
+fn tail_probabilities_agree_with_tables() {
     for (z, probability) in [(1.0, 0.158_655_25), (1.959_964, 0.025), (5.0, 2.866_516e-7)] {
         assert!((upper_tail(z) / probability - 1.0).abs() < 1e-6);
         assert!((quantile(probability) - z).abs() < 1e-5);

@@ -1,6 +1,6 @@
-//! Noise of known coefficients as the part puts it out: filtered by two averages, rounded to counts.
+//! Simulated output of a sensor with known noise coefficients: filtered by two cascaded averages and rounded to counts.
 
-use noise_analysis::grid::Grid;
+use noise_analysis::uniform_series::UniformSeries;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -10,10 +10,10 @@ use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
 pub(crate) const RATE_HZ: f64 = 204.8;
-/// Of the gyros in their widest range, deg/s.
+/// LSB of the gyros in their widest range, deg/s.
 const LSB: f64 = 0.05;
 
-/// N, B, K, what is added before the filter, and the filter.
+/// N, B and K of the noise, a signal that is added before the filter, and the length of the filter.
 pub(crate) struct Output<'a> {
     pub(crate) noise: [f64; 3],
     pub(crate) taps_log2: u8,
@@ -24,7 +24,7 @@ pub(crate) struct Output<'a> {
 pub(crate) const PAPER: Output<'static> = Output { noise: [0.0368, 0.0093, 0.0013], taps_log2: 2, added: &[] };
 
 impl Output<'_> {
-    pub(crate) fn samples(&self, samples: usize, seed: u64) -> Grid {
+    pub(crate) fn samples(&self, samples: usize, seed: u64) -> UniformSeries {
         let mut model = NoiseModel::noiseless();
         let gyro = model.channel_mut(OutputRegister::GyroX);
         [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = self.noise;
@@ -34,17 +34,17 @@ impl Output<'_> {
             let added = self.added.get(at).copied().unwrap_or(0.0);
             (filter.filter(source.sample()[OutputRegister::GyroX as usize] + added) / LSB).round() * LSB
         };
-        Grid::new(1.0 / RATE_HZ, (0..samples).map(value).collect())
+        UniformSeries::new(1.0 / RATE_HZ, (0..samples).map(value).collect())
     }
 }
 
-/// A sine with a phase of its own.
+/// A sinusoid whose phase, in rad, is the number of its frequency in Hz.
 pub(crate) fn sine(amplitude: f64, frequency: f64, samples: usize) -> Vec<f64> {
     (0..samples).map(|at| amplitude * (TAU * frequency * at as f64 / RATE_HZ + frequency).cos()).collect()
 }
 
-/// A damped oscillation driven by noise: a carrier whose two quadratures are first-order Markov processes, so that its
-/// density is a Lorentz curve of full width `width` Hz.
+/// A damped oscillation driven by noise: a carrier whose two quadratures are first-order Markov processes. Its density is a
+/// Lorentz curve of full width `width` Hz.
 pub(crate) fn resonance(deviation: f64, frequency: f64, width: f64, samples: usize, seed: u64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut gauss = || random.sample::<f64, _>(StandardNormal);
@@ -60,7 +60,7 @@ pub(crate) fn resonance(deviation: f64, frequency: f64, width: f64, samples: usi
     (0..samples).map(value).collect()
 }
 
-/// What the filter leaves of an amplitude: each of two averages over `2^taps_log2` samples is a ratio of sines.
+/// Amplitude gain of the filter: each of two averages over `2^taps_log2` samples gives a ratio of sines.
 pub(crate) fn gain(frequency: f64, taps_log2: u8) -> f64 {
     let taps = f64::from(1 << taps_log2);
     let half = PI * frequency / RATE_HZ;

@@ -1,32 +1,34 @@
 //! Spikes: single samples that do not belong to their neighbours.
 //!
-//! Each sample is compared with what its neighbours tell of it by the best linear interpolation, which follows from the
-//! covariance of the data. In white noise that is the mean; in filtered noise, a line or a drift it is much better. The
-//! error is normal, so the largest of N is judged by N times the normal tail.
+//! Each sample is compared with the best linear interpolation from its neighbours, which follows from the autocovariance of
+//! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
+//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail.
 
 use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
-use crate::findings::{Effect, Finding, Parameter, Repair, SIGNIFICANCE};
+use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
 use crate::series::Series;
 
 /// Neighbours on each side.
 const REACH: usize = 6;
 
-/// Where the estimate of a standard deviation cuts its tails, in standard deviations; a normal law has 7·10⁻⁶ beyond.
+/// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
+/// 7·10⁻⁶.
 const CLIP: f64 = 4.5;
 
-/// The sample before a spike and that after it differ by less than this part of the spike; else it is a jump.
+/// The means of the neighbours before and after a spike differ by less than this fraction of it; otherwise it is a jump of
+/// the bias.
 const SETTLED: f64 = 0.5;
 
-/// Least part of the spikes that is taken to be seen: of still smaller ones nothing is known.
-const LEAST_SEEN: f64 = 0.05;
+/// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
+const LEAST_DETECTED: f64 = 0.05;
 
-/// Looks for spikes in one channel.
+/// Looks for spikes in one channel. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
-pub fn find(series: &Series) -> Option<Finding> {
+pub(crate) fn find(series: &Series) -> Option<Detection> {
     if series.values.len() < 100 * REACH {
         return None;
     }
-    let interpolation = Interpolation::of(series)?;
+    let interpolation = Interpolation::fit(series)?;
     let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / series.values.len() as f64);
     let (spikes, jumps) = interpolation.spikes(series, threshold);
     if spikes.len() <= jumps {
@@ -35,10 +37,10 @@ pub fn find(series: &Series) -> Option<Finding> {
     let sizes: Vec<f64> = spikes.iter().map(|spike| spike.error.abs()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let hours = series.duration_s() / 3600.0;
-    let size = Size::of(&sizes, threshold, interpolation.deviation);
+    let size = SpikeSize::estimate(&sizes, threshold, interpolation.deviation);
     let count = sizes.len() as f64;
     let (fewest, most) = poisson_bounds(count);
-    let rate = |count: f64, seen: f64| count / seen / hours;
+    let rate = |count: f64, detected: f64| count / detected / hours;
     let z = largest / interpolation.deviation;
     let evidence = format!(
         "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {z:.1} σ; \
@@ -48,16 +50,16 @@ pub fn find(series: &Series) -> Option<Finding> {
     );
     let mut positions: Vec<usize> = spikes.iter().map(|spike| spike.position).collect();
     positions.sort_unstable();
-    Some(Finding {
+    Some(Detection {
         effect: Effect::new(
             "spikes",
             [
                 (
                     "rate",
                     Parameter::new(
-                        rate(count, size.seen),
-                        rate(fewest, size.seen_most),
-                        rate(most, size.seen_least),
+                        rate(count, size.detected),
+                        rate(fewest, size.detected_most),
+                        rate(most, size.detected_least),
                         "1/h",
                     ),
                 ),
@@ -65,15 +67,15 @@ pub fn find(series: &Series) -> Option<Finding> {
             ],
             evidence,
         ),
-        repair: Some(Repair::LeaveOut(positions)),
+        correction: Some(Correction::Exclude(positions)),
     })
 }
 
-/// The best linear interpolation of a sample from its neighbours.
+/// The best linear interpolation of a sample from its neighbours: the weight of each distance, to both sides.
 struct Interpolation {
     weights: [f64; REACH],
     mean: f64,
-    /// Standard deviation of its error, at least half a count: rounding is not normal.
+    /// Standard deviation of its error, at least half a count because rounding errors are not normal.
     deviation: f64,
 }
 
@@ -83,10 +85,10 @@ struct Spike {
 }
 
 impl Interpolation {
-    fn of(series: &Series) -> Option<Self> {
+    fn fit(series: &Series) -> Option<Self> {
         let mean = series.values.iter().sum::<f64>() / series.values.len() as f64;
         let mut interpolation = Self { weights: [0.5 / REACH as f64; REACH], mean, deviation: 0.0 };
-        // The neighbours' mean finds the gross spikes, which would spoil the covariance.
+        // The plain mean of the neighbours finds the gross spikes, which would distort the covariance.
         let errors = interpolation.errors(series, &series.values);
         let rough = clipped_deviation(&errors);
         let mut clean = series.values.clone();
@@ -110,7 +112,7 @@ impl Interpolation {
         values[position] - self.mean - pairs.sum::<f64>()
     }
 
-    /// The error of every sample; 0 next to a gap or an end.
+    /// The interpolation error of every sample; 0 within [`REACH`] of a gap or an end.
     fn errors(&self, series: &Series, values: &[f64]) -> Vec<f64> {
         let inner = REACH..values.len() - REACH;
         let error = |position: usize| {
@@ -120,7 +122,7 @@ impl Interpolation {
         (0..values.len()).map(error).collect()
     }
 
-    /// The spikes above `threshold`, the largest first, and the number of candidates that are jumps of the level.
+    /// The spikes above `threshold`, the largest first, and the number of candidates that are jumps of the bias.
     fn spikes(&self, series: &Series, threshold: f64) -> (Vec<Spike>, usize) {
         let mut values = series.values.clone();
         let errors = self.errors(series, &values);
@@ -128,13 +130,13 @@ impl Interpolation {
         candidates.sort_by(|a, b| errors[*b].abs().total_cmp(&errors[*a].abs()));
         let (mut spikes, mut jumps) = (Vec::new(), 0);
         for position in candidates {
-            // A spike nearby has been taken out meanwhile.
+            // Again, because a larger spike nearby may have been removed.
             let error = self.error(&values, position);
             if error.abs() <= threshold {
                 continue;
             }
-            let side = |from: usize| values[from..from + REACH].iter().sum::<f64>() / REACH as f64;
-            if (side(position + 1) - side(position - REACH)).abs() > SETTLED * error.abs() {
+            let mean = |from: usize| values[from..from + REACH].iter().sum::<f64>() / REACH as f64;
+            if (mean(position + 1) - mean(position - REACH)).abs() > SETTLED * error.abs() {
                 jumps += 1;
                 continue;
             }
@@ -145,7 +147,7 @@ impl Interpolation {
     }
 }
 
-/// Standard deviation of the non-zero entries of `errors` without outliers.
+/// Standard deviation of the non-zero entries of `errors`, without those above [`CLIP`] standard deviations.
 fn clipped_deviation(errors: &[f64]) -> f64 {
     let mut limit = f64::INFINITY;
     let mut deviation = 0.0;
@@ -168,18 +170,20 @@ fn covariance(series: &Series, values: &[f64], mean: f64) -> [f64; 2 * REACH + 1
     })
 }
 
-/// Minimises the variance of the error: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)`. `None` for a channel that never changes.
+/// The weights `a` that minimise the variance of the error: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)` with the autocovariance `r`.
+/// `None` for a channel that never changes.
 fn weights(covariance: &[f64; 2 * REACH + 1]) -> Option<[f64; REACH]> {
     let mut matrix = [[0.0; REACH + 1]; REACH];
     for (j, row) in matrix.iter_mut().enumerate() {
         for (i, entry) in row[..REACH].iter_mut().enumerate() {
             *entry = covariance[i.abs_diff(j)] + covariance[i + j + 2];
         }
-        // So little white noise more keeps the equations solvable for a pure line.
+        // A little white noise keeps the equations solvable for a pure sinusoid.
         row[j] += 1e-9 * covariance[0];
         row[REACH] = covariance[j + 1];
     }
-    // Gaussian elimination; the matrix is that of a covariance, so positive definite.
+    // Gaussian elimination of a positive definite matrix. It is not left to nalgebra yet, whose order of operations changes
+    // the last digits of the reported sizes.
     for pivot in 0..REACH {
         if matrix[pivot][pivot] <= 0.0 {
             return None;
@@ -200,20 +204,23 @@ fn weights(covariance: &[f64; 2 * REACH + 1]) -> Option<[f64; REACH]> {
     Some(weights)
 }
 
-/// Size of the spikes, and the part of them that exceeds the threshold.
-struct Size {
+/// Size of the spikes with 95 % bounds, and the fraction of them that exceeds the threshold for each.
+struct SpikeSize {
     value: f64,
     low: f64,
     high: f64,
-    seen: f64,
-    seen_least: f64,
-    seen_most: f64,
+    detected: f64,
+    detected_least: f64,
+    detected_most: f64,
 }
 
-impl Size {
-    /// Spikes of one size are seen when noise lifts them above the threshold, so the mean of those seen is too large:
-    /// it is `s + σ·φ(a)/Q(a)`, `a = (threshold − s)/σ`. Where their sizes scatter more than noise does, it stands.
-    fn of(sizes: &[f64], threshold: f64, deviation: f64) -> Self {
+impl SpikeSize {
+    /// Estimates the size from the `sizes` above `threshold`, with interpolation errors of standard deviation `deviation`.
+    ///
+    /// Of spikes of one size `s` those are detected that the noise lifts above the threshold, so their mean is too large: it
+    /// is `s + σ·φ(a)/Q(a)` with `a = (threshold − s)/σ`, the mean of a truncated normal distribution. Sizes that scatter by
+    /// more than 1.5 σ differ from each other, and their mean is not corrected.
+    fn estimate(sizes: &[f64], threshold: f64, deviation: f64) -> Self {
         let count = sizes.len() as f64;
         let mean = sizes.iter().sum::<f64>() / count;
         let scatter = (sizes.iter().map(|size| (size - mean).powi(2)).sum::<f64>() / count).sqrt();
@@ -223,25 +230,32 @@ impl Size {
                 value: mean,
                 low: mean - half,
                 high: mean + half,
-                seen: 1.0,
-                seen_least: 1.0,
-                seen_most: 1.0,
+                detected: 1.0,
+                detected_least: 1.0,
+                detected_most: 1.0,
             };
         }
         let size = |mean: f64| {
-            let seen_mean = |size: f64| {
+            let detected_mean = |size: f64| {
                 let a = (threshold - size) / deviation;
                 size + deviation * density(a) / upper_tail(a)
             };
             let (mut low, mut high) = ((threshold - 5.0 * deviation).max(0.0), mean);
             for _ in 0..50 {
                 let middle = 0.5 * (low + high);
-                if seen_mean(middle) < mean { low = middle } else { high = middle }
+                if detected_mean(middle) < mean { low = middle } else { high = middle }
             }
             0.5 * (low + high)
         };
-        let seen = |size: f64| upper_tail((threshold - size) / deviation).max(LEAST_SEEN);
+        let detected = |size: f64| upper_tail((threshold - size) / deviation).max(LEAST_DETECTED);
         let (value, low, high) = (size(mean), size((mean - half).max(threshold)), size(mean + half));
-        Self { value, low, high, seen: seen(value), seen_least: seen(low), seen_most: seen(high) }
+        Self {
+            value,
+            low,
+            high,
+            detected: detected(value),
+            detected_least: detected(low),
+            detected_most: detected(high),
+        }
     }
 }

@@ -1,0 +1,22 @@
+//! Detectors of effects in the samples of one channel, which the Allan curve shows badly or not at all.
+//!
+//! ```text
+//! Series ─┬► spikes                                        single samples
+//!         ├► effective_lsb                                 values rounded to several counts
+//!         └► block_means ─► gls_regression ─► bias         steps, ramps and covariates of the bias
+//! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
+//! ```
+//!
+//! Each returns the effect with its parameters, and the correction that removes it from the samples where there is one.
+
+pub mod bias;
+mod bias_step;
+pub mod block_means;
+pub(crate) mod effective_lsb;
+pub mod gls_regression;
+pub(crate) mod random_telegraph;
+pub(crate) mod spikes;
+mod telegraph_models;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! What changes the bias of a channel over the record: a ramp, a step, regressors such as the temperature, or several.
+//!
+//! In the differences of the Allan variance a change over the whole record has a few degrees of freedom and is lost in slow
+//! noise. Here each candidate is tested on block means against every mixture of white, flicker and random-walk noise, and
+//! against the other candidates: the one that explains the data best is accepted, then the next one beside it.
+
+use super::bias_step::{self, StepPosition};
+use super::block_means::{BlockMeans, NoiseGrid, NoiseGrids};
+use super::gls_regression::{GlsRegression, RegressionEstimate};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Detection, Effect, Parameter};
+use crate::series::Series;
+use nalgebra::DVector;
+
+/// Highest p-value of a ramp or a regressor. Three or four candidates are tried in each of six channels, so that about one
+/// recording in a hundred has a false one.
+pub const SIGNIFICANCE: f64 = 5e-4;
+/// Largest number of candidates that are accepted.
+const MOST: usize = 4;
+
+/// Sensitivity of the bias to a regressor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BiasSensitivity {
+    /// In the channel's unit over the regressor's.
+    pub sensitivity: f64,
+    /// Standard deviation of the sensitivity.
+    pub error: f64,
+}
+
+/// What changes the bias of one channel.
+#[derive(Debug, Default, Clone, PartialEq)]
+pub struct BiasChanges {
+    /// A step.
+    pub step: Option<Detection>,
+    /// A ramp over the whole record.
+    pub ramp: Option<Detection>,
+    /// Indices of the regressors that the bias depends on, with the sensitivity to each.
+    pub sensitivities: Vec<(usize, BiasSensitivity)>,
+}
+
+/// A candidate that may explain changes of the bias.
+enum Candidate {
+    Ramp,
+    Regressor(usize),
+    Step(StepPosition),
+}
+
+/// A candidate that was accepted.
+struct Accepted {
+    candidate: Candidate,
+    /// Its block means.
+    regressor: DVector<f64>,
+    /// Probability of as good an explanation by chance.
+    p_value: f64,
+}
+
+/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it; one with samples at
+/// other times is left out.
+#[must_use]
+pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> BiasChanges {
+    let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
+    let grid = grids.get(&blocks);
+    let regressors: Vec<(usize, DVector<f64>)> = regressors
+        .iter()
+        .enumerate()
+        .filter(|(_, regressor)| regressor.slots == series.slots)
+        .filter_map(|(index, regressor)| {
+            let means = BlockMeans::from_series(regressor)?.means;
+            varies(&means, regressor).then_some((index, means))
+        })
+        .collect();
+    let mut accepted: Vec<Accepted> = Vec::new();
+    while accepted.len() < MOST
+        && let Some(next) = best_candidate(series, &blocks, &grid, &regressors, &accepted)
+    {
+        accepted.push(next);
+    }
+    let mut changes = BiasChanges::default();
+    for (at, Accepted { candidate, regressor, p_value }) in accepted.iter().enumerate() {
+        let others = accepted.iter().enumerate().filter(|(other, _)| *other != at);
+        let others: Vec<DVector<f64>> = others.map(|(_, other)| other.regressor.clone()).collect();
+        let Some(estimate) = GlsRegression::new(&blocks, &grid, &others).estimate(regressor) else { continue };
+        match candidate {
+            Candidate::Ramp => changes.ramp = Some(ramp_detection(series, &blocks, &estimate, *p_value)),
+            Candidate::Step(position) => {
+                changes.step = Some(bias_step::detection(series, position, &estimate, *p_value));
+            }
+            Candidate::Regressor(index) => {
+                let RegressionEstimate { size: sensitivity, error, .. } = estimate;
+                changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error }));
+            }
+        }
+    }
+    changes
+}
+
+/// Whether the block means of a regressor span at least one count. Within a count, they show how its values were rounded.
+fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
+    means.max() - means.min() >= regressor.resolution
+}
+
+/// Of the candidates with a p-value below their limit, the one that explains the data best beside those accepted before.
+fn best_candidate(
+    series: &Series,
+    blocks: &BlockMeans,
+    grid: &NoiseGrid,
+    regressors: &[(usize, DVector<f64>)],
+    accepted: &[Accepted],
+) -> Option<Accepted> {
+    let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
+    let regression = GlsRegression::new(blocks, grid, &known);
+    let ramp = blocks.ramp();
+    // With the −2 ln likelihood by which they are compared.
+    let mut rivals: Vec<(f64, Accepted)> = Vec::new();
+    let single = std::iter::once((Candidate::Ramp, &ramp))
+        .chain(regressors.iter().map(|(index, regressor)| (Candidate::Regressor(*index), regressor)));
+    for (candidate, regressor) in single {
+        if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate(regressor)
+            && p_value < SIGNIFICANCE
+        {
+            rivals.push((deviance, Accepted { candidate, regressor: regressor.clone(), p_value }));
+        }
+    }
+    let has_step = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Step(_)));
+    let step = if has_step { None } else { bias_step::find(series, blocks, grid, &known, &regression) };
+    if let Some(step) = step
+        && step.p_value < bias_step::SIGNIFICANCE
+    {
+        let accepted =
+            Accepted { candidate: Candidate::Step(step.position), regressor: step.regressor, p_value: step.p_value };
+        rivals.push((step.deviance + bias_step::ADVANTAGE, accepted));
+    }
+    rivals.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, best)| best)
+}
+
+/// A ramp with the slope of `estimate`, which is per block, as it is reported. The noise model has a term for it, so the
+/// samples are not corrected.
+fn ramp_detection(series: &Series, blocks: &BlockMeans, estimate: &RegressionEstimate, p_value: f64) -> Detection {
+    let block_s = blocks.width as f64 * series.period_s;
+    let (slope, half) = (estimate.size / block_s, NORMAL_975 * estimate.error / block_s);
+    let evidence = format!(
+        "the level moves by {slope:.3e} {}/s throughout, by chance {p_value:.0e} in white, flicker and walking noise of any \
+         mixture; warm-up that no sensor shows, or aging",
+        series.unit,
+    );
+    let slope = Parameter::new(slope, slope - half, slope + half, format!("{}/s", series.unit));
+    Detection { effect: Effect::new("rate_ramp", [("slope", slope)], evidence), correction: None }
+}

@@ -1,0 +1,192 @@
+//! A step in the bias: it changes at once and stays.
+//!
+//! Random walk, flicker noise, ramps and temperature change the bias too, so a step has to explain the data better than any
+//! of them by a margin.
+
+use super::block_means::{BlockMeans, NoiseGrid};
+use super::gls_regression::{GlsRegression, RegressionEstimate};
+use crate::distributions::{NORMAL_975, quantile};
+use crate::findings::{Correction, Detection, Effect, Parameter};
+use crate::series::Series;
+use nalgebra::DVector;
+
+/// Highest p-value of a step. The bias of a real part at rest moves less regularly than any mixture of the noises: p-values
+/// down to 3e-5 occur in the measured recordings, in which no step is visible.
+pub(super) const SIGNIFICANCE: f64 = 1e-5;
+/// Advantage in −2 ln likelihood that a step must have over any other cause.
+pub(super) const ADVANTAGE: f64 = 12.0;
+/// Largest gain of a second step relative to the first; above it, the bias jumps repeatedly and is no single step.
+const SECOND: f64 = 0.2;
+/// In white noise of deviation σ, 95 % of the errors in the position of a step of size s are within this times (σ/s)²
+/// samples (Y.-C. Yao, "Approximating the distribution of the maximum likelihood estimate of the change-point in a sequence
+/// of independent random variables", Ann. Statist. 15, 1987).
+const POSITION_95: f64 = 11.0;
+/// Positions whose −2 ln likelihood exceeds the least one by less than this are inside the 95 % interval.
+const POSSIBLE: f64 = 7.0;
+/// Blocks at either end in which no step is sought: filters settle there, and too few blocks follow to confirm a step.
+const ENDS: usize = 3;
+/// Blocks on either side of a step that are averaged for the bias before and after it.
+const SIDE: usize = 4;
+
+/// The step that explains the data best.
+pub(super) struct BiasStep {
+    pub position: StepPosition,
+    /// Block means of a step of size 1 at this position.
+    pub regressor: DVector<f64>,
+    /// −2 ln likelihood with the best size.
+    pub deviance: f64,
+    /// Probability of such a step anywhere in the record by chance.
+    pub p_value: f64,
+}
+
+/// Position of a step in the record.
+pub(super) struct StepPosition {
+    /// First sample after the step.
+    sample: usize,
+    /// 95 % bounds, in sample periods from the first sample.
+    low: f64,
+    high: f64,
+}
+
+/// The likeliest step beside the `known` regressors, to which `regression` was fitted; `None` if the bias jumps more than
+/// once.
+pub(super) fn find(
+    series: &Series,
+    blocks: &BlockMeans,
+    grid: &NoiseGrid,
+    known: &[DVector<f64>],
+    regression: &GlsRegression<'_>,
+) -> Option<BiasStep> {
+    let scan = StepScan::new(regression)?;
+    let (sample, error) = locate(series, blocks, scan.at)?;
+    let regressor = blocks.step_at(series.slots[sample]);
+    let with_step: Vec<DVector<f64>> = known.iter().cloned().chain([regressor.clone()]).collect();
+    let with_step = GlsRegression::new(blocks, grid, &with_step);
+    let gain = regression.deviance() - scan.deviance;
+    let second = StepScan::new(&with_step).map_or(0.0, |second| with_step.deviance() - second.deviance);
+    if second > (SECOND * gain).max(2.0 * ADVANTAGE) {
+        return None;
+    }
+    let at = series.slots[sample] as f64;
+    let (earliest, latest) = scan.possible(blocks);
+    let low = (at - error).min(if scan.is_unique() { at } else { earliest }).max(0.0);
+    let high = (at + error).max(if scan.is_unique() { at } else { latest });
+    Some(BiasStep {
+        position: StepPosition { sample, low, high },
+        regressor,
+        deviance: scan.deviance,
+        p_value: scan.p_value_anywhere(),
+    })
+}
+
+/// A step with the size of `estimate`, as it is reported.
+pub(super) fn detection(
+    series: &Series,
+    position: &StepPosition,
+    estimate: &RegressionEstimate,
+    p_value: f64,
+) -> Detection {
+    let time = |slot: f64| slot * series.period_s;
+    let at = series.slots[position.sample] as f64;
+    let (size, half) = (estimate.size, NORMAL_975 * estimate.error);
+    let evidence = format!(
+        "the level changes by {size:.3e} {} at {:.1} s and stays, by chance anywhere {:.0e} in white, flicker and walking \
+         noise of any mixture; a mechanical or thermal shock, or a fault that begins",
+        series.unit,
+        time(at),
+        p_value,
+    );
+    Detection {
+        effect: Effect::new(
+            "bias_step",
+            [
+                ("time", Parameter::new(time(at), time(position.low), time(position.high), "s")),
+                ("size", Parameter::new(size, size - half, size + half, series.unit)),
+            ],
+            evidence,
+        ),
+        correction: Some(Correction::Offset { from: position.sample, size }),
+    }
+}
+
+/// A step tried at the beginning of every block.
+struct StepScan {
+    /// −2 ln likelihood with the step at each block.
+    deviances: Vec<f64>,
+    /// The least of them.
+    deviance: f64,
+    /// Its block.
+    at: usize,
+    /// p-value of the step there, for a known position.
+    p_value: f64,
+    /// Effective number of independent tests.
+    independent: f64,
+}
+
+impl StepScan {
+    fn new(regression: &GlsRegression<'_>) -> Option<Self> {
+        let steps = regression.estimate_steps();
+        let sought = ENDS..steps.len().saturating_sub(ENDS) + 1;
+        let tried = |(at, step): (usize, &Option<RegressionEstimate>)| step.filter(|_| sought.contains(&at));
+        let tried: Vec<Option<RegressionEstimate>> = steps.iter().enumerate().map(tried).collect();
+        let without = regression.deviance();
+        let deviances: Vec<f64> = tried.iter().map(|step| step.map_or(without, |step| step.deviance)).collect();
+        let (at, best) = tried
+            .iter()
+            .enumerate()
+            .filter_map(|(at, step)| Some((at, (*step)?)))
+            .min_by(|(_, a), (_, b)| a.deviance.total_cmp(&b.deviance))?;
+        let independent = regression.independent_steps();
+        Some(Self { deviances, deviance: best.deviance, at, p_value: best.p_value, independent })
+    }
+
+    /// p-value for an unknown position: adds Rice's expected number of crossings of a level by a smooth process.
+    fn p_value_anywhere(&self) -> f64 {
+        let level = quantile(0.5 * self.p_value);
+        (self.p_value + self.independent * (-0.5 * level * level).exp()).min(1.0)
+    }
+
+    /// Whether only one block is possible.
+    fn is_unique(&self) -> bool {
+        self.deviances.iter().filter(|deviance| **deviance < self.deviance + POSSIBLE).count() <= 1
+    }
+
+    /// First and last sample period in which the step may be.
+    fn possible(&self, blocks: &BlockMeans) -> (f64, f64) {
+        let possible = |at: &usize| self.deviances[*at] < self.deviance + POSSIBLE;
+        let earliest = (1..=self.at).rev().take_while(possible).last().unwrap_or(self.at);
+        let latest = (self.at..self.deviances.len()).take_while(possible).last().unwrap_or(self.at);
+        let slot = |number: usize| number as f64 * blocks.width as f64;
+        (slot(blocks.numbers[earliest - 1]), slot(blocks.numbers[latest] + 1))
+    }
+}
+
+/// The first sample after a step at the beginning of block `at`, give or take a block, and half of its 95 % interval in
+/// samples.
+///
+/// It is the sample from which on the new bias explains the data best where white noise dominates the differences of
+/// neighbouring samples.
+fn locate(series: &Series, blocks: &BlockMeans, at: usize) -> Option<(usize, f64)> {
+    let slot = |number: usize| number as u64 * blocks.width;
+    let position = |slot: u64| series.slots.partition_point(|&other| other < slot);
+    let (from, to) = (blocks.numbers[at - 1], blocks.numbers[at]);
+    let means = blocks.means.as_slice();
+    let average = |means: &[f64]| means.iter().sum::<f64>() / means.len() as f64;
+    // The block next to the step is left out on either side: it may contain a part of the step.
+    let before = average(&means[(at - 1).saturating_sub(SIDE)..(at - 1).max(1)]);
+    let after = average(&means[(at + 1).min(means.len() - 1)..(at + 1 + SIDE).min(means.len())]);
+    let (middle, size) = (0.5 * (before + after), after - before);
+    let range = position(slot(from))..position(slot(to + 1));
+    let values = &series.values[range.clone()];
+    let (mut sum, mut highest, mut best) = (0.0, f64::NEG_INFINITY, range.start);
+    for (offset, value) in values.iter().enumerate().rev() {
+        sum += size * (value - middle);
+        if sum > highest {
+            (highest, best) = (sum, range.start + offset);
+        }
+    }
+    let differences = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
+    let variance = differences / (2 * values.len().saturating_sub(1).max(1)) as f64;
+    let error = POSITION_95 * variance / (size * size);
+    error.is_finite().then_some((best, error.ceil()))
+}

@@ -1,0 +1,217 @@
+//! Random telegraph noise: jumps to and fro between two levels at random times.
+//!
+//! Its Allan variance and its spectrum are those of a Markov process, and over a few correlation times those of a random
+//! walk. The detector compares the likelihood of a hidden Markov chain of two states with that of a Gaussian process of any
+//! variance and correlation time, on means of equal parts of the record.
+
+use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Detection, Effect, Parameter};
+use crate::uniform_series::UniformSeries;
+
+/// Numbers of parts into which the record is divided: few parts for long correlation times, many for short ones.
+const PARTS: [usize; 3] = [256, 1024, 4096];
+/// Parts per correlation time where the Allan curve has shown one; more than this resolve a time well enough.
+const RESOLVED: f64 = 20.0;
+/// Least gain of the two levels in ln likelihood. A larger one has a probability below e⁻¹² where there are none.
+const LEAST_GAIN: f64 = 12.0;
+/// Fewest jumps; one or two are steps of the bias.
+const FEWEST_JUMPS: f64 = 6.0;
+/// Least correlation time, in parts.
+const LEAST_TIME: f64 = 4.0;
+/// Least fraction of the record at each level.
+const LEAST_OCCUPANCY: f64 = 0.05;
+/// Largest variance around the levels: this multiple of the white variance, plus this fraction of the square of their
+/// distance for slow noise. A clipped sinusoid has about ten times as much.
+const WHITE_FACTOR: f64 = 1.5;
+const SLOW_FRACTION: f64 = 0.01;
+
+/// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
+/// in s.
+#[must_use]
+pub(crate) fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]) -> Option<Detection> {
+    let samples = series.values().len();
+    let known = correlation_times.iter().map(|time| ((time / RESOLVED / series.sample_period()) as usize).max(1));
+    let coarse = PARTS.iter().map(|parts| samples / parts).filter(|&size| size > 0);
+    let mut sizes: Vec<usize> = coarse.chain(known).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    let mut found = None;
+    for size in sizes.into_iter().rev() {
+        let Some((chain, gain)) = fit(&PartMeans::new(series, size)) else { continue };
+        let part_s = size as f64 * series.sample_period();
+        let resolved = chain.correlation_time() > RESOLVED;
+        found = Some(detection(&chain, gain, part_s, unit));
+        if resolved {
+            break;
+        }
+    }
+    found
+}
+
+/// Means of equal parts of a record, minus the mean of the record; `NaN` where half of the samples or more are missing.
+struct PartMeans {
+    means: Vec<f64>,
+    /// Variance of white noise in a mean.
+    white: f64,
+}
+
+impl PartMeans {
+    /// Parts of `size` samples.
+    fn new(series: &UniformSeries, size: usize) -> Self {
+        let level = series.mean();
+        let mean = |values: &[f64]| {
+            let (sum, count) = values
+                .iter()
+                .filter(|value| value.is_finite())
+                .fold((0.0, 0_usize), |(sum, count), value| (sum + value - level, count + 1));
+            if 2 * count > values.len() { sum / count as f64 } else { f64::NAN }
+        };
+        let means: Vec<f64> = series.values().chunks_exact(size).map(mean).collect();
+        // Differences of the halves of a part, or else of neighbouring parts; few of them contain a jump.
+        let differences: Vec<f64> = if size > 1 {
+            let halves = series.values().chunks_exact(size).map(|part| part.split_at(size / 2));
+            halves.map(|(a, b)| 0.5 * (mean(a) - mean(b))).collect()
+        } else {
+            means.windows(2).map(|pair| (pair[1] - pair[0]) / 2f64.sqrt()).collect()
+        };
+        Self { means, white: robust_variance(differences) }
+    }
+}
+
+/// Variance of the normal distribution whose absolute values have the median of those of `values`.
+fn robust_variance(values: Vec<f64>) -> f64 {
+    /// Median of the absolute value of a standard normal number.
+    const MEDIAN: f64 = 0.674_489_75;
+    let mut sizes: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).map(f64::abs).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / MEDIAN).powi(2)
+}
+
+/// The chain, and its gain in ln likelihood over any Gaussian process; `None` if the gain or a property of the chain is below
+/// its limit.
+fn fit(parts: &PartMeans) -> Option<(TwoStateChain, f64)> {
+    let chain = TwoStateChain::fit(&parts.means)?;
+    let around = robust_variance(chain.residuals(&parts.means));
+    let jumps = chain.jumps >= FEWEST_JUMPS && chain.correlation_time() > LEAST_TIME;
+    let highest = WHITE_FACTOR * parts.white + SLOW_FRACTION * chain.distance().powi(2);
+    if !jumps || chain.occupancy().iter().any(|&occupancy| occupancy < LEAST_OCCUPANCY) || around > highest {
+        return None;
+    }
+    let gain = chain.log_likelihood - gauss_markov_log_likelihood(&parts.means);
+    (gain > LEAST_GAIN).then_some((chain.with_errors(&parts.means), gain))
+}
+
+/// The telegraph noise of `chain`, for parts of `part_s` seconds, as it is reported.
+fn detection(chain: &TwoStateChain, gain: f64, part_s: f64, unit: &str) -> Detection {
+    let bounded = |value: f64, error: f64, unit: &str| {
+        let factor = (NORMAL_975 * error).exp();
+        Parameter::new(value, value / factor, value * factor, unit)
+    };
+    let steps = chain.correlation_time();
+    let time = part_s * steps;
+    // One part in 2·steps contains a jump, and its mean is a quarter of the distance off its level on average, at either
+    // level.
+    let blurred = 0.25 / steps;
+    let distance = chain.distance() / (1.0 - blurred);
+    let distance_error = chain.distance_error.hypot(0.5 * blurred);
+    let evidence = format!(
+        "two levels {:.3e} {unit} apart with {:.0} jumps between them, e^{gain:.0} times as likely as a Gaussian process of \
+         any correlation time; charges that are caught and let go in a transistor or a crystal",
+        distance, chain.jumps,
+    );
+    Detection {
+        effect: Effect::new(
+            "telegraph",
+            [
+                ("time_constant", bounded(time, chain.time_error, "s")),
+                ("amplitude", bounded(distance, distance_error, unit)),
+            ],
+            evidence,
+        ),
+        correction: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 40_000;
+    const PERIOD_S: f64 = 0.01;
+
+    /// White noise of deviation 1 plus the values of `next`.
+    fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> UniformSeries {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let value = |at| next(&mut random, at) + random.sample::<f64, _>(StandardNormal);
+        UniformSeries::new(PERIOD_S, (0..SAMPLES).map(value).collect())
+    }
+
+    /// Two levels at a distance of `amplitude`, with the correlation time `time_s`.
+    fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+        let mut up = false;
+        move |random, _| {
+            up ^= random.random_bool(0.5 * PERIOD_S / time_s);
+            if up { amplitude } else { 0.0 }
+        }
+    }
+
+    #[test]
+    fn measures_distance_and_correlation_time_of_two_levels() {
+        let (mut covered, mut all) = (0, 0);
+        for (seed, (amplitude, time_s)) in [(1.0, 4.0), (0.7, 8.0), (50.0, 5.0), (1.5, 1.0)].into_iter().enumerate() {
+            let mut series = series(seed as u64, telegraph(amplitude, time_s));
+            if seed == 1 {
+                let values = series.values().iter().enumerate();
+                let gap = |(at, value): (usize, &f64)| if (5_000..9_000).contains(&at) { f64::NAN } else { *value };
+                series = UniformSeries::new(PERIOD_S, values.map(gap).collect());
+            }
+            let finding = find(&series, "g", &[]).unwrap_or_else(|| panic!("{amplitude} {time_s}"));
+            for (name, truth) in [("amplitude", amplitude), ("time_constant", time_s)] {
+                let parameter = &finding.effect.parameters[name];
+                assert!((parameter.value / truth).ln().abs() < 0.5, "{name} {truth}: {parameter:?}");
+                covered += usize::from((parameter.low..=parameter.high).contains(&truth));
+                all += 1;
+            }
+        }
+        // 95 % of the intervals hold the truth: two misses of eight have a probability of one in twenty.
+        assert!(covered >= all - 2, "{covered} of {all}");
+    }
+
+    #[test]
+    fn finds_short_correlation_times_that_the_curve_shows() {
+        let series = series(20, telegraph(3.0, 0.1));
+        let finding = find(&series, "g", &[0.1]).unwrap();
+        assert!((finding.effect.parameters["time_constant"].value / 0.1 - 1.0).abs() < 0.2, "{finding:?}");
+    }
+
+    #[test]
+    fn a_step_a_sinusoid_and_gaussian_processes_are_no_telegraph_noise() {
+        let step = series(30, |_, at| if at < 15_000 { 0.0 } else { 1.0 });
+        let wave = series(31, |_, at| (TAU * at as f64 * PERIOD_S / 20.0).sin());
+        let mut level = 0.0;
+        let walk = series(32, move |random, _| {
+            level += 0.02 * random.sample::<f64, _>(StandardNormal);
+            level
+        });
+        let mut state = 0.0;
+        let kept = (-PERIOD_S / 4.0f64).exp();
+        let markov = series(33, move |random, _| {
+            state = kept * state + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+            state
+        });
+        for series in [step, wave, walk, markov, series(34, |_, _| 0.0)] {
+            assert_eq!(find(&series, "g", &[1.0, 4.0]), None);
+        }
+        assert_eq!(find(&UniformSeries::new(PERIOD_S, vec![1.0; 10]), "g", &[]), None);
+        assert_eq!(find(&UniformSeries::new(PERIOD_S, vec![1.0; 10_000]), "g", &[]), None);
+    }
+}

@@ -1,0 +1,256 @@
+//! The two models between which the detector of telegraph noise decides: a hidden Markov chain of two states in white noise,
+//! and a Gaussian process with exponential autocorrelation in white noise. Both take numbers one step apart, `NaN` for a
+//! missing one.
+
+use std::f64::consts::PI;
+
+/// Rounds of the fit of the chain, at most; it ends when a round gains less than `SETTLED` in ln likelihood.
+const ROUNDS: usize = 60;
+const SETTLED: f64 = 1e-3;
+/// Probability of a jump per step with which the fit begins.
+const FIRST_JUMP: f64 = 0.05;
+/// Step in the logarithm of a parameter for the curvature of the likelihood.
+const CURVATURE_STEP: f64 = 0.05;
+
+/// A Markov chain of two states, each with a level, in white noise.
+#[derive(Debug, Clone)]
+pub(super) struct TwoStateChain {
+    levels: [f64; 2],
+    /// Variance around the level.
+    variance: f64,
+    /// Probability of leaving each level in a step.
+    leave: [f64; 2],
+    pub(super) log_likelihood: f64,
+    /// Expected number of jumps.
+    pub(super) jumps: f64,
+    /// Standard deviations of the logarithms of correlation time and distance of the levels.
+    pub(super) time_error: f64,
+    pub(super) distance_error: f64,
+}
+
+/// Expected statistics of the hidden states, given the numbers and a chain.
+#[derive(Default)]
+struct StateStatistics {
+    log_likelihood: f64,
+    /// For each state, expected count, sum and sum of squares of its numbers.
+    moments: [[f64; 3]; 2],
+    /// Expected number of steps that begin in each state, and of those that leave it.
+    steps: [f64; 2],
+    left: [f64; 2],
+}
+
+impl TwoStateChain {
+    /// The likeliest chain, by expectation maximisation (L. Baum et al., "A maximization technique occurring in the
+    /// statistical analysis of probabilistic functions of Markov chains", Ann. Math. Statist. 41, 1970). Begins with the
+    /// means of the lower and of the upper half of the numbers as levels. `None` of fewer than 16 numbers, or if they never
+    /// change.
+    pub(super) fn fit(values: &[f64]) -> Option<Self> {
+        let mut present: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+        let half = present.len() / 2;
+        if half < 8 {
+            return None;
+        }
+        present.select_nth_unstable_by(half, f64::total_cmp);
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let levels = [mean(&present[..half]), mean(&present[half..])];
+        let around = |(value, level): (&f64, f64)| (value - level).powi(2);
+        let lower = present[..half].iter().map(|value| around((value, levels[0])));
+        let upper = present[half..].iter().map(|value| around((value, levels[1])));
+        let variance = lower.chain(upper).sum::<f64>() / present.len() as f64;
+        let mut chain = Self {
+            levels,
+            variance,
+            leave: [FIRST_JUMP; 2],
+            log_likelihood: f64::NEG_INFINITY,
+            jumps: 0.0,
+            time_error: 0.0,
+            distance_error: 0.0,
+        };
+        for _ in 0..ROUNDS {
+            if chain.variance <= 0.0 {
+                return None;
+            }
+            let statistics = chain.expectation(values);
+            let gained = statistics.log_likelihood - chain.log_likelihood;
+            chain.maximise(&statistics);
+            if gained < SETTLED {
+                break;
+            }
+        }
+        Some(chain)
+    }
+
+    /// Sets the likeliest parameters for these expected statistics.
+    fn maximise(&mut self, statistics: &StateStatistics) {
+        let [lower, upper] = statistics.moments;
+        let squares = |[count, sum, squares]: [f64; 3]| squares - sum * sum / count.max(f64::MIN_POSITIVE);
+        self.levels = [lower, upper].map(|[count, sum, _]| sum / count.max(f64::MIN_POSITIVE));
+        self.variance = (squares(lower) + squares(upper)) / (lower[0] + upper[0]);
+        for state in 0..2 {
+            self.leave[state] =
+                (statistics.left[state] / statistics.steps[state].max(f64::MIN_POSITIVE)).clamp(1e-9, 0.5);
+        }
+        self.jumps = statistics.left[0] + statistics.left[1];
+        self.log_likelihood = statistics.log_likelihood;
+    }
+
+    /// Correlation time in steps: the covariance of the chain decays by the factor 1 − p₀₁ − p₁₀ a step.
+    pub(super) fn correlation_time(&self) -> f64 {
+        -1.0 / (-(self.leave[0] + self.leave[1])).ln_1p()
+    }
+
+    /// Distance of the levels.
+    pub(super) fn distance(&self) -> f64 {
+        (self.levels[1] - self.levels[0]).abs()
+    }
+
+    /// Fraction of the time at each level.
+    pub(super) fn occupancy(&self) -> [f64; 2] {
+        let both = self.leave[0] + self.leave[1];
+        [self.leave[1] / both, self.leave[0] / both]
+    }
+
+    /// Distance of each number from the nearer level.
+    pub(super) fn residuals(&self, values: &[f64]) -> Vec<f64> {
+        let nearer = |value: &f64| {
+            let [a, b] = self.levels.map(|level| value - level);
+            if a.abs() < b.abs() { a } else { b }
+        };
+        values.iter().map(nearer).collect()
+    }
+
+    /// The chain with the standard deviations of its parameters, by the curvature of the likelihood.
+    pub(super) fn with_errors(self, values: &[f64]) -> Self {
+        let log_likelihood = |time: f64, distance: f64| {
+            let middle = 0.5 * (self.levels[0] + self.levels[1]);
+            let chain = Self {
+                levels: self.levels.map(|level| middle + distance.exp() * (level - middle)),
+                leave: self.leave.map(|leave| leave * (-time).exp()),
+                ..self.clone()
+            };
+            chain.expectation(values).log_likelihood
+        };
+        let here = log_likelihood(0.0, 0.0);
+        let error = |up: f64, down: f64| {
+            let curvature = (2.0 * here - up - down) / (CURVATURE_STEP * CURVATURE_STEP);
+            if curvature > 0.0 { curvature.sqrt().recip() } else { 1.0 }
+        };
+        let time_error = error(log_likelihood(CURVATURE_STEP, 0.0), log_likelihood(-CURVATURE_STEP, 0.0));
+        let distance_error = error(log_likelihood(0.0, CURVATURE_STEP), log_likelihood(0.0, -CURVATURE_STEP));
+        Self { time_error, distance_error, ..self }
+    }
+
+    /// Expected statistics of the states, by the forward and the backward recursion.
+    fn expectation(&self, values: &[f64]) -> StateStatistics {
+        let [up, down] = self.leave;
+        let scale = 0.5 * (2.0 * PI * self.variance).ln();
+        // Densities of a number under both levels over that of the nearer one, and the logarithm of the latter: far from both
+        // levels the densities themselves underflow.
+        let densities = |value: f64| {
+            if value.is_nan() {
+                return ([1.0; 2], 0.0);
+            }
+            let squares = self.levels.map(|level| 0.5 * (value - level).powi(2) / self.variance);
+            let least = squares[0].min(squares[1]);
+            (squares.map(|square| (least - square).exp()), -least - scale)
+        };
+        let mut statistics = StateStatistics::default();
+        let mut forward: Vec<[f64; 2]> = Vec::with_capacity(values.len());
+        let mut belief = [down / (up + down), up / (up + down)];
+        for &value in values {
+            let ([a, b], nearer) = densities(value);
+            let (a, b) = (belief[0] * a, belief[1] * b);
+            let sum = a + b;
+            statistics.log_likelihood += sum.ln() + nearer;
+            let now = [a / sum, b / sum];
+            forward.push(now);
+            belief = [now[0] * (1.0 - up) + now[1] * down, now[0] * up + now[1] * (1.0 - down)];
+        }
+        // Likelihood of the later numbers given each state, up to a factor.
+        let mut later = [1.0; 2];
+        for (at, &value) in values.iter().enumerate().rev() {
+            let now = forward[at];
+            let weights = [now[0] * later[0], now[1] * later[1]];
+            let sum = weights[0] + weights[1];
+            for (moments, weight) in statistics.moments.iter_mut().zip(weights).filter(|_| value.is_finite()) {
+                for (moment, power) in moments.iter_mut().zip([1.0, value, value * value]) {
+                    *moment += weight / sum * power;
+                }
+            }
+            let Some(before) = at.checked_sub(1) else { break };
+            let ([a, b], _) = densities(value);
+            let (a, b) = (a * later[0], b * later[1]);
+            let from = forward[before];
+            let joint = [from[0] * (1.0 - up) * a, from[0] * up * b, from[1] * (1.0 - down) * b, from[1] * down * a];
+            let sum: f64 = joint.iter().sum();
+            statistics.steps[0] += (joint[0] + joint[1]) / sum;
+            statistics.left[0] += joint[1] / sum;
+            statistics.steps[1] += (joint[2] + joint[3]) / sum;
+            statistics.left[1] += joint[3] / sum;
+            let back = [(1.0 - up) * a + up * b, down * a + (1.0 - down) * b];
+            let scale = back[0] + back[1];
+            later = back.map(|value| value / scale);
+        }
+        statistics
+    }
+}
+
+/// Correlation times that are tried first: the shortest in steps, the longest in records. The longest is as good as a random
+/// walk.
+const SHORTEST: f64 = 0.5;
+const LONGEST: f64 = 30.0;
+/// Variances of the process, relative to the white variance, that are tried first.
+const WEAKEST: f64 = 1e-3;
+const STRONGEST: f64 = 1e7;
+/// Number of values of each that are tried first, and how often the step is halved after that.
+const TRIED: usize = 9;
+const HALVED: usize = 9;
+
+/// The highest ln likelihood of a Gaussian process with exponential autocorrelation in white noise, over all variances and
+/// correlation times.
+pub(super) fn gauss_markov_log_likelihood(values: &[f64]) -> f64 {
+    let longest = LONGEST * values.len() as f64;
+    let (mut step_of_time, mut step_of_ratio) =
+        ((longest / SHORTEST).ln() / (TRIED - 1) as f64, (STRONGEST / WEAKEST).ln() / (TRIED - 1) as f64);
+    let at = |time: f64, ratio: f64| (kalman_log_likelihood(values, time.exp(), ratio.exp()), time, ratio);
+    let tries = (0..TRIED * TRIED).map(|try_| {
+        let (i, j) = ((try_ / TRIED) as f64, (try_ % TRIED) as f64);
+        at(SHORTEST.ln() + step_of_time * i, WEAKEST.ln() + step_of_ratio * j)
+    });
+    let likelier = |a: &(f64, f64, f64), b: &(f64, f64, f64)| a.0.total_cmp(&b.0);
+    let mut best = tries.max_by(likelier).unwrap_or((f64::NEG_INFINITY, 0.0, 0.0));
+    for _ in 0..HALVED {
+        step_of_time *= 0.5;
+        step_of_ratio *= 0.5;
+        let around = (0..9).map(|try_| (f64::from(try_ / 3 - 1), f64::from(try_ % 3 - 1)));
+        let (_, time, ratio) = best;
+        let tries = around.map(|(i, j)| at(time + i * step_of_time, ratio + j * step_of_ratio));
+        best = tries.max_by(likelier).unwrap_or(best);
+    }
+    best.0
+}
+
+/// ln likelihood by a Kalman filter, for the correlation time in steps and the variance relative to the white noise, whose own
+/// variance is the likeliest one.
+fn kalman_log_likelihood(values: &[f64], time: f64, ratio: f64) -> f64 {
+    let decay = (-1.0 / time).exp();
+    // 1 − decay², without cancellation.
+    let drive = -(-2.0 / time).exp_m1() * ratio;
+    let (mut state, mut variance) = (0.0, ratio);
+    let (mut squares, mut logs, mut count) = (0.0, 0.0, 0.0);
+    for &value in values {
+        if value.is_finite() {
+            let spread = variance + 1.0;
+            let error: f64 = value - state;
+            squares += error * error / spread;
+            logs += spread.ln();
+            count += 1.0;
+            let gain = variance / spread;
+            state += gain * error;
+            variance *= 1.0 - gain;
+        }
+        state *= decay;
+        variance = decay * decay * variance + drive;
+    }
+    -0.5 * (count * ((2.0 * PI * squares / count).ln() + 1.0) + logs)
+}

@@ -1,0 +1,25 @@
+//! Spectral analysis of one channel or of several.
+//!
+//! All densities are one-sided, in unit²/Hz: their integral over 0 … fs/2 is the variance. White noise N has the density
+//! `2N²`, flicker noise B `B²/(πf)`, a random walk K `K²/(2π²f²)`: twice the two-sided densities of IEEE Std 952.
+//!
+//! ```text
+//! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
+//!               ├► sine tapers ─► common_mode            drift that several channels share
+//!               ├► Welch ─► SpectralShape ─► N, B, K     independent of the Allan variance
+//!               └► autocorrelation                       correlation time of a Markov process
+//! ```
+
+mod autocorrelation;
+pub(crate) mod common_mode;
+mod line_models;
+mod lines;
+mod periodogram;
+mod smooth_shape;
+mod welch;
+
+pub(crate) use autocorrelation::correlation_time;
+pub(crate) use lines::find_lines_over;
+pub use lines::{SpectralLine, find_lines};
+pub use smooth_shape::{SpectralBand, SpectralShape};
+pub use welch::Welch;

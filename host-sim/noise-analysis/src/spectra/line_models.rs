@@ -1,0 +1,288 @@
+//! The two models of a line: a sinusoid, fitted to the samples, and a resonance, fitted to the spectrum.
+
+use super::periodogram::taper;
+use crate::uniform_series::UniformSeries;
+use nalgebra::{Matrix4, Vector4};
+use std::f64::consts::{PI, TAU};
+
+/// Samples after which the rotating phasor is computed anew: its recursion loses about one bit in a thousand steps.
+const STEPS: usize = 512;
+
+/// `cosine·cos(2πft) + sine·sin(2πft)`, with `t` counted from the first sample; fitted under the periodogram's taper.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sine {
+    pub frequency: f64,
+    cosine: f64,
+    sine: f64,
+    /// `|Σwye^(−2πift)|²/Σw²`
+    power: f64,
+}
+
+impl Sine {
+    /// The least-squares sinusoid near `frequency`, in Hz, which may be off by up to half of `spacing`.
+    pub(super) fn fit_near(series: &UniformSeries, frequency: f64, spacing: f64) -> Self {
+        let mut best = Self::fit_at(series, frequency);
+        // Maximum of the parabola through three points of decreasing distance.
+        for step in [0.3 * spacing, 0.1 * spacing, 0.03 * spacing] {
+            let [left, right] = [-step, step].map(|offset| Self::fit_at(series, best.frequency + offset).power);
+            let curvature = 2.0 * best.power - left - right;
+            let shift =
+                if curvature > 0.0 { (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { 0.0 };
+            let summit = Self::fit_at(series, best.frequency + shift);
+            if summit.power > best.power {
+                best = summit;
+            }
+        }
+        best
+    }
+
+    /// The least-squares sinusoid of one frequency.
+    fn fit_at(series: &UniformSeries, frequency: f64) -> Self {
+        let (mut cc, mut ss, mut cs, mut yc, mut ys, mut weights) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let length = series.values().len();
+        for_each_phase(series, frequency, |at, value, cosine, sine| {
+            if value.is_finite() {
+                let weight = taper(at, length);
+                cc += weight * cosine * cosine;
+                ss += weight * sine * sine;
+                cs += weight * cosine * sine;
+                yc += weight * value * cosine;
+                ys += weight * value * sine;
+                weights += weight * weight;
+            }
+        });
+        let determinant = cc * ss - cs * cs;
+        if determinant <= 0.0 {
+            return Self { frequency, cosine: 0.0, sine: 0.0, power: 0.0 };
+        }
+        let (cosine, sine) = ((yc * ss - ys * cs) / determinant, (ys * cc - yc * cs) / determinant);
+        Self { frequency, cosine, sine, power: (yc * yc + ys * ys) / weights }
+    }
+
+    pub(super) fn amplitude(&self) -> f64 {
+        self.cosine.hypot(self.sine)
+    }
+
+    /// The ordinate of a periodogram at the sinusoid's own frequency, unit²/Hz.
+    pub(super) fn density(&self, series: &UniformSeries) -> f64 {
+        2.0 * self.power * series.sample_period()
+    }
+
+    /// The series without the sinusoid.
+    pub(super) fn subtracted_from(&self, series: &UniformSeries) -> UniformSeries {
+        let mut values = Vec::with_capacity(series.values().len());
+        for_each_phase(series, self.frequency, |_, value, cosine, sine| {
+            values.push(value - self.cosine * cosine - self.sine * sine);
+        });
+        UniformSeries::new(series.sample_period(), values)
+    }
+}
+
+/// Calls `visit` with position, value, cosine and sine of every sample.
+fn for_each_phase(series: &UniformSeries, frequency: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
+    let turn = frequency * series.sample_period();
+    let (step_sine, step_cosine) = (TAU * turn).sin_cos();
+    for (block, values) in series.values().chunks(STEPS).enumerate() {
+        // Whole turns are dropped before the multiplication by 2π, which would cost them digits.
+        let (mut sine, mut cosine) = (TAU * (turn * (block * STEPS) as f64).fract()).sin_cos();
+        for (at, value) in values.iter().enumerate() {
+            visit(block * STEPS + at, *value, cosine, sine);
+            (cosine, sine) = (cosine * step_cosine - sine * step_sine, sine * step_cosine + cosine * step_sine);
+        }
+    }
+}
+
+/// Half-width of the region that a resonance is fitted to, in widths of the line; at least [`LEAST`] ordinates.
+const REACH: f64 = 6.0;
+const LEAST: f64 = 16.0;
+/// Neighbouring ordinates of the region are averaged into this many groups, at most.
+const GROUPS: usize = 256;
+/// Steps of the Levenberg-Marquardt iteration, at most.
+const ROUNDS: usize = 60;
+/// Narrowest width that is tried, in resolutions.
+const NARROWEST: f64 = 0.5;
+
+/// `level·(1 + height/(1 + (2(k − centre)/width)²))` over the ordinates `k` of a whitened spectrum, with the same line at
+/// `−centre`; fitted by Whittle's likelihood.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lorentz {
+    pub level: f64,
+    pub height: f64,
+    /// In resolutions.
+    pub centre: f64,
+    /// Full width at half maximum, in resolutions.
+    pub width: f64,
+    /// Standard deviations of `ln height`, of `centre` and of `ln width`.
+    pub errors: [f64; 3],
+    /// Covariance of `ln height` and `ln width`.
+    pub height_and_width: f64,
+    /// −2 log-likelihood ratio of the level alone against level and line.
+    pub statistic: f64,
+}
+
+/// The mean of some neighbouring ordinates.
+struct Group {
+    /// Mean position, in resolutions.
+    position: f64,
+    density: f64,
+    ordinates: f64,
+}
+
+impl Lorentz {
+    /// The likeliest curve near `centre` with about `width`, both in resolutions, over the ordinates from `lowest` on;
+    /// `None` if the fit fails.
+    pub(super) fn fit(whitened: &[f64], lowest: usize, centre: f64, width: f64) -> Option<Self> {
+        let near = Self::fit_within(whitened, lowest, centre, width, REACH * width)?;
+        // The skirts of a high line exceed the level far beyond its width.
+        let skirts = near.width * near.height.sqrt().max(REACH);
+        Self::fit_within(whitened, lowest, near.centre, near.width, skirts.min(whitened.len() as f64 / 8.0))
+            .or(Some(near))
+    }
+
+    /// As [`fit`](Self::fit), to the ordinates within `reach` of the centre.
+    fn fit_within(whitened: &[f64], lowest: usize, centre: f64, width: f64, reach: f64) -> Option<Self> {
+        let reach = reach.max(LEAST);
+        let low = ((centre - reach).max(lowest as f64)) as usize;
+        let high = ((centre + reach) as usize).min(whitened.len().checked_sub(2)?);
+        if high < low + LEAST as usize {
+            return None;
+        }
+        let groups = groups(&whitened[low..=high], low);
+        let weight: f64 = groups.iter().map(|group| group.ordinates).sum();
+        let mean = |groups: &mut dyn Iterator<Item = &Group>| {
+            let (sum, weight) = groups.fold((0.0, 0.0), |(sum, weight), group| {
+                (sum + group.ordinates * group.density, weight + group.ordinates)
+            });
+            sum / weight
+        };
+        let everything = mean(&mut groups.iter());
+        let surroundings = mean(&mut groups.iter().filter(|group| (group.position - centre).abs() > 0.6 * reach));
+        let summit = mean(&mut around(&groups, centre, width).iter().copied());
+        // The mean of a Lorentz curve over its full width is π/4 of its height.
+        let height = ((summit / surroundings - 1.0) * 4.0 / PI).max(0.1);
+        let mut parameters = Vector4::new(surroundings.ln(), height.ln(), centre, width.ln());
+        let mut likelihood = log_likelihood(&groups, &parameters);
+        let mut damping = 1e-2;
+        for _ in 0..ROUNDS {
+            let (information, score) = normal_equations(&groups, &parameters);
+            let damped = information + Matrix4::from_diagonal(&(damping * information.diagonal()));
+            let next = parameters + damped.cholesky()?.solve(&score);
+            let better = log_likelihood(&groups, &next);
+            let inside = (next[2] - centre).abs() < 2.0 * width.max(reach / REACH)
+                && next[3] < reach.ln()
+                && next[3] > NARROWEST.ln();
+            if inside && better > likelihood {
+                let gain = better - likelihood;
+                (parameters, likelihood, damping) = (next, better, damping / 10.0);
+                if gain < 1e-6 {
+                    break;
+                }
+            } else if damping > 1e6 {
+                break;
+            } else {
+                damping *= 10.0;
+            }
+        }
+        let level_alone = -weight * (everything.ln() + 1.0);
+        let covariance = normal_equations(&groups, &parameters).0.cholesky()?.inverse();
+        Some(Self {
+            level: parameters[0].exp(),
+            height: parameters[1].exp(),
+            centre: parameters[2],
+            width: parameters[3].exp(),
+            errors: [1, 2, 3].map(|at| covariance[(at, at)].sqrt()),
+            height_and_width: covariance[(1, 3)],
+            statistic: 2.0 * (likelihood - level_alone),
+        })
+    }
+
+    /// Factor on the ordinate at `position` that removes the line and leaves the level.
+    pub(super) fn deflation(&self, position: f64) -> f64 {
+        1.0 / (1.0 + self.height * bell(position, self.centre, self.width))
+    }
+
+    /// Relative standard deviation of the area `height·width`.
+    pub(super) fn area_error(&self) -> f64 {
+        let [height, _, width] = self.errors;
+        (height * height + width * width + 2.0 * self.height_and_width).max(0.0).sqrt()
+    }
+}
+
+/// The groups within half a width of the centre, or else the nearest one.
+fn around(groups: &[Group], centre: f64, width: f64) -> Vec<&Group> {
+    let distance = |group: &&Group| (group.position - centre).abs();
+    let inside: Vec<&Group> = groups.iter().filter(|group| distance(group) <= width / 2.0).collect();
+    if inside.is_empty() {
+        groups.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).into_iter().collect()
+    } else {
+        inside
+    }
+}
+
+/// Lorentz curves of height 1 at the positive and at the negative frequency of a damped oscillation.
+fn bell(position: f64, centre: f64, width: f64) -> f64 {
+    let at = |centre: f64| 1.0 / (1.0 + (2.0 * (position - centre) / width).powi(2));
+    at(centre) + at(-centre)
+}
+
+fn groups(ordinates: &[f64], first: usize) -> Vec<Group> {
+    let size = ordinates.len().div_ceil(GROUPS);
+    let group = |(index, chunk): (usize, &[f64])| Group {
+        position: (first + index * size) as f64 + (chunk.len() - 1) as f64 / 2.0,
+        density: chunk.iter().sum::<f64>() / chunk.len() as f64,
+        ordinates: chunk.len() as f64,
+    };
+    ordinates.chunks(size).enumerate().map(group).collect()
+}
+
+/// Modelled density of a group and its derivatives by `ln level`, `ln height`, `centre` and `ln width`.
+fn modelled(group: &Group, parameters: &Vector4<f64>) -> (f64, Vector4<f64>) {
+    let (level, height, width) = (parameters[0].exp(), parameters[1].exp(), parameters[3].exp());
+    let offset = 2.0 * (group.position - parameters[2]) / width;
+    let near = 1.0 / (1.0 + offset * offset);
+    let line = level * height * bell(group.position, parameters[2], width);
+    let density = level + line;
+    // The derivatives neglect the line at the negative frequency, which hardly changes with the parameters.
+    let slope = level * height * near * near * offset;
+    (density, Vector4::new(density, line, 4.0 * slope / width, 2.0 * slope * offset))
+}
+
+fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
+    let of_group = |group: &Group| {
+        let (density, _) = modelled(group, parameters);
+        -group.ordinates * (density.ln() + group.density / density)
+    };
+    groups.iter().map(of_group).sum()
+}
+
+/// Fisher's information and the score.
+fn normal_equations(groups: &[Group], parameters: &Vector4<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+    let (mut information, mut score) = (Matrix4::zeros(), Vector4::zeros());
+    for group in groups {
+        let (density, slope) = modelled(group, parameters);
+        let weight = group.ordinates / (density * density);
+        information += weight * slope * slope.transpose();
+        score += weight * (group.density - density) * slope;
+    }
+    (information, score)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fits_and_removes_a_sinusoid_between_two_ordinates() {
+        let values =
+            (0..10_000).map(|at| if at % 11 == 5 { f64::NAN } else { 3.0 * (TAU * 0.123_456 * f64::from(at)).cos() });
+        let series = UniformSeries::new(1.0, values.collect());
+        let sine = Sine::fit_near(&series, 0.123_475, 5e-5);
+        assert!((sine.frequency - 0.123_456).abs() < 1e-8, "{}", sine.frequency);
+        assert!((sine.amplitude() - 3.0).abs() < 1e-4);
+        let rest = sine.subtracted_from(&series);
+        assert!(rest.values().iter().filter(|value| value.is_finite()).all(|value| value.abs() < 1e-3));
+        // Without a taper an ordinate of M samples is A²·M·dt/2; a Tukey window over a tenth keeps (1 − 0.05)²/(1 − 0.0625).
+        let ordinate = 9.0 * series.present() as f64 / 2.0 * 0.95 * 0.95 / 0.9375;
+        assert!((sine.density(&series) / ordinate - 1.0).abs() < 1e-3);
+    }
+}

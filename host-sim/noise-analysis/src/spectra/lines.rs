@@ -1,0 +1,319 @@
+//! Lines in a spectrum: sinusoids, and resonances that are wider than the record's resolution.
+//!
+//! A sinusoid is tested by the likelihood ratio of its least-squares fit against a locally white background. The p-value
+//! accounts for all the frequencies that were searched (R. Baluev, "Assessing the statistical significance of periodogram
+//! peaks", MNRAS 385, 2008) and for the uncertainty of the background. A resonance is sought in averages over 4, 16, 64 …
+//! ordinates. A peak is taken for the model with the larger likelihood.
+
+use super::line_models::{Lorentz, Sine};
+use super::periodogram::{PADDING, Periodogram};
+use super::smooth_shape::{Background, LocalLevel, median};
+use crate::findings::MeasuredValue;
+use crate::uniform_series::UniformSeries;
+use statrs::function::beta::beta_reg;
+use std::f64::consts::PI;
+
+/// Probability that a record without lines yields one sinusoid or more, and the same again for a resonance.
+const FALSE_ALARM: f64 = 2e-4;
+
+/// Lowest frequency that is searched, in periods per record: below, lines cannot be distinguished from drift.
+const FEWEST_PERIODS: usize = 8;
+
+/// Largest number of lines that are returned.
+const MOST: usize = 6;
+/// Least width of a resonance, in resolutions.
+const NARROWEST: f64 = 1.5;
+/// Least −2 log-likelihood ratio of a sinusoid against a resonance for the latter to be taken.
+const PREFERENCE: f64 = 10.0;
+/// Least relative excess of a broad peak over its surroundings; a smaller one may be an error of the background's shape.
+const LEAST_EXCESS: f64 = 0.1;
+/// Averages on either side that a broad peak is compared with.
+const NEIGHBOURS: usize = 16;
+/// Largest number of resonances that are refitted when one is added: each refit transforms the whole record.
+const REFITTED: usize = 2;
+/// A line within this many widths of a resonance, and with less than this fraction of its statistic, is a residue of it.
+const SKIRTS: f64 = 20.0;
+const RESIDUE: f64 = 0.02;
+
+/// A line that stands out of the background.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpectralLine {
+    /// Hz.
+    pub frequency: MeasuredValue,
+    /// Standard deviation of the line's signal, in the unit of the series: 1/√2 of a sinusoid's amplitude.
+    pub deviation: MeasuredValue,
+    /// Full width at half maximum in Hz; `None` for a sinusoid, which is no wider than the record resolves.
+    pub width: Option<MeasuredValue>,
+    /// −2 log-likelihood ratio of the background alone against background and line.
+    pub statistic: f64,
+    /// Probability that a record without lines shows such a peak at any frequency.
+    pub p_value: f64,
+}
+
+impl SpectralLine {
+    /// Amplitude of the sinusoid; for a resonance, of a sinusoid of the same power.
+    #[must_use]
+    pub fn amplitude(&self) -> MeasuredValue {
+        let root = 2f64.sqrt();
+        MeasuredValue { value: root * self.deviation.value, error: root * self.deviation.error }
+    }
+}
+
+/// The lines of a series with a p-value below 2·10⁻⁴, the strongest first; at most 6.
+///
+/// Searches from 8 periods per record up to half the sample rate, or to half the rate at which rounding acts as noise
+/// where that is lower. A record of fewer than some hundred samples has too few ordinates and yields none.
+#[must_use]
+pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
+    find_lines_over(series, |_| 1.0)
+}
+
+/// As [`find_lines`], over a background of white, flicker and random-walk noise times `known`, a function of the frequency
+/// in Hz.
+#[must_use]
+pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
+    let known: &dyn Fn(f64) -> f64 = &known;
+    let mut rest = series.clone().averaged_until_dithered().detrended();
+    let mut sines = Vec::new();
+    let mut resonances: Vec<Resonance> = Vec::new();
+    while sines.len() + resonances.len() < MOST
+        && let Some(spectrum) = WhitenedSpectrum::new(&rest, known, &resonances, None)
+    {
+        match spectrum.most_significant(&rest) {
+            Some(Candidate::Sine(line, sine)) => {
+                rest = sine.subtracted_from(&rest);
+                sines.push(line);
+            }
+            Some(Candidate::Resonance(resonance)) => {
+                resonances.push(resonance);
+                if resonances.len() <= REFITTED {
+                    refit(&rest, known, &mut resonances);
+                }
+            }
+            None => break,
+        }
+    }
+    let mut found: Vec<SpectralLine> =
+        sines.into_iter().chain(resonances.iter().map(|resonance| resonance.line)).collect();
+    found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    let all = found.clone();
+    found.retain(|line| !all.iter().any(|strong| is_residue(line, strong)));
+    found
+}
+
+/// Refits each resonance over the background without any of them: a strong one biases the first estimate of it.
+fn refit(rest: &UniformSeries, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
+    for index in 0..resonances.len() {
+        let Some(spectrum) = WhitenedSpectrum::new(rest, known, resonances, Some(index)) else { return };
+        let Resonance { line, lorentz } = resonances[index];
+        if let Some(better) = spectrum.resonance(lorentz.centre, [lorentz.width]) {
+            resonances[index] = Resonance { line: spectrum.resonance_line(&better, line.p_value), lorentz: better };
+        }
+    }
+}
+
+/// Whether `line` is what the fit of a far stronger resonance has left on its skirts.
+fn is_residue(line: &SpectralLine, strong: &SpectralLine) -> bool {
+    strong.width.is_some_and(|width| {
+        let distance = (line.frequency.value - strong.frequency.value).abs();
+        distance > 0.0 && distance < SKIRTS * width.value && line.statistic < RESIDUE * strong.statistic
+    })
+}
+
+/// A line with the model by which it is removed from the record.
+enum Candidate {
+    Sine(SpectralLine, Sine),
+    Resonance(Resonance),
+}
+
+#[derive(Clone, Copy)]
+struct Resonance {
+    line: SpectralLine,
+    lorentz: Lorentz,
+}
+
+/// A record's spectrum divided by its background.
+struct WhitenedSpectrum<'a> {
+    resolution: f64,
+    background: Background<'a>,
+    /// Ordinates at the multiples of the resolution, over the background's shape.
+    whitened: Vec<f64>,
+    /// Ordinates at the multiples of `1/PADDING` of the resolution.
+    padded: Vec<f64>,
+    /// Factor by which resonances were removed from each of the `padded` ordinates.
+    deflation: Vec<f64>,
+}
+
+impl<'a> WhitenedSpectrum<'a> {
+    /// Transforms the series and removes the `resonances`, except the one with the index `kept`.
+    fn new(
+        series: &UniformSeries,
+        known: &'a dyn Fn(f64) -> f64,
+        resonances: &[Resonance],
+        kept: Option<usize>,
+    ) -> Option<Self> {
+        let periodogram = Periodogram::new(series)?;
+        let deflation = |bin: f64, except: Option<usize>| {
+            let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != except);
+            others.map(|(_, resonance)| resonance.lorentz.deflation(bin)).product::<f64>()
+        };
+        let mut density = periodogram.independent();
+        for (bin, ordinate) in density.iter_mut().enumerate() {
+            *ordinate *= deflation(bin as f64, None);
+        }
+        let background = Background::fit(&density, known, periodogram.resolution(), series.sample_period())?;
+        let bin = |at: usize| at as f64 / PADDING as f64;
+        let deflation: Vec<f64> = (0..periodogram.padded().len()).map(|at| deflation(bin(at), kept)).collect();
+        let over_shape = |(at, (ordinate, deflation)): (usize, (&f64, &f64))| match at {
+            0 => 0.0,
+            at => ordinate * deflation / background.shape_at(bin(at)),
+        };
+        let padded: Vec<f64> = periodogram.padded().iter().zip(&deflation).enumerate().map(over_shape).collect();
+        let whitened = padded.iter().copied().step_by(PADDING).collect();
+        Some(Self { resolution: periodogram.resolution(), background, whitened, padded, deflation })
+    }
+
+    /// The most significant line, if one is significant.
+    fn most_significant(&self, series: &UniformSeries) -> Option<Candidate> {
+        let sine = self.strongest_sine(series).filter(|(line, _)| line.p_value < FALSE_ALARM);
+        if let Some((line, sine)) = sine {
+            let bin = line.frequency.value / self.resolution;
+            let widths =
+                (0..).map(|power| 2f64.powi(2 * power)).take_while(|width| *width < self.whitened.len() as f64 / 32.0);
+            let resonance = self.resonance(bin, widths);
+            return Some(match resonance {
+                Some(lorentz) if lorentz.statistic > line.statistic + PREFERENCE => {
+                    Candidate::Resonance(Resonance { line: self.resonance_line(&lorentz, line.p_value), lorentz })
+                }
+                _ => Candidate::Sine(line, sine),
+            });
+        }
+        let (bin, width, p_value) = self.broad_peak()?;
+        let lorentz = self.resonance(bin, [width / 2.0, width, 2.0 * width])?;
+        Some(Candidate::Resonance(Resonance { line: self.resonance_line(&lorentz, p_value), lorentz }))
+    }
+
+    /// The sinusoid with the largest likelihood ratio.
+    fn strongest_sine(&self, series: &UniformSeries) -> Option<(SpectralLine, Sine)> {
+        let mut peaks: Vec<(f64, usize)> = self.peaks();
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        peaks.truncate(3);
+        let candidates = peaks.into_iter().map(|(_, at)| {
+            let spacing = self.resolution / PADDING as f64;
+            let sine = Sine::fit_near(series, at as f64 * spacing, spacing);
+            let bin = sine.frequency / self.resolution;
+            let level = self.background.level(&self.whitened, at / PADDING);
+            let ratio = sine.density(series) * self.deflation[at] / (level.value * self.background.shape_at(bin));
+            (ratio, level, sine)
+        });
+        let (ratio, level, sine) = candidates.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let amplitude = sine.amplitude();
+        let line = SpectralLine {
+            // Cramér-Rao bound for a sinusoid in white noise.
+            frequency: MeasuredValue {
+                value: sine.frequency,
+                error: 1.5f64.sqrt() / (PI * series.duration() * ratio.sqrt()),
+            },
+            deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
+            width: None,
+            statistic: 2.0 * ratio,
+            p_value: self.sine_p_value(ratio, level),
+        };
+        Some((line, sine))
+    }
+
+    /// Local maxima of the padded ordinates above four times the local level, over that level, with their positions.
+    fn peaks(&self) -> Vec<(f64, usize)> {
+        let mut level = 1.0;
+        let mut until = 0;
+        let mut peaks = Vec::new();
+        for at in PADDING * FEWEST_PERIODS..self.padded.len().saturating_sub(2 * PADDING) {
+            let bin = at / PADDING;
+            if bin >= until {
+                // The level is computed at every few ordinates: it changes little over a fraction of its window.
+                level = self.background.level(&self.whitened, bin).value;
+                until = bin + (bin / 16).clamp(1, 32);
+            }
+            let [left, here, right] = [self.padded[at - 1], self.padded[at], self.padded[at + 1]];
+            if here >= left && here > right && here > 4.0 * level {
+                peaks.push((here / level, at));
+            }
+        }
+        peaks
+    }
+
+    /// Probability of a peak of `ratio` times the background at any frequency: Baluev's bound, for a background that is
+    /// estimated from `level.ordinates` ordinates.
+    fn sine_p_value(&self, ratio: f64, level: LocalLevel) -> f64 {
+        let one = (1.0 + ratio / level.ordinates).powf(-level.ordinates);
+        let frequencies = self.whitened.len() as f64 * (PI / 3.0).sqrt();
+        (one * (1.0 + frequencies * ratio.sqrt())).min(1.0)
+    }
+
+    /// The most significant broad peak: its position and width in resolutions and its p-value.
+    fn broad_peak(&self) -> Option<(f64, f64, f64)> {
+        let ordinates = self.whitened.len();
+        let sizes = || (1..).map(|power| 4_usize.pow(power)).take_while(move |size| *size <= ordinates / 64);
+        let trials: f64 = sizes().map(|size| 2.0 * ordinates as f64 / size as f64).sum();
+        let peaks = sizes().flat_map(|size| {
+            let first = FEWEST_PERIODS.max(size);
+            let averages: Vec<f64> = self.whitened[first..ordinates - 1]
+                .chunks_exact(size)
+                .map(|chunk| chunk.iter().sum::<f64>() / size as f64)
+                .collect();
+            let shifted = self.whitened[first + size / 2..ordinates - 1].chunks_exact(size);
+            let shifted: Vec<f64> = shifted.map(|chunk| chunk.iter().sum::<f64>() / size as f64).collect();
+            let mut peaks = Vec::new();
+            for (offset, values) in [(0, &averages), (size / 2, &shifted)] {
+                for (at, &value) in values.iter().enumerate() {
+                    let level = neighbourhood(&averages, at, size);
+                    let excess = value / level.value;
+                    if excess > 1.0 + LEAST_EXCESS {
+                        let p_value = trials * mean_ratio_tail(excess, size as f64, level.ordinates);
+                        let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
+                        peaks.push((centre, size as f64, p_value));
+                    }
+                }
+            }
+            peaks
+        });
+        peaks.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|peak| peak.2 < FALSE_ALARM)
+    }
+
+    /// The likeliest resonance near `bin`, by fits that begin with each of `widths`; all in resolutions.
+    fn resonance(&self, bin: f64, widths: impl IntoIterator<Item = f64>) -> Option<Lorentz> {
+        let fits = widths.into_iter().filter_map(|width| Lorentz::fit(&self.whitened, FEWEST_PERIODS, bin, width));
+        fits.filter(|fit| fit.width > NARROWEST).max_by(|a, b| a.statistic.total_cmp(&b.statistic))
+    }
+
+    fn resonance_line(&self, lorentz: &Lorentz, p_value: f64) -> SpectralLine {
+        let height = lorentz.height * lorentz.level * self.background.shape_at(lorentz.centre);
+        let width = lorentz.width * self.resolution;
+        // The area of a Lorentz curve is π/2 of height times width.
+        let deviation = (height * width * PI / 2.0).sqrt();
+        let [_, centre, relative_width] = lorentz.errors;
+        SpectralLine {
+            frequency: MeasuredValue { value: lorentz.centre * self.resolution, error: centre * self.resolution },
+            deviation: MeasuredValue { value: deviation, error: deviation * lorentz.area_error() / 2.0 },
+            width: Some(MeasuredValue { value: width, error: width * relative_width }),
+            statistic: lorentz.statistic,
+            p_value,
+        }
+    }
+}
+
+/// Median of the averages around one of them, each over `size` ordinates.
+fn neighbourhood(averages: &[f64], at: usize, size: usize) -> LocalLevel {
+    let low = at.saturating_sub(NEIGHBOURS);
+    let high = (at + NEIGHBOURS).min(averages.len() - 1);
+    let mut window = averages[low..=high].to_vec();
+    // The median of a gamma variable of shape g is about 1 − 1/(3g) of its mean. The median of many is worth the mean of
+    // 2/π of them.
+    let value = median(&mut window) / (1.0 - 1.0 / (3.0 * size as f64));
+    LocalLevel { value, ordinates: (window.len() * size) as f64 * 2.0 / PI }
+}
+
+/// Probability that the mean of `above` exponential variables exceeds `ratio` times the mean of `below` others.
+fn mean_ratio_tail(ratio: f64, above: f64, below: f64) -> f64 {
+    beta_reg(below, above, below / (below + above * ratio))
+}

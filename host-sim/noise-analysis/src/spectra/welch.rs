@@ -1,0 +1,120 @@
+//! Welch's estimate of a power spectral density: the average of the periodograms of overlapping windowed segments.
+
+use super::smooth_shape::{SpectralBand, SpectralShape};
+use crate::uniform_series::UniformSeries;
+use realfft::RealFftPlanner;
+use std::f64::consts::PI;
+
+/// A segment with more than this fraction of its samples missing is left out.
+const MOST_MISSING: f64 = 0.5;
+
+/// One-sided power spectral density, averaged over segments of one length that overlap by half, each with its mean removed
+/// and under a Hann window (P. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans.
+/// Audio Electroacoust. 15, 1967).
+///
+/// A missing sample is replaced by the segment's mean and left out of the window's power. For white noise that is exact;
+/// of red noise it spreads the missing fraction of the power over all frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Welch {
+    sample_period: f64,
+    length: usize,
+    segments: usize,
+    density: Vec<f64>,
+}
+
+impl Welch {
+    /// Estimates the density from segments of `length` samples, at least 8; `None` if the series has no such segment.
+    #[must_use]
+    pub fn estimate(series: &UniformSeries, length: usize) -> Option<Self> {
+        if length < 8 {
+            return None;
+        }
+        let window: Vec<f64> = (0..length).map(|at| (PI * (at as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
+        let mut density = vec![0.0; output.len()];
+        let mut segments = 0;
+        for segment in series.values().windows(length).step_by(length / 2) {
+            let present = || segment.iter().zip(&window).filter(|(value, _)| value.is_finite());
+            let count = present().count();
+            if ((length - count) as f64) > MOST_MISSING * length as f64 {
+                continue;
+            }
+            let mean = present().map(|(value, _)| value).sum::<f64>() / count as f64;
+            let power: f64 = present().map(|(_, weight)| weight * weight).sum();
+            for ((slot, value), weight) in input.iter_mut().zip(segment).zip(&window) {
+                *slot = if value.is_finite() { (value - mean) * weight } else { 0.0 };
+            }
+            // An error means buffers of the wrong length; these are the planner's own.
+            transform.process(&mut input, &mut output).ok()?;
+            let scale = 2.0 * series.sample_period() / power;
+            for (sum, bin) in density.iter_mut().zip(&output) {
+                *sum += scale * bin.norm_sqr();
+            }
+            segments += 1;
+        }
+        for sum in &mut density {
+            *sum /= segments as f64;
+        }
+        (segments > 0).then_some(Self { sample_period: series.sample_period(), length, segments, density })
+    }
+
+    /// Number of segments that were averaged.
+    #[must_use]
+    pub fn segments(&self) -> usize {
+        self.segments
+    }
+
+    /// Frequency in Hz and density in unit²/Hz, from 0 Hz to half the sample rate.
+    pub fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let spacing = 1.0 / (self.length as f64 * self.sample_period);
+        self.density.iter().enumerate().map(move |(bin, &density)| (bin as f64 * spacing, density))
+    }
+
+    /// Number of independent ordinates that each point is worth: half its degrees of freedom.
+    ///
+    /// Segments under a Hann window that overlap by half are correlated with `ρ = 1/6`, so that `n` of them count as
+    /// `n/(1 + 2ρ²)` for large `n`.
+    #[must_use]
+    pub fn ordinates(&self) -> f64 {
+        let count = self.segments as f64;
+        count / (1.0 + 2.0 * (1.0 - 1.0 / count) / 36.0)
+    }
+
+    /// Averages over bands of up to an eighth of their frequency, without the frequencies in Hz for which `is_line` holds.
+    ///
+    /// The first two points are left out, because the window spreads drift over them, and the last one, which has half
+    /// the degrees of freedom.
+    pub(crate) fn bands(&self, is_line: impl Fn(f64) -> bool) -> Vec<SpectralBand> {
+        // Correlation of neighbouring points under a Hann window: 2/3 at distance 1 and 1/6 at distance 2. So many points
+        // in a row are worth one.
+        const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+        let points: Vec<(f64, f64)> = self.points().collect();
+        // Narrow enough to resolve the nulls of a filter.
+        let widest = (points.len() / 256).max(1);
+        let mut bands = Vec::new();
+        let mut start = 2;
+        while start + 1 < points.len() {
+            let end = (start + (start / 8).clamp(1, widest)).min(points.len() - 1);
+            let kept: Vec<f64> =
+                points[start..end].iter().filter(|point| !is_line(point.0)).map(|point| point.1).collect();
+            if !kept.is_empty() {
+                let count = kept.len() as f64;
+                bands.push(SpectralBand {
+                    frequency: (points[start].0 + points[end - 1].0) / 2.0,
+                    density: kept.iter().sum::<f64>() / count,
+                    ordinates: self.ordinates() * (count / NEIGHBOURS).max(1.0),
+                });
+            }
+            start = end;
+        }
+        bands
+    }
+
+    /// The smooth shape of the spectrum without its lines, and the bands that it was fitted to.
+    #[must_use]
+    pub fn shape(&self, is_line: impl Fn(f64) -> bool) -> (SpectralShape, Vec<SpectralBand>) {
+        let bands = self.bands(is_line);
+        (SpectralShape::fit(&bands, self.sample_period), bands)
+    }
+}
