@@ -1,8 +1,6 @@
-//! What is kept of the second differences of one octave.
+//! Exact sums of the squares and fourth powers of second differences: what an octave's variance and kurtosis are made of.
 
-use super::sum::Sum;
-
-/// Exact sum of squares, and the sum of fourth powers of the differences rounded to [`unit_bits`].
+/// Exact sum of squares, and the sum of fourth powers of the differences rounded by [`unit_bits`] binary digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Moments {
     pub(crate) squares: Sum,
@@ -10,11 +8,12 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    pub(crate) const NONE: Self = Self { squares: Sum::ZERO, fourths: Sum::ZERO };
+    pub(crate) const ZERO: Self = Self { squares: Sum::ZERO, fourths: Sum::ZERO };
 
-    /// Takes one difference of an octave below [`ROUNDED`]. Most are small: a microcontroller multiplies 32 bits.
+    /// Adds one difference of an octave below [`ROUNDED`]. Most differences fit in 16 bits, whose powers need only
+    /// 32-bit multiplications.
     ///
-    /// No fourth power is below its square, so a square's carry may stand until the fourth powers' comes:
+    /// No fourth power is below its square, so the carry of the squares may wait for the carry of the fourth powers:
     /// `squares.low` stays below `2⁶³ + fourths.low`.
     #[inline]
     pub(crate) fn add_unrounded(&mut self, difference: i64) {
@@ -30,7 +29,7 @@ impl Moments {
         }
     }
 
-    /// Takes one difference.
+    /// Adds one difference of any octave.
     pub(crate) fn add(&mut self, octave: usize, difference: i64) {
         if is_small(difference) {
             let bits = unit_bits(octave);
@@ -64,12 +63,13 @@ impl Moments {
         self.fourths.add(fourth_power(difference, unit_bits(octave)));
     }
 
+    /// Adds the sums of another stretch.
     pub(crate) fn merge(&mut self, later: &Self) {
         self.squares.add(later.squares.get());
         self.fourths.add(later.fourths.get());
     }
 
-    /// Excess kurtosis of `count` differences; `None` if there is none, or a sum is full.
+    /// Excess kurtosis of `count` differences; `None` if all are 0 or a sum is full.
     pub(crate) fn excess_kurtosis(&self, octave: usize, count: u64) -> Option<f64> {
         let (squares, fourths) = (self.squares.get(), self.fourths.get());
         if squares == 0 || self.squares.is_full() || self.fourths.is_full() {
@@ -86,14 +86,14 @@ pub(crate) const ROUNDED: usize = 11;
 
 /// Binary digits that a difference is rounded by before its fourth power is summed.
 ///
-/// White noise of 1 count has differences of `√(2n)` counts, 32 units or more: the rounding adds 1.5·10⁻³ to
-/// the kurtosis at most. Ties go up, whatever the sign, so they cancel.
+/// White noise of 1 count rms has differences of `√(2n)` counts rms, which is 32 units or more, so rounding changes the
+/// kurtosis by at most 1.5·10⁻³. Ties are rounded up for both signs, so their errors cancel.
 #[inline]
 pub(crate) const fn unit_bits(octave: usize) -> u32 {
     (octave.saturating_sub(ROUNDED - 2) / 2) as u32
 }
 
-/// The difference in units of `2^bits`.
+/// The difference in units of `2^bits`, rounded to nearest, ties up.
 #[inline]
 pub(crate) const fn rounded(difference: i64, bits: u32) -> i64 {
     (difference + (1 << bits >> 1)) >> bits
@@ -105,7 +105,7 @@ const fn is_small(difference: i64) -> bool {
     difference.wrapping_add(1 << 15) as u64 >> 16 == 0
 }
 
-/// Fourth power of a difference rounded by `bits` digits, saturating.
+/// Fourth power of a difference rounded by `bits` digits; `u128::MAX` where it does not fit.
 #[inline]
 pub(crate) fn fourth_power(difference: i64, bits: u32) -> u128 {
     match u32::try_from(rounded(difference, bits).unsigned_abs()) {
@@ -116,3 +116,84 @@ pub(crate) fn fourth_power(difference: i64, bits: u32) -> u128 {
         Err(_) => u128::MAX,
     }
 }
+
+/// A sum of 127 bits that stays at its maximum once it is full.
+///
+/// Held as `high·2⁶³ + low`: most additions touch `low` alone, whose top bit is a pending carry. Two pairs of words can
+/// stand for the same sum while a carry is pending, so equality compares values.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sum {
+    low: u64,
+    high: u64,
+}
+
+const CARRY: u64 = 1 << 63;
+
+impl Sum {
+    pub(crate) const ZERO: Self = Self { low: 0, high: 0 };
+    pub(crate) const MAX: u128 = (1 << 127) - 1;
+
+    #[inline]
+    pub(crate) fn get(self) -> u128 {
+        ((u128::from(self.high) << 63) + u128::from(self.low)).min(Self::MAX)
+    }
+
+    pub(crate) fn is_full(self) -> bool {
+        self.get() == Self::MAX
+    }
+
+    /// Adds `value`, saturating at [`MAX`](Self::MAX).
+    pub(crate) fn add(&mut self, value: u128) {
+        *self = Self::from(self.get().saturating_add(value));
+    }
+
+    /// Adds less than 2⁶³.
+    #[inline]
+    pub(crate) fn add_word(&mut self, word: u64) {
+        if self.must_carry() {
+            self.carry();
+        }
+        self.low += word;
+        if self.must_carry() {
+            self.carry();
+        }
+    }
+
+    /// Adds a word without propagating the carry; the caller ensures that `low` stays below 2⁶⁴.
+    #[inline]
+    pub(crate) fn add_below_carry(&mut self, word: u64) {
+        self.low += word;
+    }
+
+    #[inline]
+    pub(crate) fn must_carry(self) -> bool {
+        self.low >= CARRY
+    }
+
+    #[cold]
+    pub(crate) fn carry(&mut self) {
+        *self = Self::from(self.get());
+    }
+
+    /// Both words with the carry propagated, the lower one first.
+    #[cfg(feature = "serde")]
+    pub(crate) fn words(&mut self) -> [&mut u64; 2] {
+        self.carry();
+        [&mut self.low, &mut self.high]
+    }
+}
+
+impl From<u128> for Sum {
+    fn from(value: u128) -> Self {
+        let value = value.min(Self::MAX);
+        Self { low: value as u64 & (CARRY - 1), high: (value >> 63) as u64 }
+    }
+}
+
+impl PartialEq for Sum {
+    fn eq(&self, other: &Self) -> bool {
+        self.get() == other.get()
+    }
+}
+
+impl Eq for Sum {}

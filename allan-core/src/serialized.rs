@@ -1,8 +1,8 @@
-//! The state of an estimator as data: to be kept, sent and resumed to the bit.
+//! Serialisation of an estimator's whole state with serde: a deserialised estimator continues to the bit.
 //!
-//! It is a sequence of a header (version, type and parameters), the words of the estimator in the order of its fields
-//! and a CRC-32 of both. Whatever does not fit is refused with what is wrong; what comes back is an estimator that
-//! samples could have made.
+//! The state is a sequence of a header (version, type and parameters), the 64-bit words of the estimator in the order of
+//! its fields, and a CRC-32 of both. Deserialising refuses another version, type or size, a wrong checksum, and words that
+//! no sequence of samples leads to; the error says which.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -14,32 +14,32 @@ use serde::{Deserializer, Serializer};
 const VERSION: u8 = 1;
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// An estimator that can be taken apart into words and put together again.
-pub(crate) trait State: Clone {
+/// An estimator whose state is a fixed number of 64-bit words.
+pub(crate) trait StateWords: Clone {
     const EMPTY: Self;
-    /// Tells one type from another.
+    /// Identifies the type in the header.
     const KIND: u8;
     const OCTAVES: usize;
-    /// 0 where it has none.
+    /// 0 if the type has no such parameter.
     const OVERLAP: usize;
     const WORDS: usize;
 
-    /// Shows every word in turn, for reading and for writing.
-    fn walk<E>(&mut self, visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E>;
+    /// Calls `visit` with every word in order, for reading or for writing.
+    fn visit_words<E>(&mut self, visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E>;
 
-    /// What no samples could have led to.
-    fn flaw(&self) -> Option<&'static str>;
+    /// A property of the state that no sequence of samples leads to, if there is one.
+    fn inconsistency(&self) -> Option<&'static str>;
 }
 
-const fn header<S: State>() -> [u8; 4] {
+const fn header<S: StateWords>() -> [u8; 4] {
     [VERSION, S::KIND, S::OCTAVES as u8, S::OVERLAP as u8]
 }
 
-pub(crate) fn serialize<S: State, Z: Serializer>(state: &S, serializer: Z) -> Result<Z::Ok, Z::Error> {
+pub(crate) fn serialize<S: StateWords, Z: Serializer>(state: &S, serializer: Z) -> Result<Z::Ok, Z::Error> {
     let mut tuple = serializer.serialize_tuple(S::WORDS + 2)?;
     let mut digest = started_digest::<S>();
     tuple.serialize_element(&u32::from_be_bytes(header::<S>()))?;
-    state.clone().walk(|word| {
+    state.clone().visit_words(|word| {
         digest.update(&word.to_le_bytes());
         tuple.serialize_element(word)
     })?;
@@ -47,19 +47,19 @@ pub(crate) fn serialize<S: State, Z: Serializer>(state: &S, serializer: Z) -> Re
     tuple.end()
 }
 
-pub(crate) fn deserialize<'de, S: State, D: Deserializer<'de>>(deserializer: D) -> Result<S, D::Error> {
-    deserializer.deserialize_tuple(S::WORDS + 2, Words(PhantomData))
+pub(crate) fn deserialize<'de, S: StateWords, D: Deserializer<'de>>(deserializer: D) -> Result<S, D::Error> {
+    deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor(PhantomData))
 }
 
-fn started_digest<S: State>() -> Digest<'static, u32> {
+fn started_digest<S: StateWords>() -> Digest<'static, u32> {
     let mut digest = CRC.digest();
     digest.update(&header::<S>());
     digest
 }
 
-struct Words<S>(PhantomData<S>);
+struct StateVisitor<S>(PhantomData<S>);
 
-impl<'de, S: State> Visitor<'de> for Words<S> {
+impl<'de, S: StateWords> Visitor<'de> for StateVisitor<S> {
     type Value = S;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -80,7 +80,7 @@ impl<'de, S: State> Visitor<'de> for Words<S> {
         let mut state = S::EMPTY;
         let mut digest = started_digest::<S>();
         let mut at = 1;
-        state.walk(|word| {
+        state.visit_words(|word| {
             *word = words.next_element()?.ok_or_else(|| short(at))?;
             digest.update(&word.to_le_bytes());
             at += 1;
@@ -90,23 +90,25 @@ impl<'de, S: State> Visitor<'de> for Words<S> {
         if checksum != digest.finalize() {
             return Err(de::Error::custom("an estimator's state with a wrong checksum"));
         }
-        match state.flaw() {
-            Some(flaw) => Err(de::Error::custom(format_args!("an estimator's state that no samples lead to: {flaw}"))),
+        match state.inconsistency() {
+            Some(reason) => {
+                Err(de::Error::custom(format_args!("an estimator's state that no samples lead to: {reason}")))
+            }
             None => Ok(state),
         }
     }
 }
 
-struct Expected<'a, S>(&'a Words<S>);
+struct Expected<'a, S>(&'a StateVisitor<S>);
 
-impl<S: State> fmt::Display for Expected<'_, S> {
+impl<S: StateWords> fmt::Display for Expected<'_, S> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         self.0.expecting(f)
     }
 }
 
 /// Visits a signed word as the same bits.
-pub(crate) fn signed<E>(word: &mut i64, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
+pub(crate) fn visit_signed<E>(word: &mut i64, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
     let mut bits = *word as u64;
     visit(&mut bits)?;
     *word = bits as i64;
@@ -114,7 +116,7 @@ pub(crate) fn signed<E>(word: &mut i64, mut visit: impl FnMut(&mut u64) -> Resul
 }
 
 /// Visits the two halves of a wide sum, the lower one first.
-pub(crate) fn wide<E>(sum: &mut u128, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
+pub(crate) fn visit_wide<E>(sum: &mut u128, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
     let (mut low, mut high) = (*sum as u64, (*sum >> 64) as u64);
     visit(&mut low)?;
     visit(&mut high)?;
@@ -122,20 +124,20 @@ pub(crate) fn wide<E>(sum: &mut u128, mut visit: impl FnMut(&mut u64) -> Result<
     Ok(())
 }
 
-/// Implements serde's traits for a type with parameters by its [`State`].
-macro_rules! serde_by_state {
+/// Implements serde's traits for a type with these const parameters through its [`StateWords`].
+macro_rules! serde_by_words {
     ($($parameter:ident),+ for $type:ty) => {
         impl<$(const $parameter: usize),+> serde::Serialize for $type {
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                crate::state::serialize(self, serializer)
+                crate::serialized::serialize(self, serializer)
             }
         }
 
         impl<'de, $(const $parameter: usize),+> serde::Deserialize<'de> for $type {
             fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                crate::state::deserialize(deserializer)
+                crate::serialized::deserialize(deserializer)
             }
         }
     };
 }
-pub(crate) use serde_by_state;
+pub(crate) use serde_by_words;
