@@ -73,7 +73,7 @@ pub struct Curve<const OCTAVES: usize> {
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// A curve without points, to be filled in place by [`Cascade::rebuild_curve`](crate::Cascade::rebuild_curve): with 24
-    /// octaves a curve takes about 2.5 kB, too much to be moved over a small stack.
+    /// octaves a curve takes about 2 kB, too much to be moved over a small stack.
     #[must_use]
     pub const fn empty() -> Self {
         Self { sample_period: 0.0, samples: 0, points: Vec::new() }

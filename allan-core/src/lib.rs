@@ -39,6 +39,10 @@ extern crate self as allan_core;
 #[cfg(test)]
 extern crate std; // for the simulation that unit tests share with the integration tests
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;
+
 mod cascade;
 pub mod confidence;
 mod coupling;

@@ -76,7 +76,7 @@ impl Trace {
         trace
     }
 
-    /// A trace of no curve, to be filled in place by [`fit_baseline`](Self::fit_baseline): a trace takes about 3 kB, too much to
+    /// A trace of no curve, to be filled in place by [`fit_baseline`](Self::fit_baseline): a trace takes about 1.5 kB, too much to
     /// be moved over a small stack.
     #[must_use]
     pub fn empty() -> Self {

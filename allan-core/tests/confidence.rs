@@ -1,6 +1,7 @@
 //! Degrees of freedom against the exact table for 2¹⁷ rate samples (Greenhall sums, computed independently).
 
-use allan_core::confidence::{VarianceFractions, edf};
+use allan_core::VarianceFractions;
+use allan_core::confidence::edf;
 
 const SAMPLES: u64 = 1 << 17;
 

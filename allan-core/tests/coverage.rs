@@ -1,4 +1,4 @@
-//! How often the 95 % bounds of the coefficients hold the truth, where it is told by few degrees of freedom.
+//! How often the 95 % bounds of coefficients with few degrees of freedom contain the truth.
 //!
 //! The three cases are those of `tests/peers/accuracy`: the same noise for the same time, in fewer and longer samples.
 

@@ -1,6 +1,6 @@
 //! The fit and the slope method on simulated noise with known coefficients.
 
-use allan_core::{Cascade, Curve, Model, NoiseTerm, check::Discrepancy, fit::fit, slope_method};
+use allan_core::{Cascade, Curve, Model, NoiseTerm, fit::fit, model::Discrepancy, slope_method};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,6 +1,6 @@
 //! Serialised state: continued to the bit, refused when damaged; merging in any grouping.
 
-use allan_core::{Cascade, Coupling, Hadamard};
+use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
 use proptest::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;

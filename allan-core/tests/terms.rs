@@ -3,7 +3,7 @@
 #[path = "support/simulation.rs"]
 mod simulation;
 
-use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
+use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
 use allan_core::{Model, model::FittedTerm};
 use simulation::{MARKOV, Noise, PERIOD, RESONANCE, autocovariance, curve, noises, stationary};
 use std::f64::consts::PI;
