@@ -1,67 +1,61 @@
-//! The streaming estimator: integers in, exact sums of squared second differences out.
+//! The streaming estimator: integer samples in, exact sums of squared second differences out.
 
 mod block;
-mod checkpoint;
-mod moments;
-#[cfg(feature = "serde")]
-mod state;
-mod sum;
+pub(crate) mod checkpoint;
 
-pub use checkpoint::Learnt;
-pub(crate) use moments::Moments;
-use moments::ROUNDED;
-
-use crate::curve::Curve;
+use crate::moments::{Moments, ROUNDED};
 use core::mem::replace;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
 ///
-/// The running sum runs down a chain of delay lines: each level `j` delays by `OVERLAP·2^j` samples what the level
-/// above it lets out, keeping every `2^j`-th. So the sums of now, `n` ago and `2n` ago that a second difference with
-/// `n = OVERLAP·2^j` takes are there every `2^j` samples, an `OVERLAP`-fold overlap, for `OVERLAP` words a level; the
-/// first line also gives `n < OVERLAP`, fully overlapping. A sample costs `log2(OVERLAP) + 2` differences on average,
-/// whatever the length of the record.
+/// The running sum of the samples passes through a chain of delay lines. Level `j` receives every second value that
+/// leaves the level above it and delays it by `OVERLAP` strides of `2^j` samples. The sums of now, `n` samples ago and
+/// `2n` samples ago, of which a second difference with `n = OVERLAP·2^j` consists, are therefore available every `2^j`
+/// samples: an `OVERLAP`-fold overlap for `OVERLAP` words a level. The first line also serves `n < OVERLAP`, fully
+/// overlapping. A sample costs `log2(OVERLAP) + 2` differences on average, independent of the length of the record.
 ///
 /// # Range
-/// Running sums wrap, their second differences do not: `|d| ≤ n·2³²` stays below `2⁶³` for `n ≤ 2³⁰`. For samples
-/// within ±2²³, `d² ≤ 2⁴⁸·n²`, and over `2⁴⁰` samples there are at most `2⁴⁴/n` differences with `n ≥ 16`, so with
-/// `n ≤ 2²³` no sum exceeds `2¹¹⁵`: nothing is ever rounded. Should wider samples fill the 127 bits all the same,
-/// the sum stays at its maximum and [`is_saturated`](Self::is_saturated) says so. Fourth powers are summed in 127
-/// bits too, of differences rounded to `√(n/512)` counts at `n > 2¹⁰`; where they fill up (over
-/// 2⁴⁰ samples: white noise above 2¹⁷ counts, or averages over `n = 2²³` that differ by more than 2¹⁰ counts
-/// throughout) the kurtosis is `None`.
+/// Running sums wrap modulo 2⁶⁴, but their second differences do not: `|d| ≤ n·2³²` stays below `2⁶³` for `n ≤ 2³⁰`.
+/// For samples within ±2²³, `d² ≤ 2⁴⁸·n²`, and 2⁴⁰ samples have at most `2⁴⁴/n` differences with `n ≥ 16`, so for
+/// `n ≤ 2²³` no sum of squares exceeds `2¹¹⁵` and nothing is rounded. If wider samples fill the 127 bits of a sum, it
+/// stays at its maximum and [`is_saturated`](Self::is_saturated) returns true. The fourth powers are summed in 127 bits
+/// too, with differences at `n > 2¹⁰` rounded to `√(n/512)` counts. Where such a sum is full the kurtosis is `None`;
+/// within 2⁴⁰ samples that takes white noise above 2¹⁷ counts rms, or averages over `n = 2²³` samples that differ by
+/// more than 2¹⁰ counts throughout.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[repr(C)] // what every sample touches lies together, within reach of one base register
+#[repr(C)] // the fields that every sample touches come first, within reach of one base register
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
     /// Samples since the start or the last gap.
     elapsed: u64,
-    /// Their running sum, modulo 2⁶⁴.
+    /// Running sum of these samples, modulo 2⁶⁴.
     sum: i64,
-    /// The last `OVERLAP` running sums; the one of sample `k` in slot `k mod OVERLAP`, in the lines below likewise.
+    /// The last `OVERLAP` running sums. The sum up to sample `k` is in slot `k mod OVERLAP`; the lines below use the
+    /// same rule with the step of their level.
     recent: [i64; OVERLAP],
     octaves: [Octave<OVERLAP>; OCTAVES],
     /// Samples before the last gap.
     ended: u64,
+    /// Samples reported missing.
     missing: u64,
 }
 
-/// What was learnt at `n = 2^octave`, and from `n = OVERLAP` on the delay line of its level.
+/// The sums at `n = 2^octave` and, from `n = OVERLAP` on, the delay line of the level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 struct Octave<const OVERLAP: usize> {
     moments: Moments,
-    /// What the line let out last: the sum of `2·OVERLAP` strides ago.
+    /// The sum that left the line last: that of `2·OVERLAP` strides ago.
     oldest: i64,
-    /// The `OVERLAP` sums before those that the line above holds, at the level's own stride.
+    /// The `OVERLAP` sums, at the level's own stride, before those that the line above holds.
     line: [i64; OVERLAP],
-    /// Differences of the stretches that a gap has ended.
+    /// Number of differences in the stretches before the last gap.
     differences: u64,
 }
 
 impl<const OVERLAP: usize> Octave<OVERLAP> {
-    const NEW: Self = Self { moments: Moments::NONE, oldest: 0, line: [0; OVERLAP], differences: 0 };
+    const NEW: Self = Self { moments: Moments::ZERO, oldest: 0, line: [0; OVERLAP], differences: 0 };
 
-    /// Puts the sum of `step` into the line; out comes the one of `OVERLAP` strides before.
+    /// Puts the sum of `step` into the line and returns the one of `OVERLAP` strides before.
     #[inline]
     fn exchange(&mut self, step: u64, sum: i64) -> i64 {
         self.oldest = replace(&mut self.line[step as usize & (OVERLAP - 1)], sum);
@@ -70,24 +64,24 @@ impl<const OVERLAP: usize> Octave<OVERLAP> {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
-    /// Averaging factors below `OVERLAP`, all of which the first line serves.
+    /// Number of octaves with `n < OVERLAP`, all of which the first line serves.
     const FINE: usize = OVERLAP.trailing_zeros() as usize;
+    /// Number of delay lines below the first.
     const LEVELS: usize = OCTAVES - Self::FINE;
-    /// Levels whose differences are not rounded for the kurtosis.
+    /// Number of levels whose differences are not rounded for the kurtosis.
     const SHORT: usize = if OCTAVES < ROUNDED { Self::LEVELS } else { ROUNDED - Self::FINE };
-    /// Samples after which all of these have differences: 2048 for eleven octaves or more.
+    /// Number of samples after which all of these levels have differences: 2048 for eleven octaves or more.
     const WARM: u64 = (2 * OVERLAP as u64) << (Self::SHORT - 1);
 
-    /// An estimator that has seen nothing.
+    /// An estimator without samples.
     ///
-    /// A parameter without meaning does not compile: `OVERLAP` is a power of two up to 16, and
-    /// `log2(OVERLAP) < OCTAVES ≤ 31`.
+    /// `OVERLAP` is 1, 2, 4, 8 or 16 and `log2(OVERLAP) < OCTAVES ≤ 31`; other values do not compile:
     ///
     /// ```compile_fail,E0080
     /// allan_core::Cascade::<24, 3>::new(); // not a power of two
     /// ```
     /// ```compile_fail,E0080
-    /// allan_core::Cascade::<24, 32>::new(); // more overlap than is of use
+    /// allan_core::Cascade::<24, 32>::new(); // more than 16
     /// ```
     /// ```compile_fail,E0080
     /// allan_core::Cascade::<3, 8>::new(); // no octave with 8-fold overlap
@@ -104,34 +98,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         Self { elapsed: 0, sum: 0, recent: [0; OVERLAP], octaves: [Octave::NEW; OCTAVES], ended: 0, missing: 0 }
     }
 
-    /// The estimator that has taken `sample` so many times, at once: to start tests and benchmarks late in a record.
-    #[must_use]
-    pub fn after_constant(sample: i32, samples: u64) -> Self {
-        let sum_at = |step: u64, level: usize| i64::from(sample).wrapping_mul((step << level) as i64);
-        let mut cascade = Self { elapsed: samples, sum: sum_at(samples, 0), ..Self::new() };
-        for back in 0..samples.min(OVERLAP as u64) {
-            cascade.recent[Self::slot(samples - back)] = sum_at(samples - back, 0);
-        }
-        let overlap = OVERLAP as u64;
-        for level in 0..Self::LEVELS {
-            let step = samples >> level;
-            for back in overlap..step.min(2 * overlap) {
-                cascade.octaves[level + Self::FINE].line[Self::slot(step - back)] = sum_at(step - back, level);
-            }
-            cascade.octaves[level + Self::FINE].oldest = sum_at(step.saturating_sub(2 * overlap), level);
-        }
-        cascade
-    }
-
-    /// Bytes that an estimator takes.
+    /// Size of an estimator in bytes.
     #[must_use]
     pub const fn memory() -> usize {
         size_of::<Self>()
     }
 
-    /// Takes the next sample.
+    /// Adds the next sample, in counts.
     ///
-    /// The first 2048 samples after a gap take a slower way.
+    /// The first 2048 samples after a gap take more time, as they test which octaves are complete.
     #[inline]
     pub fn push(&mut self, sample: i32) {
         let previous = self.sum;
@@ -155,7 +130,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(Self::SHORT, middle);
     }
 
-    /// The same while some levels have no differences yet.
+    /// [`push`](Self::push) while some levels have no differences yet.
     #[inline(never)]
     fn push_early(&mut self, previous: i64) {
         self.add_fine((self.elapsed.ilog2() as usize).min(Self::FINE), previous);
@@ -163,7 +138,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(0, middle);
     }
 
-    /// Takes the differences of the first octaves, at `n < OVERLAP`.
+    /// Adds the differences of the first `octaves` octaves, at `n < OVERLAP`.
     #[inline(always)]
     fn add_fine(&mut self, octaves: usize, previous: i64) {
         let mut middle = previous;
@@ -174,7 +149,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Passes on what the line above let out, as far as the newest sample ends strides, from `level` on.
+    /// Passes `middle`, the sum that left the line above `level`, down all lines of which the newest sample ends a stride.
     #[inline(never)]
     fn advance(&mut self, level: usize, mut middle: i64) {
         let due = (self.elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
@@ -189,9 +164,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Notes that `missing` samples were lost before the next one: no difference will straddle the gap.
+    /// Records that `missing` samples were lost before the next one: no difference will include samples from both sides.
     ///
-    /// What was learnt is kept. A gap of 0 samples is none.
+    /// The sums are kept. A gap of 0 samples has no effect.
     pub fn gap(&mut self, missing: u32) {
         if missing > 0 {
             self.missing = self.missing.saturating_add(u64::from(missing));
@@ -206,9 +181,10 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Adds what another estimator learnt from a later stretch of the same channel, and goes on where it stands.
+    /// Adds the sums of another estimator, which has seen a later stretch of the same channel; further samples continue
+    /// that stretch.
     ///
-    /// No difference straddles the seam: the result is that of one estimator with a gap there, of no samples.
+    /// The result is that of one estimator with a gap of no missing samples between the two stretches.
     pub fn merge(&mut self, later: &Self) {
         for k in 0..OCTAVES {
             let differences = self.count(k).saturating_add(later.octaves[k].differences);
@@ -224,9 +200,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         };
     }
 
-    /// Forgets everything.
+    /// Removes all samples.
     pub fn reset(&mut self) {
-        // In place: a new one would pass over the stack.
+        // In place: a new estimator would be built on the stack first.
         self.recent.fill(0);
         self.octaves.fill(Octave::NEW);
         (self.elapsed, self.sum, self.ended, self.missing) = (0, 0, 0, 0);
@@ -250,7 +226,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.missing
     }
 
-    /// Whether samples far beyond 24 bits have filled an accumulator, so that the curve is a lower bound.
+    /// Whether a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.octaves.iter().any(|octave| octave.moments.squares.is_full())
@@ -264,17 +240,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         Some((self.octaves.get(octave)?.moments.squares.get(), self.count(octave)))
     }
 
-    /// The Allan variance, in counts², of every octave that has at least one difference.
-    ///
-    /// `sample_period` in seconds. The confidence is that of the noise that the local slope suggests; a
-    /// [`fit`](crate::fit::fit) gives the one of the fitted mixture.
-    #[must_use]
-    pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
-        let mut curve = Curve::empty();
-        Self::draw(&mut curve, sample_period, self.len(), |octave| self.learnt(octave).unwrap_or_default());
-        curve
-    }
-
+    /// Number of differences at `n = 2^octave`.
     fn count(&self, octave: usize) -> u64 {
         self.octaves[octave].differences.saturating_add(self.open_differences(octave))
     }
@@ -288,7 +254,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// The second difference of sums of `2^octave` samples that the newest sample completed, if it completed one.
     ///
-    /// For products of channels in step, as [`Coupling`](crate::Coupling) makes them; `octave` below `OCTAVES`.
+    /// [`Coupling`](crate::Coupling) multiplies these of two channels. `octave` must be below `OCTAVES`.
     #[inline]
     #[must_use]
     pub fn newest_difference(&self, octave: usize) -> Option<i64> {
@@ -298,7 +264,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             .then(|| second_difference(self.sum, self.sum_before(level, n), self.sum_before(level, 2 * n)))
     }
 
-    /// Whether the newest sample ends a stride of `level` and there are sums of `back` strides before it.
+    /// Whether the newest sample ends a stride of `level` and the sum of `back` strides before it exists.
     #[inline]
     pub(crate) fn has(&self, level: usize, back: u64) -> bool {
         self.elapsed.trailing_zeros() as usize >= level && self.elapsed >> level >= back && self.elapsed > 0
@@ -324,6 +290,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.elapsed
     }
 
+    /// Where the sum of a step of a level is kept in its line.
     #[inline]
     const fn slot(step: u64) -> usize {
         step as usize & (OVERLAP - 1)
@@ -336,7 +303,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Default for Cascade<OCTAVES, OV
     }
 }
 
-/// Exact although the running sums wrap, because the true difference fits.
+/// Second difference of three running sums: exact although the sums wrap, because the true difference fits.
 #[inline]
 pub(crate) fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
     newest.wrapping_sub(middle).wrapping_sub(middle.wrapping_sub(oldest))

@@ -1,9 +1,8 @@
-//! What two channels have in common at every octave, without a second pass over the data.
+//! Allan covariance of two channels at every octave, from the sums that their estimators hold.
 
+use crate::cascade::Cascade;
 #[cfg(feature = "serde")]
-mod state;
-
-use crate::Cascade;
+use crate::serialized::{StateWords, serde_by_words, visit_wide};
 use heapless::Vec;
 
 /// Allan covariance of two channels at one averaging factor.
@@ -13,17 +12,17 @@ pub struct Covariance {
     pub n: u64,
     /// Half the mean product of the two channels' differences of averages, in the product of their units.
     pub covariance: f64,
-    /// Products that it is the mean of.
+    /// Number of products that it is the mean of.
     pub count: u64,
 }
 
-/// Allan covariance of a pair of channels whose [`Cascade`]s take their samples in step.
+/// Estimator of the Allan covariance of two channels that are sampled together.
 ///
-/// It multiplies the second differences that the two estimators have anyway, so for channels `y` and `c`
+/// It multiplies the second differences of their two [`Cascade`]s. For channels `y` and `c` and any factor `β`
 ///
 /// `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`
 ///
-/// holds exactly at every octave: the left side is what compensation of `y` by `c` would leave.
+/// holds exactly at every octave: the Allan variance that remains when `β·c` is subtracted from `y`.
 ///
 /// ```
 /// use allan_core::{Cascade, Coupling};
@@ -34,20 +33,19 @@ pub struct Covariance {
 ///     let t = k * k % 1_009;
 ///     temperature.push(t);
 ///     rate.push(3 * t + k % 2);
-///     coupling.observe(&rate, &temperature); // after every sample of the two
+///     coupling.observe(&rate, &temperature); // after every pair of samples
 /// }
 /// let at_16 = &coupling.points()[4];
 /// let variance = temperature.curve(1.0).points()[4].avar;
 /// assert!((at_16.covariance / variance - 3.0).abs() < 1e-3);
 /// ```
 ///
-/// Both estimators must hear of every gap in either channel, so that both leave out the same differences. Samples that
-/// they have taken since their last gaps must be as many; where they are not, nothing is multiplied and
-/// [`out_of_step`](Self::out_of_step) counts it. There is no way for slices.
+/// Every gap of one channel must be reported to both estimators, so that both leave out the same differences. Where they
+/// have seen different numbers of samples since their last gaps, nothing is added and
+/// [`out_of_step`](Self::out_of_step) counts the sample. Slices are not supported.
 ///
 /// # Range
-/// As of [`Cascade`]: exact for samples within ±2²³ over 2⁴⁰ samples. An octave whose sum has left 128 bits has no
-/// covariance any more.
+/// Exact for 2⁴⁰ samples within ±2²³. An octave whose sum overflows 128 bits has no covariance from then on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Coupling<const OCTAVES: usize> {
     products: [i128; OCTAVES],
@@ -55,17 +53,18 @@ pub struct Coupling<const OCTAVES: usize> {
     out_of_step: u64,
 }
 
-/// Takes the place of a sum that left 128 bits.
-const FULL: i128 = i128::MIN;
+/// Marks a sum that has overflowed 128 bits.
+const OVERFLOWED: i128 = i128::MIN;
 
 impl<const OCTAVES: usize> Coupling<OCTAVES> {
-    /// A pair of which nothing was seen.
+    /// An estimator without samples.
     #[must_use]
     pub const fn new() -> Self {
         Self { products: [0; OCTAVES], counts: [0; OCTAVES], out_of_step: 0 }
     }
 
-    /// Multiplies the differences that the newest sample of both channels completed. To be called once after each.
+    /// Adds the products of the differences that the newest sample of both channels completed. To be called once after
+    /// each pair of samples.
     #[inline]
     pub fn observe<const OVERLAP: usize>(&mut self, a: &Cascade<OCTAVES, OVERLAP>, b: &Cascade<OCTAVES, OVERLAP>) {
         if a.elapsed() != b.elapsed() {
@@ -74,13 +73,13 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         }
         for octave in 0..OCTAVES {
             let (Some(a), Some(b)) = (a.newest_difference(octave), b.newest_difference(octave)) else {
-                return; // longer ones are not complete either
+                return; // those of longer averaging times are not complete either
             };
             self.add(octave, i128::from(a) * i128::from(b), 1);
         }
     }
 
-    /// Adds what was learnt of the same pair in a later stretch.
+    /// Adds the sums of the same pair of channels in a later stretch.
     pub fn merge(&mut self, later: &Self) {
         for octave in 0..OCTAVES {
             self.add(octave, later.products[octave], later.counts[octave]);
@@ -90,11 +89,11 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
 
     /// The exact sum of products of second differences of sums of `2^octave` samples, and their number.
     ///
-    /// `None` beyond the last octave and where the sum has left its range.
+    /// `None` beyond the last octave and where the sum has overflowed.
     #[must_use]
     pub fn sum_of_products(&self, octave: usize) -> Option<(i128, u64)> {
         let sum = *self.products.get(octave)?;
-        (sum != FULL).then(|| (sum, self.counts[octave]))
+        (sum != OVERFLOWED).then(|| (sum, self.counts[octave]))
     }
 
     /// The covariance of every octave that has at least one product, shortest first.
@@ -109,7 +108,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         points.collect()
     }
 
-    /// Samples at which the two estimators did not stand at the same place after their gaps.
+    /// Number of samples that were left out because the two estimators had seen different numbers of samples since their
+    /// last gaps.
     #[must_use]
     pub const fn out_of_step(&self) -> u64 {
         self.out_of_step
@@ -119,8 +119,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
     fn add(&mut self, octave: usize, product: i128, count: u64) {
         let sum = &mut self.products[octave];
         *sum = match sum.checked_add(product) {
-            Some(next) if *sum != FULL && product != FULL => next,
-            _ => FULL,
+            Some(next) if *sum != OVERFLOWED && product != OVERFLOWED => next,
+            _ => OVERFLOWED,
         };
         self.counts[octave] = self.counts[octave].saturating_add(count);
     }
@@ -129,5 +129,31 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
 impl<const OCTAVES: usize> Default for Coupling<OCTAVES> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(feature = "serde")]
+serde_by_words!(OCTAVES for Coupling<OCTAVES>);
+
+#[cfg(feature = "serde")]
+impl<const OCTAVES: usize> StateWords for Coupling<OCTAVES> {
+    const EMPTY: Self = Self::new();
+    const KIND: u8 = b'C';
+    const OCTAVES: usize = OCTAVES;
+    const OVERLAP: usize = 0;
+    const WORDS: usize = OCTAVES * 3 + 1;
+
+    fn visit_words<E>(&mut self, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
+        for product in &mut self.products {
+            let mut bits = *product as u128;
+            visit_wide(&mut bits, &mut visit)?;
+            *product = bits as i128;
+        }
+        self.counts.iter_mut().chain([&mut self.out_of_step]).try_for_each(visit)
+    }
+
+    fn inconsistency(&self) -> Option<&'static str> {
+        let idle = |(product, count): (&i128, &u64)| *count == 0 && *product != 0;
+        self.products.iter().zip(&self.counts).any(idle).then_some("a sum over no products that is not 0")
     }
 }

@@ -1,14 +1,14 @@
-//! The measured Allan variance, octave by octave.
+//! The measured Allan variance curve with its confidence and noise types.
 
-use crate::cascade::Moments;
-use crate::confidence::{Difference, Law, Shares};
+use crate::confidence::{ChiSquareApproximation, Difference};
 use crate::math::log2;
-use crate::noise_type::{Level, Noise, identify};
+use crate::moments::Moments;
+use crate::noise_type::{OctaveVariance, PowerLaw, VarianceFractions, classify};
 use heapless::Vec;
 
 /// One averaging factor of a [`Curve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub struct AllanPoint {
     /// Averaging factor, samples.
     pub n: u64,
     /// Averaging time, s.
@@ -17,7 +17,7 @@ pub struct Point {
     pub avar: f64,
     /// Squared differences that `avar` is the mean of.
     pub count: u64,
-    /// Differences per averaging time: the stride between them is `n/overlap` samples.
+    /// Differences per averaging time: one is taken every `n/overlap` samples.
     pub overlap: u32,
     /// Equivalent degrees of freedom of `avar`.
     pub edf: f64,
@@ -25,14 +25,15 @@ pub struct Point {
     pub low: f64,
     /// Upper 95 % bound of `avar`.
     pub high: f64,
-    /// Excess kurtosis of the differences: 0 for Gaussian noise. `None` if they are all 0 or too large to say.
+    /// Excess kurtosis of the differences: 0 for Gaussian noise. `None` if all differences are 0 or the sum of their
+    /// fourth powers is full.
     pub kurtosis: Option<f64>,
-    /// The power law that rules around this averaging time.
-    pub noise: Noise,
+    /// The power law that dominates around this averaging time.
+    pub power_law: PowerLaw,
 }
 
-impl Point {
-    /// A point without confidence yet. `octave` is the one that the moments were rounded for.
+impl AllanPoint {
+    /// A point whose confidence is not set yet. `octave` selects the rounding of the fourth powers.
     pub(crate) fn new(
         n: u64,
         sample_period: f64,
@@ -40,7 +41,7 @@ impl Point {
         octave: usize,
         count: u64,
         overlap: u32,
-        noise: Noise,
+        power_law: PowerLaw,
     ) -> Self {
         Self {
             n,
@@ -52,12 +53,13 @@ impl Point {
             low: 0.0,
             high: 0.0,
             kurtosis: moments.excess_kurtosis(octave, count),
-            noise,
+            power_law,
         }
     }
 
-    fn level(&self) -> Level {
-        Level { octave: log2(self.n as f64), variance: self.avar, weight: self.count as f64 / f64::from(self.overlap) }
+    fn octave_variance(&self) -> OctaveVariance {
+        let weight = self.count as f64 / f64::from(self.overlap);
+        OctaveVariance { octave: log2(self.n as f64), variance: self.avar, weight }
     }
 }
 
@@ -66,45 +68,47 @@ impl Point {
 pub struct Curve<const OCTAVES: usize> {
     sample_period: f64,
     samples: u64,
-    points: Vec<Point, OCTAVES>,
+    points: Vec<AllanPoint, OCTAVES>,
 }
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    /// Without points: to be [drawn](crate::Cascade::draw) where it stands, as it is too large to be handed about on a small
-    /// stack.
+    /// A curve without points, to be filled in place by [`Cascade::rebuild_curve`](crate::Cascade::rebuild_curve): with 24
+    /// octaves a curve takes about 2 kB, too much to be moved over a small stack.
     #[must_use]
     pub const fn empty() -> Self {
         Self { sample_period: 0.0, samples: 0, points: Vec::new() }
     }
 
-    /// Takes `points` in the place of its own.
-    pub(crate) fn take(&mut self, sample_period: f64, samples: u64, points: impl Iterator<Item = Point>) {
+    /// Replaces the points by `points`, classifies them and sets their confidence.
+    pub(crate) fn fill(&mut self, sample_period: f64, samples: u64, points: impl Iterator<Item = AllanPoint>) {
         (self.sample_period, self.samples) = (sample_period, samples);
         self.points.clear();
         self.points.extend(points);
-        self.name();
-        self.weigh(&mut |point| point.noise.shares());
+        self.classify();
+        self.set_confidence(&mut |point| point.power_law.variance_fractions());
     }
 
-    /// Of points whose noise type is known already.
-    pub(crate) fn of_named(sample_period: f64, samples: u64, points: Vec<Point, OCTAVES>) -> Self {
-        Self { sample_period, samples, points }.with_confidence(|point| point.noise.shares())
+    /// A curve of points whose noise type is set already.
+    pub(crate) fn from_classified(sample_period: f64, samples: u64, points: Vec<AllanPoint, OCTAVES>) -> Self {
+        Self { sample_period, samples, points }.with_confidence(|point| point.power_law.variance_fractions())
     }
 
-    /// Finds the power law around each point.
-    #[inline(never)] // so that its stack is not everybody's
-    fn name(&mut self) {
-        let levels: Vec<Level, OCTAVES> = self.points.iter().map(Point::level).collect();
+    /// Sets the power law of each point from the slope around it.
+    #[inline(never)] // its stack frame would otherwise be part of every caller's
+    fn classify(&mut self) {
+        let octaves: Vec<OctaveVariance, OCTAVES> = self.points.iter().map(AllanPoint::octave_variance).collect();
         for (at, point) in self.points.iter_mut().enumerate() {
-            point.noise = identify(&levels, at);
+            point.power_law = classify(&octaves, at);
         }
     }
 
-    fn weigh(&mut self, shares: &mut dyn FnMut(&Point) -> Shares) {
+    /// Sets the degrees of freedom and bounds of each point for its variance fractions.
+    fn set_confidence(&mut self, fractions: &mut dyn FnMut(&AllanPoint) -> VarianceFractions) {
         for point in &mut self.points {
-            let law = Law::new(Difference::Second, point.n, point.count, point.overlap, shares(point));
-            point.edf = law.edf;
-            (point.low, point.high) = law.bounds(point.avar);
+            let approximation =
+                ChiSquareApproximation::new(Difference::Second, point.n, point.count, point.overlap, fractions(point));
+            point.edf = approximation.edf;
+            (point.low, point.high) = approximation.bounds(point.avar);
         }
     }
 
@@ -122,18 +126,18 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
 
     /// The points, shortest averaging time first.
     #[must_use]
-    pub fn points(&self) -> &[Point] {
+    pub fn points(&self) -> &[AllanPoint] {
         &self.points
     }
 
-    /// The same curve with the samples' unit replaced: `avar` and its bounds times the square of `lsb`.
+    /// The same curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
         self.scale(lsb);
         self
     }
 
-    /// The same in place.
+    /// As [`scaled`](Self::scaled), in place.
     pub fn scale(&mut self, lsb: f64) {
         let square = lsb * lsb;
         for point in &mut self.points {
@@ -143,15 +147,16 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Takes what another curve has.
-    pub(crate) fn copy(&mut self, other: &Self) {
+    /// Copies another curve in place, without a copy on the stack.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
         (self.sample_period, self.samples) = (other.sample_period, other.samples);
         self.points.clear();
         self.points.extend(other.points.iter().copied());
     }
 
-    /// Gives the points whose variance is not 0 another one, with bounds in proportion and the same degrees of freedom.
-    pub fn change_avar(&mut self, avar: impl Fn(&Point) -> f64) {
+    /// Replaces the variance of every point with a positive one. The bounds change in proportion, the degrees of freedom
+    /// not at all.
+    pub fn replace_avar(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
             let ratio = avar(point) / point.avar;
             point.avar *= ratio;
@@ -160,10 +165,10 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// The same curve with the confidence of the noise that `shares` tells for each point.
+    /// The same curve with the confidence of the variance fractions that `fractions` returns for each point.
     #[must_use]
-    pub fn with_confidence(mut self, mut shares: impl FnMut(&Point) -> Shares) -> Self {
-        self.weigh(&mut shares);
+    pub fn with_confidence(mut self, mut fractions: impl FnMut(&AllanPoint) -> VarianceFractions) -> Self {
+        self.set_confidence(&mut fractions);
         self
     }
 }

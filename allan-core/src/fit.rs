@@ -1,90 +1,245 @@
-//! From a curve to coefficients: the non-negative fit of a gamma likelihood.
+//! From a curve to the coefficients of a model: the maximum of a gamma likelihood over non-negative coefficients.
 //!
-//! An estimate of the Allan variance with `edf` degrees of freedom is gamma distributed around the true one, so the
-//! coefficients minimise `Σ edf/2·(ln m + v/m)`. Fisher scoring turns that into a sequence of small non-negative
-//! least-squares problems; the degrees of freedom follow the fitted mixture of noises, which is iterated too.
-//! Parameters of a term's shape are searched for around it.
+//! An estimate `v` of the Allan variance with `edf` degrees of freedom is gamma distributed around the true variance `m`, so
+//! the coefficients minimise `Σ edf/2·(ln m + v/m)`. Fisher scoring makes this a sequence of small non-negative
+//! least-squares problems. The degrees of freedom depend on the fitted mixture of noises, so the two are computed in turn.
+//! Shape parameters of terms (correlation times, frequencies) are searched for around these fits.
 
 mod bounds;
-mod goodness;
-mod improvement;
 pub(crate) mod least_squares;
-mod parameter;
-mod points;
-mod problem;
+mod likelihood;
 mod shape;
 
-pub use goodness::Goodness;
-pub(crate) use improvement::Baseline;
-pub(crate) use shape::Free;
-
-use crate::model::Model;
-use crate::{Curve, Kind};
 pub(crate) use bounds::set as set_bounds;
-use points::Points;
-use problem::Problem;
+pub(crate) use shape::FreeShapes;
 
+use crate::confidence::chi_square_upper_tail;
+use crate::curve::Curve;
+use crate::math::{lnf, sqrtf};
+use crate::model::{MAX_TERMS, Model};
+use crate::term::NoiseTerm;
+use heapless::Vec;
+use likelihood::{MAX_PARAMETERS, Measured, Points, Problem, correlation};
+use shape::remove_component;
+
+/// Number of alternations between coefficients and degrees of freedom.
 const EDF_ROUNDS: usize = 4;
 
-/// Fits the coefficients of `kinds` (the first [`MAX_TERMS`](crate::model::MAX_TERMS) of them, each once) to all points
-/// of a curve; their shapes stay as they are given.
+/// Fits the coefficients of `kinds` to all points of a curve; shape parameters stay as given.
 ///
-/// A curve without points, or of a channel that never changed, gives coefficients of 0.
+/// At most the first [`MAX_TERMS`] of `kinds` are used; each must occur once. Coefficients are in the unit of the curve (see
+/// [`NoiseTerm::unit`]), with 95 % bounds. A curve without points, or of a channel that never changed, gives coefficients of 0.
 #[must_use]
-pub fn fit<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
+pub fn fit<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[NoiseTerm]) -> Model {
     let mut model = Model::new(0.0, []);
-    estimate(curve, kinds, Free::Nothing, &mut || true, &mut model);
+    estimate(curve, kinds, FreeShapes::None, &mut || true, &mut model);
     set_bounds(curve, &mut model);
     model
 }
 
-/// Fits the coefficients of `kinds` and also the shapes of those that have one, from the given ones on.
+/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters, starting from the given ones.
 #[must_use]
-pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[Kind]) -> Model {
+pub fn fit_shapes<const POINTS: usize>(curve: &Curve<POINTS>, kinds: &[NoiseTerm]) -> Model {
     let mut model = Model::new(0.0, []);
-    estimate(curve, kinds, Free::AllBut(&[]), &mut || true, &mut model);
+    estimate(curve, kinds, FreeShapes::AllExcept(&[]), &mut || true, &mut model);
     set_bounds(curve, &mut model);
     model
 }
 
-/// Whether `model`, which was fitted to `curve`, is enough to describe it.
+/// Tests whether `model`, which was fitted to `curve`, describes it within its uncertainty.
 #[must_use]
-#[inline(never)] // here and below: so that its stack is not everybody's
+#[inline(never)] // here and below: the stack frame would otherwise be part of every caller's
 pub fn goodness<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Goodness {
     let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
-    points.take();
-    problem.take_model(&mut points, model);
-    goodness::judge(&points, &mut problem)
+    points.fill();
+    problem.fill_from_model(&mut points, model);
+    goodness_of(&points, &mut problem)
 }
 
 /// `Σ edf·(v/m − 1 − ln(v/m))` of `model`, which was fitted to `curve`.
 #[inline(never)]
 pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> f32 {
     let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
-    points.take();
-    problem.take_model(&mut points, model);
+    points.fill();
+    problem.fill_from_model(&mut points, model);
     problem.deviance(&points)
 }
 
-/// Coefficients of `kinds`, and the shapes of those that are `free`, without bounds: into `model`.
+/// Sets `model` to the fitted coefficients of `kinds` and to the fitted shapes of those that are `free`, without bounds.
+///
+/// `keep_on` is asked before every step of a shape search; if it returns false, the search ends where it is.
 #[inline(never)]
 pub(crate) fn estimate<const POINTS: usize>(
     curve: &Curve<POINTS>,
-    kinds: &[Kind],
-    free: Free,
+    kinds: &[NoiseTerm],
+    free: FreeShapes,
     keep_on: &mut dyn FnMut() -> bool,
     model: &mut Model,
 ) {
     let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
-    points.take();
-    problem.take(&points, kinds);
+    points.fill();
+    problem.set_terms(&points, kinds);
     let searched = problem.kinds.iter().any(|kind| free.has(kind));
-    problem.settle(&mut points, if searched { 2 } else { EDF_ROUNDS });
+    problem.fit_with_confidence(&mut points, if searched { 2 } else { EDF_ROUNDS });
     if searched {
         for _ in 0..2 {
             shape::search(&points, &mut problem, free, keep_on);
-            problem.settle(&mut points, 2);
+            problem.fit_with_confidence(&mut points, 2);
         }
     }
     model.set(curve.sample_period(), problem.terms());
+}
+
+/// How well a model describes the curve that it was fitted to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goodness {
+    /// `Σ edf·(v/m − 1 − ln(v/m))` over all points.
+    pub deviance: f64,
+    /// Probability of a deviance at least this large if the model is correct.
+    pub p_value: f64,
+}
+
+/// Goodness of the fitted `problem`, whose columns are overwritten.
+///
+/// The deviance is a sum of squares of correlated normal residuals, orthogonal to the directions of the fitted parameters.
+/// Its distribution is approximated by a scaled χ² with the same mean and variance (F. Satterthwaite, Biometrics 2, 1946).
+fn goodness_of<const POINTS: usize>(points: &Points<POINTS>, problem: &mut Problem<POINTS>) -> Goodness {
+    let deviance = f64::from(problem.deviance(points));
+    let count = problem.orthonormal(points);
+    let (mean, square) = traces(&points.measured, &problem.columns[..count]);
+    let (mean, square) = (f64::from(mean), f64::from(square));
+    let dof = mean * mean / square;
+    let p_value = if mean > 1e-5 { chi_square_upper_tail(deviance * mean / square, dof) } else { 1.0 };
+    Goodness { deviance, p_value }
+}
+
+/// The traces of `PR` and of `(PR)²` for the correlation matrix `R` and the projection `P = 1 − Σ ddᵀ` that removes the
+/// orthonormal directions `d`: `tr R − Σ dᵀRd` and `tr R² − 2 Σ |Rd|² + Σ (dᵀRe)²`.
+#[inline(never)]
+fn traces<const POINTS: usize>(measured: &[Measured], directions: &[[f32; POINTS]]) -> (f32, f32) {
+    let (mut mean, mut square) = (0.0, 0.0);
+    let mut between = [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS];
+    for (i, a) in measured.iter().enumerate() {
+        let mut product = [0.0; MAX_PARAMETERS];
+        for (j, b) in measured.iter().enumerate() {
+            let entry = correlation(a, b);
+            mean += if i == j { entry } else { 0.0 };
+            square += entry * entry;
+            product.iter_mut().zip(directions).for_each(|(sum, direction)| *sum += entry * direction[j]);
+        }
+        for (row, direction) in between.iter_mut().zip(directions) {
+            row.iter_mut().zip(product).for_each(|(entry, sum)| *entry += direction[i] * sum);
+        }
+        square -= 2.0 * product.iter().map(|entry| entry * entry).sum::<f32>();
+    }
+    for (i, row) in between.iter().enumerate() {
+        mean -= row[i];
+        square += row.iter().map(|entry| entry * entry).sum::<f32>();
+    }
+    (mean, square)
+}
+
+/// A fitted model with which other sets of terms are compared, at the degrees of freedom that it gives to the points.
+pub(crate) struct Baseline<'a, const POINTS: usize> {
+    points: Points<'a, POINTS>,
+    deviance: f32,
+    modelled: [f32; POINTS],
+    /// Number of orthonormal directions of its own parameters in `explained`.
+    directions: usize,
+    explained: [[f32; POINTS]; MAX_PARAMETERS],
+    /// The terms that are compared with it.
+    tried: Problem<POINTS>,
+}
+
+/// By how much another set of terms fits better.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Improvement {
+    /// Decrease of the deviance.
+    fall: f32,
+    /// Mean decrease of the deviance per parameter by chance: 1 for independent points, more for correlated ones.
+    scatter: f32,
+}
+
+impl Improvement {
+    /// Decrease of the deviance in units of its scatter: χ² distributed with one degree of freedom if the added term does
+    /// not exist.
+    pub(crate) fn score(&self) -> f64 {
+        f64::from(self.fall / self.scatter)
+    }
+
+    /// Decrease of the deviance beyond `cost`, which is in units of the scatter.
+    pub(crate) fn gain(&self, cost: f32) -> f32 {
+        self.fall - cost * self.scatter
+    }
+}
+
+impl<'a, const POINTS: usize> Baseline<'a, POINTS> {
+    /// Without a model, to be filled in place: it is too large to be moved over a small stack.
+    #[inline(always)]
+    pub(crate) const fn empty(curve: &'a Curve<POINTS>) -> Self {
+        Self {
+            points: Points::empty(curve),
+            deviance: 0.0,
+            modelled: [0.0; POINTS],
+            directions: 0,
+            explained: [[0.0; POINTS]; MAX_PARAMETERS],
+            tried: Problem::empty(),
+        }
+    }
+
+    /// Sets the fitted model.
+    #[inline(never)]
+    pub(crate) fn fill(&mut self, model: &Model) {
+        let Self { points, deviance, modelled, directions, explained, tried } = self;
+        points.fill();
+        tried.fill_from_model(points, model);
+        *deviance = tried.minimise(points);
+        modelled.iter_mut().enumerate().for_each(|(at, entry)| *entry = tried.modelled(at, &tried.amounts));
+        *directions = tried.orthonormal(points);
+        *explained = tried.columns;
+        // The columns were overwritten by the orthonormal directions.
+        tried.kinds.clear();
+    }
+
+    /// Decrease of the deviance with the terms `kinds` and their best coefficients.
+    #[inline(never)]
+    pub(crate) fn fall(&mut self, kinds: &[NoiseTerm]) -> f32 {
+        self.tried.set_terms(&self.points, kinds);
+        self.deviance - self.tried.minimise(&self.points)
+    }
+
+    /// Improvement by the terms `kinds` with their best coefficients and the best shapes of those that are `free`.
+    #[inline(never)]
+    pub(crate) fn improvement(
+        &mut self,
+        kinds: &[NoiseTerm],
+        free: FreeShapes,
+        keep_on: &mut dyn FnMut() -> bool,
+    ) -> Improvement {
+        self.tried.set_terms(&self.points, kinds);
+        let deviance = shape::search(&self.points, &mut self.tried, free, keep_on);
+        self.compared(deviance)
+    }
+
+    /// The terms of the last comparison, with the shapes that were found.
+    pub(crate) fn tried(&self) -> &Vec<NoiseTerm, MAX_TERMS> {
+        &self.tried.kinds
+    }
+
+    /// The improvement of the tried model. Its scatter is the variance of the residual along the change of the model.
+    fn compared(&self, deviance: f32) -> Improvement {
+        let mut change = [0.0; POINTS];
+        for (at, (entry, point)) in change.iter_mut().zip(&self.points.measured).enumerate() {
+            let ratio = self.tried.modelled(at, &self.tried.amounts) / self.modelled[at];
+            *entry = sqrtf(point.edf / 2.0) * lnf(ratio);
+        }
+        for known in &self.explained[..self.directions] {
+            remove_component(&mut change, known);
+        }
+        let length: f32 = change.iter().map(|entry| entry * entry).sum();
+        let [variance] = self.points.variances([&change]);
+        let scatter = variance / length;
+        let fall = if length > 0.0 { self.deviance - deviance } else { 0.0 };
+        Improvement { fall, scatter: scatter.max(1.0) }
+    }
 }

@@ -1,11 +1,10 @@
-//! Hadamard variance: third differences, which a drift of the rate leaves alone.
+//! Hadamard variance: by third differences of the running sum, on which a linear drift of the rate has no effect.
 
+use crate::cascade::Cascade;
+use crate::confidence::{ChiSquareApproximation, Difference};
+use crate::noise_type::{OctaveVariance, VarianceFractions, classify};
 #[cfg(feature = "serde")]
-mod state;
-
-use crate::Cascade;
-use crate::confidence::{Difference, Law, Shares};
-use crate::noise_type::{Level, identify};
+use crate::serialized::{StateWords, serde_by_words, visit_wide};
 use heapless::Vec;
 
 /// One averaging factor of a Hadamard curve.
@@ -17,9 +16,9 @@ pub struct HadamardPoint {
     pub tau: f64,
     /// Hadamard variance `⟨(ȳ₂ − 2ȳ₁ + ȳ₀)²⟩/6`, in the square of the unit of the samples.
     pub hvar: f64,
-    /// Squared differences that `hvar` is the mean of.
+    /// Number of squared differences that `hvar` is the mean of.
     pub count: u64,
-    /// Differences per averaging time: the stride between them is `n/overlap` samples.
+    /// Differences per averaging time: one is taken every `n/overlap` samples.
     pub overlap: u32,
     /// Equivalent degrees of freedom of `hvar`.
     pub edf: f64,
@@ -30,22 +29,22 @@ pub struct HadamardPoint {
 }
 
 impl HadamardPoint {
-    fn level(&self) -> Level {
+    fn octave_variance(&self) -> OctaveVariance {
         let weight = self.count as f64 / f64::from(self.overlap);
-        Level { octave: f64::from(self.n.ilog2()), variance: self.hvar, weight }
+        OctaveVariance { octave: f64::from(self.n.ilog2()), variance: self.hvar, weight }
     }
 
-    fn set_confidence(&mut self, shares: Shares) {
-        let law = Law::new(Difference::Third, self.n, self.count, self.overlap, shares);
-        self.edf = law.edf;
-        (self.low, self.high) = law.bounds(self.hvar);
+    fn set_confidence(&mut self, fractions: VarianceFractions) {
+        let approximation = ChiSquareApproximation::new(Difference::Third, self.n, self.count, self.overlap, fractions);
+        self.edf = approximation.edf;
+        (self.low, self.high) = approximation.bounds(self.hvar);
     }
 }
 
-/// Hadamard variance from the running sums that a [`Cascade`] holds, at every octave but its last.
+/// Estimator of the Hadamard variance from the running sums of a [`Cascade`], at every octave but its last.
 ///
-/// A third difference at `n ≥ OVERLAP` reaches back three averaging times, which the next coarser delay line holds: so
-/// it comes every `2n/OVERLAP` samples, half the overlap of the Allan variance.
+/// A third difference at `n ≥ OVERLAP` reaches back three averaging times, which only the next coarser delay line covers.
+/// It is therefore taken every `2n/OVERLAP` samples: half the overlap of the Allan variance.
 ///
 /// ```
 /// use allan_core::{Cascade, Hadamard};
@@ -61,9 +60,9 @@ impl HadamardPoint {
 /// ```
 ///
 /// # Range
-/// Exact like the Cascade's sums: third differences of samples within ±2²³ stay below `2²⁵·n`, twice second ones, and
-/// come half as often, so 2⁴⁰ samples leave their squares below 2¹¹⁶. Beyond 128 bits a sum stays at its maximum and
-/// has no point any more.
+/// Third differences of samples within ±2²³ stay below `2²⁵·n`, twice second differences, and are half as many, so the
+/// sum of squares of 2⁴⁰ samples stays below 2¹¹⁶ and is exact. A sum that overflows 128 bits stays at its maximum, and
+/// its octave has no point from then on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hadamard<const OCTAVES: usize, const OVERLAP: usize> {
     squares: [u128; OCTAVES],
@@ -71,9 +70,9 @@ pub struct Hadamard<const OCTAVES: usize, const OVERLAP: usize> {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
-    /// One that has seen nothing.
+    /// An estimator without samples.
     ///
-    /// An estimator without overlap (`OVERLAP` = 1) does not hold the sums and does not compile:
+    /// A cascade without overlap (`OVERLAP` = 1) does not hold the sums that are needed, so this does not compile:
     ///
     /// ```compile_fail,E0080
     /// allan_core::Hadamard::<12, 1>::new();
@@ -84,12 +83,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         Self { squares: [0; OCTAVES], counts: [0; OCTAVES] }
     }
 
-    /// Takes the third differences that the newest sample completed. To be called once after each.
+    /// Adds the third differences that the newest sample completed. To be called once after each sample.
     pub fn observe(&mut self, cascade: &Cascade<OCTAVES, OVERLAP>) {
         for octave in 0..OCTAVES - 1 {
             let (level, n) = place::<OVERLAP>(octave);
             if !cascade.has(level, 3 * n) {
-                return; // longer ones are not complete either
+                return; // those of longer averaging times are not complete either
             }
             let sum = |back| cascade.sum_before(level, back);
             let steps = [sum(0), sum(n), sum(2 * n), sum(3 * n)];
@@ -99,7 +98,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Adds what was learnt of the same channel in a later stretch.
+    /// Adds the sums of the same channel in a later stretch.
     pub fn merge(&mut self, later: &Self) {
         for octave in 0..OCTAVES {
             self.add(octave, later.squares[octave], later.counts[octave]);
@@ -116,20 +115,25 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
 
     /// The Hadamard variance, in counts², of every octave that has at least one difference, shortest first.
     ///
-    /// `sample_period` in seconds. The confidence is that of the noise that the local slope suggests.
+    /// `sample_period` in seconds. The confidence is that of the power law that the local slope suggests.
     #[must_use]
     pub fn points(&self, sample_period: f64) -> Vec<HadamardPoint, OCTAVES> {
-        let mut points = self.points_with(sample_period, |_| Shares::WHITE);
-        let levels: Vec<Level, OCTAVES> = points.iter().map(HadamardPoint::level).collect();
+        let mut points = self.points_with(sample_period, |_| VarianceFractions::WHITE);
+        let octaves: Vec<OctaveVariance, OCTAVES> = points.iter().map(HadamardPoint::octave_variance).collect();
         for (at, point) in points.iter_mut().enumerate() {
-            point.set_confidence(identify(&levels, at).shares());
+            point.set_confidence(classify(&octaves, at).variance_fractions());
         }
         points
     }
 
-    /// The same with the confidence of the noise that `shares` tells for each averaging factor.
+    /// [`points`](Self::points) with the confidence of the variance fractions that `fractions` returns for each averaging
+    /// factor, for example those of a fitted model.
     #[must_use]
-    pub fn points_with(&self, sample_period: f64, shares: impl Fn(u64) -> Shares) -> Vec<HadamardPoint, OCTAVES> {
+    pub fn points_with(
+        &self,
+        sample_period: f64,
+        fractions: impl Fn(u64) -> VarianceFractions,
+    ) -> Vec<HadamardPoint, OCTAVES> {
         let points = (0..OCTAVES).filter_map(|octave| {
             let (square, count) = (self.squares[octave], self.counts[octave]);
             if count == 0 || square == u128::MAX {
@@ -146,7 +150,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
                 low: 0.0,
                 high: 0.0,
             };
-            point.set_confidence(shares(n));
+            point.set_confidence(fractions(n));
             Some(point)
         });
         points.collect()
@@ -164,9 +168,33 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Default for Hadamard<OCTAVES, O
     }
 }
 
-/// Level of delay line, and strides of it to an averaging time.
+/// The delay line that serves an octave, and the number of its strides in an averaging time.
 const fn place<const OVERLAP: usize>(octave: usize) -> (usize, u64) {
     let fine = OVERLAP.trailing_zeros() as usize;
     let level = (octave + 1).saturating_sub(fine);
     (level, 1 << (octave - level))
+}
+
+#[cfg(feature = "serde")]
+serde_by_words!(OCTAVES, OVERLAP for Hadamard<OCTAVES, OVERLAP>);
+
+#[cfg(feature = "serde")]
+impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Hadamard<OCTAVES, OVERLAP> {
+    const EMPTY: Self = Self::new();
+    const KIND: u8 = b'H';
+    const OCTAVES: usize = OCTAVES;
+    const OVERLAP: usize = OVERLAP;
+    const WORDS: usize = OCTAVES * 3;
+
+    fn visit_words<E>(&mut self, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
+        for square in &mut self.squares {
+            visit_wide(square, &mut visit)?;
+        }
+        self.counts.iter_mut().try_for_each(visit)
+    }
+
+    fn inconsistency(&self) -> Option<&'static str> {
+        let idle = |(square, count): (&u128, &u64)| *count == 0 && *square != 0;
+        self.squares.iter().zip(&self.counts).any(idle).then_some("a sum over no differences that is not 0")
+    }
 }

@@ -1,37 +1,34 @@
-//! A noise model: terms with their coefficients, and what they do together.
+//! A noise model: a sum of terms with coefficients. Its Allan variance, spectrum, degrees of freedom, and its distance
+//! from a measured curve.
 
-pub(crate) mod freedom;
-
-use crate::Point;
-use crate::confidence::Shares;
-use crate::term::Kind;
-use freedom::{Flicker, degrees_of_freedom};
+use crate::curve::{AllanPoint, Curve};
+use crate::math::{clamp, ln, sqrt};
+use crate::noise_type::VarianceFractions;
+use crate::term::{MAX_SHAPE, NoiseTerm};
 use heapless::Vec;
 
-/// Terms that a model can hold.
+/// Largest number of terms of a model.
 pub const MAX_TERMS: usize = 8;
-/// Shape parameters that a term can have.
-pub const MAX_SHAPE: usize = 2;
 
 /// A fitted term with its 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Term {
-    /// What the coefficient belongs to, with the estimates of its shape.
-    pub kind: Kind,
-    /// Coefficient; 0 when the data does not show the term.
+pub struct FittedTerm {
+    /// The term, with the estimates of its shape parameters.
+    pub kind: NoiseTerm,
+    /// Coefficient, in the unit of [`NoiseTerm::unit`]; 0 if the data does not show the term.
     pub value: f64,
-    /// Lower bound; 0 when the data is compatible with the absence of the term.
+    /// Lower 95 % bound; 0 if the data is compatible with the absence of the term.
     pub low: f64,
-    /// Upper bound, above 0 wherever there is data.
+    /// Upper 95 % bound; above 0 if the curve has any point with a positive variance.
     pub high: f64,
-    /// Bounds of the shape's parameters, in the order of [`Kind::shape`].
+    /// 95 % bounds of the shape parameters, in the order of [`NoiseTerm::shape`].
     pub shape: [(f64, f64); MAX_SHAPE],
 }
 
-impl Term {
-    /// A coefficient that is known, or whose bounds are still to be found.
+impl FittedTerm {
+    /// A term with a known coefficient: its bounds are the value itself.
     #[must_use]
-    pub fn exact(kind: Kind, value: f64) -> Self {
+    pub fn exact(kind: NoiseTerm, value: f64) -> Self {
         let shape = kind.shape().map(|(_, value)| (value, value));
         Self { kind, value, low: value, high: value, shape }
     }
@@ -41,18 +38,18 @@ impl Term {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     sample_period: f64,
-    terms: Vec<Term, MAX_TERMS>,
+    terms: Vec<FittedTerm, MAX_TERMS>,
 }
 
 impl Model {
-    /// The first [`MAX_TERMS`] of `terms` in samples every `sample_period` seconds.
+    /// The sum of the first [`MAX_TERMS`] of `terms` for samples every `sample_period` seconds.
     #[must_use]
-    pub fn new(sample_period: f64, terms: impl IntoIterator<Item = Term>) -> Self {
+    pub fn new(sample_period: f64, terms: impl IntoIterator<Item = FittedTerm>) -> Self {
         Self { sample_period, terms: terms.into_iter().take(MAX_TERMS).collect() }
     }
 
-    /// The same in place.
-    pub(crate) fn set(&mut self, sample_period: f64, terms: impl Iterator<Item = Term>) {
+    /// As [`new`](Self::new), in place.
+    pub(crate) fn set(&mut self, sample_period: f64, terms: impl Iterator<Item = FittedTerm>) {
         self.sample_period = sample_period;
         self.terms.clear();
         self.terms.extend(terms.take(MAX_TERMS));
@@ -64,18 +61,18 @@ impl Model {
         self.sample_period
     }
 
-    /// The terms in the order that was asked for.
+    /// The terms, in the order in which they were given.
     #[must_use]
-    pub fn terms(&self) -> &[Term] {
+    pub fn terms(&self) -> &[FittedTerm] {
         &self.terms
     }
 
-    /// What the terms are.
-    pub(crate) fn kinds(&self) -> Vec<Kind, MAX_TERMS> {
+    /// The terms without their coefficients.
+    pub(crate) fn kinds(&self) -> Vec<NoiseTerm, MAX_TERMS> {
         self.terms.iter().map(|term| term.kind).collect()
     }
 
-    pub(crate) fn terms_mut(&mut self) -> &mut [Term] {
+    pub(crate) fn terms_mut(&mut self) -> &mut [FittedTerm] {
         &mut self.terms
     }
 
@@ -85,34 +82,35 @@ impl Model {
         self.contributions(n).map(|(_, avar)| avar).sum()
     }
 
-    /// Modelled two-sided power spectral density at `frequency` in Hz; lines have none.
+    /// Modelled two-sided power spectral density at `frequency` in Hz, in unit²/Hz; deterministic terms contribute nothing.
     #[must_use]
     pub fn density(&self, frequency: f64) -> f64 {
-        let of = |term: &Term| term.value * term.value * term.kind.process().density(frequency, self.sample_period);
-        self.present().map(of).sum()
+        let density =
+            |term: &FittedTerm| term.value * term.value * term.kind.process().density(frequency, self.sample_period);
+        self.present().map(density).sum()
     }
 
-    /// What part of the modelled variance at averaging factor `n` is due to which power law, roughly where a term is
-    /// none.
+    /// Fractions of the modelled variance at averaging factor `n` that are due to each power law. A term that is not a power
+    /// law counts as the one that it resembles at this averaging time.
     #[must_use]
-    pub fn shares(&self, n: u64) -> Shares {
+    pub fn variance_fractions(&self, n: u64) -> VarianceFractions {
         let total = self.avar(n);
         if total <= 0.0 {
-            return Shares::WHITE;
+            return VarianceFractions::WHITE;
         }
-        shares(self.contributions(n).map(|(kind, avar)| (kind, avar / total)), n, self.sample_period)
+        variance_fractions(self.contributions(n).map(|(kind, avar)| (kind, avar / total)), n, self.sample_period)
     }
 
-    /// Equivalent degrees of freedom of a measured point if the model is true.
+    /// Equivalent degrees of freedom of a measured point if the model is correct.
     #[must_use]
-    pub fn edf(&self, point: &Point) -> f64 {
+    pub fn edf(&self, point: &AllanPoint) -> f64 {
         let avar = self.avar(point.n);
-        let parts: Vec<(Kind, f64), MAX_TERMS> =
+        let parts: Vec<(NoiseTerm, f64), MAX_TERMS> =
             self.contributions(point.n).map(|(kind, part)| (kind, part / avar)).collect();
-        degrees_of_freedom(&parts, point, self.sample_period, &Flicker::NONE).0
+        degrees_of_freedom(&parts, point, self.sample_period, &FlickerCorrelations::EMPTY).0
     }
 
-    /// The same model with the samples' unit replaced: every coefficient times `lsb`.
+    /// The same model in another unit: every coefficient is multiplied by `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
         for term in &mut self.terms {
@@ -123,24 +121,199 @@ impl Model {
         self
     }
 
-    fn present(&self) -> impl Iterator<Item = &Term> {
+    /// The terms with a positive coefficient.
+    fn present(&self) -> impl Iterator<Item = &FittedTerm> {
         self.terms.iter().filter(|term| term.value > 0.0)
     }
 
-    fn contributions(&self, n: u64) -> impl Iterator<Item = (Kind, f64)> + '_ {
+    /// Each present term with its Allan variance at averaging factor `n`.
+    fn contributions(&self, n: u64) -> impl Iterator<Item = (NoiseTerm, f64)> + '_ {
         self.present().map(move |term| (term.kind, term.value * term.value * term.kind.avar(n, self.sample_period)))
     }
 }
 
-/// The power laws that terms with such shares resemble at averaging factor `n`.
-pub(crate) fn shares(parts: impl Iterator<Item = (Kind, f64)>, n: u64, sample_period: f64) -> Shares {
-    let mut shares = Shares { white: 0.0, ..Shares::WHITE };
+/// Sum of the variance fractions of the power laws that the terms resemble at averaging factor `n`. Each term comes with
+/// its fraction of the variance.
+pub(crate) fn variance_fractions(
+    parts: impl Iterator<Item = (NoiseTerm, f64)>,
+    n: u64,
+    sample_period: f64,
+) -> VarianceFractions {
+    let mut fractions = VarianceFractions { white: 0.0, ..VarianceFractions::WHITE };
     for (kind, part) in parts {
         let share = kind.share(part, n, sample_period);
-        shares.white += share.white;
-        shares.flicker += share.flicker;
-        shares.random_walk += share.random_walk;
-        shares.quantization += share.quantization;
+        fractions.white += share.white;
+        fractions.flicker += share.flicker;
+        fractions.random_walk += share.random_walk;
+        fractions.quantization += share.quantization;
     }
-    shares
+    fractions
+}
+
+/// Distance of a model from a measured curve over the octaves with `n ≤ M/8` of a curve of `M` samples. `v` is the
+/// measured and `m` the modelled Allan variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Discrepancy {
+    /// `mean edf·(ln(m/v) + v/m − 1)`: about 1 for a correct model on the data to which it was fitted.
+    pub deviance_per_point: f64,
+    /// `100·sqrt(mean (½ ln(v/m))²)`: the rms error of the Allan deviation in percent.
+    pub rms_percent: f64,
+    /// Number of octaves that were compared.
+    pub points: usize,
+}
+
+impl Discrepancy {
+    /// Compares `model` with `curve`; `None` if the curve has no octave in range.
+    ///
+    /// The degrees of freedom are those of the model's mixture of terms. A measured or modelled variance of 0 makes the
+    /// result infinite.
+    #[must_use]
+    pub fn between<const OCTAVES: usize>(model: &Model, curve: &Curve<OCTAVES>) -> Option<Self> {
+        let (mut deviance, mut square, mut points) = (0.0, 0.0, 0);
+        for point in curve.points().iter().filter(|point| point.n <= curve.samples() / 8) {
+            let ratio = point.avar / model.avar(point.n);
+            let log = ln(ratio);
+            deviance += model.edf(point) * (ratio - 1.0 - log);
+            square += log * log / 4.0;
+            points += 1;
+        }
+        (points > 0).then(|| Self {
+            deviance_per_point: deviance / points as f64,
+            rms_percent: 100.0 * sqrt(square / points as f64),
+            points,
+        })
+    }
+}
+
+/// Largest number of differences per averaging time whose correlations are computed; more of them hardly change the result.
+const MAX_OVERLAP: u32 = 8;
+/// Largest number of lags: 0 to four averaging times.
+const MAX_LAGS: usize = 4 * MAX_OVERLAP as usize + 1;
+
+/// Equivalent degrees of freedom of a point under a mixture of terms, each with its fraction of the variance; first with
+/// all correlations, then without those of narrow-band terms beyond two averaging times.
+///
+/// Both are sums over the covariances of the second differences, as in Greenhall and Riley (see [`confidence`]). A
+/// deterministic term repeats in every record and adds scatter only through its product with the noise. A narrow-band term
+/// stays correlated over many averaging times. The result is 10¹⁸ if the mixture has no random term.
+///
+/// [`confidence`]: crate::confidence
+#[inline(never)] // its stack frame would otherwise be part of every caller's
+pub(crate) fn degrees_of_freedom(
+    parts: &[(NoiseTerm, f64)],
+    point: &AllanPoint,
+    sample_period: f64,
+    flicker: &FlickerCorrelations,
+) -> (f64, f64) {
+    let overlap = point.overlap.min(MAX_OVERLAP);
+    let count = point.count as f64 * f64::from(overlap) / f64::from(point.overlap);
+    let reach = |times: u32| (u64::from(times * overlap).min(point.count.saturating_sub(1))) as usize + 1;
+    let (mut noise, mut deterministic) = ([0.0_f32; MAX_LAGS], [0.0_f32; MAX_LAGS]);
+    let mut far = 0.0;
+    for (kind, share) in parts {
+        let sums = match kind {
+            NoiseTerm::BiasInstability => &mut noise[..reach(4)],
+            kind if kind.is_deterministic() => &mut deterministic[..reach(4)],
+            // Correlations beyond two averaging times are 0 or part of `far`.
+            _ => &mut noise[..reach(2)],
+        };
+        match kind {
+            NoiseTerm::BiasInstability => flicker.add(*share as f32, overlap, sums),
+            kind => add_correlations(kind, *share as f32, point.n, overlap, sample_period, sums),
+        }
+        let stride = point.n as f64 / f64::from(overlap);
+        far += 2.0 * share * share * kind.squared_covariance_tail(point.n, stride, sample_period);
+    }
+    let pairs = noise.iter().zip(&deterministic).map(|(noise, fixed)| f64::from(noise * (noise + 2.0 * fixed)));
+    let weight = |lag: usize| if lag == 0 { 1.0 } else { 2.0 * (1.0 - lag as f64 / count) };
+    let near: f64 = pairs.enumerate().map(|(lag, pair)| if pair == 0.0 { 0.0 } else { weight(lag) * pair }).sum();
+    let edf = |pairs: f64| clamp(count / pairs, 1.0_f64.min(count), 1e18);
+    (edf(near + far), edf(near))
+}
+
+/// Correlations of second differences of flicker noise, computed once for all points: they depend only on the lag in
+/// averaging times.
+pub(crate) struct FlickerCorrelations {
+    /// Number of strides per averaging time; 0 if the table is empty.
+    overlap: u32,
+    table: [f32; MAX_LAGS],
+}
+
+impl FlickerCorrelations {
+    /// A table without entries.
+    pub(crate) const EMPTY: Self = Self { overlap: 0, table: [0.0; MAX_LAGS] };
+
+    /// Computes the correlations for points of this overlap and of those that divide it.
+    pub(crate) fn fill(&mut self, overlap: u32) {
+        let overlap = overlap.min(MAX_OVERLAP);
+        (self.overlap, self.table) = (overlap, [0.0; MAX_LAGS]);
+        add_flicker_correlations(1.0, overlap, &mut self.table);
+    }
+
+    /// Adds `share` times the correlations at lags of 0, 1, 2 … strides to `sums`.
+    fn add(&self, share: f32, overlap: u32, sums: &mut [f32]) {
+        let per_lag = if self.overlap.is_multiple_of(overlap) { (self.overlap / overlap) as usize } else { 0 };
+        if per_lag == 0 || (sums.len() - 1) * per_lag >= MAX_LAGS {
+            return add_flicker_correlations(share, overlap, sums);
+        }
+        for (sum, known) in sums.iter_mut().zip(self.table.iter().step_by(per_lag)) {
+            *sum += share * known;
+        }
+    }
+}
+
+/// [`add_correlations`] of flicker noise. They do not depend on the averaging factor, for which the overlap serves.
+fn add_flicker_correlations(share: f32, overlap: u32, sums: &mut [f32]) {
+    add_correlations(&NoiseTerm::BiasInstability, share, u64::from(overlap), overlap, 1.0, sums);
+}
+
+/// Adds `share` times the correlations of second differences of averages over `n` samples to `sums`, at lags of 0, 1, 2 …
+/// strides of `n/overlap` samples.
+///
+/// For up to [`MAX_LAGS`] lags and an overlap of up to [`MAX_OVERLAP`]; otherwise nothing is added.
+#[inline(never)] // its stack frame would otherwise be part of every caller's
+fn add_correlations(kind: &NoiseTerm, share: f32, n: u64, overlap: u32, sample_period: f64, sums: &mut [f32]) {
+    let width = overlap as usize;
+    let mut table = [0.0; MAX_LAGS + 2 * MAX_OVERLAP as usize];
+    let Some(v) = table.get_mut(..sums.len() + 2 * width) else { return };
+    kind.sum_variances(n as f64 / f64::from(overlap), sample_period, v);
+    // The covariances are these fourth differences times `−1/(4n²)`.
+    let fourth = |lag: usize| {
+        6.0 * v[lag] - 4.0 * (v[lag.abs_diff(width)] + v[lag + width]) + v[lag.abs_diff(2 * width)] + v[lag + 2 * width]
+    };
+    let whole = fourth(0);
+    if whole < 0.0 {
+        for (lag, sum) in sums.iter_mut().enumerate() {
+            *sum += share * clamp(fourth(lag) / whole, -1.0, 1.0) as f32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::{PERIOD, autocovariance, stationary};
+    use std::vec::Vec;
+
+    #[test]
+    fn second_differences_correlate_as_the_autocovariance_says() {
+        for kind in stationary() {
+            let n = 6_usize;
+            // The second difference of averages is a filter of 2n weights; at n = 6, lags on both sides of 2n.
+            let weights: Vec<f64> = (0..2 * n).map(|i| if i < n { 1.0 } else { -1.0 } / n as f64).collect();
+            let mut correlations = [0.0; 31];
+            add_correlations(&kind, 1.0, n as u64, n as u32, PERIOD, &mut correlations);
+            for lag in [0_usize, 1, 5, 6, 11, 12, 13, 30] {
+                let mut covariance = 0.0;
+                for (i, a) in weights.iter().enumerate() {
+                    for (j, b) in weights.iter().enumerate() {
+                        covariance += a * b * autocovariance(&kind, (lag + i).abs_diff(j)) / 2.0;
+                    }
+                }
+                let found = f64::from(correlations[lag]) * kind.avar(n as u64, PERIOD);
+                let tolerance = 1e-6 * kind.avar(n as u64, PERIOD);
+                assert!((found - covariance).abs() < tolerance, "{kind:?}, lag {lag}: {found} and {covariance}");
+            }
+        }
+    }
 }

@@ -1,11 +1,10 @@
-//! Which power law rules where on a curve.
+//! Power-law noise types, and the classification of each point of a curve by its local slope.
 
-use crate::confidence::Shares;
 use crate::math::coarse_log2;
 
-/// A power law of the noise of a rate.
+/// A power-law noise of a rate signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Noise {
+pub enum PowerLaw {
     /// Angle quantization, σ² ∝ τ⁻².
     Quantization,
     /// Angle random walk, white rate noise, σ² ∝ τ⁻¹.
@@ -16,17 +15,17 @@ pub enum Noise {
     RandomWalk,
 }
 
-impl Noise {
+impl PowerLaw {
     const ALL: [Self; 4] = [Self::Quantization, Self::White, Self::Flicker, Self::RandomWalk];
 
-    /// All of the variance due to this noise.
+    /// The whole variance attributed to this noise.
     #[must_use]
-    pub const fn shares(self) -> Shares {
+    pub const fn variance_fractions(self) -> VarianceFractions {
         match self {
-            Self::Quantization => Shares::QUANTIZATION,
-            Self::White => Shares::WHITE,
-            Self::Flicker => Shares::FLICKER,
-            Self::RandomWalk => Shares::RANDOM_WALK,
+            Self::Quantization => VarianceFractions::QUANTIZATION,
+            Self::White => VarianceFractions::WHITE,
+            Self::Flicker => VarianceFractions::FLICKER,
+            Self::RandomWalk => VarianceFractions::RANDOM_WALK,
         }
     }
 
@@ -42,41 +41,67 @@ impl Noise {
     }
 }
 
-/// An octave of a curve, as far as the noise type needs it.
+/// The fractions of a variance that are due to each power law; they sum to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VarianceFractions {
+    /// Angle quantization, σ² ∝ τ⁻².
+    pub quantization: f64,
+    /// Angle random walk (white rate noise), σ² ∝ τ⁻¹.
+    pub white: f64,
+    /// Bias instability (flicker rate noise), σ² constant.
+    pub flicker: f64,
+    /// Rate random walk and steeper, σ² ∝ τ.
+    pub random_walk: f64,
+}
+
+impl VarianceFractions {
+    /// White rate noise alone.
+    pub const WHITE: Self = Self { quantization: 0.0, white: 1.0, flicker: 0.0, random_walk: 0.0 };
+    /// Flicker rate noise alone.
+    pub const FLICKER: Self = Self { quantization: 0.0, white: 0.0, flicker: 1.0, random_walk: 0.0 };
+    /// Random-walk rate noise alone.
+    pub const RANDOM_WALK: Self = Self { quantization: 0.0, white: 0.0, flicker: 0.0, random_walk: 1.0 };
+    /// Angle quantization alone.
+    pub const QUANTIZATION: Self = Self { quantization: 1.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
+}
+
+/// What the classification needs of one octave of a curve.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Level {
+pub(crate) struct OctaveVariance {
     /// `log2 n`.
     pub(crate) octave: f64,
     pub(crate) variance: f64,
-    /// Stretches of `n` samples that the differences covered: about the degrees of freedom of any noise.
+    /// Number of stretches of `n` samples that the differences cover: about the degrees of freedom for any noise.
     pub(crate) weight: f64,
 }
 
-/// Standard deviation of the slope `d log σ²/d log τ` that a window of octaves must reach: power laws are 1 apart,
-/// so it leaves ½ three deviations away; less in truth, as neighbouring octaves are correlated.
+/// The window of octaves grows until the standard deviation of the slope `d log σ²/d log τ` is below this value.
+///
+/// Slopes of power laws differ by 1, so the decision threshold of ½ is three such deviations away. The correlation of
+/// neighbouring octaves, which is ignored here, makes the true deviation larger.
 const SLOPE_DEVIATION: f64 = 0.16;
 
-/// The power law that explains the octaves around `at` best, by least squares of the logarithm.
+/// The power law with the smallest weighted squared residual in `log σ²` over the octaves around `at`.
 ///
-/// The window starts with the neighbours of the octave and grows towards shorter times, which are better known, until
-/// it can tell one power law from the next.
-pub(crate) fn identify(levels: &[Level], at: usize) -> Noise {
+/// The window starts with the two neighbours of the octave and is extended towards shorter averaging times, which have
+/// more degrees of freedom, until the slope is known to [`SLOPE_DEVIATION`].
+pub(crate) fn classify(levels: &[OctaveVariance], at: usize) -> PowerLaw {
     let last = (at + 1).min(levels.len() - 1);
     let mut first = at.saturating_sub(1);
     while first > 0 && slope_variance(&levels[first..=last]) > SLOPE_DEVIATION * SLOPE_DEVIATION {
         first -= 1;
     }
     let window = &levels[first..=last];
-    let misfit = |noise: Noise| {
-        let residual = |level: &Level| {
+    let misfit = |noise: PowerLaw| {
+        let residual = |level: &OctaveVariance| {
             let ratio = level.variance / window[0].variance;
             coarse_log2(ratio) - noise.log2_avar(level.octave)
         };
         let mean = weighted_mean(window, residual);
         weighted_mean(window, |level| (residual(level) - mean) * (residual(level) - mean))
     };
-    let mut best = (Noise::White, misfit(Noise::White));
-    for noise in Noise::ALL {
+    let mut best = (PowerLaw::White, misfit(PowerLaw::White));
+    for noise in PowerLaw::ALL {
         let misfit = misfit(noise);
         if misfit < best.1 {
             best = (noise, misfit);
@@ -85,13 +110,14 @@ pub(crate) fn identify(levels: &[Level], at: usize) -> Noise {
     best.0
 }
 
-fn weighted_mean(levels: &[Level], of: impl Fn(&Level) -> f64) -> f64 {
+fn weighted_mean(levels: &[OctaveVariance], of: impl Fn(&OctaveVariance) -> f64) -> f64 {
     let weight: f64 = levels.iter().map(|level| level.weight).sum();
     levels.iter().map(|level| level.weight * of(level)).sum::<f64>() / weight
 }
 
-/// Of the weighted least-squares line through the octaves, each with a variance of `2/weight` in the natural logarithm.
-fn slope_variance(levels: &[Level]) -> f64 {
+/// Variance of the slope of the weighted least-squares line through the octaves. The natural logarithm of an octave's
+/// variance is assigned the variance `2/weight`.
+fn slope_variance(levels: &[OctaveVariance]) -> f64 {
     let mean = weighted_mean(levels, |level| level.octave);
     let spread: f64 = levels.iter().map(|level| level.weight * (level.octave - mean) * (level.octave - mean)).sum();
     2.0 / (core::f64::consts::LN_2 * core::f64::consts::LN_2 * spread)

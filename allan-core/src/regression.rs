@@ -1,112 +1,188 @@
-//! How much of a channel follows other channels: regression at every octave at once, from curves and couplings alone.
+//! Regression of a channel on covariates (temperature, supply, acceleration), from Allan variance curves and Allan
+//! covariances alone, over all octaves at once.
 //!
-//! In the differences of an octave a channel is `d(y) = Σ βᵢ·d(cᵢ) + d(e)`. Each octave is worth its degrees of
-//! freedom over the variance of the rest `e`, which is the fitted model's. A covariate that is measured with noise of
-//! its own would make `β` too small; what its curve shows as white is taken off first. Slow channels have few degrees
-//! of freedom, and a chance likeness of two random walks goes far: a sensitivity is judged by Student's distribution.
+//! The second differences of an octave are modelled as `d(y) = Σ βᵢ·d(cᵢ) + d(e)`. An octave has the weight of its degrees
+//! of freedom over the variance of the residual `e`, which a fitted model gives. Measurement noise of a covariate would
+//! bias `β` towards 0; the quantization and white noise that its curve shows are subtracted first. Slow channels have few
+//! degrees of freedom, and two random walks can be similar by chance, so the significance of a sensitivity is that of
+//! Student's distribution.
 
-mod covariate;
-mod octave;
-mod sensitivity;
+mod uncertainty;
 
-pub use covariate::Covariate;
-pub use sensitivity::Sensitivity;
+pub use uncertainty::Sensitivity;
 
 use crate::coupling::Covariance;
+use crate::curve::{AllanPoint, Curve};
 use crate::fit::least_squares::{entry, solve, triangle};
-use crate::fit::{Free, estimate};
+use crate::fit::{FreeShapes, estimate, fit};
 use crate::math::sqrt;
-use crate::{Curve, Kind, Model, Point};
+use crate::model::Model;
+use crate::term::NoiseTerm;
 use heapless::Vec;
-use octave::{Octave, freedom, is_poor, scatter};
+use uncertainty::{OctaveWeight, edf, is_poor, sum_variance};
 
-/// Covariates that can be taken at once.
+/// Largest number of covariates of one regression.
 pub const MAX_COVARIATES: usize = 6;
-/// Degrees of freedom below which nothing is said.
-const LEAST_FREEDOM: f64 = 2.0;
-/// Standard deviations of a normal distribution from which on a sensitivity is believed. Smooth covariates pass it by
-/// chance in some 2 of 10,000 pairs, more often than the normal distribution says.
-const DOUBT: f64 = 4.5;
+/// Degrees of freedom below which no sensitivity is estimated.
+const LEAST_EDF: f64 = 2.0;
+/// Significance, in standard deviations of a normal distribution, from which a sensitivity is accepted. Pairs of smooth
+/// independent channels exceed it in about 2 of 10,000 cases, more often than the normal distribution says.
+const SIGNIFICANT: f64 = 4.5;
 
-/// The coupling of two channels in the product of their physical units.
-pub type Shared<const POINTS: usize> = Vec<Covariance, POINTS>;
+/// Allan covariances of two channels, by averaging factor, in the product of their units.
+pub type CovarianceCurve<const POINTS: usize> = Vec<Covariance, POINTS>;
+
+/// Octaves at which the measurement noise of a covariate exceeds this fraction of its variance are not used.
+const NOISE_FRACTION: f64 = 0.5;
+
+/// First Allan variance, in LSB², above which the noise of a covariate dithers its rounding to counts.
+const DITHERED: f64 = 0.2;
+
+/// The terms of a covariate's measurement noise.
+const NOISE: [NoiseTerm; 2] = [NoiseTerm::Quantization, NoiseTerm::AngleRandomWalk];
+
+/// A measured quantity on which a channel may depend: its Allan variance at up to `POINTS` averaging factors, and its
+/// measurement noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariate<const POINTS: usize> {
+    sample_period: f64,
+    /// Coefficients of [`NOISE`].
+    noise: [f64; NOISE.len()],
+    /// Variance of the rounding to counts if the noise is too small to dither it, else 0; in the square of the unit.
+    rounding: f64,
+    /// Averaging factors and Allan variances.
+    points: Vec<(u64, f64), POINTS>,
+}
+
+impl<const POINTS: usize> Covariate<POINTS> {
+    /// A covariate with this curve in its unit, of which one count is `lsb`. Its measurement noise is estimated from the
+    /// curve.
+    ///
+    /// Averaging factors below `from` are not used, nor those beyond the first `POINTS`.
+    #[must_use]
+    #[inline(never)] // its stack frame would otherwise be part of every caller's
+    pub fn new<const MEASURED: usize>(curve: &Curve<MEASURED>, lsb: f64, from: u64) -> Self {
+        let [quantization, white] = NOISE;
+        let model = fit(
+            curve,
+            &[quantization, white, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk, NoiseTerm::RateRamp],
+        );
+        let mut noise = [0.0; NOISE.len()];
+        noise.iter_mut().zip(model.terms()).for_each(|(noise, term)| *noise = term.value);
+        let dithered = curve.points().first().is_some_and(|point| point.avar > DITHERED * lsb * lsb);
+        Self { noise, rounding: if dithered { 0.0 } else { lsb * lsb / 12.0 }, ..Self::as_measured(curve, from) }
+    }
+
+    /// A covariate that is taken as measured: its noise counts as part of it.
+    #[must_use]
+    pub fn as_measured<const MEASURED: usize>(curve: &Curve<MEASURED>, from: u64) -> Self {
+        let points = curve.points().iter().filter(|point| point.n >= from);
+        Self {
+            sample_period: curve.sample_period(),
+            noise: [0.0; NOISE.len()],
+            rounding: 0.0,
+            points: points.map(|point| (point.n, point.avar)).take(POINTS).collect(),
+        }
+    }
+
+    /// The same covariate in another stretch of time, with the measurement noise of this one.
+    #[must_use]
+    pub fn continued<const MEASURED: usize>(&self, curve: &Curve<MEASURED>, from: u64) -> Self {
+        Self { noise: self.noise, rounding: self.rounding, ..Self::as_measured(curve, from) }
+    }
+
+    /// Measured Allan variance at averaging factor `n`.
+    fn avar(&self, n: u64) -> Option<f64> {
+        self.points.iter().find(|point| point.0 == n).map(|&(_, avar)| avar)
+    }
+
+    /// Allan variance without the measurement noise, and as measured; `None` where too much of it is noise.
+    fn signal(&self, n: u64) -> Option<(f64, f64)> {
+        let measured = self.avar(n)?;
+        let avar = |(kind, value): (&NoiseTerm, f64)| value * value * kind.avar(n, self.sample_period);
+        let noise: f64 = NOISE.iter().zip(self.noise).map(avar).sum();
+        let is_usable = measured > 0.0 && noise < NOISE_FRACTION * measured && measured > 4.0 * self.rounding;
+        is_usable.then_some((measured - noise, measured))
+    }
+}
 
 /// Sensitivities to several covariates at once.
 type Sensitivities = Vec<Sensitivity, MAX_COVARIATES>;
 
-/// A channel, the covariates that it may follow, and what they share, at `COUPLED` octaves or fewer.
-pub struct Beside<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
-    /// The channel.
+/// A channel, the covariates on which it may depend, and their Allan covariances at up to `COUPLED` octaves.
+pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
+    /// Curve of the channel, in its unit.
     pub channel: &'a Curve<POINTS>,
     /// At most [`MAX_COVARIATES`].
     pub covariates: &'a [Covariate<COUPLED>],
-    /// The covariance of the channel (`None`) or of another covariate with a covariate at an averaging factor, in the
-    /// product of their units; `None` where it is not known.
+    /// Returns the Allan covariance of the channel (first argument `None`) or of another covariate (`Some(index)`) with a
+    /// covariate (second argument) at an averaging factor, in the product of their units; `None` if it is not known.
     pub covariance: &'a dyn Fn(Option<usize>, usize, u64) -> Option<f64>,
 }
 
-impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
-    /// The covariates that the channel follows beyond doubt, the clearest chosen first.
+impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, COUPLED> {
+    /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen.
     #[must_use]
-    pub fn followed(&self) -> Vec<Sensitivity, MAX_COVARIATES> {
-        self.followed_while(&mut || true).unwrap_or_default()
+    pub fn sensitivities(&self) -> Vec<Sensitivity, MAX_COVARIATES> {
+        self.sensitivities_while(&mut || true).unwrap_or_default()
     }
 
-    /// The same, asking before every fit whether to keep on; `None` if the answer was no.
+    /// As [`sensitivities`](Self::sensitivities), calling `keep_on` before every fit; `None` if it returned false.
     #[must_use]
-    #[inline(never)] // here and below: so that stack frames do not add up
-    pub fn followed_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
-        let mut followed = Sensitivities::new();
-        let (mut octaves, mut reweighed) = (Vec::new(), Vec::new());
-        while followed.len() < self.covariates.len() {
-            self.weigh(&followed, &mut octaves);
+    #[inline(never)] // here and below: so that stack frames do not add up in the caller
+    pub fn sensitivities_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
+        let mut accepted = Sensitivities::new();
+        let (mut octaves, mut reweighted) = (Vec::new(), Vec::new());
+        while accepted.len() < self.covariates.len() {
+            self.set_weights(&accepted, &mut octaves);
             let mut best = Sensitivities::new();
-            let clarity = |tried: &Sensitivities| tried.last().map_or(0.0, Sensitivity::sigmas);
-            for next in (0..self.covariates.len()).filter(|i| followed.iter().all(|known| known.covariate != *i)) {
+            let significance = |tried: &Sensitivities| tried.last().map_or(0.0, Sensitivity::sigmas);
+            for next in (0..self.covariates.len()).filter(|i| accepted.iter().all(|known| known.covariate != *i)) {
                 if !keep_on() {
                     return None;
                 }
                 let chosen: Vec<usize, MAX_COVARIATES> =
-                    followed.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
-                // What is left is smaller when it is subtracted: weigh the octaves by that.
-                let tried = self.sensitivities(&chosen, &octaves).and_then(|first| {
-                    self.weigh(&first, &mut reweighed);
-                    self.sensitivities(&chosen, &reweighed)
+                    accepted.iter().map(|known| known.covariate).chain(core::iter::once(next)).collect();
+                // The residual without these covariates is smaller: estimate again with its weights.
+                let tried = self.estimate_for(&chosen, &octaves).and_then(|first| {
+                    self.set_weights(&first, &mut reweighted);
+                    self.estimate_for(&chosen, &reweighted)
                 });
                 let tried = tried.unwrap_or_default();
-                if clarity(&tried).total_cmp(&clarity(&best)).is_ge() {
+                if significance(&tried).total_cmp(&significance(&best)).is_ge() {
                     best = tried;
                 }
             }
-            if clarity(&best) < DOUBT {
+            if significance(&best) < SIGNIFICANT {
                 break;
             }
-            followed = best;
+            accepted = best;
         }
-        Some(followed)
+        Some(accepted)
     }
 
-    /// Finds what each octave that is known of a covariate is worth, as far as N, B and K describe the channel without
-    /// what it follows.
+    /// Sets the weights of the octaves at which any covariate is known, from N, B and K fitted to the channel without its
+    /// dependence on the covariates.
     #[inline(never)]
-    fn weigh(&self, followed: &[Sensitivity], octaves: &mut Vec<Octave, COUPLED>) {
-        let mut rest = Curve::empty();
-        rest.copy(self.channel);
-        self.subtract(&mut rest, followed, |covariate, n| self.measured(covariate, n));
+    fn set_weights(&self, sensitivities: &[Sensitivity], octaves: &mut Vec<OctaveWeight, COUPLED>) {
+        let mut residual = Curve::empty();
+        residual.copy_from(self.channel);
+        self.subtract(&mut residual, sensitivities, |covariate, n| self.measured(covariate, n));
         let mut model = Model::new(0.0, []);
-        estimate(&rest, &Kind::DECLARED, Free::Nothing, &mut || true, &mut model);
-        let is_known = |point: &&Point| self.covariates.iter().any(|covariate| covariate.avar(point.n).is_some());
+        estimate(&residual, &NoiseTerm::BASELINE, FreeShapes::None, &mut || true, &mut model);
+        let is_known = |point: &&AllanPoint| self.covariates.iter().any(|covariate| covariate.avar(point.n).is_some());
         octaves.clear();
-        let is_poor = is_poor(&model, rest.points());
-        let known = rest.points().iter().filter(is_known).filter_map(|point| Octave::of(point, &model, is_poor));
+        let is_poor = is_poor(&model, residual.points());
+        let known =
+            residual.points().iter().filter(is_known).filter_map(|point| OctaveWeight::new(point, &model, is_poor));
         octaves.extend(known.take(COUPLED));
     }
 
     /// Sensitivities to the covariates in `chosen`.
     ///
-    /// `None` where the covariates move too little, or too much alike.
+    /// `None` if the covariates vary too little or are too similar to each other.
     #[inline(never)]
-    fn sensitivities(&self, chosen: &[usize], octaves: &[Octave]) -> Option<Sensitivities> {
+    fn estimate_for(&self, chosen: &[usize], octaves: &[OctaveWeight]) -> Option<Sensitivities> {
         let mut normal = [0.0; triangle(MAX_COVARIATES)];
         let mut value = [0.0; MAX_COVARIATES];
         for octave in octaves {
@@ -130,28 +206,29 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
                 entry * row.iter().zip(scatter).map(|(a, b)| a * b).sum::<f64>()
             };
             let error = sqrt(row.into_iter().zip(scatter).map(along).sum());
-            let freedom = freedom(octaves, |n| self.measured(covariate, n));
-            let left = freedom - chosen.len() as f64;
-            (left >= LEAST_FREEDOM).then(|| Sensitivity::new(covariate, value[i], error * sqrt(freedom / left), left))
+            let edf = edf(octaves, |n| self.measured(covariate, n));
+            let left = edf - chosen.len() as f64;
+            (left >= LEAST_EDF).then(|| Sensitivity::new(covariate, value[i], error * sqrt(edf / left), left))
         };
         chosen.iter().enumerate().map(sensitivity).collect()
     }
 
-    /// Covariance of the right side of the normal equations.
+    /// Covariance matrix of the right side of the normal equations.
     #[inline(never)]
-    fn scatter(&self, chosen: &[usize], octaves: &[Octave]) -> [[f64; MAX_COVARIATES]; MAX_COVARIATES] {
+    fn scatter(&self, chosen: &[usize], octaves: &[OctaveWeight]) -> [[f64; MAX_COVARIATES]; MAX_COVARIATES] {
         let mut matrix = [[0.0; MAX_COVARIATES]; MAX_COVARIATES];
         for (i, &a) in chosen.iter().enumerate() {
             for (j, &b) in chosen[..=i].iter().enumerate() {
-                let of = |n: u64| if i == j { self.measured(a, n) } else { self.shared(a, b, n) };
-                matrix[i][j] = scatter::<COUPLED>(octaves, of);
+                let common = |n: u64| if i == j { self.measured(a, n) } else { self.shared(a, b, n) };
+                matrix[i][j] = sum_variance::<COUPLED>(octaves, common);
                 matrix[j][i] = matrix[i][j];
             }
         }
         matrix
     }
 
-    /// The channel's curve less what follows the covariates.
+    /// The channel's curve without its dependence on the covariates: what remains if `Σ βᵢ·cᵢ` is subtracted with the
+    /// covariates free of measurement noise.
     #[must_use]
     pub fn compensated(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
         let mut curve = self.channel.clone();
@@ -159,40 +236,32 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         curve
     }
 
-    /// Takes covariates of such a variance from the channel's `curve`.
+    /// Subtracts the dependence on covariates with these variances from the channel's `curve`.
     fn subtract(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity], variance: impl Fn(usize, u64) -> f64) {
-        curve.change_avar(|point| {
-            let of = |a: &Sensitivity| {
+        curve.replace_avar(|point| {
+            let change = |a: &Sensitivity| {
                 let others = sensitivities.iter().filter(|b| b.covariate < a.covariate);
                 let products = others.map(|b| 2.0 * b.value * self.shared(a.covariate, b.covariate, point.n));
-                let followed = self.with_channel(a.covariate, point.n);
-                a.value * (a.value * variance(a.covariate, point.n) - 2.0 * followed + products.sum::<f64>())
+                let with_channel = self.with_channel(a.covariate, point.n);
+                a.value * (a.value * variance(a.covariate, point.n) - 2.0 * with_channel + products.sum::<f64>())
             };
-            // An estimate of what is left can come out below 0 where almost nothing is.
+            // The estimate can be negative where almost nothing remains.
             let least = 0.01 * point.avar;
-            (point.avar + sensitivities.iter().map(of).sum::<f64>()).max(least)
+            (point.avar + sensitivities.iter().map(change).sum::<f64>()).max(least)
         });
     }
 
-    /// The channel's curve when the covariates, as they are measured, are subtracted from its samples.
+    /// Makes `curve`, a copy of the channel's curve, that of the stream `y − Σ βᵢ·cᵢ` with the covariates as measured,
+    /// including their noise.
     ///
-    /// Exact where all the covariances are known, the noise that the covariates bring included; elsewhere it is that
-    /// of the channel.
-    #[must_use]
-    pub fn subtracted(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
-        let mut curve = self.channel.clone();
-        self.subtract_from(&mut curve, sensitivities);
-        curve
-    }
-
-    /// Makes a copy of the channel's curve that in place.
+    /// Exact where all covariances are known; elsewhere the point stays as it is.
     pub fn subtract_from(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity]) {
-        curve.change_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
+        curve.replace_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
     }
 
-    /// The same at one point; `None` where a covariance is not known.
+    /// The Allan variance of that stream at one point; `None` if a covariance is not known.
     #[must_use]
-    pub fn subtracted_at(&self, point: &Point, sensitivities: &[Sensitivity]) -> Option<f64> {
+    pub fn subtracted_at(&self, point: &AllanPoint, sensitivities: &[Sensitivity]) -> Option<f64> {
         let mut avar = point.avar;
         for (i, a) in sensitivities.iter().enumerate() {
             let own = self.covariates[a.covariate].avar(point.n)?;
@@ -204,16 +273,17 @@ impl<const POINTS: usize, const COUPLED: usize> Beside<'_, POINTS, COUPLED> {
         Some(avar.max(0.0))
     }
 
+    /// Allan covariance of the channel with a covariate; 0 if it is not known.
     fn with_channel(&self, covariate: usize, n: u64) -> f64 {
         (self.covariance)(None, covariate, n).unwrap_or_default()
     }
 
-    /// All the variance of a covariate at an octave that says something of it.
+    /// Allan variance of a covariate as measured; 0 at an octave that is not usable.
     fn measured(&self, covariate: usize, n: u64) -> f64 {
         self.covariates[covariate].signal(n).map_or(0.0, |(_, measured)| measured)
     }
 
-    /// What two covariates have in common, noise taken off; 0 at an octave that says nothing of either.
+    /// Allan covariance of two covariates, without measurement noise; 0 at an octave that is not usable for both.
     fn shared(&self, a: usize, b: usize, n: u64) -> f64 {
         let signal = |covariate: usize| self.covariates[covariate].signal(n);
         match (signal(a), signal(b)) {

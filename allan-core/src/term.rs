@@ -1,60 +1,28 @@
-//! The terms of the noise model: what each does to sampled data.
+//! The terms of a noise model in the nomenclature of IEEE Std 952, and what each contributes to sampled data.
 //!
-//! Every term knows its Allan variance for *samples* of the process (the continuous forms are 12 to 34 % off at the
-//! shortest averaging times), its power spectral density, and how its second differences hang together, which is
-//! what decides how much an estimate is worth.
+//! Every term has its Allan variance for *samples* of the process (the formulas for continuous time are 12 to 34 % off at
+//! the shortest averaging times), its power spectral density, and the correlation of its second differences, which
+//! determines the degrees of freedom of an estimate.
 
-pub mod correlation;
 mod exponential;
 mod filter;
-mod power_law;
-mod sinusoid;
+mod process;
 
 pub use exponential::{Markov, Resonance};
-pub use filter::Filter;
-pub use power_law::{AngleRandomWalk, BiasInstability, Quantization, RateRamp, RateRandomWalk};
-pub use sinusoid::Sinusoid;
+pub use filter::MovingAverageFilter;
+pub use process::{AngleRandomWalk, BiasInstability, Process, Quantization, RateRamp, RateRandomWalk, Sinusoid};
 
-use crate::confidence::Shares;
 use crate::math::clamp;
-use crate::model::MAX_SHAPE;
+use crate::noise_type::VarianceFractions;
 
-/// A process with a coefficient of 1, sampled every `sample_period` seconds.
-pub trait Process {
-    /// Variance of the sum of `m` samples, less what second differences do not see (constants, lines, parabolas).
-    ///
-    /// The Allan variance is `[4V(n) − V(2n)]/(2n²)`.
-    fn structure(&self, m: f64, sample_period: f64) -> f64;
+/// Largest number of shape parameters of a term.
+pub const MAX_SHAPE: usize = 2;
 
-    /// Two-sided power spectral density at `frequency` in Hz, aliases included, in unit²/Hz; 0 for what is not noise.
-    fn density(&self, frequency: f64, sample_period: f64) -> f64;
-
-    /// The shortest record, in s, that can tell the process from its neighbours.
-    fn record_needed(&self, sample_period: f64) -> f64;
-
-    /// Allan variance at averaging factor `n`.
-    fn avar(&self, n: u64, sample_period: f64) -> f64 {
-        let n = n as f64;
-        (4.0 * self.structure(n, sample_period) - self.structure(2.0 * n, sample_period)) / (2.0 * n * n)
-    }
-
-    /// [`structure`](Self::structure) of 0, 1, 2 … strides of `stride` samples, up to a factor and an error that does not
-    /// matter to how second differences that far apart hang together.
-    fn structures(&self, stride: f64, sample_period: f64, structures: &mut [f64]) {
-        for (k, structure) in structures.iter_mut().enumerate() {
-            *structure = self.structure(k as f64 * stride, sample_period);
-        }
-    }
-
-    /// Sum of the squares of the halved covariances of second differences at the lags `2n + stride, 2n + 2·stride …`; 0 for what forgets.
-    fn memory_beyond(&self, _n: u64, _stride: f64, _sample_period: f64) -> f64 {
-        0.0
-    }
-}
-
-/// A term of the noise model: a [`Process`] whose coefficient is to be estimated.
+/// A term of a noise model: a [`Process`] with an unknown coefficient.
+///
+/// "Unit" is that of the channel, of a rate in deg/s for example.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub enum NoiseTerm {
     /// Q: white noise of the angle, in unit·s.
     Quantization,
     /// N: white rate noise, in unit·√s; IEEE 952 angle random walk.
@@ -63,26 +31,27 @@ pub enum Kind {
     BiasInstability,
     /// K: random walk of the rate, in unit/√s.
     RateRandomWalk,
-    /// R: a steady trend, in unit/s.
+    /// R: a linear trend, in unit/s.
     RateRamp,
-    /// N behind a digital low-pass filter.
-    Filtered(Filter),
+    /// N after a digital low-pass filter, in unit·√s.
+    Filtered(MovingAverageFilter),
     /// Exponentially correlated noise; its standard deviation, in the unit itself.
     Markov(Markov),
-    /// A narrow-band, damped oscillation; its standard deviation, in the unit itself.
+    /// A damped oscillation driven by white noise; its standard deviation, in the unit itself.
     Resonance(Resonance),
-    /// A pure line; its amplitude, in the unit itself.
+    /// A sinusoid; its amplitude, in the unit itself.
     Sinusoid(Sinusoid),
 }
 
-/// Frequency over bandwidth from which on a curve cannot tell a resonance from a sinusoid.
+/// Frequency over bandwidth above which an Allan variance curve cannot distinguish a resonance from a sinusoid.
 const SHARPEST: f64 = 200.0;
-/// The same below which it is a Markov process rather than an oscillation.
+/// Frequency over bandwidth below which it cannot distinguish a resonance from a Markov process.
 const BROADEST: f64 = 1.5;
 
-const NONE: (&str, f64) = ("", 0.0);
+/// An unused shape parameter.
+const UNUSED: (&str, f64) = ("", 0.0);
 
-/// What a coefficient is measured in, the channel's unit being that of a rate.
+/// The unit of a coefficient in terms of the unit of the channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CoefficientUnit {
     /// unit·s
@@ -97,44 +66,44 @@ pub enum CoefficientUnit {
     PerSecond,
 }
 
-/// An expression of the process of a kind. What is not called is not linked, as it would be behind a `dyn`.
-macro_rules! of {
+/// Evaluates an expression with the process of a term, without dynamic dispatch: methods that are never called are not
+/// linked.
+macro_rules! with_process {
     ($kind:expr, $process:ident => $expression:expr) => {
         match $kind {
-            Kind::Quantization => {
+            NoiseTerm::Quantization => {
                 let $process = &Quantization;
                 $expression
             }
-            Kind::AngleRandomWalk => {
+            NoiseTerm::AngleRandomWalk => {
                 let $process = &AngleRandomWalk;
                 $expression
             }
-            Kind::BiasInstability => {
+            NoiseTerm::BiasInstability => {
                 let $process = &BiasInstability;
                 $expression
             }
-            Kind::RateRandomWalk => {
+            NoiseTerm::RateRandomWalk => {
                 let $process = &RateRandomWalk;
                 $expression
             }
-            Kind::RateRamp => {
+            NoiseTerm::RateRamp => {
                 let $process = &RateRamp;
                 $expression
             }
-            Kind::Filtered($process) => $expression,
-            Kind::Markov($process) => $expression,
-            Kind::Resonance($process) => $expression,
-            Kind::Sinusoid($process) => $expression,
+            NoiseTerm::Filtered($process) => $expression,
+            NoiseTerm::Markov($process) => $expression,
+            NoiseTerm::Resonance($process) => $expression,
+            NoiseTerm::Sinusoid($process) => $expression,
         }
     };
 }
-use of;
 
-impl Kind {
-    /// The model that is declared before anything is known: N, B, K.
-    pub const DECLARED: [Self; 3] = [Self::AngleRandomWalk, Self::BiasInstability, Self::RateRandomWalk];
+impl NoiseTerm {
+    /// The terms of the baseline model: N, B, K.
+    pub const BASELINE: [Self; 3] = [Self::AngleRandomWalk, Self::BiasInstability, Self::RateRandomWalk];
 
-    /// Name in reports.
+    /// Name in reports, for example `angle_random_walk`.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -150,7 +119,7 @@ impl Kind {
         }
     }
 
-    /// What the coefficient is called in reports.
+    /// Name of the coefficient in reports: `value`, `slope`, `deviation` or `amplitude`.
     #[must_use]
     pub const fn coefficient(&self) -> &'static str {
         match self {
@@ -161,7 +130,7 @@ impl Kind {
         }
     }
 
-    /// What the coefficient is measured in.
+    /// Unit of the coefficient.
     #[must_use]
     pub const fn unit(&self) -> CoefficientUnit {
         match self {
@@ -173,19 +142,19 @@ impl Kind {
         }
     }
 
-    /// Names and values of the parameters of its shape; the unused ones are nameless.
+    /// Names and values of its shape parameters, times in s and frequencies in Hz; unused ones have an empty name.
     #[must_use]
     pub const fn shape(&self) -> [(&'static str, f64); MAX_SHAPE] {
         match self {
-            Self::Markov(markov) => [("time_constant", markov.time_constant), NONE],
+            Self::Markov(markov) => [("time_constant", markov.time_constant), UNUSED],
             Self::Resonance(resonance) => [("frequency", resonance.frequency), ("bandwidth", resonance.bandwidth)],
-            Self::Sinusoid(sinusoid) => [("frequency", sinusoid.frequency), NONE],
+            Self::Sinusoid(sinusoid) => [("frequency", sinusoid.frequency), UNUSED],
             Self::Filtered(filter) => [("taps", filter.taps as f64), ("decimation", filter.decimation)],
-            _ => [NONE, NONE],
+            _ => [UNUSED, UNUSED],
         }
     }
 
-    /// The same term with another shape, in the order of [`shape`](Self::shape).
+    /// The same term with other shape parameters, in the order of [`shape`](Self::shape).
     #[must_use]
     pub(crate) fn with_shape(self, shape: [f64; MAX_SHAPE]) -> Self {
         match self {
@@ -198,13 +167,13 @@ impl Kind {
                 })
             }
             Self::Sinusoid(_) => Self::Sinusoid(Sinusoid { frequency: shape[0] }),
-            Self::Filtered(filter) => Self::Filtered(Filter { decimation: shape[1], ..filter }),
+            Self::Filtered(filter) => Self::Filtered(MovingAverageFilter { decimation: shape[1], ..filter }),
             other => other,
         }
     }
 
-    /// Which parameters of the shape can be searched for: real numbers, and not a decimation of 1 that is built in.
-    pub(crate) const fn freedom(&self) -> core::ops::Range<usize> {
+    /// Indices of the shape parameters that a fit can adjust: real numbers, except a decimation of exactly 1.
+    pub(crate) const fn free_parameters(&self) -> core::ops::Range<usize> {
         match self {
             Self::Markov(_) | Self::Sinusoid(_) => 0..1,
             Self::Resonance(_) => 0..2,
@@ -213,52 +182,60 @@ impl Kind {
         }
     }
 
-    /// What it does to samples.
+    /// The process of the term.
     #[must_use]
     pub fn process(&self) -> &dyn Process {
-        of!(self, process => process)
+        with_process!(self, process => process)
     }
 
     /// Allan variance at averaging factor `n` and `sample_period` seconds for a coefficient of 1.
     #[must_use]
     pub fn avar(&self, n: u64, sample_period: f64) -> f64 {
-        of!(self, process => process.avar(n, sample_period))
+        with_process!(self, process => process.avar(n, sample_period))
     }
 
-    /// [`Process::memory_beyond`] in units of the square of the Allan variance.
-    pub(crate) fn memory_beyond(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
+    /// [`Process::sum_variances`] of the term.
+    pub(crate) fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
+        with_process!(self, process => process.sum_variances(stride, sample_period, table));
+    }
+
+    /// [`Process::squared_covariance_tail`] in units of the square of the Allan variance.
+    pub(crate) fn squared_covariance_tail(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
         match self {
             Self::Markov(_) | Self::Resonance(_) => {
                 let avar = self.avar(n, sample_period);
-                of!(self, process => process.memory_beyond(n, stride, sample_period)) / (avar * avar)
+                with_process!(self, process => process.squared_covariance_tail(n, stride, sample_period))
+                    / (avar * avar)
             }
             _ => 0.0,
         }
     }
 
-    /// Whether it adds the same to every record, so that it blurs no estimate.
+    /// Whether it contributes the same to every record, so that it adds no scatter of its own to an estimate.
     pub(crate) const fn is_deterministic(&self) -> bool {
         matches!(self, Self::RateRamp | Self::Sinusoid(_))
     }
 
-    /// The power laws that it resembles at averaging factor `n`, in parts that sum to `share`.
-    pub(crate) fn share(&self, share: f64, n: u64, sample_period: f64) -> Shares {
-        let none = Shares { quantization: 0.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
+    /// The power laws that the term resembles at averaging factor `n`, as fractions that sum to `fraction`.
+    pub(crate) fn share(&self, fraction: f64, n: u64, sample_period: f64) -> VarianceFractions {
+        let none = VarianceFractions { quantization: 0.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
         match self {
-            Self::Quantization => Shares { quantization: share, ..none },
-            Self::AngleRandomWalk | Self::Resonance(_) | Self::Sinusoid(_) => Shares { white: share, ..none },
-            Self::BiasInstability => Shares { flicker: share, ..none },
-            Self::RateRandomWalk | Self::RateRamp => Shares { random_walk: share, ..none },
-            Self::Filtered(filter) if (n as f64) * filter.decimation < f64::from(filter.taps) => {
-                Shares { random_walk: share, ..none }
+            Self::Quantization => VarianceFractions { quantization: fraction, ..none },
+            Self::AngleRandomWalk | Self::Resonance(_) | Self::Sinusoid(_) => {
+                VarianceFractions { white: fraction, ..none }
             }
-            Self::Filtered(_) => Shares { white: share, ..none },
+            Self::BiasInstability => VarianceFractions { flicker: fraction, ..none },
+            Self::RateRandomWalk | Self::RateRamp => VarianceFractions { random_walk: fraction, ..none },
+            Self::Filtered(filter) if (n as f64) * filter.decimation < f64::from(filter.taps) => {
+                VarianceFractions { random_walk: fraction, ..none }
+            }
+            Self::Filtered(_) => VarianceFractions { white: fraction, ..none },
             Self::Markov(markov) => {
                 let averaged = n as f64 * sample_period / markov.time_constant;
                 match averaged {
-                    short if short < 0.7 => Shares { random_walk: share, ..none },
-                    long if long > 4.0 => Shares { white: share, ..none },
-                    _ => Shares { flicker: share, ..none },
+                    short if short < 0.7 => VarianceFractions { random_walk: fraction, ..none },
+                    long if long > 4.0 => VarianceFractions { white: fraction, ..none },
+                    _ => VarianceFractions { flicker: fraction, ..none },
                 }
             }
         }

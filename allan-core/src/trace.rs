@@ -1,251 +1,248 @@
-//! The loop: fit what is declared, look at the residual, name the term that is missing, add it, fit again.
+//! The trace: fits the baseline model (N, B, K) to a curve, finds the term that explains the residual best, adds it, fits
+//! again, and repeats this until the residual is within its uncertainty.
 //!
-//! Works on curves alone, so it runs wherever the estimator does. What a curve cannot show — where a line stands to a
-//! thousandth, when a step came — is for those who have the samples; the lines that they found are candidates here.
+//! It needs the curve alone, so it runs on a microcontroller too. Effects that a curve does not show, such as the exact
+//! frequency of a line, need the samples; lines from a spectrum can be passed as [candidates](LineCandidates).
 
-mod candidate;
+mod candidates;
 
-use crate::fit::{Baseline, Free, Goodness, deviance, estimate, goodness, set_bounds};
+pub use candidates::LineCandidates;
+
+use crate::curve::{AllanPoint, Curve};
+use crate::fit::{Baseline, FreeShapes, Goodness, deviance, estimate, goodness, set_bounds};
+use crate::math;
 use crate::model::{MAX_TERMS, Model};
-use crate::{Curve, Kind, math};
-use candidate::Families;
+use crate::term::{MovingAverageFilter, NoiseTerm};
+use candidates::Families;
 use heapless::Vec;
 
-/// Terms beyond the declared ones that a trace can add.
-pub const MAX_ADDED: usize = MAX_TERMS - Kind::DECLARED.len();
+/// Largest number of terms that a trace can add to the baseline model.
+pub const MAX_ADDED: usize = MAX_TERMS - NoiseTerm::BASELINE.len();
 
-/// What one more parameter has to lower the deviance by, in units of its scatter, to be believed: the square of 3.7
-/// standard deviations.
-const CONVINCING: f32 = 14.0;
-/// What each further parameter has to earn.
+/// Decrease of the deviance, in units of its scatter, from which an added parameter is accepted: the square of 3.7 standard
+/// deviations.
+const SIGNIFICANT: f32 = 14.0;
+/// Additional decrease required for each further parameter.
 const PER_PARAMETER: f32 = 4.0;
 
-/// Part of its cost that a candidate has to gain before its shape is searched for: between the shapes that are tried, the
-/// best is rarely twice as good.
+/// Fraction of the required decrease that the best starting shape of a family must reach for its shape to be searched. The
+/// best shape between the starting shapes rarely gains twice as much.
 const PROMISING: f32 = 0.4;
 
-/// A term that the declared model lacked.
+/// A term that was missing in the baseline model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
-    /// Which of the terms of the final model it is.
+pub struct AddedTerm {
+    /// Index of the term in the final model.
     pub term: usize,
-    /// How much the deviance fell when it was added, in units of its scatter: the square of a number of standard
+    /// Decrease of the deviance when it was added, in units of its scatter: the square of a significance in standard
     /// deviations.
     pub score: f64,
-    /// Where the residual was largest in units of its uncertainty before the term was added.
+    /// The largest residual, in units of its uncertainty, before the term was added.
     pub residual: Residual,
 }
 
-/// Measured against modelled at one averaging factor.
+/// Residual of the Allan deviation at one averaging factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
     /// Averaging factor, samples.
     pub n: u64,
     /// `σ/σ_model − 1`.
     pub excess: f64,
-    /// The same in standard deviations.
+    /// The residual in standard deviations.
     pub sigmas: f64,
 }
 
-/// What [`trace`] found.
+/// The result of a [`trace`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
-    /// The declared model, fitted.
+    /// The fitted baseline model.
     pub before: Model,
-    /// How well it describes the curve.
+    /// Goodness of the baseline model.
     pub before_goodness: Goodness,
-    /// The model with what was missing.
+    /// The fitted model with the added terms.
     pub after: Model,
-    /// How well that describes the curve.
+    /// Goodness of that model.
     pub after_goodness: Goodness,
-    /// What was added, in the order in which it was found. Empty: nothing is missing.
-    pub found: Vec<Found, MAX_ADDED>,
-}
-
-/// Where lines are looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Lines<'a> {
-    /// In the curve itself, which sees strong ones.
-    InTheCurve,
-    /// Nowhere but at these terms, which a spectrum has shown.
-    Known(&'a [Kind]),
+    /// The added terms, in the order in which they were found; empty if the baseline model is complete.
+    pub added: Vec<AddedTerm, MAX_ADDED>,
 }
 
 impl Trace {
-    /// N, B and K fitted to `curve`, and nothing sought.
+    /// The baseline model (N, B, K) fitted to `curve`, without added terms.
     #[must_use]
-    pub fn declared<const POINTS: usize>(curve: &Curve<POINTS>) -> Self {
+    pub fn baseline<const POINTS: usize>(curve: &Curve<POINTS>) -> Self {
         let mut trace = Self::empty();
-        trace.declare(curve);
+        trace.fit_baseline(curve);
         trace
     }
 
-    /// Of nothing: to be filled where it stands, as it is too large to be handed about on a small stack.
+    /// A trace of no curve, to be filled in place by [`fit_baseline`](Self::fit_baseline): a trace takes about 1.5 kB, too much to
+    /// be moved over a small stack.
     #[must_use]
     pub fn empty() -> Self {
         let nothing = Goodness { deviance: 0.0, p_value: 1.0 };
         let (before, after) = (Model::new(0.0, []), Model::new(0.0, []));
-        Self { before, before_goodness: nothing, after, after_goodness: nothing, found: Vec::new() }
+        Self { before, before_goodness: nothing, after, after_goodness: nothing, added: Vec::new() }
     }
 
-    /// Makes it that of [`declared`](Self::declared).
-    #[inline(never)] // so that its stack is not everybody's
-    pub fn declare<const POINTS: usize>(&mut self, curve: &Curve<POINTS>) {
-        estimate(curve, &Kind::DECLARED, Free::Nothing, &mut || true, &mut self.before);
+    /// Makes it the [`baseline`](Self::baseline) of `curve`.
+    #[inline(never)] // its stack frame would otherwise be part of every caller's
+    pub fn fit_baseline<const POINTS: usize>(&mut self, curve: &Curve<POINTS>) {
+        estimate(curve, &NoiseTerm::BASELINE, FreeShapes::None, &mut || true, &mut self.before);
         set_bounds(curve, &mut self.before);
         self.before_goodness = goodness(curve, &self.before);
         self.after.clone_from(&self.before);
         self.after_goodness = self.before_goodness;
-        self.found.clear();
+        self.added.clear();
     }
 }
 
-impl<'a> Lines<'a> {
-    /// A spectrum tells the frequency of a sinusoid far better than a curve could.
-    fn free(self) -> Free<'a> {
-        Free::AllBut(match self {
-            Self::InTheCurve => &[],
-            Self::Known(lines) => lines,
-        })
-    }
-}
-
-/// Fits N, B and K to `curve` and adds what is missing, the most telling term first, until the residual is noise.
+/// Fits N, B and K to `curve` and adds the missing terms, the most significant first, until no candidate is significant.
+///
+/// The candidates are quantization, a rate ramp, Markov processes, the lines of `lines`, and the digital low-pass filters
+/// that the sensor may have: `filters` lists their starting shapes, with a decimation of 1 where every value of the filter
+/// is read. The decimation of the others is adjusted. Of each of the two kinds the first 64 are used.
 #[must_use]
-pub fn trace<const POINTS: usize>(curve: &Curve<POINTS>, lines: Lines) -> Trace {
-    let mut trace = Trace::declared(curve);
-    let _nobody_said_no = trace_while(&mut trace, curve, lines, &mut || true);
+pub fn trace<const POINTS: usize>(
+    curve: &Curve<POINTS>,
+    lines: LineCandidates,
+    filters: &[MovingAverageFilter],
+) -> Trace {
+    let mut trace = Trace::baseline(curve);
+    let _completed = trace_while(&mut trace, curve, lines, filters, &mut || true);
     trace
 }
 
-/// The same from the curve's [`Trace::declared`] on, asking before every fit of a candidate and every step of a search
-/// whether to keep on; false, and the trace unfinished, if the answer was no.
+/// As [`trace`], for a `trace` that holds the curve's [`Trace::baseline`]. Calls `keep_on` before every fit of a candidate
+/// and every step of a shape search; if it returns false, the trace is left unfinished and the result is false.
 ///
-/// For a microcontroller that has other things to do as well: `keep_on` can do them.
+/// `keep_on` may do other work: a trace takes seconds on a microcontroller.
 #[must_use]
 pub fn trace_while<const POINTS: usize>(
     trace: &mut Trace,
     curve: &Curve<POINTS>,
-    lines: Lines,
+    lines: LineCandidates,
+    filters: &[MovingAverageFilter],
     keep_on: &mut dyn FnMut() -> bool,
 ) -> bool {
-    let mut search = Search { families: Families::new(curve, lines), free: lines.free(), keep_on };
+    let mut search = Search { families: Families::new(curve, lines, filters), free: lines.free(), keep_on };
     search.complete(curve, trace).is_ok()
 }
 
-/// The candidates, and whether to go on.
+/// The candidates of a trace and the function that may cancel it.
 struct Search<'a> {
     families: Families<'a>,
-    free: Free<'a>,
+    free: FreeShapes<'a>,
     keep_on: &'a mut dyn FnMut() -> bool,
 }
 
-/// Somebody said no.
-struct Stopped;
+/// The trace was cancelled by `keep_on`.
+struct Cancelled;
 
-/// The terms that explain most, and how much better they do than those before.
+/// The best extended set of terms: its decrease of the deviance beyond the required one, and its score.
 struct Best {
-    kinds: Vec<Kind, MAX_TERMS>,
+    kinds: Vec<NoiseTerm, MAX_TERMS>,
     gain: f32,
     score: f64,
 }
 
 impl Search<'_> {
-    /// Adds what is missing.
-    fn complete<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<(), Stopped> {
-        while trace.after.terms().len() < MAX_TERMS && !trace.found.is_full() && self.extend(curve, trace)? {
-            if trace.found.len() > 1 {
-                self.reconsider(curve, &mut trace.after, &trace.found)?;
+    /// Adds all missing terms.
+    fn complete<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<(), Cancelled> {
+        while trace.after.terms().len() < MAX_TERMS && !trace.added.is_full() && self.extend(curve, trace)? {
+            if trace.added.len() > 1 {
+                self.reconsider(curve, &mut trace.after, &trace.added)?;
             }
         }
-        if !trace.found.is_empty() {
+        if !trace.added.is_empty() {
             set_bounds(curve, &mut trace.after);
             trace.after_goodness = goodness(curve, &trace.after);
         }
         Ok(())
     }
 
-    /// Adds the term that is most telling; false if there is none.
-    #[inline(never)] // here and below: so that stack frames do not add up
-    fn extend<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<bool, Stopped> {
+    /// Adds the most significant term; false if there is none.
+    #[inline(never)] // here and below: so that stack frames do not add up in the caller
+    fn extend<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<bool, Cancelled> {
         let mut best = Best::NONE;
-        self.most_telling(curve, &trace.after, &mut best)?;
+        self.most_significant(curve, &trace.after, &mut best)?;
         if best.kinds.is_empty() {
             return Ok(false);
         }
         let residual = largest_residual(curve, &trace.after);
-        // A filter that is read slowly has taken the place of the white noise.
+        // A decimated filter replaces the white noise, which is the first term.
         let before = trace.after.terms().len();
         let term = if best.kinds.len() == before { 0 } else { before };
         estimate(curve, &best.kinds, self.free, self.keep_on, &mut trace.after);
-        self.go_on()?;
-        // There is room: nothing is added to a full list.
-        let _ = trace.found.push(Found { term, score: best.score, residual });
+        self.check_cancelled()?;
+        // There is room: the caller adds nothing to a full list.
+        let _ = trace.added.push(AddedTerm { term, score: best.score, residual });
         Ok(true)
     }
 
-    /// Terms that were found before others were known, put to the test again: each gives way to another that explains
-    /// more.
+    /// Tests the terms that were added before others were known again: each is replaced by another candidate that fits
+    /// significantly better.
     #[inline(never)]
     fn reconsider<const POINTS: usize>(
         &mut self,
         curve: &Curve<POINTS>,
         model: &mut Model,
-        found: &[Found],
-    ) -> Result<(), Stopped> {
+        added: &[AddedTerm],
+    ) -> Result<(), Cancelled> {
         let mut other = Model::new(0.0, []);
-        for known in found.iter().filter(|known| known.term >= Kind::DECLARED.len()) {
+        for known in added.iter().filter(|known| known.term >= NoiseTerm::BASELINE.len()) {
             let mut kinds = model.kinds();
             let old = kinds.remove(known.term);
-            estimate(curve, &kinds, Free::Nothing, self.keep_on, &mut other);
+            estimate(curve, &kinds, FreeShapes::None, self.keep_on, &mut other);
             let mut best = Best::NONE;
-            self.most_telling(curve, &other, &mut best)?;
-            // A slowly read filter would change the order of the terms.
+            self.most_significant(curve, &other, &mut best)?;
+            // A decimated filter would change the order of the terms.
             if best.kinds.len() <= kinds.len() {
                 continue;
             }
             let Some(new) = best.kinds.pop().filter(|new| new.name() != old.name()) else { continue };
-            // In the place of the old one.
+            // At the index of the old term.
             let _ = best.kinds.insert(known.term.min(kinds.len()), new);
             estimate(curve, &best.kinds, self.free, self.keep_on, &mut other);
-            self.go_on()?;
-            if deviance(curve, &other) < deviance(curve, model) - CONVINCING {
+            self.check_cancelled()?;
+            if deviance(curve, &other) < deviance(curve, model) - SIGNIFICANT {
                 core::mem::swap(model, &mut other);
             }
         }
         Ok(())
     }
 
-    /// The candidate that gains most beyond what its parameters cost; none if chance could do as much.
+    /// Sets `most` to the model extended by the candidate with the largest decrease of the deviance beyond the required one;
+    /// leaves it if no candidate reaches that.
     #[inline(never)]
-    fn most_telling<const POINTS: usize>(
+    fn most_significant<const POINTS: usize>(
         &mut self,
         curve: &Curve<POINTS>,
         model: &Model,
         most: &mut Best,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), Cancelled> {
         let mut baseline = Baseline::empty(curve);
-        baseline.take(model);
+        baseline.fill(model);
         let families = self.families;
         let mut kinds = model.kinds();
         let known = kinds.len();
         for family in families.all() {
-            let mut best: Option<(f32, Kind)> = None;
+            let mut best: Option<(f32, NoiseTerm)> = None;
             for shape in families.shapes(family) {
-                let Some(place) = place(&kinds[..known], &shape) else { continue };
-                self.go_on()?;
-                let fall = put(&mut kinds, place, shape, |kinds| baseline.fall(kinds));
+                let Some(at) = insertion_index(&kinds[..known], &shape) else { continue };
+                self.check_cancelled()?;
+                let fall = with_candidate(&mut kinds, at, shape, |kinds| baseline.fall(kinds));
                 if best.is_none_or(|(other, _)| fall.total_cmp(&other).is_ge()) {
                     best = Some((fall, shape));
                 }
             }
-            let cost = CONVINCING + PER_PARAMETER * (family.parameters() - 1) as f32;
-            let is_promising = |(fall, _): &(f32, Kind)| family.takes_a_place() || *fall > PROMISING * cost;
+            let cost = SIGNIFICANT + PER_PARAMETER * (family.parameters() - 1) as f32;
+            let is_promising = |(fall, _): &(f32, NoiseTerm)| family.replaces_a_term() || *fall > PROMISING * cost;
             let Some((_, shape)) = best.filter(is_promising) else { continue };
-            let Some(place) = place(&kinds[..known], &shape) else { continue };
-            self.go_on()?;
+            let Some(at) = insertion_index(&kinds[..known], &shape) else { continue };
+            self.check_cancelled()?;
             let improvement =
-                put(&mut kinds, place, shape, |kinds| baseline.improvement(kinds, self.free, self.keep_on));
+                with_candidate(&mut kinds, at, shape, |kinds| baseline.improvement(kinds, self.free, self.keep_on));
             let gain = improvement.gain(cost);
             if gain > 0.0 && gain >= most.gain {
                 (most.gain, most.score) = (gain, improvement.score());
@@ -255,8 +252,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn go_on(&mut self) -> Result<(), Stopped> {
-        if (self.keep_on)() { Ok(()) } else { Err(Stopped) }
+    fn check_cancelled(&mut self) -> Result<(), Cancelled> {
+        if (self.keep_on)() { Ok(()) } else { Err(Cancelled) }
     }
 }
 
@@ -264,41 +261,48 @@ impl Best {
     const NONE: Self = Self { kinds: Vec::new(), gain: 0.0, score: 0.0 };
 }
 
-/// Where a candidate belongs among the terms of a model; `None` if that has one that would be the same.
-fn place(kinds: &[Kind], candidate: &Kind) -> Option<usize> {
-    let is_filter = |kind: &Kind| matches!(kind, Kind::Filtered(_));
+/// The index at which a candidate enters the terms of a model, at the end or in place of a term; `None` if the model already
+/// has it or another filter, or is full.
+fn insertion_index(kinds: &[NoiseTerm], candidate: &NoiseTerm) -> Option<usize> {
+    let is_filter = |kind: &NoiseTerm| matches!(kind, NoiseTerm::Filtered(_));
     if kinds.contains(candidate) || (is_filter(candidate) && kinds.iter().any(is_filter)) {
         return None;
     }
-    // Read slowly, what is left of a filter cannot be told from a mixture with white noise: it takes its place.
-    if matches!(candidate, Kind::Filtered(filter) if filter.decimation != 1.0) {
-        return kinds.iter().position(|kind| *kind == Kind::AngleRandomWalk);
+    // The curve cannot distinguish a decimated filter from its mixture with white noise, which it therefore replaces.
+    if matches!(candidate, NoiseTerm::Filtered(filter) if filter.decimation != 1.0) {
+        return kinds.iter().position(|kind| *kind == NoiseTerm::AngleRandomWalk);
     }
     (kinds.len() < MAX_TERMS).then_some(kinds.len())
 }
 
-/// What `work` makes of the terms while a candidate is in its place.
-fn put<T>(kinds: &mut Vec<Kind, MAX_TERMS>, place: usize, candidate: Kind, work: impl FnOnce(&[Kind]) -> T) -> T {
-    let old = kinds.get(place).copied();
+/// The result of `work` with a candidate at its index among the terms, which are the same again afterwards.
+fn with_candidate<T>(
+    kinds: &mut Vec<NoiseTerm, MAX_TERMS>,
+    at: usize,
+    candidate: NoiseTerm,
+    work: impl FnOnce(&[NoiseTerm]) -> T,
+) -> T {
+    let old = kinds.get(at).copied();
     match old {
-        Some(_) => kinds[place] = candidate,
-        // There is room: it has a place.
+        Some(_) => kinds[at] = candidate,
+        // There is room: insertion_index returns none for a full model.
         None => _ = kinds.push(candidate),
     }
     let done = work(kinds);
     match old {
-        Some(old) => kinds[place] = old,
+        Some(old) => kinds[at] = old,
         None => _ = kinds.pop(),
     }
     done
 }
 
+/// The largest residual in units of its uncertainty.
 fn largest_residual<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Residual {
-    let of = |point: &crate::Point| {
+    let residual = |point: &AllanPoint| {
         let excess = math::sqrt(point.avar / model.avar(point.n)) - 1.0;
         Residual { n: point.n, excess, sigmas: excess * math::sqrt(2.0 * model.edf(point)) }
     };
     let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
-    let residuals = curve.points().iter().filter(|point| point.avar > 0.0).map(of);
+    let residuals = curve.points().iter().filter(|point| point.avar > 0.0).map(residual);
     residuals.max_by(|a, b| math::abs(a.sigmas).total_cmp(&math::abs(b.sigmas))).unwrap_or(nothing)
 }

@@ -1,4 +1,4 @@
-//! Allan covariance: the compensation formula to the bit, gaps, merging.
+//! Allan covariance: exact compensation, gaps, merging, overflow.
 
 use allan_core::{Cascade, Coupling};
 use proptest::prelude::*;
@@ -37,7 +37,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn compensation_is_foretold_to_the_bit(stretches in prop::collection::vec(samples(), 1..4), beta in -20..20_i32) {
+    fn the_variance_after_compensation_follows_exactly_from_the_covariance(stretches in prop::collection::vec(samples(), 1..4), beta in -20..20_i32) {
         let (mut pair, mut compensated) = (Pair::new(), Cascade::<OCTAVES, 8>::new());
         for stretch in &stretches {
             pair.gap();
@@ -58,7 +58,7 @@ proptest! {
     }
 
     #[test]
-    fn merging_is_a_gap_at_the_seam(samples in samples(), seam in 0.0..1.0) {
+    fn merging_two_stretches_equals_a_gap_between_them(samples in samples(), seam in 0.0..1.0) {
         let (first, second) = samples.split_at((samples.len() as f64 * seam) as usize);
         let (mut whole, mut early, mut late) = (Pair::new(), Pair::new(), Pair::new());
         first.iter().for_each(|&sample| { whole.push(sample); early.push(sample); });
@@ -70,7 +70,7 @@ proptest! {
 }
 
 #[test]
-fn a_gap_that_only_one_channel_heard_of_is_counted() {
+fn samples_after_a_gap_of_one_channel_only_are_left_out_and_counted() {
     let mut pair = Pair::new();
     (0..100).for_each(|k| pair.push((k * k, k)));
     let before = pair.coupling.points();
@@ -81,8 +81,8 @@ fn a_gap_that_only_one_channel_heard_of_is_counted() {
 }
 
 #[test]
-fn a_sum_beyond_its_range_is_withdrawn() {
-    // Full swing at n = 2⁸, over and over: products of 2⁸⁰. 48 doublings pass 2¹²⁷.
+fn an_octave_whose_sum_overflows_has_no_covariance() {
+    // A full-scale square wave at n = 2⁸: the sum of products is 2⁸⁰; 48 doublings exceed 2¹²⁷.
     let mut pair = Pair::new();
     for k in 0..4 << OCTAVES {
         let level = if k >> (OCTAVES - 1) & 1 == 0 { i32::MIN } else { i32::MAX };

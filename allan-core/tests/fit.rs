@@ -1,10 +1,11 @@
-//! The fit and the read-off against simulated noise whose coefficients are known.
+//! The fit and the slope method on simulated noise with known coefficients.
 
-use allan_core::{Cascade, Curve, Kind, Model, check::ModelError, fit::fit, read_off};
+use allan_core::{Cascade, Curve, Model, NoiseTerm, fit::fit, model::Discrepancy, slope_method};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+/// Seconds between samples.
 const PERIOD: f64 = 0.01;
 /// Counts are a thousandth of the unit, so that rounding adds 10⁻⁶/12 to a white variance of 10⁻² and more.
 const LSB: f64 = 1e-3;
@@ -26,7 +27,7 @@ fn curve(cascade: &Cascade<20, 8>) -> Curve<20> {
     cascade.curve(PERIOD).scaled(LSB)
 }
 
-fn value(model: &Model, kind: Kind) -> allan_core::model::Term {
+fn value(model: &Model, kind: NoiseTerm) -> allan_core::model::FittedTerm {
     *model.terms().iter().find(|term| term.kind == kind).expect("a fitted term")
 }
 
@@ -35,12 +36,13 @@ const COVERAGE: core::ops::RangeInclusive<f64> = 0.8997..=1.0;
 const RECORDS: u64 = 300;
 
 #[test]
-fn intervals_cover_the_truth() {
+fn bounds_of_strong_coefficients_cover_the_truth() {
     let (n, k) = (0.05, 0.02);
     let (mut n_covered, mut k_covered, mut n_ratio) = (0, 0, 0.0);
     for seed in 0..RECORDS {
-        let model = fit(&curve(&record(1 << 15, n, k, seed)), &[Kind::AngleRandomWalk, Kind::RateRandomWalk]);
-        let (fitted_n, fitted_k) = (value(&model, Kind::AngleRandomWalk), value(&model, Kind::RateRandomWalk));
+        let model = fit(&curve(&record(1 << 15, n, k, seed)), &[NoiseTerm::AngleRandomWalk, NoiseTerm::RateRandomWalk]);
+        let (fitted_n, fitted_k) =
+            (value(&model, NoiseTerm::AngleRandomWalk), value(&model, NoiseTerm::RateRandomWalk));
         n_covered += u64::from((fitted_n.low..=fitted_n.high).contains(&n));
         k_covered += u64::from((fitted_k.low..=fitted_k.high).contains(&k));
         n_ratio += fitted_n.value / n / RECORDS as f64;
@@ -53,55 +55,55 @@ fn intervals_cover_the_truth() {
 }
 
 #[test]
-fn a_term_that_is_absent_gets_an_upper_bound() {
+fn an_absent_term_has_a_lower_bound_of_0_and_a_positive_upper_bound() {
     let absent = |seed: u64| {
-        let model = fit(&curve(&record(1 << 14, 0.05, 0.0, 1_000 + seed)), &Kind::DECLARED);
-        let (b, k) = (value(&model, Kind::BiasInstability), value(&model, Kind::RateRandomWalk));
+        let model = fit(&curve(&record(1 << 14, 0.05, 0.0, 1_000 + seed)), &NoiseTerm::BASELINE);
+        let (b, k) = (value(&model, NoiseTerm::BiasInstability), value(&model, NoiseTerm::RateRandomWalk));
         assert!(b.high > 0.0 && k.high > 0.0);
         b.low == 0.0 && k.low == 0.0
     };
     let clean = (0..100).filter(|&seed| absent(seed)).count();
-    assert!(clean >= 88, "claimed a term that is not there in {} of 100 records", 100 - clean);
+    assert!(clean >= 88, "a lower bound above 0 in {} of 100 records", 100 - clean);
 }
 
 #[test]
-fn a_true_model_scores_about_one_where_it_was_fitted() {
+fn a_correct_model_has_a_deviance_per_point_of_about_1() {
     // The deviance of 16 correlated points less two parameters: below 2 with a wide margin on average of 50 records.
     let score = |seed: u64| {
         let curve = curve(&record(1 << 15, 0.05, 0.02, 2_000 + seed));
-        let model = fit(&curve, &[Kind::AngleRandomWalk, Kind::RateRandomWalk]);
-        ModelError::between(&model, &curve).expect("octaves to compare").deviance_per_point
+        let model = fit(&curve, &[NoiseTerm::AngleRandomWalk, NoiseTerm::RateRandomWalk]);
+        Discrepancy::between(&model, &curve).expect("octaves to compare").deviance_per_point
     };
     let mean = (0..50).map(score).sum::<f64>() / 50.0;
     assert!((0.4..1.3).contains(&mean), "{mean}");
 }
 
 #[test]
-fn the_read_off_finds_the_slopes_where_one_noise_rules() {
+fn the_slope_method_finds_the_coefficient_of_a_single_noise() {
     let white = curve(&record(1 << 17, 0.05, 0.0, 7));
-    let n = read_off::angle_random_walk(&white).expect("a −½ slope");
+    let n = slope_method::angle_random_walk(&white).expect("a −½ slope");
     assert!((n.value / 0.05 - 1.0).abs() < 0.05, "{}", n.value);
     assert_eq!(*n.interval.start(), PERIOD);
-    assert_eq!(read_off::rate_random_walk(&white), None);
+    assert_eq!(slope_method::rate_random_walk(&white), None);
 
     // Points at n = 1 … 4096 of 2¹⁷ samples: the worst, 4096, has 9 % (1σ) by the formula; the mean of the run less.
     let walk = curve(&record(1 << 17, 0.0, 0.5, 8));
-    let k = read_off::rate_random_walk(&walk).expect("a +½ slope");
+    let k = slope_method::rate_random_walk(&walk).expect("a +½ slope");
     assert!((k.value / 0.5 - 1.0).abs() < 0.2, "{}", k.value);
-    assert_eq!(read_off::angle_random_walk(&walk), None);
+    assert_eq!(slope_method::angle_random_walk(&walk), None);
 }
 
 #[test]
-fn percentage_accuracy_is_the_papers_formula() {
+fn percentage_accuracy_is_that_of_ieee_952() {
     // 100/√(2(N/n−1)) for an hour at 204.8 SPS: n = 1 and τ = 230 s.
-    assert!((read_off::percentage_accuracy(737_280, 1) - 0.0824).abs() < 5e-5);
-    assert!((read_off::percentage_accuracy(737_280, 47_104) - 18.47).abs() < 5e-3);
+    assert!((slope_method::percentage_accuracy(737_280, 1) - 0.0824).abs() < 5e-5);
+    assert!((slope_method::percentage_accuracy(737_280, 47_104) - 18.47).abs() < 5e-3);
 }
 
 #[test]
-fn a_channel_that_never_changes_has_no_noise() {
+fn coefficients_of_a_constant_channel_are_0() {
     let mut cascade = Cascade::<20, 8>::new();
     cascade.push_slice(&[5; 1_000]);
-    let model = fit(&cascade.curve(PERIOD), &Kind::DECLARED);
+    let model = fit(&cascade.curve(PERIOD), &NoiseTerm::BASELINE);
     assert!(model.terms().iter().all(|term| term.value == 0.0));
 }

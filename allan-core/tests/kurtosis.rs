@@ -1,4 +1,4 @@
-//! Excess kurtosis of the differences: against its definition, and what it is for.
+//! Excess kurtosis of the differences: against its definition, and for a telegraph and a Markov process.
 
 use allan_core::Cascade;
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 const OCTAVES: usize = 10;
 
-/// Σd² and Σd⁴ over one stretch, straight from the definition.
+/// Σd², Σd⁴ and the number of differences in one stretch, by definition.
 fn moments(samples: &[i32], n: usize) -> (u128, u128, u64) {
     let block = |start: usize| samples[start..start + n].iter().map(|&x| i128::from(x)).sum::<i128>();
     let starts = (0..).step_by((n / 8).max(1)).take_while(|start| start + 2 * n <= samples.len());
@@ -20,7 +20,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn is_the_ratio_of_exact_sums(
+    fn the_kurtosis_is_the_ratio_of_exact_sums(
         samples in prop::collection::vec(-(1 << 23)..1_i32 << 23, 1..3_000), shift in 0..24_u32, cut in 0.0..1.0
     ) {
         let samples: Vec<i32> = samples.iter().map(|sample| sample >> shift).collect();
@@ -41,7 +41,7 @@ proptest! {
 }
 
 #[test]
-fn rounding_of_long_differences_hardly_shows() {
+fn rounding_of_long_differences_changes_the_kurtosis_by_less_than_its_scatter() {
     // White noise of one count, the least that a converter can dither.
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let samples: Vec<i32> =
@@ -84,7 +84,7 @@ fn markov(samples: usize, step: f64, seed: u64) -> Cascade<OCTAVES, 8> {
 }
 
 #[test]
-fn tells_a_telegraph_from_a_markov_process_of_the_same_variance() {
+fn the_kurtosis_differs_between_a_telegraph_and_a_markov_process_of_the_same_variance() {
     const SAMPLES: usize = 1 << 20;
     let (telegraph, markov) = (telegraph(SAMPLES, 1_000, 1).curve(1.0), markov(SAMPLES, 1_000.0, 2).curve(1.0));
     let at_1 = telegraph.points()[0];

@@ -1,6 +1,10 @@
-//! Late in a long record, at the limits of the samples, and beyond them.
+//! Long records, and samples at and beyond the limits of the range.
+
+#[path = "support/late_state.rs"]
+mod late_state;
 
 use allan_core::Cascade;
+use late_state::after_constant;
 use proptest::prelude::*;
 
 const FULL_SCALE: i32 = 1 << 23;
@@ -9,20 +13,20 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn a_fast_forwarded_estimator_is_the_one_that_was_pushed(sample in any::<i32>(), samples in 0..3_000_u64) {
+    fn the_late_state_of_these_tests_is_the_one_after_pushing(sample in any::<i32>(), samples in 0..3_000_u64) {
         let mut pushed = Cascade::<9, 8>::new();
         (0..samples).for_each(|_| pushed.push(sample));
-        prop_assert!(Cascade::after_constant(sample, samples) == pushed);
+        prop_assert!(after_constant::<9, 8>(sample, samples) == pushed);
     }
 
     #[test]
-    fn exact_after_2_to_the_40_samples_whose_sum_has_wrapped(
+    fn sums_are_exact_after_2_to_the_40_samples_whose_running_sum_has_wrapped(
         tail in prop::collection::vec(-FULL_SCALE..FULL_SCALE, 1..2_000), early in 0..100_u64
     ) {
         const OCTAVES: usize = 9;
         // The running sum passes −2⁶³ on the way.
         let before = (1 << 40) - early;
-        let mut cascade = Cascade::<OCTAVES, 8>::after_constant(-FULL_SCALE, before);
+        let mut cascade = after_constant::<OCTAVES, 8>(-FULL_SCALE, before);
         let (one_by_one, slice) = tail.split_at(tail.len() / 2);
         one_by_one.iter().for_each(|&sample| cascade.push(sample));
         cascade.push_slice(slice);
@@ -44,7 +48,7 @@ proptest! {
 
 /// Full swing of 24 bits at the longest averaging time: the largest sum of squares that 2⁴⁰ samples can make.
 #[test]
-fn the_worst_that_24_bits_can_do_in_2_to_the_40_samples_fits() {
+fn the_largest_sum_of_2_to_the_40_samples_of_24_bits_fits() {
     const HALF_PERIOD: usize = 1 << 23;
     let mut cascade = Cascade::<24, 16>::new();
     for sample in [-FULL_SCALE, FULL_SCALE - 1, -FULL_SCALE, FULL_SCALE - 1] {
@@ -63,7 +67,7 @@ fn the_worst_that_24_bits_can_do_in_2_to_the_40_samples_fits() {
 }
 
 #[test]
-fn wider_samples_stop_at_the_limit_and_say_so() {
+fn wider_samples_saturate_the_sums_and_are_reported() {
     let mut cascade = Cascade::<20, 8>::new();
     for sample in [i32::MIN, i32::MAX, i32::MIN, i32::MAX] {
         (0..1 << 7).for_each(|_| cascade.push_slice(&[sample; 1 << 12]));
@@ -81,7 +85,7 @@ fn wider_samples_stop_at_the_limit_and_say_so() {
 }
 
 #[test]
-fn the_kurtosis_lasts_as_long_as_stated() {
+fn the_kurtosis_is_known_for_2_to_the_40_samples_within_the_documented_range() {
     // White noise of ±2¹⁷ counts, and a square wave of 2¹⁰ counts at n = 2²³.
     let mut state = 1_u64;
     let mut next = || {

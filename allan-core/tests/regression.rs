@@ -1,11 +1,10 @@
-//! Regression on covariates and the common mode, on channels whose relation is known.
+//! Regression on covariates, on simulated channels with known sensitivities.
 
+#[path = "support/simulation.rs"]
 mod simulation;
 
-use allan_core::common_mode::common_mode;
-use allan_core::fit::fit;
-use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
-use allan_core::term::{Kind, Markov};
+use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
+use allan_core::term::{Markov, NoiseTerm};
 use allan_core::{Cascade, Coupling, Curve};
 use simulation::{Noise, PERIOD};
 
@@ -16,8 +15,8 @@ const LSB: f64 = 1e-4;
 
 type Estimator = Cascade<OCTAVES, 8>;
 
-/// Curves of channels that are sampled in step, and what each has in common with those before it.
-fn measured(channels: &[Vec<f64>]) -> (Vec<Curve<OCTAVES>>, Vec<Shared<OCTAVES>>) {
+/// Curves of channels that are sampled together, and the covariances of each with those before it.
+fn measured(channels: &[Vec<f64>]) -> (Vec<Curve<OCTAVES>>, Vec<CovarianceCurve<OCTAVES>>) {
     let mut cascades = vec![Estimator::new(); channels.len()];
     let mut couplings = vec![Coupling::<OCTAVES>::new(); channels.len() * (channels.len() - 1) / 2];
     for k in 0..SAMPLES {
@@ -39,59 +38,61 @@ fn measured(channels: &[Vec<f64>]) -> (Vec<Curve<OCTAVES>>, Vec<Shared<OCTAVES>>
     (curves, couplings.iter().map(in_units).collect())
 }
 
-/// Of the channel, which comes first, or of a covariate with a covariate.
-fn covariance(shared: &[Shared<OCTAVES>], with: Option<usize>, covariate: usize, n: u64) -> Option<f64> {
+/// Covariance of the channel, which comes first, or of a covariate with a covariate.
+fn covariance(shared: &[CovarianceCurve<OCTAVES>], with: Option<usize>, covariate: usize, n: u64) -> Option<f64> {
     let (a, b) = (with.map_or(0, |other| other + 1), covariate + 1);
     let (high, low) = (a.max(b), a.min(b));
     let points = &shared[high * (high - 1) / 2 + low];
     points.iter().find(|point| point.n == n).map(|point| point.covariance)
 }
 
-/// What the first channel follows of the others.
-fn followed(channels: &[Vec<f64>]) -> Vec<Sensitivity> {
+/// The significant sensitivities of the first channel to the others.
+fn sensitivities(channels: &[Vec<f64>]) -> Vec<Sensitivity> {
     let (curves, shared) = measured(channels);
     let covariates: Vec<Covariate<OCTAVES>> = curves[1..].iter().map(|curve| Covariate::new(curve, LSB, 1)).collect();
     let covariance = |a: Option<usize>, b: usize, n: u64| covariance(&shared, a, b, n);
-    let beside = Beside { channel: &curves[0], covariates: &covariates, covariance: &covariance };
-    beside.followed().into_iter().collect()
+    let regression = CovariateRegression { channel: &curves[0], covariates: &covariates, covariance: &covariance };
+    regression.sensitivities().into_iter().collect()
 }
 
-/// A stream from which multiples of others are subtracted, sample by sample, against the curve that is worked out.
+/// The curve of a stream from which multiples of covariates are subtracted sample by sample equals the calculated one.
 #[test]
-fn subtracting_is_exact_without_a_second_pass() {
+fn the_curve_after_subtracting_covariates_is_exact() {
     let mut noise = Noise::new(7);
-    let channels = [rest(&mut noise), course(&mut noise, 0.3).1, course(&mut noise, 0.2).1];
+    let channels = [rest(&mut noise), slow_covariate(&mut noise, 0.3).1, slow_covariate(&mut noise, 0.2).1];
     let count = |channel: &[f64], k: usize| (channel[k] / LSB).round();
-    let less: Vec<f64> = (0..SAMPLES)
+    let rest_of_stream: Vec<f64> = (0..SAMPLES)
         .map(|k| LSB * (count(&channels[0], k) - 3.0 * count(&channels[1], k) + 2.0 * count(&channels[2], k)))
         .collect();
     let (curves, shared) = measured(&channels);
-    let (expected, _) = measured(&[less, channels[0].clone()]);
+    let (expected, _) = measured(&[rest_of_stream, channels[0].clone()]);
     let covariates: Vec<Covariate<OCTAVES>> =
         curves[1..].iter().map(|curve| Covariate::as_measured(curve, 1)).collect();
     let known = |a: Option<usize>, b: usize, n: u64| covariance(&shared, a, b, n);
-    let beside = Beside { channel: &curves[0], covariates: &covariates, covariance: &known };
-    let subtracted = beside.subtracted(&[Sensitivity::exact(0, 3.0), Sensitivity::exact(1, -2.0)]);
+    let regression = CovariateRegression { channel: &curves[0], covariates: &covariates, covariance: &known };
+    let mut subtracted = curves[0].clone();
+    regression.subtract_from(&mut subtracted, &[Sensitivity::exact(0, 3.0), Sensitivity::exact(1, -2.0)]);
     for (found, expected) in subtracted.points().iter().zip(expected[0].points()) {
-        // Differences of sums 10⁴ times as large.
+        // The calculation subtracts sums 10⁴ times as large.
         assert!((found.avar / expected.avar - 1.0).abs() < 1e-9, "{found:?}, {expected:?}");
     }
-    // Where a covariance is not known nothing is subtracted.
+    // Where a covariance is not known, nothing is subtracted.
     let short = [Covariate::<OCTAVES>::as_measured(&curves[1], 256)];
-    let beside = Beside { channel: &curves[0], covariates: &short, covariance: &known };
-    let subtracted = beside.subtracted(&[Sensitivity::exact(0, 3.0)]);
+    let regression = CovariateRegression { channel: &curves[0], covariates: &short, covariance: &known };
+    let mut subtracted = curves[0].clone();
+    regression.subtract_from(&mut subtracted, &[Sensitivity::exact(0, 3.0)]);
     for (found, raw) in subtracted.points().iter().zip(curves[0].points()) {
         assert_eq!(found.avar == raw.avar, found.n < 256, "{found:?}");
     }
 }
 
 fn rest(noise: &mut Noise) -> Vec<f64> {
-    noise.sum(SAMPLES, &[(Kind::AngleRandomWalk, 0.05), (Kind::RateRandomWalk, 0.002)])
+    noise.sum(SAMPLES, &[(NoiseTerm::AngleRandomWalk, 0.05), (NoiseTerm::RateRandomWalk, 0.002)])
 }
 
-/// A slow course, as of a temperature, and what a converter with white noise shows of it.
-fn course(noise: &mut Noise, deviation: f64) -> (Vec<f64>, Vec<f64>) {
-    let slow = noise.sum(SAMPLES, &[(Kind::Markov(Markov { time_constant: 40.0 }), deviation)]);
+/// A slowly varying quantity such as a temperature, and its measurement with white noise.
+fn slow_covariate(noise: &mut Noise, deviation: f64) -> (Vec<f64>, Vec<f64>) {
+    let slow = noise.sum(SAMPLES, &[(NoiseTerm::Markov(Markov { time_constant: 40.0 }), deviation)]);
     let seen = slow.iter().map(|value| value + 0.2 * noise.normal()).collect();
     (slow, seen)
 }
@@ -103,12 +104,12 @@ fn sensitivities_to_noisy_covariates_are_unbiased() {
     let mut standardised = Vec::new();
     for seed in 0..RECORDS {
         let mut noise = Noise::new(seed);
-        let (first, first_seen) = course(&mut noise, 3.0);
-        let (second, second_seen) = course(&mut noise, 3.0);
+        let (first, first_seen) = slow_covariate(&mut noise, 3.0);
+        let (second, second_seen) = slow_covariate(&mut noise, 3.0);
         let mut channel = rest(&mut noise);
-        let causes = first.iter().zip(&second);
-        channel.iter_mut().zip(causes).for_each(|(y, (a, b))| *y += truth[0] * a + truth[1] * b);
-        let mut found = followed(&[channel, first_seen, second_seen]);
+        let covariates = first.iter().zip(&second);
+        channel.iter_mut().zip(covariates).for_each(|(y, (a, b))| *y += truth[0] * a + truth[1] * b);
+        let mut found = sensitivities(&[channel, first_seen, second_seen]);
         found.sort_by_key(|of| of.covariate);
         assert_eq!(found.iter().map(|of| of.covariate).collect::<Vec<_>>(), [0, 1], "seed {seed}");
         for (of, truth) in found.iter().zip(truth) {
@@ -125,18 +126,18 @@ fn sensitivities_to_noisy_covariates_are_unbiased() {
     assert!((0.5..1.5).contains(&deviation), "{deviation}");
 }
 
-/// N, B and K describe noise behind a filter badly: what it follows is weighed by what is measured instead. A matched
-/// filter would know the sensitivity to 0.0195: the root of N²/PERIOD over the sum of the squares of the force.
+/// N, B and K do not fit noise after a filter, so the octaves are weighted by their measured variances. A matched filter
+/// would determine the sensitivity to 0.0195: the root of N²/PERIOD over the sum of the squares of the force.
 #[test]
-fn a_filter_hides_nothing_that_the_channel_follows() {
+fn a_sensitivity_is_found_in_filtered_noise() {
     let truth = 0.25;
     for seed in 0..20 {
         let mut noise = Noise::new(1300 + seed);
-        let force = noise.sum(SAMPLES, &[(Kind::Markov(Markov { time_constant: 4.0 }), 0.1)]);
+        let force = noise.sum(SAMPLES, &[(NoiseTerm::Markov(Markov { time_constant: 4.0 }), 0.1)]);
         let seen: Vec<f64> = force.iter().map(|force| force + 0.003 * noise.normal()).collect();
         let own = rest(&mut noise);
         let channel: Vec<f64> = own.iter().zip(&force).map(|(own, force)| own + truth * force).collect();
-        let found = followed(&[averaged(&averaged(&channel)), averaged(&averaged(&seen))]);
+        let found = sensitivities(&[averaged(&averaged(&channel)), averaged(&averaged(&seen))]);
         let [of] = found[..] else { panic!("seed {seed}: {found:?}") };
         assert!((of.value - truth).abs() < 4.0 * of.error && of.error < 3.0 * 0.0195, "seed {seed}: {of:?}");
     }
@@ -147,43 +148,17 @@ fn averaged(values: &[f64]) -> Vec<f64> {
     (0..values.len()).map(|at| (0..4).map(|lag| values[at.saturating_sub(lag)]).sum::<f64>() / 4.0).collect()
 }
 
-/// Two walks that are alike by chance; a covariate that moves no more than its converter's noise.
+/// Two random walks that are similar by chance, and a covariate that varies less than its measurement noise.
 #[test]
-fn channels_that_go_by_themselves_do_not_follow_each_other() {
-    let walk = [(Kind::RateRandomWalk, 0.1), (Kind::AngleRandomWalk, 0.01)];
-    let still = [(Kind::AngleRandomWalk, 0.05), (Kind::RateRandomWalk, 0.001)];
+fn independent_channels_have_no_significant_sensitivity() {
+    let walk = [(NoiseTerm::RateRandomWalk, 0.1), (NoiseTerm::AngleRandomWalk, 0.01)];
+    let still = [(NoiseTerm::AngleRandomWalk, 0.05), (NoiseTerm::RateRandomWalk, 0.001)];
     for kinds in [walk.as_slice(), still.as_slice()] {
-        // By chance in 2 of 10,000 pairs: in 2 % of the runs of this test.
+        // The probability of a significant sensitivity is 2 in 10,000 pairs, or 2 % for this test.
         for seed in 0..60 {
             let mut noise = Noise::new(900 + seed);
             let (own, other) = (noise.sum(SAMPLES, kinds), noise.sum(SAMPLES, kinds));
-            assert!(followed(&[own, other]).is_empty(), "seed {seed}");
+            assert!(sensitivities(&[own, other]).is_empty(), "seed {seed}");
         }
     }
-}
-
-#[test]
-fn what_two_channels_share_is_found_with_its_size() {
-    let time_constant = 5.0;
-    let (mut found, mut alarms) = (0, 0);
-    for seed in 0..20 {
-        let mut noise = Noise::new(300 + seed);
-        let shared = noise.sum(SAMPLES, &[(Kind::Markov(Markov { time_constant }), 0.1)]);
-        let [alone, other] = [rest(&mut noise), rest(&mut noise)];
-        let with = |channel: &[f64]| channel.iter().zip(&shared).map(|(own, shared)| own + shared).collect::<Vec<_>>();
-        let common = |channels: &[Vec<f64>]| {
-            let (curves, shared) = measured(channels);
-            let models: Vec<_> = curves.iter().map(|curve| fit(curve, &Kind::DECLARED)).collect();
-            common_mode((&curves[0], &models[0]), (&curves[1], &models[1]), &shared[0])
-        };
-        alarms += usize::from(common(&[alone.clone(), other.clone()]).is_some());
-        if let Some(common) = common(&[with(&alone), with(&other)]) {
-            found += 1;
-            // 655 s hold 65 independent stretches of twice the correlation time: 12 % of the deviation at 1 σ.
-            assert!((common.deviation / 0.1 - 1.0).abs() < 0.5, "{common:?}");
-            assert!(common.sigmas > 0.0);
-            assert!((1.0 / 3.0..3.0).contains(&(common.time_constant / time_constant)), "{common:?}");
-        }
-    }
-    assert!(found == 20 && alarms == 0, "{found} of 20 found, {alarms} false");
 }

@@ -1,41 +1,18 @@
-//! Every term three ways: against the integral of its spectrum, against its autocovariance, against simulation.
+//! Every term: its Allan variance against the integral of its spectrum, its autocovariance and simulation.
 
+#[path = "support/simulation.rs"]
 mod simulation;
 
-use allan_core::term::{Filter, Kind, Markov, Resonance, Sinusoid};
-use allan_core::{Model, model::Term};
-use simulation::{Noise, PERIOD, autocovariance, curve};
+use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
+use allan_core::{Model, model::FittedTerm};
+use simulation::{MARKOV, Noise, PERIOD, RESONANCE, autocovariance, curve, noises, stationary};
 use std::f64::consts::PI;
 
 const FACTORS: [u64; 8] = [1, 2, 3, 4, 8, 33, 128, 1024];
 
-const MARKOV: [Markov; 3] =
-    [Markov { time_constant: 0.02 }, Markov { time_constant: 0.7 }, Markov { time_constant: 50.0 }];
-const RESONANCE: [Resonance; 3] = [
-    Resonance { frequency: 20.3, bandwidth: 0.5 },
-    Resonance { frequency: 1.1, bandwidth: 0.2 },
-    Resonance { frequency: 37.0, bandwidth: 6.0 },
-];
-const FILTER: [Filter; 7] = [
-    Filter::boxcar(1),
-    Filter::boxcar(5),
-    Filter::bartlett(2),
-    Filter::bartlett(4),
-    Filter::bartlett(16),
-    // Every third value is read: an integer decimation has an exact recursion too.
-    Filter { stages: 2, taps: 4, decimation: 3.0 },
-    Filter { stages: 1, taps: 8, decimation: 5.0 },
-];
-
-fn noises() -> Vec<Kind> {
-    let classical = [Kind::Quantization, Kind::AngleRandomWalk, Kind::BiasInstability, Kind::RateRandomWalk];
-    let shaped = MARKOV.map(Kind::Markov).into_iter().chain(RESONANCE.map(Kind::Resonance));
-    classical.into_iter().chain(shaped).chain(FILTER.map(Kind::Filtered)).collect()
-}
-
 /// `4∫S(f) sin⁴(πfτ)/(πfτ)² df`, for sampled data: over all frequencies up to half the sample rate, with the sum of
 /// `n` samples in the place of the integral over τ. Midpoints, on a scale that is fine near 0.
-fn integral(kind: &Kind, n: u64) -> f64 {
+fn integral(kind: &NoiseTerm, n: u64) -> f64 {
     const STEPS: u32 = 200_000;
     let nyquist = 0.5 / PERIOD;
     let sum: f64 = (0..STEPS)
@@ -50,7 +27,7 @@ fn integral(kind: &Kind, n: u64) -> f64 {
 }
 
 #[test]
-fn the_closed_form_is_the_integral_of_the_spectrum() {
+fn the_allan_variance_is_the_integral_of_the_spectrum() {
     for kind in noises() {
         for n in FACTORS {
             let (closed, integral) = (kind.avar(n, PERIOD), integral(&kind, n));
@@ -59,14 +36,8 @@ fn the_closed_form_is_the_integral_of_the_spectrum() {
     }
 }
 
-fn stationary() -> Vec<Kind> {
-    let lines = [0.3, 20.3, 49.0].map(|frequency| Kind::Sinusoid(Sinusoid { frequency }));
-    let noises = noises().into_iter().filter(|kind| !matches!(kind, Kind::BiasInstability | Kind::RateRandomWalk));
-    noises.chain(lines).collect()
-}
-
 #[test]
-fn the_closed_form_is_that_of_the_autocovariance() {
+fn the_allan_variance_is_that_of_the_autocovariance() {
     for kind in stationary() {
         let r: Vec<f64> = (0..2 * 1024).map(|j| autocovariance(&kind, j)).collect();
         // Variance of the sum of m samples.
@@ -84,61 +55,42 @@ fn the_closed_form_is_that_of_the_autocovariance() {
 }
 
 #[test]
-fn second_differences_hang_together_as_the_autocovariance_says() {
-    for kind in stationary() {
-        let n = 6_usize;
-        // The second difference of averages is a filter of 2n weights; at n = 6, lags on both sides of 2n.
-        let weights: Vec<f64> = (0..2 * n).map(|i| if i < n { 1.0 } else { -1.0 } / n as f64).collect();
-        let mut correlations = [0.0; 31];
-        kind.add_correlations(1.0, n as u64, n as u32, PERIOD, &mut correlations);
-        for lag in [0_usize, 1, 5, 6, 11, 12, 13, 30] {
-            let mut covariance = 0.0;
-            for (i, a) in weights.iter().enumerate() {
-                for (j, b) in weights.iter().enumerate() {
-                    covariance += a * b * autocovariance(&kind, (lag + i).abs_diff(j)) / 2.0;
-                }
-            }
-            let found = f64::from(correlations[lag]) * kind.avar(n as u64, PERIOD);
-            let tolerance = 1e-6 * kind.avar(n as u64, PERIOD);
-            assert!((found - covariance).abs() < tolerance, "{kind:?}, lag {lag}: {found} and {covariance}");
-        }
-    }
-}
-
-#[test]
-fn the_memory_of_a_resonance_is_summed_to_its_end() {
-    for kind in MARKOV.map(Kind::Markov).into_iter().chain(RESONANCE.map(Kind::Resonance)) {
+fn squared_covariances_beyond_two_averaging_times_are_summed_completely() {
+    for kind in MARKOV.map(NoiseTerm::Markov).into_iter().chain(RESONANCE.map(NoiseTerm::Resonance)) {
         let (n, stride) = (16, 2.0);
         let width = n as f64;
-        let v = |m: f64| kind.process().structure(m.abs(), PERIOD);
+        let v = |m: f64| kind.process().sum_variance(m.abs(), PERIOD);
         let covariance = |lag: f64| {
             let fourth =
                 6.0 * v(lag) - 4.0 * (v(lag - width) + v(lag + width)) + v(lag - 2.0 * width) + v(lag + 2.0 * width);
             -fourth / (4.0 * width * width)
         };
-        let summed: f64 = (1..100_000).map(|j| covariance(2.0 * width + f64::from(j) * stride)).map(|of| of * of).sum();
-        let closed = kind.process().memory_beyond(n, stride, PERIOD);
+        let summed: f64 = (1..100_000)
+            .map(|j| covariance(2.0 * width + f64::from(j) * stride))
+            .map(|covariance| covariance * covariance)
+            .sum();
+        let closed = kind.process().squared_covariance_tail(n, stride, PERIOD);
         assert!((closed - summed).abs() < 1e-6 * summed, "{kind:?}: {closed} and {summed}");
     }
 }
 
 #[test]
-fn the_closed_form_is_what_simulation_shows() {
+fn the_allan_variance_is_that_of_simulated_samples() {
     const SAMPLES: usize = 1 << 16;
-    let others = [Kind::RateRamp, Kind::Sinusoid(Sinusoid { frequency: 21.7 })];
+    let others = [NoiseTerm::RateRamp, NoiseTerm::Sinusoid(Sinusoid { frequency: 21.7 })];
     for (seed, kind) in noises().into_iter().chain(others).enumerate() {
         let curve = curve(&Noise::new(seed as u64).series(&kind, SAMPLES));
-        let model = Model::new(PERIOD, [Term::exact(kind, 1.0)]);
+        let model = Model::new(PERIOD, [FittedTerm::exact(kind, 1.0)]);
         for point in curve.points().iter().filter(|point| point.n <= 1024) {
             let (modelled, edf) = (model.avar(point.n), model.edf(point));
             // Half-integrated noise is flicker only below the sample rate, and 4096 weights reach no further.
-            let flicker = kind == Kind::BiasInstability;
+            let flicker = kind == NoiseTerm::BiasInstability;
             if flicker && !(16..=256).contains(&point.n) {
                 continue;
             }
             // S(f) = 1/(2π|f|) for B = 1, and white noise of variance 1 integrated half a time has dt/(2πf·dt).
             // A line's phases are not all met equally often: 1/(π·beats), with 28 beats and more in every octave.
-            let line = matches!(kind, Kind::Sinusoid(_));
+            let line = matches!(kind, NoiseTerm::Sinusoid(_));
             let tolerance = 5.0 * (2.0 / edf).sqrt() + if flicker || line { 0.012 } else { 1e-3 };
             let ratio = point.avar / modelled;
             assert!((ratio - 1.0).abs() < tolerance, "{kind:?}, n = {}: {ratio} ± {tolerance}, edf {edf}", point.n);
@@ -147,20 +99,23 @@ fn the_closed_form_is_what_simulation_shows() {
 }
 
 #[test]
-fn degrees_of_freedom_tell_the_scatter_of_estimates() {
+fn degrees_of_freedom_are_those_of_the_scatter_of_estimates() {
     const RECORDS: u64 = 400;
     const SAMPLES: usize = 1 << 14;
-    // A resonance that remembers 640 samples, a Markov process that remembers 70, and a line in white noise.
+    // A resonance that stays correlated for 640 samples, a Markov process for 70, and a line in white noise.
     let models = [
-        vec![Term::exact(Kind::Resonance(Resonance { frequency: 20.3, bandwidth: 0.05 }), 1.0)],
-        vec![Term::exact(Kind::Markov(MARKOV[1]), 1.0)],
-        vec![Term::exact(Kind::Sinusoid(Sinusoid { frequency: 5.1 }), 10.0), Term::exact(Kind::AngleRandomWalk, 1.0)],
+        vec![FittedTerm::exact(NoiseTerm::Resonance(Resonance { frequency: 20.3, bandwidth: 0.05 }), 1.0)],
+        vec![FittedTerm::exact(NoiseTerm::Markov(MARKOV[1]), 1.0)],
+        vec![
+            FittedTerm::exact(NoiseTerm::Sinusoid(Sinusoid { frequency: 5.1 }), 10.0),
+            FittedTerm::exact(NoiseTerm::AngleRandomWalk, 1.0),
+        ],
     ];
     for terms in models {
         let model = Model::new(PERIOD, terms.iter().copied());
         let curves: Vec<_> = (0..RECORDS)
             .map(|seed| {
-                let sum: Vec<(Kind, f64)> = terms.iter().map(|term| (term.kind, term.value)).collect();
+                let sum: Vec<(NoiseTerm, f64)> = terms.iter().map(|term| (term.kind, term.value)).collect();
                 curve(&Noise::new(seed).sum(SAMPLES, &sum))
             })
             .collect();

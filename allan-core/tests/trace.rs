@@ -1,37 +1,56 @@
-//! The loop on simulated noise whose composition is known: nothing found where nothing is missing, and what is
-//! missing found by name and size.
+//! The trace on simulated noise of known composition: no term is added to complete models, and missing terms are added with
+//! the correct name and size.
 
+#[path = "support/simulation.rs"]
 mod simulation;
 
-use allan_core::model::Term;
-use allan_core::term::{Filter, Kind, Markov, Resonance, Sinusoid};
-use allan_core::trace::{Lines, Trace, trace};
+use allan_core::model::FittedTerm;
+use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
+use allan_core::trace::{LineCandidates, Trace, trace};
 use allan_core::{Model, telegraph};
 use simulation::{Noise, curve, telegraph_signal};
 
 const SAMPLES: usize = 1 << 17;
+/// Starting shapes of a sensor with Bartlett windows of 2 to 64 taps, or with one of 8 taps that is read at a lower rate.
+const FILTERS: [MovingAverageFilter; 10] = {
+    const fn decimated(decimation: f64) -> MovingAverageFilter {
+        MovingAverageFilter { stages: 2, taps: 8, decimation }
+    }
+    [
+        MovingAverageFilter::bartlett(2),
+        MovingAverageFilter::bartlett(4),
+        MovingAverageFilter::bartlett(8),
+        MovingAverageFilter::bartlett(16),
+        MovingAverageFilter::bartlett(32),
+        MovingAverageFilter::bartlett(64),
+        decimated(6.1),
+        decimated(8.1),
+        decimated(10.1),
+        decimated(12.1),
+    ]
+};
 /// White noise of 0.05 unit·√s and a random walk of 0.004 unit/√s, which meet at about 20 s.
-const DECLARED: [(Kind, f64); 2] = [(Kind::AngleRandomWalk, 0.05), (Kind::RateRandomWalk, 0.004)];
+const BASELINE: [(NoiseTerm, f64); 2] = [(NoiseTerm::AngleRandomWalk, 0.05), (NoiseTerm::RateRandomWalk, 0.004)];
 
-fn traced(hidden: &[(Kind, f64)], seed: u64) -> Trace {
+fn traced(hidden: &[(NoiseTerm, f64)], seed: u64) -> Trace {
     let mut noise = Noise::new(seed);
-    let sum = noise.sum(SAMPLES, DECLARED.iter().chain(hidden));
-    trace(&curve(&sum), Lines::InTheCurve)
+    let sum = noise.sum(SAMPLES, BASELINE.iter().chain(hidden));
+    trace(&curve(&sum), LineCandidates::Curve, &FILTERS)
 }
 
-fn added(trace: &Trace) -> Vec<Term> {
-    trace.found.iter().map(|found| trace.after.terms()[found.term]).collect()
+fn added(trace: &Trace) -> Vec<FittedTerm> {
+    trace.added.iter().map(|found| trace.after.terms()[found.term]).collect()
 }
 
 #[test]
-fn nothing_is_found_where_nothing_is_missing() {
+fn no_term_is_added_to_a_complete_model() {
     // A false alarm in 2 % of the records at most: of 60, three or fewer with a probability of 0.97.
-    let alarms = (0..60).filter(|&seed| !traced(&[], seed).found.is_empty()).count();
+    let alarms = (0..60).filter(|&seed| !traced(&[], seed).added.is_empty()).count();
     assert!(alarms <= 3, "{alarms} of 60");
 }
 
 #[test]
-fn the_p_value_of_a_true_model_is_uniform() {
+fn the_p_value_of_a_correct_model_is_uniformly_distributed() {
     const RECORDS: usize = 100;
     let mut p_values: Vec<f64> =
         (0..RECORDS as u64).map(|seed| traced(&[], 1_000 + seed).before_goodness.p_value).collect();
@@ -42,19 +61,20 @@ fn the_p_value_of_a_true_model_is_uniform() {
     assert!(distance < 1.63 / (RECORDS as f64).sqrt() + 0.05, "{distance}");
 }
 
-/// What is hidden, and how far its parameters may be off: the amount, and the shape's, each as a share.
-fn hidden() -> Vec<(Kind, f64, f64, f64)> {
+/// A term that the baseline lacks, its coefficient, and the tolerances of the coefficient and of the shape parameters as
+/// fractions.
+fn hidden() -> Vec<(NoiseTerm, f64, f64, f64)> {
     vec![
-        (Kind::Quantization, 1e-3, 0.1, 0.0),
-        (Kind::RateRamp, 2e-3, 0.1, 0.0),
-        (Kind::Markov(Markov { time_constant: 1.3 }), 0.06, 0.1, 0.3),
-        (Kind::Sinusoid(Sinusoid { frequency: 3.1 }), 0.1, 0.1, 0.06),
-        (Kind::Resonance(Resonance { frequency: 7.0, bandwidth: 1.5 }), 0.2, 0.1, 0.5),
+        (NoiseTerm::Quantization, 1e-3, 0.1, 0.0),
+        (NoiseTerm::RateRamp, 2e-3, 0.1, 0.0),
+        (NoiseTerm::Markov(Markov { time_constant: 1.3 }), 0.06, 0.1, 0.3),
+        (NoiseTerm::Sinusoid(Sinusoid { frequency: 3.1 }), 0.1, 0.1, 0.06),
+        (NoiseTerm::Resonance(Resonance { frequency: 7.0, bandwidth: 1.5 }), 0.2, 0.1, 0.5),
     ]
 }
 
 #[test]
-fn each_effect_is_named_with_its_size() {
+fn each_missing_term_is_added_with_its_name_and_size() {
     for (kind, value, amount, share) in hidden() {
         let trace = traced(&[(kind, value)], 7);
         let added = added(&trace);
@@ -71,24 +91,28 @@ fn each_effect_is_named_with_its_size() {
 }
 
 #[test]
-fn a_filter_is_recognised_by_its_taps() {
+fn a_filter_is_found_with_its_number_of_taps() {
     for taps in [2, 4, 16, 64] {
         let mut noise = Noise::new(u64::from(taps));
-        let terms = [(Kind::Filtered(Filter::bartlett(taps)), 0.05), (Kind::RateRandomWalk, 0.004)];
-        let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), Lines::InTheCurve);
+        let terms =
+            [(NoiseTerm::Filtered(MovingAverageFilter::bartlett(taps)), 0.05), (NoiseTerm::RateRandomWalk, 0.004)];
+        let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), LineCandidates::Curve, &FILTERS);
         let added = added(&trace);
         let [term] = added[..] else { panic!("{taps}: {added:?}") };
-        assert_eq!(term.kind, Kind::Filtered(Filter::bartlett(taps)));
+        assert_eq!(term.kind, NoiseTerm::Filtered(MovingAverageFilter::bartlett(taps)));
         assert!((term.value / 0.05 - 1.0).abs() < 0.03, "{term:?}");
     }
 }
 
 #[test]
-fn a_filter_that_is_read_slowly_tells_the_sample_rate() {
+fn the_decimation_of_a_filter_is_estimated() {
     let decimation = 9.0;
     let mut noise = Noise::new(5);
-    let terms = [(Kind::Filtered(Filter { stages: 2, taps: 8, decimation }), 0.05), (Kind::RateRandomWalk, 0.004)];
-    let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), Lines::InTheCurve);
+    let terms = [
+        (NoiseTerm::Filtered(MovingAverageFilter { stages: 2, taps: 8, decimation }), 0.05),
+        (NoiseTerm::RateRandomWalk, 0.004),
+    ];
+    let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), LineCandidates::Curve, &FILTERS);
     let added = added(&trace);
     let [term] = added[..] else { panic!("{added:?}") };
     let (low, high) = term.shape[1];
@@ -96,26 +120,33 @@ fn a_filter_that_is_read_slowly_tells_the_sample_rate() {
 }
 
 #[test]
-fn two_effects_are_found_one_after_the_other() {
-    let pair =
-        [(Kind::Sinusoid(Sinusoid { frequency: 3.1 }), 0.1), (Kind::Markov(Markov { time_constant: 4.0 }), 0.06)];
+fn two_missing_terms_are_both_added() {
+    let pair = [
+        (NoiseTerm::Sinusoid(Sinusoid { frequency: 3.1 }), 0.1),
+        (NoiseTerm::Markov(Markov { time_constant: 4.0 }), 0.06),
+    ];
     let mut names: Vec<&str> = added(&traced(&pair, 3)).iter().map(|term| term.kind.name()).collect();
     names.sort_unstable();
     assert_eq!(names, ["markov", "sinusoid"]);
 }
 
 #[test]
-fn a_larger_model_never_fits_worse() {
+fn a_model_with_more_terms_does_not_fit_worse() {
     for seed in 0..5 {
         let mut noise = Noise::new(40 + seed);
-        let curve = curve(&noise.sum(1 << 14, &DECLARED));
-        let all =
-            [Kind::Quantization, Kind::AngleRandomWalk, Kind::BiasInstability, Kind::RateRandomWalk, Kind::RateRamp];
+        let curve = curve(&noise.sum(1 << 14, &BASELINE));
+        let all = [
+            NoiseTerm::Quantization,
+            NoiseTerm::AngleRandomWalk,
+            NoiseTerm::BiasInstability,
+            NoiseTerm::RateRandomWalk,
+            NoiseTerm::RateRamp,
+        ];
         // At the same weights; those of the largest model are given to all.
         let largest = allan_core::fit::fit(&curve, &all);
-        let deviance = |kinds: &[Kind]| {
+        let deviance = |kinds: &[NoiseTerm]| {
             let model = allan_core::fit::fit(&curve, kinds);
-            let of = |point: &allan_core::Point| {
+            let of = |point: &allan_core::AllanPoint| {
                 let ratio = point.avar / model.avar(point.n);
                 largest.edf(point) * (ratio - 1.0 - ratio.ln())
             };
@@ -128,36 +159,36 @@ fn a_larger_model_never_fits_worse() {
 }
 
 #[test]
-fn two_levels_are_told_from_a_gaussian_process() {
+fn a_telegraph_signal_is_distinguished_from_a_gaussian_process() {
     let shape = Markov { time_constant: 1.3 };
     for seed in 0..10 {
         let mut noise = Noise::new(500 + seed);
-        let rest = noise.sum(SAMPLES, &DECLARED);
-        let gaussian = noise.series(&Kind::Markov(shape), SAMPLES);
+        let rest = noise.sum(SAMPLES, &BASELINE);
+        let gaussian = noise.series(&NoiseTerm::Markov(shape), SAMPLES);
         // Levels 0.4 apart have a standard deviation of 0.2.
         let levels = telegraph_signal(&mut noise, SAMPLES, shape.time_constant, 0.4);
-        let verdict = |signal: &dyn Fn(usize) -> f64| {
+        let ratio = |signal: &dyn Fn(usize) -> f64| {
             let sum: Vec<f64> = rest.iter().enumerate().map(|(k, rest)| rest + signal(k)).collect();
             let curve = curve(&sum);
-            let trace = trace(&curve, Lines::InTheCurve);
+            let trace = trace(&curve, LineCandidates::Curve, &FILTERS);
             let found = added(&trace).into_iter().find_map(|term| match term.kind {
-                Kind::Markov(markov) => Some(markov),
+                NoiseTerm::Markov(markov) => Some(markov),
                 _ => None,
             });
-            let markov = found.unwrap_or_else(|| panic!("no correlated term in {:?}", trace.found));
-            telegraph::judge(&curve, &trace.after, markov).expect("fourth moments")
+            let markov = found.unwrap_or_else(|| panic!("no correlated term in {:?}", trace.added));
+            telegraph::kurtosis_ratio(&curve, &trace.after, markov).expect("fourth moments")
         };
-        let (smooth, two) = (verdict(&|k| 0.2 * gaussian[k]), verdict(&|k| levels[k]));
+        let (smooth, two) = (ratio(&|k| 0.2 * gaussian[k]), ratio(&|k| levels[k]));
         assert!(two.is_telegraph() && !smooth.is_telegraph(), "{two:?}, {smooth:?}");
     }
 }
 
 #[test]
-fn a_declared_model_is_left_alone_when_nothing_is_sought() {
+fn a_baseline_has_the_baseline_terms_and_no_others() {
     let mut noise = Noise::new(1);
-    let curve = curve(&noise.sum(1 << 14, &[(Kind::AngleRandomWalk, 0.05), (Kind::RateRamp, 0.1)]));
-    let trace = Trace::declared(&curve);
-    assert!(trace.found.is_empty() && trace.before == trace.after);
+    let curve = curve(&noise.sum(1 << 14, &[(NoiseTerm::AngleRandomWalk, 0.05), (NoiseTerm::RateRamp, 0.1)]));
+    let trace = Trace::baseline(&curve);
+    assert!(trace.added.is_empty() && trace.before == trace.after);
     let names = |model: &Model| model.terms().iter().map(|term| term.kind).collect::<Vec<_>>();
-    assert_eq!(names(&trace.after), Kind::DECLARED);
+    assert_eq!(names(&trace.after), NoiseTerm::BASELINE);
 }

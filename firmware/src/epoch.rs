@@ -10,8 +10,8 @@ use crate::statistics::{
     AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
 };
 use adis16405_driver::{Channel, Config};
-use allan_core::regression::{Beside, Covariate, Sensitivity};
-use allan_core::{Curve, Point};
+use allan_core::regression::{Covariate, CovariateRegression, Sensitivity};
+use allan_core::{AllanPoint, Curve};
 use heapless::Vec;
 use link::{MAX_COVARIATES, ReportedShift};
 
@@ -124,8 +124,8 @@ pub fn estimate_regressors(
                 config,
             )
         };
-        let regression = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
-        let sensitivities = regression.followed_while(keep_on)?;
+        let regression = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
+        let sensitivities = regression.sensitivities_while(keep_on)?;
         let degrades = || degrades(epoch, &candidates, config, &sensitivities, &regression);
         // Sensitivities are chosen by falling significance: the last one is the weakest.
         let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
@@ -181,7 +181,8 @@ fn subtract(
         )
     };
     let channel = &curve.clone();
-    Beside { channel, covariates: &covariates, covariance: &covariance }.subtract_from(curve, &sensitivities);
+    CovariateRegression { channel, covariates: &covariates, covariance: &covariance }
+        .subtract_from(curve, &sensitivities);
     Some(())
 }
 
@@ -242,7 +243,7 @@ fn degrades(
     candidates: &Candidates,
     config: Config,
     sensitivities: &[Sensitivity],
-    regression: &Beside<'_, OCTAVES, CROSS_OCTAVES>,
+    regression: &CovariateRegression<'_, OCTAVES, CROSS_OCTAVES>,
 ) -> bool {
     let mut added = [0.0; OCTAVES];
     let mut covariate = Curve::empty();
@@ -252,7 +253,7 @@ fn degrades(
             *added += sensitivity.value * sensitivity.value * point.avar;
         }
     }
-    let worse = |(raw, added): (&Point, f64)| {
+    let worse = |(raw, added): (&AllanPoint, f64)| {
         let subtracted = regression.subtracted_at(raw, sensitivities).unwrap_or(raw.avar);
         subtracted + added > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf))
     };

@@ -6,9 +6,10 @@ use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL, mo
 use adis16405_driver::Config;
 use allan_core::confidence::NORMAL_975;
 use allan_core::fit::fit;
-use allan_core::model::{MAX_TERMS, Term};
-use allan_core::trace::{Found, Lines, MAX_ADDED, Trace, trace_while};
-use allan_core::{Curve, Kind, Model};
+use allan_core::model::{FittedTerm, MAX_TERMS};
+use allan_core::term::MovingAverageFilter;
+use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Trace, trace_while};
+use allan_core::{Curve, Model, NoiseTerm};
 use heapless::Vec;
 use link::{
     LearnedMessage, MAX_DRIFTS, ReportedAddedTerm, ReportedCoefficient, ReportedDrift, ReportedModelError,
@@ -29,12 +30,12 @@ pub struct EpochModel {
     /// N, B and K of the stream itself; `None` before the first fit.
     baseline: Option<BaselineCoefficients>,
     /// All terms of the compensated stream.
-    full: Vec<(Kind, f64), MAX_TERMS>,
+    full: Vec<(NoiseTerm, f64), MAX_TERMS>,
     /// What is subtracted from the stream.
     pub(crate) regressors: Regressors,
 }
 
-type BaselineCoefficients = [f64; Kind::DECLARED.len()];
+type BaselineCoefficients = [f64; NoiseTerm::BASELINE.len()];
 
 impl EpochModel {
     /// The model before the first fit.
@@ -43,7 +44,7 @@ impl EpochModel {
     /// N, B and K of the stream itself; `None` before the first fit.
     #[must_use]
     pub(crate) fn baseline(&self, config: Config) -> Option<Model> {
-        Some(model(Kind::DECLARED.into_iter().zip(self.baseline?), config))
+        Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), config))
     }
 
     /// All terms of the compensated stream; `None` before the first fit.
@@ -53,14 +54,29 @@ impl EpochModel {
     }
 }
 
-fn model(terms: impl Iterator<Item = (Kind, f64)>, config: Config) -> Model {
-    Model::new(1.0 / config.sample_period().hz(), terms.map(|(kind, value)| Term::exact(kind, value)))
+fn model(terms: impl Iterator<Item = (NoiseTerm, f64)>, config: Config) -> Model {
+    Model::new(1.0 / config.sample_period().hz(), terms.map(|(kind, value)| FittedTerm::exact(kind, value)))
 }
 
 fn baseline_coefficients(model: &Model) -> Option<BaselineCoefficients> {
     let mut values = model.terms().iter().map(|term| term.value);
     Some([values.next()?, values.next()?, values.next()?])
 }
+
+/// Low-pass filters of the ADIS16405 that the trace tries. SENS_AVG selects Bartlett windows of 2 to 64 taps per stage; the
+/// window of 8 taps is also tried as read at a lower rate than the part samples at, from four starting decimations.
+pub const FILTERS: [MovingAverageFilter; 10] = [
+    MovingAverageFilter::bartlett(2),
+    MovingAverageFilter::bartlett(4),
+    MovingAverageFilter::bartlett(8),
+    MovingAverageFilter::bartlett(16),
+    MovingAverageFilter::bartlett(32),
+    MovingAverageFilter::bartlett(64),
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 6.1 },
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 8.1 },
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 10.1 },
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 12.1 },
+];
 
 /// The fit of one channel's model to an epoch.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,9 +127,9 @@ impl EpochFit {
         let mut curve = Curve::empty();
         // Without covariances there are no regressors, and the curve is that of the stream itself.
         let _ = rebuild_compensated_curve(&mut curve, epoch, index, config, &self.regressors);
-        self.trace.declare(&curve);
+        self.trace.fit_baseline(&curve);
         let sufficient = self.trace.before_goodness.p_value > P_VALUE_SUFFICIENT;
-        sufficient || trace_while(&mut self.trace, &curve, Lines::InTheCurve, keep_on)
+        sufficient || trace_while(&mut self.trace, &curve, LineCandidates::Curve, &FILTERS, keep_on)
     }
 
     /// The model that was fitted.
@@ -131,7 +147,7 @@ impl EpochFit {
             channel: CHANNELS[index] as u8,
             epoch,
             regressors: regressors.iter().map(reported_regressor).collect(),
-            added_terms: trace.found.iter().map(|found| reported_added_term(found, &trace.after)).collect(),
+            added_terms: trace.added.iter().map(|found| reported_added_term(found, &trace.after)).collect(),
             p_before: trace.before_goodness.p_value,
             p_after: trace.after_goodness.p_value,
         }
@@ -142,7 +158,7 @@ impl EpochFit {
 fn refit_baseline(epoch: &FinishedEpoch, index: usize, config: Config) -> Option<BaselineCoefficients> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, config);
-    baseline_coefficients(&fit(&curve, &Kind::DECLARED))
+    baseline_coefficients(&fit(&curve, &NoiseTerm::BASELINE))
 }
 
 /// Validates on an epoch the model of [`CHANNELS`]`[index]` from the epoch before, whose means are `means`. `None` before the
@@ -211,8 +227,8 @@ fn reported_regressor(regressor: &Regressor) -> ReportedRegressor {
     }
 }
 
-fn reported_added_term(found: &Found, model: &Model) -> ReportedAddedTerm {
-    let Term { kind, value, low, high, shape } = model.terms()[found.term];
+fn reported_added_term(found: &AddedTerm, model: &Model) -> ReportedAddedTerm {
+    let FittedTerm { kind, value, low, high, shape } = model.terms()[found.term];
     let named = kind.shape().into_iter().zip(shape).filter(|((name, _), _)| !name.is_empty());
     ReportedAddedTerm {
         coefficient: ReportedCoefficient { term: reported_term(kind), value, low, high },

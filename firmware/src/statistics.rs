@@ -2,9 +2,9 @@
 //! and report that are made of one channel's sums.
 
 use adis16405_driver::{Channel, Config};
-use allan_core::{Cascade, Curve, Kind, Learnt, Model, check, fit::fit, model};
+use allan_core::{Cascade, Curve, Model, NoiseTerm, OctaveSums, fit::fit, model};
 use heapless::Vec;
-use link::{ChannelMessage, OctaveSums, ReportedCoefficient, ReportedModelError, ReportedTerm};
+use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
 
 /// Channels that are estimated, by index: the six inertial channels, then the covariates temperature and supply.
 pub const CHANNELS: [Channel; 8] = {
@@ -87,7 +87,7 @@ impl ChannelSums {
 
     /// Has an estimator continue from these sums, as after a gap.
     pub fn restore(&self, estimator: &mut ChannelEstimator) {
-        estimator.resume(self.samples, self.missing, |octave| self.octave(octave));
+        estimator.restore(self.samples, self.missing, |octave| self.octave(octave));
     }
 
     /// Rebuilds the Allan variance curve of a channel in its unit.
@@ -96,7 +96,7 @@ impl ChannelSums {
     #[inline(never)]
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, config: Config) {
         let period = 1.0 / config.sample_period().hz();
-        ChannelEstimator::draw(curve, period, self.samples, |octave| self.octave(octave));
+        ChannelEstimator::rebuild_curve(curve, period, self.samples, |octave| self.octave(octave));
         curve.scale(channel.lsb(config.range()));
     }
 
@@ -106,7 +106,7 @@ impl ChannelSums {
     pub fn fit_baseline(&self, channel: Channel, config: Config) -> Model {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, config);
-        fit(&curve, &Kind::DECLARED)
+        fit(&curve, &NoiseTerm::BASELINE)
     }
 
     /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
@@ -135,9 +135,9 @@ impl ChannelSums {
             unseen_error,
         };
         let octaves = self.octaves.iter().enumerate().filter(|(_, (_, count))| *count > 0);
-        let octaves = octaves.map(|(octave, &(sum, count))| OctaveSums { n: 1 << octave, sum, count });
+        let octaves = octaves.map(|(octave, &(sum, count))| ReportedOctave { n: 1 << octave, sum, count });
         report.octaves.extend(octaves.take(link::MAX_OCTAVES));
-        let coefficient = |term: &model::Term| {
+        let coefficient = |term: &model::FittedTerm| {
             let (value, low, high) = (term.value, term.low, term.high);
             ReportedCoefficient { term: reported_term(term.kind), value, low, high }
         };
@@ -146,29 +146,29 @@ impl ChannelSums {
         report
     }
 
-    fn octave(&self, octave: usize) -> Learnt {
+    fn octave(&self, octave: usize) -> OctaveSums {
         let (squares, count) = self.octaves[octave];
-        Learnt { squares, fourths: 0, count }
+        OctaveSums { squares, fourths: 0, count }
     }
 }
 
 /// Error of a model on a curve; `None` if no octave can be compared.
 pub(crate) fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> Option<ReportedModelError> {
-    let error = check::ModelError::between(model, curve)?;
+    let error = allan_core::model::Discrepancy::between(model, curve)?;
     Some(ReportedModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent })
 }
 
-pub(crate) fn reported_term(kind: Kind) -> ReportedTerm {
+pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
     match kind {
-        Kind::Quantization => ReportedTerm::Quantization,
-        Kind::AngleRandomWalk => ReportedTerm::AngleRandomWalk,
-        Kind::BiasInstability => ReportedTerm::BiasInstability,
-        Kind::RateRandomWalk => ReportedTerm::RateRandomWalk,
-        Kind::RateRamp => ReportedTerm::RateRamp,
-        Kind::Filtered(_) => ReportedTerm::Filtered,
-        Kind::Markov(_) => ReportedTerm::Markov,
-        Kind::Resonance(_) => ReportedTerm::Resonance,
-        Kind::Sinusoid(_) => ReportedTerm::Sinusoid,
+        NoiseTerm::Quantization => ReportedTerm::Quantization,
+        NoiseTerm::AngleRandomWalk => ReportedTerm::AngleRandomWalk,
+        NoiseTerm::BiasInstability => ReportedTerm::BiasInstability,
+        NoiseTerm::RateRandomWalk => ReportedTerm::RateRandomWalk,
+        NoiseTerm::RateRamp => ReportedTerm::RateRamp,
+        NoiseTerm::Filtered(_) => ReportedTerm::Filtered,
+        NoiseTerm::Markov(_) => ReportedTerm::Markov,
+        NoiseTerm::Resonance(_) => ReportedTerm::Resonance,
+        NoiseTerm::Sinusoid(_) => ReportedTerm::Sinusoid,
     }
 }
 

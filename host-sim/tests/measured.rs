@@ -7,7 +7,7 @@
 mod common;
 
 use adis16405_driver::GyroRange;
-use allan_core::{Kind, term::Filter};
+use allan_core::{NoiseTerm, term::MovingAverageFilter};
 use noise_analysis::analysis::analyze;
 use noise_analysis::explain::{ChannelExplanation, Explanation, explain};
 use noise_analysis::time_course::moving::Free;
@@ -34,9 +34,9 @@ fn of<'a>(explanation: &'a Explanation, channel: &str) -> &'a ChannelExplanation
     explanation.channels.iter().find(|of| of.channel.name == channel).expect("the channel")
 }
 
-fn filter(of: &ChannelExplanation) -> Filter {
+fn filter(of: &ChannelExplanation) -> MovingAverageFilter {
     let mut filters = of.trace.after.terms().iter().filter_map(|term| match term.kind {
-        Kind::Filtered(filter) => Some(filter),
+        NoiseTerm::Filtered(filter) => Some(filter),
         _ => None,
     });
     filters.next().unwrap_or_else(|| panic!("no filter in {}", of.channel.name))
@@ -200,7 +200,7 @@ fn the_parts_own_filter() {
     assert!((explanation.sample_rate_hz - 816.44).abs() < 0.03, "{}", explanation.sample_rate_hz);
     for of in &explanation.channels {
         // Two averages over four values each, read at the full rate: the spectra have their nulls at 204 and 408 Hz.
-        assert_eq!(filter(of), Filter::bartlett(4), "{}", of.channel.name);
+        assert_eq!(filter(of), MovingAverageFilter::bartlett(4), "{}", of.channel.name);
     }
     assert_eq!(explanation.channels.len(), 6);
     // One interval of 16 periods without a flush; equal neighbours are as frequent as chance makes them.

@@ -1,27 +1,25 @@
-//! Many samples at once: the same differences level by level, in loops that a compiler can vectorise.
+//! Slices of samples: the same differences as sample by sample, computed level by level in loops that vectorise.
 
-mod powers;
+use super::{Cascade, second_difference};
+use crate::moments::{rounded, unit_bits};
 
-use super::Cascade;
-use super::moments::unit_bits;
-use powers::{Word, differences};
-
-/// Samples that are taken together.
+/// Samples of one block.
 const BLOCK: usize = 1024;
-/// Running sums of earlier samples that a block's differences reach back to.
+/// Running sums before a block to which its differences reach back: two averaging times at the largest overlap.
 const HISTORY: usize = 2 * 16;
 
-/// Running sums of one level, less a common base: those of the past in front, then the block's own.
+/// Running sums of one level, relative to a common base: first those before the block, then those of the block.
 struct Sums<W> {
     values: [W; HISTORY + BLOCK],
     base: i64,
-    /// Steps that the level had taken before the block.
+    /// Number of steps of the level before the block.
     past: u64,
+    /// Number of sums of the block at this level.
     new: usize,
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
-    /// Takes samples in order; the same as [`push`](Self::push) for each, and faster where words have 64 bits.
+    /// Adds samples in order: the same result as [`push`](Self::push) for each, and faster on 64-bit machines.
     pub fn push_slice(&mut self, samples: &[i32]) {
         if cfg!(target_pointer_width = "32") {
             return samples.iter().for_each(|&sample| self.push(sample));
@@ -34,7 +32,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Takes a block down to the level whose sums do not fit in narrow words; returns that level and its sums.
+    /// Processes a block in 32-bit sums, down to the first level whose sums do not fit; returns that level and its sums.
     fn push_narrow(&mut self, block: &[i32], narrow: &mut Sums<i32>) -> Option<(usize, Sums<i64>)> {
         if self.begin(block, narrow) {
             return self.descend(0, narrow).map(|level| (level, narrow.widened()));
@@ -44,7 +42,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         Some((0, wide))
     }
 
-    /// Adds the samples up, behind the recent sums. Nothing has happened if a sum does not fit.
+    /// Sets `sums` to those of the first level. If one does not fit in a word, returns false and leaves the estimator as it
+    /// was.
     fn begin<W: Word>(&mut self, block: &[i32], sums: &mut Sums<W>) -> bool {
         sums.base = W::base(self.sum);
         sums.past = self.elapsed;
@@ -65,7 +64,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         fits
     }
 
-    /// Takes the differences from `level` on; returns the level whose past does not fit.
+    /// Adds the differences from `level` on; returns the first level whose earlier sums do not fit in a word.
     fn descend<W: Word>(&mut self, level: usize, sums: &mut Sums<W>) -> Option<usize> {
         for level in level..Self::LEVELS {
             let line = &mut self.octaves[level + Self::FINE].line;
@@ -88,7 +87,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         None
     }
 
-    /// The differences over `reach` steps of a level that end in the block.
+    /// Adds the differences with an averaging time of `reach` steps that end in the block.
     fn accumulate_block<W: Word>(&mut self, octave: usize, reach: usize, sums: &Sums<W>) {
         // The first difference ends at step 2·reach.
         let first = (2 * reach as u64).saturating_sub(sums.past + 1);
@@ -112,7 +111,7 @@ impl<W: Word> Sums<W> {
         Self { values: [W::default(); HISTORY + BLOCK], base: 0, past: 0, new: 0 }
     }
 
-    /// The same in words that hold any sum.
+    /// The same sums in words that hold any value.
     fn widened(&self) -> Sums<i64> {
         let values = self.values.map(|value| self.base.wrapping_add(value.into()));
         Sums { values, base: 0, past: self.past, new: self.new }
@@ -123,7 +122,7 @@ impl<W: Word> Sums<W> {
         self.base.wrapping_add(self.values[HISTORY + self.new - 1 - back].into())
     }
 
-    /// Puts a line of sums, of `nearest` steps ago and before, in front of the block; returns the bits that they use.
+    /// Copies the sums of `nearest` and more steps ago from a delay line in front of the block; returns the bits they use.
     #[inline]
     fn put_past<const OVERLAP: usize>(&mut self, nearest: usize, line: &[i64; OVERLAP]) -> u64 {
         let mut used = 0;
@@ -135,7 +134,7 @@ impl<W: Word> Sums<W> {
         used
     }
 
-    /// Fills a line anew, with the sums of `nearest` steps ago and before.
+    /// Fills a delay line with the sums of `nearest` and more steps before the end of the block.
     #[inline]
     fn keep_past<const OVERLAP: usize>(&self, nearest: usize, line: &mut [i64; OVERLAP]) {
         let last = self.past + self.new as u64;
@@ -144,7 +143,7 @@ impl<W: Word> Sums<W> {
         }
     }
 
-    /// Leaves every second running sum: those of the next level, the last `history` of the past among them.
+    /// Keeps every second sum, which are those of the next level, and the last `history` of those before the block.
     fn halve(&mut self, history: usize) {
         let odd = (self.past & 1) as usize;
         let new = (self.new + odd) / 2;
@@ -157,4 +156,91 @@ impl<W: Word> Sums<W> {
         self.past >>= 1;
         self.new = new;
     }
+}
+
+/// A word that holds a running sum relative to a base.
+trait Word: Copy + Default + Into<i64> {
+    /// The largest sum that fits.
+    const MAX: u64;
+
+    /// A base for sums around `sum`.
+    fn base(sum: i64) -> i64;
+
+    fn truncated(sum: i64) -> Self;
+
+    /// Sums of the squares and of the fourth powers of the second differences of newest, middle and oldest sums. For the
+    /// fourth powers, differences are rounded by `bits`. `None` if the totals might not fit.
+    fn powers(sums: [&[Self]; 3], bits: u32) -> Option<(u128, u128)>;
+}
+
+/// Holds any sum.
+impl Word for i64 {
+    const MAX: u64 = u64::MAX;
+
+    fn base(_: i64) -> i64 {
+        0
+    }
+
+    fn truncated(sum: i64) -> Self {
+        sum
+    }
+
+    fn powers(sums: [&[Self]; 3], bits: u32) -> Option<(u128, u128)> {
+        wide_powers(sums, bits)
+    }
+}
+
+/// Holds sums of 30 bits, whose second differences fit in the word; vector units process more of these at once.
+impl Word for i32 {
+    const MAX: u64 = (1 << 30) - 1;
+
+    fn base(sum: i64) -> i64 {
+        sum.wrapping_sub(1 << 29)
+    }
+
+    fn truncated(sum: i64) -> Self {
+        sum as i32
+    }
+
+    fn powers(sums: [&[Self]; 3], bits: u32) -> Option<(u128, u128)> {
+        let exact = (bits == 0).then(|| narrow_powers(sums)).flatten();
+        exact.or_else(|| wide_powers(sums, bits))
+    }
+}
+
+/// `None` if a difference has 14 bits or more: the fourth powers of a block of 13-bit differences fill 62 bits.
+fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
+    let (mut digits, mut squares, mut fourths) = (0, 0_u64, 0_u64);
+    for (newest, middle, oldest) in zipped(sums) {
+        let magnitude = (newest - middle - (middle - oldest)).unsigned_abs();
+        digits |= magnitude;
+        // Factors of 15 bits, which the vector multiplication of every x86-64 supports.
+        let small = magnitude & 0x7fff;
+        let square = u64::from(small * small);
+        squares += square;
+        fourths = fourths.wrapping_add(square * square);
+    }
+    (digits < 1 << 13).then_some((squares.into(), fourths.into()))
+}
+
+/// `None` if a difference has 29 bits or more: the fourth powers of a block of 28-bit differences fill 122 bits.
+fn wide_powers<W: Word>(sums: [&[W]; 3], bits: u32) -> Option<(u128, u128)> {
+    let square = |factor: i64| u128::from(factor.wrapping_mul(factor) as u64);
+    let (mut digits, mut squares, mut fourths) = (0, 0_u128, 0_u128);
+    for difference in differences(sums) {
+        digits |= difference.unsigned_abs();
+        let rounded = square(rounded(difference, bits));
+        squares += square(difference);
+        fourths = fourths.wrapping_add(rounded * rounded);
+    }
+    (digits < 1 << 28).then_some((squares, fourths))
+}
+
+/// Second differences in 64 bits.
+fn differences<W: Word>(sums: [&[W]; 3]) -> impl Iterator<Item = i64> {
+    zipped(sums).map(|(newest, middle, oldest)| second_difference(newest.into(), middle.into(), oldest.into()))
+}
+
+fn zipped<W: Word>([newest, middle, oldest]: [&[W]; 3]) -> impl Iterator<Item = (W, W, W)> {
+    newest.iter().zip(middle).zip(oldest).map(|((&newest, &middle), &oldest)| (newest, middle, oldest))
 }

@@ -1,32 +1,32 @@
-//! How far the data fixes the parameters: 95 % bounds from the sandwich covariance.
+//! 95 % bounds of fitted parameters, from the sandwich covariance.
 //!
-//! The points of a curve are not independent, and independent ones would claim 1.5 to 1.8 times too little. A
-//! coefficient that few degrees of freedom tell would also be claimed too well wherever it came out too small: its
-//! bounds are the values under which the estimate lies at the end of *their* scatter (test inversion), not of its own.
+//! The points of a curve are correlated; bounds for independent points would be 1.5 to 1.8 times too narrow. The scatter of
+//! a coefficient also depends on its value, so bounds from the scatter at the estimate would be too narrow where the
+//! estimate came out too small by chance. Coefficients with a large uncertainty are therefore bounded by test inversion: a
+//! bound is the value under which the estimate lies at the 2.5 % or 97.5 % quantile of the distribution for that value.
 
 use super::least_squares::{entry, solve, triangle};
-use super::parameter::Parameter;
-use super::points::Points;
-use super::problem::{MAX_PARAMETERS, Problem};
-use crate::Curve;
-use crate::chi_square::quantile;
-use crate::confidence::NORMAL_975;
+use super::likelihood::{MAX_PARAMETERS, Points, Problem};
+use super::shape::Parameter;
+use crate::confidence::{NORMAL_975, chi_square_quantile};
+use crate::curve::Curve;
 use crate::math::{absf, exp, sqrt, sqrtf};
 use crate::model::{MAX_TERMS, Model};
 
-/// Standard deviation over the estimate of an amount below which its own scatter is good enough: the bounds of the
-/// coefficient are then a hundredth of their distance off.
+/// Standard deviation over the estimate of an amount below which the scatter at the estimate is used: the error of the
+/// bounds of the coefficient is then a hundredth of their distance.
 const SMALL: f32 = 0.02;
-/// A candidate of 0 would leave a model of one term without any variance.
-const NEXT_TO_NOTHING: f32 = 1e-4;
+/// The smallest amount that is tested, over the estimate: at 0 a model of one term would have no variance.
+const SMALLEST: f32 = 1e-4;
+/// Largest number of secant steps.
 const SEARCH_ROUNDS: usize = 5;
 
 /// Sets the bounds of all parameters of `model`, which was fitted to the curve.
-#[inline(never)] // here and below: so that stack frames do not add up
+#[inline(never)] // here and below: so that stack frames do not add up in the caller
 pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model) {
     let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
-    points.take();
-    problem.take_model(&mut points, model);
+    points.fill();
+    problem.fill_from_model(&mut points, model);
     let parameters = problem.differentiate(&points);
     let estimate = problem.amounts;
     for (column, parameter) in parameters.iter().enumerate() {
@@ -48,7 +48,7 @@ pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model)
                 (set.low, set.high) = (coefficient(low), coefficient(high));
                 if problem.amounts != estimate {
                     problem.amounts = estimate;
-                    problem.weigh(&mut points);
+                    problem.set_confidence(&mut points);
                 }
             }
             Parameter::Shape(term, index) => {
@@ -61,29 +61,29 @@ pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model)
     }
 }
 
-/// How the estimate of a parameter scatters.
+/// The distribution of the estimate of a parameter.
 struct Scatter {
     deviation: f32,
     skewness: f32,
-    /// How far beyond its estimate the data pulls the parameter: below 0 only for a square that may not follow.
+    /// The unconstrained step of the parameter from its estimate: negative only for an amount at its limit of 0.
     pull: f32,
-    /// What the other parameters do where this one is moved and they are fitted again, up to a factor.
+    /// Change of all parameters, up to a factor, when this one is moved and the others are fitted again.
     direction: [f32; MAX_PARAMETERS],
 }
 
 impl Scatter {
-    /// What the estimate exceeds its expectation by with probability `1 − p`: the quantile of the gamma distribution
-    /// with the same deviation and skewness (Pearson's type III).
+    /// The `p` quantile of the estimate less its expectation: that of the gamma distribution with this standard deviation
+    /// and skewness (Pearson type III).
     fn quantile(&self, p: f64) -> f32 {
-        // Below, the distribution is normal up to a hundredth of a deviation.
+        // At lower skewness the distribution is normal to a hundredth of a standard deviation.
         let skewness = f64::from(self.skewness.max(0.02));
         let dof = 8.0 / (skewness * skewness);
-        self.deviation * ((quantile(p, dof) - dof) / sqrt(2.0 * dof)) as f32
+        self.deviation * ((chi_square_quantile(p, dof) - dof) / sqrt(2.0 * dof)) as f32
     }
 }
 
-/// The scatter of the parameter of a column, if the model is true as the problem has it: the sandwich covariance
-/// `H⁻¹·JᵀRJ·H⁻¹`, with the skewness of the points weighed by what they add to it.
+/// The scatter of the parameter of a column if the present amounts are the true ones: the sandwich covariance
+/// `H⁻¹·JᵀRJ·H⁻¹`, and the skewness of the points weighted by their contributions to it.
 #[inline(never)]
 fn scatter<const POINTS: usize>(
     points: &Points<POINTS>,
@@ -93,7 +93,7 @@ fn scatter<const POINTS: usize>(
 ) -> Option<Scatter> {
     let mut weights = [0.0; POINTS];
     let direction = direction(points, problem, parameters, column, &mut weights)?;
-    // A point's estimate is χ² with as many degrees of freedom, whose skewness is √(8/edf).
+    // The skewness of χ² with edf degrees of freedom is √(8/edf).
     let mut skewed = weights;
     let mut pull = 0.0;
     for (at, point) in points.measured.iter().enumerate() {
@@ -105,8 +105,8 @@ fn scatter<const POINTS: usize>(
     Some(Scatter { deviation: sqrtf(variance), skewness, pull, direction })
 }
 
-/// The parameter's column of the inverse information; `weights` become those of the standardised residuals in its
-/// estimate.
+/// The parameter's column of the inverse information matrix; sets `weights` to those of the standardised residuals in its
+/// estimate. `None` if the matrix is singular.
 #[inline(never)]
 fn direction<const POINTS: usize>(
     points: &Points<POINTS>,
@@ -133,7 +133,7 @@ fn direction<const POINTS: usize>(
     Some(direction)
 }
 
-/// Values that the amount of one term could have.
+/// Test inversion for the amount of one term.
 struct Candidates<'a, 'b, const POINTS: usize> {
     points: &'a mut Points<'b, POINTS>,
     problem: &'a mut Problem<POINTS>,
@@ -144,11 +144,12 @@ struct Candidates<'a, 'b, const POINTS: usize> {
 }
 
 impl<const POINTS: usize> Candidates<'_, '_, POINTS> {
+    /// 95 % bounds of the amount; `own` is the scatter at the estimate.
     fn bounds(&mut self, own: &Scatter) -> (f32, f32) {
         let amount = self.estimate[self.term];
         if amount == 0.0 {
-            // Below 0, but no further than chance would often have it: an upper bound must not vanish with bad luck
-            // (power-constrained limits: G. Cowan et al., arXiv:1105.3166).
+            // The unconstrained estimate is negative. It is limited to one standard deviation below 0, so that the upper
+            // bound does not vanish (power-constrained limits: G. Cowan et al., arXiv:1105.3166).
             let observed = own.pull.max(-own.deviation).min(0.0);
             return (0.0, self.high(observed, own));
         }
@@ -159,17 +160,17 @@ impl<const POINTS: usize> Candidates<'_, '_, POINTS> {
         (self.low(amount, own), self.high(amount, own))
     }
 
-    /// The value whose upper tail begins at what was observed.
+    /// The value under which the observed estimate is the 97.5 % quantile; 0 if there is none.
     fn low(&mut self, observed: f32, own: &Scatter) -> f32 {
-        let nearly_nothing = NEXT_TO_NOTHING * observed;
-        let excess = self.quantile(nearly_nothing, 0.975) - observed;
+        let smallest = SMALLEST * observed;
+        let excess = self.quantile(smallest, 0.975) - observed;
         if excess >= 0.0 {
             return 0.0;
         }
-        self.root(0.975, observed, (nearly_nothing, excess), (observed, own.quantile(0.975)))
+        self.root(0.975, observed, (smallest, excess), (observed, own.quantile(0.975)))
     }
 
-    /// The value whose lower tail ends at what was observed.
+    /// The value under which the observed estimate is the 2.5 % quantile.
     fn high(&mut self, observed: f32, own: &Scatter) -> f32 {
         let distance = -own.quantile(0.025);
         let further = observed + 1.5 * distance;
@@ -177,7 +178,8 @@ impl<const POINTS: usize> Candidates<'_, '_, POINTS> {
         self.root(0.025, observed, (observed, -distance), (further, excess))
     }
 
-    /// Where a quantile of the estimate is what was observed, from two values with their excess: the secant method.
+    /// The value under which the `p` quantile of the estimate is the observed one, by the secant method from two values with
+    /// their differences.
     fn root(&mut self, p: f64, observed: f32, mut a: (f32, f32), mut b: (f32, f32)) -> f32 {
         for _ in 0..SEARCH_ROUNDS {
             let slope = ((b.1 - a.1) / (b.0 - a.0)).max(0.02);
@@ -190,13 +192,13 @@ impl<const POINTS: usize> Candidates<'_, '_, POINTS> {
         b.0
     }
 
-    /// A quantile of the estimate if the amount is `value`, the other terms following.
+    /// The `p` quantile of the estimate if the true amount is `value` and the other amounts are fitted to it.
     fn quantile(&mut self, value: f32, p: f64) -> f32 {
         let change = value - self.estimate[self.term];
         for (other, entry) in self.problem.amounts.iter_mut().enumerate() {
             *entry = (self.estimate[other] + change * self.direction[other]).max(0.0);
         }
-        self.problem.weigh(self.points);
+        self.problem.set_confidence(self.points);
         let scatter = scatter(self.points, self.problem, self.parameters, self.term);
         scatter.map_or(f32::NAN, |scatter| value + scatter.quantile(p))
     }

@@ -1,27 +1,26 @@
 //! Non-negative least squares of a few unknowns, from the normal equations.
 //!
-//! Symmetric matrices are packed: of `N` unknowns the lower triangle, row by row.
+//! Symmetric matrices are stored as their lower triangle, row by row.
 
 use crate::math::sqrt;
 
-/// Unknowns of the largest system.
+/// Largest number of unknowns.
 pub(crate) const MOST: usize = 12;
 
-/// Entries of a packed triangle.
+/// Number of entries of a stored triangle.
 pub(crate) const fn triangle(unknowns: usize) -> usize {
     unknowns * (unknowns + 1) / 2
 }
 
-/// Where a packed triangle has an entry.
+/// Index of a matrix element in a stored triangle.
 pub(crate) const fn entry(i: usize, j: usize) -> usize {
     if i < j { triangle(j) + i } else { triangle(i) + j }
 }
 
-/// A pull towards a positive value, or a part of a column that the others do not explain, that rounding could show too,
-/// relative to the whole.
+/// Relative size below which a gradient, or the remainder of a pivot, counts as a rounding error.
 const ROUNDING: f64 = 1e-12;
 
-/// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns, from the `x ≥ 0` that is given on.
+/// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns, starting from the given `x ≥ 0`.
 ///
 /// The active-set method of C. Lawson and R. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
 pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
@@ -32,21 +31,21 @@ pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
 ) {
     let mut free = (0..count).filter(|&i| x[i] > 0.0).fold(0, |free, i| free | 1 << i);
     let mut refused = 0_usize;
-    match settle(a, b, x, free) {
+    match minimise_free(a, b, x, free) {
         Some(set) => free = set,
         None => (*x, free) = ([0.0; N], 0),
     }
-    // Each round lowers the objective, so no set of free unknowns comes twice; rounding could make it seem so.
+    // Each round lowers the objective, so no set of free unknowns recurs, except by rounding: hence the limit.
     for _ in 0..4 * N {
         let along = |i: usize| (0..count).map(|j| a[entry(i, j)] * x[j]).sum::<f64>();
-        let pull = |i: usize| (b[i] - along(i)) / sqrt(a[entry(i, i)]);
+        let gradient = |i: usize| (b[i] - along(i)) / sqrt(a[entry(i, i)]);
         let candidates = (0..count).filter(|&i| (free | refused) >> i & 1 == 0 && a[entry(i, i)] > 0.0);
-        let Some(entering) = candidates.max_by(|&i, &j| pull(i).total_cmp(&pull(j))) else { break };
-        if pull(entering) <= ROUNDING * b[entering] / sqrt(a[entry(entering, entering)]) {
+        let Some(entering) = candidates.max_by(|&i, &j| gradient(i).total_cmp(&gradient(j))) else { break };
+        if gradient(entering) <= ROUNDING * b[entering] / sqrt(a[entry(entering, entering)]) {
             break;
         }
         let before = *x;
-        match settle(a, b, x, free | 1 << entering) {
+        match minimise_free(a, b, x, free | 1 << entering) {
             Some(set) => free = set,
             None => *x = before,
         }
@@ -56,9 +55,9 @@ pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
     }
 }
 
-/// Goes from `x` towards the minimum over the unknowns in `free`, and frees fewer whenever one would turn negative: those
-/// that are left. `None` if it is singular.
-fn settle<const N: usize, const TRIANGLE: usize>(
+/// Moves `x` to the minimum over the unknowns in the bit set `free`, removing from the set each one that would turn
+/// negative. Returns the remaining set; `None` if the matrix is singular.
+fn minimise_free<const N: usize, const TRIANGLE: usize>(
     a: &[f64; TRIANGLE],
     b: &[f64; N],
     x: &mut [f64; N],
@@ -83,12 +82,12 @@ fn settle<const N: usize, const TRIANGLE: usize>(
     Some(free)
 }
 
-/// Solves `Ax = b` of up to [`MOST`] unknowns for those in the bit set, the others being 0. `x` is `b` before; `a` is
-/// used up.
+/// Solves `Ax = b` of up to [`MOST`] unknowns for those in the bit set `set`; the others are 0. `x` holds `b` on entry and
+/// the solution on return; `a` is overwritten.
 ///
-/// By Cholesky's decomposition of the matrix scaled to a unit diagonal: unknowns may differ by orders of magnitude.
-/// `None` if it is singular.
-#[inline(never)] // one for all sizes
+/// By Cholesky decomposition of the matrix scaled to a unit diagonal, as the unknowns may differ by orders of magnitude.
+/// `None` if the matrix is singular.
+#[inline(never)] // one copy for all sizes
 pub(crate) fn solve(a: &mut [f64], x: &mut [f64], set: usize) -> Option<()> {
     let chosen = |i: &usize| set >> i & 1 == 1;
     let count = x.len();

@@ -1,76 +1,82 @@
-//! The search for the shapes of terms: coordinate by coordinate in the logarithm, the coefficients following.
+//! Shape parameters of terms: which are free, the derivatives of the modelled variances to them, and the search for their
+//! best values.
+//!
+//! The search goes coordinate by coordinate in the logarithm of the parameters and refits the coefficients at each step.
 
-use super::points::Points;
-use super::problem::Problem;
-use crate::Kind;
-use crate::math::{absf, exp};
-use crate::model::{MAX_SHAPE, MAX_TERMS};
+use super::likelihood::{MAX_PARAMETERS, Points, Problem};
+use crate::math::{absf, exp, sqrtf};
+use crate::model::MAX_TERMS;
+use crate::term::{MAX_SHAPE, NoiseTerm};
+use heapless::Vec;
 
+/// Largest number of rounds over all parameters.
 const ROUNDS: usize = 12;
-/// First step: a factor of about 1.2 each way.
+/// First step in the logarithm: a factor of about 1.2.
 const FIRST_STEP: f64 = 0.18;
-/// Steps shorter than this, relative to the parameter, are taken for none.
+/// Step, relative to the parameter, below which it counts as converged.
 const LAST_STEP: f64 = 2e-4;
-/// Rise of the deviance on both sides together up to which a parabola holds: a step of a standard deviation.
+/// Sum of the rises of the deviance on both sides up to which it is taken for a parabola: the step is then at most a
+/// standard deviation.
 const NEAR: f32 = 2.0;
-/// What a round has to gain for another one to be worth while: a tenth of a standard deviation.
-const WORTH_WHILE: f32 = 0.01;
-/// Samples: neighbours that correlate more briefly do so behind a filter.
+/// Smallest decrease of the deviance in a round that makes another round worthwhile: a tenth of a standard deviation.
+const WORTHWHILE: f32 = 0.01;
+/// Lower limit of a Markov correlation time, in samples: shorter correlations are those of a filter.
 const SHORTEST: f64 = 1.5;
 
-/// Which shapes are searched for.
+/// Which shape parameters a fit adjusts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Free<'a> {
-    /// None of them.
-    Nothing,
-    /// All but those of the sinusoids among these, which something better than a curve has told.
-    AllBut(&'a [Kind]),
+pub(crate) enum FreeShapes<'a> {
+    /// None.
+    None,
+    /// All except the frequencies of the sinusoids in this list, which are known from a spectrum.
+    AllExcept(&'a [NoiseTerm]),
 }
 
-impl Free<'_> {
-    pub(super) fn has(self, kind: &Kind) -> bool {
-        let told = |known: &[Kind]| matches!(kind, Kind::Sinusoid(_)) && known.contains(kind);
-        !kind.freedom().is_empty() && matches!(self, Self::AllBut(known) if !told(known))
+impl FreeShapes<'_> {
+    /// Whether the shape of this term is adjusted.
+    pub(super) fn has(self, kind: &NoiseTerm) -> bool {
+        let is_fixed = |known: &[NoiseTerm]| matches!(kind, NoiseTerm::Sinusoid(_)) && known.contains(kind);
+        !kind.free_parameters().is_empty() && matches!(self, Self::AllExcept(known) if !is_fixed(known))
     }
 }
 
-/// Moves the shapes of all terms that are free to where the deviance is least, at the present weights, and returns it.
+/// Sets the shapes of all free terms to those with the least deviance at the present degrees of freedom, and returns it.
 ///
-/// Stops where it is as soon as `keep_on`, which is asked before every step, says no.
+/// `keep_on` is asked before every step; if it returns false, the search ends where it is.
 #[inline(never)]
 pub(super) fn search<const POINTS: usize>(
     points: &Points<POINTS>,
     problem: &mut Problem<POINTS>,
-    free: Free,
+    free: FreeShapes,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> f32 {
     let mut deviance = problem.minimise(points);
-    // Decided before any of them moves.
-    let mut moving = [false; MAX_TERMS];
-    moving.iter_mut().zip(&problem.kinds).for_each(|(moving, kind)| *moving = free.has(kind));
+    // Decided before any shape changes, as known lines are recognised by their frequency.
+    let mut is_free = [false; MAX_TERMS];
+    is_free.iter_mut().zip(&problem.kinds).for_each(|(is_free, kind)| *is_free = free.has(kind));
     let mut steps = [[FIRST_STEP; MAX_SHAPE]; MAX_TERMS];
     for _ in 0..ROUNDS {
         let (before, mut bracketed) = (deviance, true);
-        for term in (0..problem.kinds.len()).filter(|&term| moving[term]) {
-            for index in problem.kinds[term].freedom() {
+        for term in (0..problem.kinds.len()).filter(|&term| is_free[term]) {
+            for index in problem.kinds[term].free_parameters() {
                 if !keep_on() {
                     return deviance;
                 }
                 let near;
-                (deviance, near) = walk(points, problem, (term, index), &mut steps[term][index], deviance);
+                (deviance, near) = line_search(points, problem, (term, index), &mut steps[term][index], deviance);
                 bracketed &= near;
             }
         }
-        if bracketed && before - deviance < WORTH_WHILE {
+        if bracketed && before - deviance < WORTHWHILE {
             break;
         }
     }
     deviance
 }
 
-/// Walks along one parameter: on while it goes down, then with a step of the size that the bow suggests. Returns the
+/// Searches along one parameter: steps while the deviance falls, then goes to the vertex of a parabola. Returns the
 /// deviance, and whether the minimum is known to a fraction of its uncertainty.
-fn walk<const POINTS: usize>(
+fn line_search<const POINTS: usize>(
     points: &Points<POINTS>,
     problem: &mut Problem<POINTS>,
     (term, index): (usize, usize),
@@ -93,12 +99,12 @@ fn walk<const POINTS: usize>(
             deviance = least;
             continue;
         }
-        // The minimum is bracketed: go to the parabola's, and look closer next time.
+        // The minimum is bracketed: go to the parabola's vertex, and take smaller steps next time.
         let curvature = before - 2.0 * deviance + after;
         let vertex = if curvature > 0.0 { 0.5 * *step * f64::from((before - after) / curvature) } else { 0.0 };
         let there = trial(vertex);
-        let foretold = deviance - 0.5 * curvature * (vertex / *step * vertex / *step) as f32;
-        near = *step < LAST_STEP || (curvature < NEAR && absf(there - foretold) < WORTH_WHILE);
+        let predicted = deviance - 0.5 * curvature * (vertex / *step * vertex / *step) as f32;
+        near = *step < LAST_STEP || (curvature < NEAR && absf(there - predicted) < WORTHWHILE);
         if there < deviance {
             here = shifted(here, vertex);
             deviance = there;
@@ -115,11 +121,97 @@ fn walk<const POINTS: usize>(
     (deviance, near)
 }
 
-fn shifted(kind: Kind, index: usize, shift: f64, sample_period: f64) -> Kind {
+/// The term with one shape parameter multiplied by `exp(shift)`.
+fn shifted(kind: NoiseTerm, index: usize, shift: f64, sample_period: f64) -> NoiseTerm {
     let mut shape = kind.shape().map(|(_, value)| value);
     shape[index] *= exp(shift);
-    if let Kind::Markov(_) = kind {
+    if let NoiseTerm::Markov(_) = kind {
         shape[index] = shape[index].max(SHORTEST * sample_period);
     }
     kind.with_shape(shape)
+}
+
+/// Relative step of the numerical derivative to a shape's parameter.
+const STEP: f64 = 1e-3;
+/// Relative length of the remainder of a direction, orthogonal to the others, that rounding can produce.
+const ROUNDING: f32 = 1e-4;
+
+/// The parameter to which a column of derivatives belongs.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Parameter {
+    /// The amount of a term.
+    Amount(usize),
+    /// The logarithm of a shape parameter of a term, by its index.
+    Shape(usize, usize),
+}
+
+impl<const POINTS: usize> Problem<POINTS> {
+    /// Sets the columns of all amounts and of the free shape parameters of all terms with a positive amount, and lists the
+    /// parameters in the order of the columns.
+    #[inline(never)]
+    pub(super) fn differentiate(&mut self, points: &Points<POINTS>) -> Vec<Parameter, MAX_PARAMETERS> {
+        let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
+        for (term, kind) in self.kinds.iter().enumerate().filter(|(term, _)| self.amounts[*term] > 0.0) {
+            let square = self.square(term);
+            for index in kind.free_parameters() {
+                let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
+                for (entry, point) in column.iter_mut().zip(points.all()) {
+                    let at = |factor: f64| {
+                        let mut shape: [f64; MAX_SHAPE] = kind.shape().map(|(_, value)| value);
+                        shape[index] *= factor;
+                        kind.with_shape(shape).avar(point.n, points.curve.sample_period())
+                    };
+                    *entry = (square * (at(1.0 + STEP) - at(1.0 - STEP)) / (2.0 * STEP) / point.avar) as f32;
+                }
+                // There is as much room as there are columns.
+                let _ = parameters.push(Parameter::Shape(term, index));
+            }
+        }
+        parameters
+    }
+
+    /// Replaces the first columns by an orthonormal basis of the directions of the parameters in the space of standardised
+    /// residuals, and returns the number of these directions.
+    #[inline(never)]
+    pub(super) fn orthonormal(&mut self, points: &Points<POINTS>) -> usize {
+        let parameters = self.differentiate(points);
+        let mut scale = [0.0; POINTS];
+        for (at, (scale, point)) in scale.iter_mut().zip(&points.measured).enumerate() {
+            *scale = sqrtf(point.edf / 2.0) / self.modelled(at, &self.amounts);
+        }
+        let is_present = |parameter: &Parameter| match *parameter {
+            Parameter::Amount(term) | Parameter::Shape(term, _) => self.amounts[term] > 0.0,
+        };
+        let mut count = 0;
+        for column in (0..parameters.len()).filter(|&column| is_present(&parameters[column])) {
+            let (known, rest) = self.columns.split_at_mut(column);
+            let Some(direction) = rest.first_mut() else { break };
+            direction.iter_mut().zip(&scale).for_each(|(entry, scale)| *entry *= scale);
+            // Normalised before, so that one threshold for the remainder holds for all.
+            if !normalise(direction, 0.0) {
+                continue;
+            }
+            for known in known.iter().take(count) {
+                remove_component(direction, known);
+            }
+            if normalise(direction, ROUNDING) {
+                self.columns.swap(count, column);
+                count += 1;
+            }
+        }
+        count
+    }
+}
+
+/// Normalises a vector; false if its length was not above `least`.
+fn normalise(direction: &mut [f32], least: f32) -> bool {
+    let length = sqrtf(direction.iter().map(|entry| entry * entry).sum());
+    direction.iter_mut().for_each(|entry| *entry /= length);
+    length > least
+}
+
+/// Removes the component of a vector along a direction of length 1.
+pub(super) fn remove_component(vector: &mut [f32], direction: &[f32]) {
+    let along: f32 = vector.iter().zip(direction).map(|(a, b)| a * b).sum();
+    vector.iter_mut().zip(direction).for_each(|(entry, known)| *entry -= along * known);
 }

@@ -1,19 +1,18 @@
-//! Processes whose autocovariance decays exponentially: the Markov process at a real rate, the resonance at a complex one.
+//! Processes with an exponentially decaying autocovariance: the Gauss–Markov process, and the resonance, whose decay rate
+//! is complex.
 //!
-//! With `r_j = Re z^j` the variance of a sum of `m` samples is `Re[m(1+z)/(1−z) − 2z(1−z^m)/(1−z)²]`, from which the
-//! Allan variance follows. `z = exp(−λ)` is close to 1 wherever the process is slow, so everything is written in
-//! `1 − z`, and where even that cancels, as a power series in `λ`.
+//! With the autocovariance `r_j = Re z^j`, `z = exp(−λ)`, the variance of a sum of `m` samples is
+//! `Re[m(1+z)/(1−z) − 2z(1−z^m)/(1−z)²]`, from which the Allan variance follows. For slow processes `z` is close to 1, so
+//! the formulas are written in `1 − z`; where this cancels too, a power series in `λ` is used.
 
-mod complex;
-
-use super::Process;
-use crate::math::{cos, exp};
-use complex::Complex;
+use super::process::Process;
+use crate::math::{cos, exp, expm1, sin, sqrt};
 use core::f64::consts::PI;
+use core::ops::{Add, Div, Mul, Sub};
 
-/// Exponentially correlated noise of variance 1, first-order Gauss–Markov: `r(t) = exp(−|t|/T)`.
+/// Exponentially correlated (first-order Gauss–Markov) noise of variance 1: `r(t) = exp(−|t|/T)` (IEEE 952).
 ///
-/// Sampled it is an AR(1) process, and its Allan variance is exactly that one's; random telegraph noise has the same.
+/// Sampled, it is an AR(1) process, whose Allan variance this is exactly. Random telegraph noise has the same Allan variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Markov {
     /// T: correlation time, s, above 0.
@@ -29,67 +28,52 @@ pub struct Resonance {
     pub bandwidth: f64,
 }
 
-/// Below this `|λ·n|` the power series is the better one.
+/// Magnitude of `λ·n` below which the power series is more accurate than the closed form.
 const SLOW: f64 = 0.03;
 
-/// What decays as `Re exp(−λ·|j|)` from one sample to the next.
-trait Decaying {
-    /// λ: decay and angle a sample.
+/// A process with the autocovariance `Re exp(−λ·|j|)` at a lag of `j` samples.
+trait ExponentialAutocovariance {
+    /// λ: decay and angle (radians) per sample.
     fn rate(&self, sample_period: f64) -> Complex;
-
-    /// The shortest record, in s, that can tell the process from its neighbours.
-    fn record_needed(&self) -> f64;
 }
 
-impl Decaying for Markov {
+impl ExponentialAutocovariance for Markov {
     fn rate(&self, sample_period: f64) -> Complex {
         Complex { re: sample_period / self.time_constant, im: 0.0 }
     }
-
-    fn record_needed(&self) -> f64 {
-        20.0 * self.time_constant
-    }
 }
 
-impl Decaying for Resonance {
+impl ExponentialAutocovariance for Resonance {
     fn rate(&self, sample_period: f64) -> Complex {
         Complex { re: PI * self.bandwidth * sample_period, im: 2.0 * PI * self.frequency * sample_period }
     }
-
-    fn record_needed(&self) -> f64 {
-        10.0 / self.bandwidth
-    }
 }
 
-impl<T: Decaying> Process for T {
-    fn structure(&self, m: f64, sample_period: f64) -> f64 {
-        structure(self.rate(sample_period), m)
+impl<T: ExponentialAutocovariance> Process for T {
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
+        sum_variance(self.rate(sample_period), m)
     }
 
     fn density(&self, frequency: f64, sample_period: f64) -> f64 {
         let Complex { re: decay, im: centre } = self.rate(sample_period);
         let angle = 2.0 * PI * frequency * sample_period;
-        (line(decay, angle - centre) + line(decay, angle + centre)) * sample_period / 2.0
-    }
-
-    fn record_needed(&self, _sample_period: f64) -> f64 {
-        Decaying::record_needed(self)
+        (lorentzian(decay, angle - centre) + lorentzian(decay, angle + centre)) * sample_period / 2.0
     }
 
     fn avar(&self, n: u64, sample_period: f64) -> f64 {
         avar(self.rate(sample_period), n as f64)
     }
 
-    fn structures(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
-        structures(self.rate(sample_period), stride, table);
+    fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
+        sum_variances(self.rate(sample_period), stride, table);
     }
 
-    fn memory_beyond(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
-        memory_beyond(self.rate(sample_period), n as f64, stride)
+    fn squared_covariance_tail(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
+        squared_covariance_tail(self.rate(sample_period), n as f64, stride)
     }
 }
 
-fn structure(rate: Complex, m: f64) -> f64 {
+fn sum_variance(rate: Complex, m: f64) -> f64 {
     let one_minus_z = rate.one_minus_exp();
     let one_minus_power = (rate * m).one_minus_exp();
     let z = Complex::ONE - one_minus_z;
@@ -110,7 +94,7 @@ fn avar(rate: Complex, n: f64) -> f64 {
     (line - z * bend / (one_minus_z * one_minus_z)).re / (n * n)
 }
 
-/// The first four powers of `λ`; the next one is below 10⁻⁷ of the result.
+/// Power series of the Allan variance in `λ` up to `λ⁴`; the next term is below 10⁻⁷ of the result.
 fn slow_avar(rate: Complex, n: f64) -> f64 {
     let square = rate * rate;
     let (n2, n3) = (n * n, n * n * n);
@@ -120,13 +104,14 @@ fn slow_avar(rate: Complex, n: f64) -> f64 {
     sum.re
 }
 
-/// Structures of 0, 1, 2 … strides, the power of `z` following from stride to stride as `1 − zᵃ⁺ᵇ = u + v − uv`.
-fn structures(rate: Complex, stride: f64, table: &mut [f64]) {
+/// Sum variances at 0, 1, 2 … strides. `1 − z^m` advances from stride to stride by `1 − zᵃ⁺ᵇ = u + v − uv` with
+/// `u = 1 − zᵃ`, `v = 1 − zᵇ`.
+fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
     if (rate * stride).magnitude() * (table.len() as f64) < 1e-3 {
-        // So slow it is a random walk to them, and the sums below would cancel.
-        for (k, structure) in table.iter_mut().enumerate() {
+        // At these strides the process is a random walk, and the differences below would cancel.
+        for (k, sum_variance) in table.iter_mut().enumerate() {
             let m = k as f64 * stride;
-            *structure = m - m * m * m;
+            *sum_variance = m - m * m * m;
         }
         return;
     }
@@ -136,14 +121,15 @@ fn structures(rate: Complex, stride: f64, table: &mut [f64]) {
     let bend = z / (one_minus_z * one_minus_z) * 2.0;
     let step = (rate * stride).one_minus_exp();
     let mut one_minus_power = Complex { re: 0.0, im: 0.0 };
-    for (k, structure) in table.iter_mut().enumerate() {
-        *structure = (line * (k as f64 * stride) - bend * one_minus_power).re;
+    for (k, sum_variance) in table.iter_mut().enumerate() {
+        *sum_variance = (line * (k as f64 * stride) - bend * one_minus_power).re;
         one_minus_power = one_minus_power + step - one_minus_power * step;
     }
 }
 
-/// What the covariance at a lag of `2n` is the real part of; from there on it turns and decays as `z^lag`.
-fn memory(rate: Complex, n: f64) -> Complex {
+/// A complex number whose real part is the covariance of second differences at a lag of `2n`; at longer lags it is
+/// multiplied by `z` per sample.
+fn covariance_at_2n(rate: Complex, n: f64) -> Complex {
     let one_minus_z = rate.one_minus_exp();
     let square = (rate * n).one_minus_exp() * (rate * n).one_minus_exp();
     let z = Complex::ONE - one_minus_z;
@@ -151,16 +137,80 @@ fn memory(rate: Complex, n: f64) -> Complex {
 }
 
 /// Sum of the squares of the covariances at the lags `2n + stride, 2n + 2·stride …`
-fn memory_beyond(rate: Complex, n: f64, stride: f64) -> f64 {
+fn squared_covariance_tail(rate: Complex, n: f64, stride: f64) -> f64 {
     let step = rate * stride;
-    let first = memory(rate, n) * step.decay();
+    let first = covariance_at_2n(rate, n) * step.decay();
     let square = first * first;
-    let steady = (first.re * first.re + first.im * first.im) / -crate::math::expm1(-2.0 * step.re);
+    let steady = (first.re * first.re + first.im * first.im) / -expm1(-2.0 * step.re);
     (steady + (square / (step * 2.0).one_minus_exp()).re) / 2.0
 }
 
-/// Discrete spectrum of `exp(−decay·|j|)` at `angle` radians a sample.
-fn line(decay: f64, angle: f64) -> f64 {
+/// Discrete spectrum of `exp(−decay·|j|)` at `angle` radians per sample.
+fn lorentzian(decay: f64, angle: f64) -> f64 {
     let z = exp(-decay);
     (1.0 - z * z) / (1.0 - 2.0 * z * cos(angle) + z * z)
+}
+
+/// A complex number with the operations that the formulas above need.
+#[derive(Debug, Clone, Copy)]
+struct Complex {
+    re: f64,
+    im: f64,
+}
+
+impl Complex {
+    const ONE: Self = Self { re: 1.0, im: 0.0 };
+
+    /// `1 − exp(−self)`, without cancellation near 0.
+    fn one_minus_exp(self) -> Self {
+        let shrink = expm1(-self.re);
+        let half = sin(self.im / 2.0);
+        Self { re: 2.0 * half * half * (1.0 + shrink) - shrink, im: (1.0 + shrink) * sin(self.im) }
+    }
+
+    /// `exp(−self)`.
+    fn decay(self) -> Self {
+        let modulus = exp(-self.re);
+        Self { re: modulus * cos(self.im), im: -modulus * sin(self.im) }
+    }
+
+    fn magnitude(self) -> f64 {
+        sqrt(self.re * self.re + self.im * self.im)
+    }
+}
+
+impl Add for Complex {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { re: self.re + other.re, im: self.im + other.im }
+    }
+}
+
+impl Sub for Complex {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self { re: self.re - other.re, im: self.im - other.im }
+    }
+}
+
+impl Mul for Complex {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        Self { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
+    }
+}
+
+impl Mul<f64> for Complex {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        Self { re: self.re * factor, im: self.im * factor }
+    }
+}
+
+impl Div for Complex {
+    type Output = Self;
+    fn div(self, by: Self) -> Self {
+        let square = by.re * by.re + by.im * by.im;
+        Self { re: (self.re * by.re + self.im * by.im) / square, im: (self.im * by.re - self.re * by.im) / square }
+    }
 }

@@ -136,7 +136,7 @@ pub struct ChannelMessage {
     /// Samples missing between them.
     pub missing: u64,
     /// Sums of every octave, by rising averaging factor.
-    pub octaves: Vec<OctaveSums, MAX_OCTAVES>,
+    pub octaves: Vec<ReportedOctave, MAX_OCTAVES>,
     /// Coefficients of the fitted baseline model; empty for temperature and supply.
     pub coefficients: Vec<ReportedCoefficient, MAX_COEFFICIENTS>,
     /// Error of the previous epoch's model on this epoch's curve; `None` without a previous model or a curve.
@@ -147,7 +147,7 @@ pub struct ChannelMessage {
 ///
 /// The Allan variance in counts² is `sum / (2 · n² · count)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct OctaveSums {
+pub struct ReportedOctave {
     /// Averaging factor in samples.
     pub n: u64,
     /// Sum of the squared second differences of the running sum of counts, at distance `n`.

@@ -2,8 +2,8 @@
 
 use link::{
     ChannelMessage, Decoder, DecoderCounters, Encoder, Health, LearnedMessage, MAX_ADDED_TERMS, MAX_COEFFICIENTS,
-    MAX_COVARIATES, MAX_DRIFTS, MAX_FRAME, MAX_OCTAVES, MAX_RAW_BURSTS, MAX_RAW_FRAME, MAX_TEXT, Message, OctaveSums,
-    RawBurst, RawMessage, Received, ReportedAddedTerm, ReportedCoefficient, ReportedDrift, ReportedModelError,
+    MAX_COVARIATES, MAX_DRIFTS, MAX_FRAME, MAX_OCTAVES, MAX_RAW_BURSTS, MAX_RAW_FRAME, MAX_TEXT, Message, RawBurst,
+    RawMessage, Received, ReportedAddedTerm, ReportedCoefficient, ReportedDrift, ReportedModelError, ReportedOctave,
     ReportedParameter, ReportedRegressor, ReportedShift, ReportedTerm, VERSION, ValidationMessage, text_line,
     wire_bytes,
 };
@@ -36,7 +36,7 @@ fn sequences(found: &[Received]) -> Vec<u16> {
 
 /// The longest channel message: every list full, every integer in its longest encoding.
 fn longest_channel() -> Message {
-    let point = OctaveSums { n: u64::MAX, sum: u128::MAX, count: u64::MAX };
+    let point = ReportedOctave { n: u64::MAX, sum: u128::MAX, count: u64::MAX };
     let coefficient = ReportedCoefficient {
         term: ReportedTerm::RateRandomWalk,
         value: f64::MIN_POSITIVE,

@@ -1,5 +1,7 @@
 //! The Analog Devices ADIS16405, from its data sheet (Rev. B).
 
+use allan_core::term::MovingAverageFilter;
+
 use crate::profile::{ChannelProfile, Quantity, SensorProfile};
 
 /// Rate of the sample clock with SMPL_PRD = 0x0001, which the part has after reset, Hz.
@@ -46,6 +48,7 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         ],
         internal_rate_hz: INTERNAL_RATE_HZ,
         native_rates_hz: native_rates_hz(),
+        filters: filters(),
         dithered_avar_counts2: 0.2,
     }
 }
@@ -56,6 +59,14 @@ fn native_rates_hz() -> Vec<f64> {
     let fast = (2..=128).map(|divisor| TIME_BASE_HZ / f64::from(divisor));
     let slow = (1..=128).map(|divisor| TIME_BASE_HZ / f64::from(SLOW_TIME_BASE * divisor));
     fast.chain(slow).collect()
+}
+
+/// Bartlett windows of 2 to 64 taps per stage, as SENS_AVG selects them; and the window of 8 taps read at a lower rate than
+/// the part samples at, from four starting decimations.
+fn filters() -> Vec<MovingAverageFilter> {
+    let own_rate = (1..=6).map(|taps_log2| MovingAverageFilter::bartlett(1 << taps_log2));
+    let read_slowly = [6.1, 8.1, 10.1, 12.1];
+    own_rate.chain(read_slowly.map(|decimation| MovingAverageFilter { stages: 2, taps: 8, decimation })).collect()
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! What is known of a sensor before it is measured.
 
+use allan_core::term::MovingAverageFilter;
+
 /// Physical quantity that a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
@@ -60,6 +62,8 @@ pub struct SensorProfile {
     pub internal_rate_hz: f64,
     /// Rates at which the sensor can be set to sample, Hz.
     pub native_rates_hz: Vec<f64>,
+    /// Low-pass filters that the sensor may have put before its samples, for the trace to try, the simplest first.
+    pub filters: Vec<MovingAverageFilter>,
     /// Allan variance of a channel at the shortest octaves, in counts², above which rounding to counts adds white noise and
     /// nothing else.
     pub dithered_avar_counts2: f64,

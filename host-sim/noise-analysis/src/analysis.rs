@@ -25,8 +25,8 @@ use crate::report::{
 use crate::series::Series;
 use crate::uniform_series::UniformSeries;
 use crate::{OCTAVES, OVERLAP};
-use allan_core::term::{CoefficientUnit, Kind, Markov};
-use allan_core::{Cascade, Curve, Model, check, read_off, telegraph};
+use allan_core::term::{CoefficientUnit, Markov, MovingAverageFilter, NoiseTerm};
+use allan_core::{Cascade, Curve, Model, slope_method, telegraph};
 use common::Common;
 use compensation::compensated;
 use lines::Line;
@@ -83,7 +83,7 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let repaired = in_parallel(&coupled, |&channel| repairs.series(measurement, channel));
     let studies = in_parallel(&recorded, |&channel| {
         let traced = traced.iter().position(|of| *of == channel).map(|position| &repaired[position]);
-        let studies = Studies::of(&parts, channel, traced, &repairs, &noises, &repaired);
+        let studies = Studies::of(&parts, channel, traced, &repairs, &noises, &repaired, &profile.filters);
         let own = traced.map_or_else(|| Cow::Owned(Series::of(measurement, &channel)), Cow::Borrowed);
         // What the channel follows is no noise, and is in the series: there the declared model has to do.
         let trace = &studies.first.trace;
@@ -107,9 +107,9 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
             let ramps = repairs.ramps(*channel);
             let common = commons.iter().find(|common| common.channels.contains(channel));
             let named = named(profile, &parts.both, *channel, own, common);
-            effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != Kind::RateRamp.name()));
+            effects.extend(named.into_iter().filter(|effect| !ramps || effect.kind != NoiseTerm::RateRamp.name()));
         }
-        let whole = measured.clone().with_confidence(|point| own.first.trace.before.shares(point.n));
+        let whole = measured.clone().with_confidence(|point| own.first.trace.before.variance_fractions(point.n));
         ChannelReport {
             name: channel.name.to_owned(),
             unit: unit.to_owned(),
@@ -146,6 +146,7 @@ impl Studies {
         repairs: &Repairs,
         noises: &NoiseGrids,
         repaired: &[Series],
+        filters: &[MovingAverageFilter],
     ) -> Self {
         let position = parts.both.position(channel).unwrap_or_default();
         let Some(own) = own else {
@@ -168,8 +169,8 @@ impl Studies {
         let without = |following: &Following| compensated(own, following, repaired);
         let half = without(&first).map(|rest| rest.first_half());
         let whole = without(&both);
-        let (first, _) = spectral::study(first, &own_half, half.as_ref());
-        let (both, lines) = spectral::study(both, own, whole.as_ref());
+        let (first, _) = spectral::study(first, &own_half, half.as_ref(), filters);
+        let (both, lines) = spectral::study(both, own, whole.as_ref(), filters);
         let correlated: Vec<f64> = both.correlation_times().collect();
         let rest = UniformSeries::from_series(whole.as_ref().unwrap_or(own));
         let two_levels = random_telegraph::find(&rest, channel.unit, &correlated);
@@ -230,30 +231,32 @@ fn named(
     // Behind a filter, what rounding adds is alike over as many samples as the noise is.
     let settled_s =
         if reaches(profile, study, step, 1) { 0.0 } else { SETTLED * spectral::filter_s(&study.trace.after) };
-    for found in &study.trace.found {
+    for found in &study.trace.added {
         let term = &study.trace.after.terms()[found.term];
         match term.kind {
-            Kind::Filtered(filter) => {
+            NoiseTerm::Filtered(filter) => {
                 effects.push(naming::filter_effect((term, &filter), found, unit, period_s, internal_rate_hz))
             }
             _ if !dithered => {}
-            Kind::Markov(Markov { time_constant }) if time_constant < settled_s => {}
-            Kind::Quantization if settled_s > 0.0 => {}
+            NoiseTerm::Markov(Markov { time_constant }) if time_constant < settled_s => {}
+            NoiseTerm::Quantization if settled_s > 0.0 => {}
             // The spectrum tells them better.
-            Kind::Sinusoid(_) | Kind::Resonance(_) => {}
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) => {}
             // As it shows in the curve.
-            Kind::Markov(_) | Kind::RateRamp if two_levels.is_some() => {}
+            NoiseTerm::Markov(_) | NoiseTerm::RateRamp if two_levels.is_some() => {}
             // What is shared needs no second name.
-            Kind::Markov(_) | Kind::RateRamp if common.is_some() => {}
-            Kind::Markov(markov) if is_low_pass(&study.trace.after, markov, step) => {
+            NoiseTerm::Markov(_) | NoiseTerm::RateRamp if common.is_some() => {}
+            NoiseTerm::Markov(markov) if is_low_pass(&study.trace.after, markov, step) => {
                 effects.push(naming::low_pass_effect(term, markov, found, period_s));
             }
-            Kind::Markov(markov) => match telegraph::judge(&study.following.curve, &study.trace.after, markov) {
-                Some(verdict) if verdict.is_telegraph() => {
-                    effects.push(naming::telegraph_effect(term, found, &verdict, unit, period_s));
+            NoiseTerm::Markov(markov) => {
+                match telegraph::kurtosis_ratio(&study.following.curve, &study.trace.after, markov) {
+                    Some(verdict) if verdict.is_telegraph() => {
+                        effects.push(naming::telegraph_effect(term, found, &verdict, unit, period_s));
+                    }
+                    _ => effects.push(naming::term_effect(term, found, unit, period_s)),
                 }
-                _ => effects.push(naming::term_effect(term, found, unit, period_s)),
-            },
+            }
             _ => effects.push(naming::term_effect(term, found, unit, period_s)),
         }
     }
@@ -279,7 +282,7 @@ fn reaches(profile: &SensorProfile, study: &Study, step: f64, octaves: usize) ->
 fn is_low_pass(model: &Model, markov: Markov, step: f64) -> bool {
     let period_s = model.sample_period();
     let rounding = ROUNDING * step * step * period_s;
-    let is_white = |kind: &Kind| matches!(kind, Kind::AngleRandomWalk | Kind::Filtered(_));
+    let is_white = |kind: &NoiseTerm| matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_));
     let white = model.terms().iter().filter(|term| is_white(&term.kind));
     let left: f64 = white.map(|term| term.low * term.low).sum();
     markov.time_constant < LOW_PASS * period_s && left <= rounding
@@ -301,7 +304,7 @@ fn curve_points(curve: &Curve<OCTAVES>) -> Vec<CurvePoint> {
 }
 
 fn terms(model: &Model, unit: &str) -> Vec<Term> {
-    let term = |term: &allan_core::model::Term| Term {
+    let term = |term: &allan_core::model::FittedTerm| Term {
         kind: term.kind.name().to_owned(),
         parameters: naming::parameters(term, unit),
     };
@@ -309,7 +312,7 @@ fn terms(model: &Model, unit: &str) -> Vec<Term> {
 }
 
 fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> ModelError {
-    let error = check::ModelError::between(model, curve);
+    let error = allan_core::model::Discrepancy::between(model, curve);
     let finite = |value: f64| value.is_finite().then_some(value);
     ModelError {
         deviance_per_point: error.and_then(|error| finite(error.deviance_per_point)),
@@ -318,7 +321,7 @@ fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> ModelError {
 }
 
 fn read_off(curve: &Curve<OCTAVES>, unit: &str) -> ReadOff {
-    let value = |coefficient: Option<read_off::Coefficient>, kind: Kind| {
+    let value = |coefficient: Option<slope_method::SlopeEstimate>, kind: NoiseTerm| {
         coefficient.map(|coefficient| ReadOffValue {
             value: coefficient.value,
             unit: coefficient_unit(&kind, unit),
@@ -327,14 +330,14 @@ fn read_off(curve: &Curve<OCTAVES>, unit: &str) -> ReadOff {
         })
     };
     ReadOff {
-        angle_random_walk: value(read_off::angle_random_walk(curve), Kind::AngleRandomWalk),
-        bias_instability: value(read_off::bias_instability(curve), Kind::BiasInstability),
-        rate_random_walk: value(read_off::rate_random_walk(curve), Kind::RateRandomWalk),
+        angle_random_walk: value(slope_method::angle_random_walk(curve), NoiseTerm::AngleRandomWalk),
+        bias_instability: value(slope_method::bias_instability(curve), NoiseTerm::BiasInstability),
+        rate_random_walk: value(slope_method::rate_random_walk(curve), NoiseTerm::RateRandomWalk),
     }
 }
 
 /// The unit of a coefficient of a channel in `unit`.
-fn coefficient_unit(kind: &Kind, unit: &str) -> String {
+fn coefficient_unit(kind: &NoiseTerm, unit: &str) -> String {
     match (kind.unit(), unit.strip_suffix("/s")) {
         (CoefficientUnit::TimesSecond, Some(angle)) => angle.to_owned(),
         (CoefficientUnit::TimesSecond, None) => format!("{unit}*s"),

@@ -21,8 +21,9 @@ use crate::time_course::typical::typical;
 use crate::time_course::{Parts, deviance_per_point};
 use crate::trace::{deliveries, sample_clock};
 use allan_core::fit::fit_shapes;
-use allan_core::trace::{Lines, Trace, trace};
-use allan_core::{Curve, Kind, Model};
+use allan_core::term::MovingAverageFilter;
+use allan_core::trace::{LineCandidates, Trace, trace};
+use allan_core::{Curve, Model, NoiseTerm};
 use measurement::{ChannelProfile, Measurement};
 use slow_part::SlowPart;
 
@@ -99,7 +100,7 @@ pub fn explain(measurement: &Measurement) -> Explanation {
     let (searched, series): (Vec<ChannelProfile>, Vec<Series>) =
         inertial.map(|channel| (channel, Series::of(measurement, &channel))).unzip();
     let explained = |position: usize| {
-        let mut explained = explain_channel(searched[position], &series[position])?;
+        let mut explained = explain_channel(searched[position], &series[position], &measurement.profile.filters)?;
         explained.companion = Companion::of(&series, position, &explained.moving, &explained.parts);
         Some(explained)
     };
@@ -117,18 +118,22 @@ pub fn explain(measurement: &Measurement) -> Explanation {
     }
 }
 
-fn explain_channel(channel: ChannelProfile, series: &Series) -> Option<ChannelExplanation> {
+fn explain_channel(
+    channel: ChannelProfile,
+    series: &Series,
+    filters: &[MovingAverageFilter],
+) -> Option<ChannelExplanation> {
     let parts = Parts::of(series)?;
     if parts.quarters.iter().chain([&parts.unseen]).any(|part| part.points().iter().all(|point| point.avar == 0.0)) {
         return None;
     }
-    let trace = trace(&parts.fitted, Lines::InTheCurve);
+    let trace = trace(&parts.fitted, LineCandidates::Curve, filters);
     let stationarity = stationarity(&parts.quarters[0], &parts.quarters[1], &trace.after);
     let part = predictive_part(stationarity);
     let predictive = match part {
         Part::FittedHalf => trace.after.clone(),
         Part::LatestQuarter => {
-            let kinds: Vec<Kind> = trace.after.terms().iter().map(|term| term.kind).collect();
+            let kinds: Vec<NoiseTerm> = trace.after.terms().iter().map(|term| term.kind).collect();
             fit_shapes(&typical(&parts.quarters[1], parts.latest_epochs()), &kinds)
         }
     };

@@ -4,7 +4,7 @@
 //! large as it expects. The measurements are means over [`BLOCK_S`], so that half an hour is some thousand steps.
 
 use crate::uniform_series::UniformSeries;
-use allan_core::{Kind, Model};
+use allan_core::{Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::{LN_2, PI, TAU};
@@ -133,21 +133,21 @@ impl Filter {
         for term in model.terms() {
             let square = term.value * term.value;
             match term.kind {
-                Kind::RateRandomWalk => walk += square * block,
-                Kind::BiasInstability => {
+                NoiseTerm::RateRandomWalk => walk += square * block,
+                NoiseTerm::BiasInstability => {
                     let octaves =
                         (0..).map(|octave| block * 2f64.powi(octave)).take_while(|time| *time < 4.0 * duration);
                     modes.extend(octaves.map(|time| Mode::markov(square * LN_2 / PI, time, block)));
                 }
-                Kind::Markov(markov) if markov.time_constant > block => {
+                NoiseTerm::Markov(markov) if markov.time_constant > block => {
                     modes.push(Mode::markov(square, markov.time_constant, block));
                 }
-                Kind::Resonance(resonance) if 4.0 * resonance.frequency * block < 1.0 => {
+                NoiseTerm::Resonance(resonance) if 4.0 * resonance.frequency * block < 1.0 => {
                     let decay = (-PI * resonance.bandwidth * block).exp();
                     let turn = Some(TAU * resonance.frequency * block);
                     modes.push(Mode { decay, turn, drive: square * (1.0 - decay * decay), variance: square });
                 }
-                Kind::Sinusoid(sinusoid) if 4.0 * sinusoid.frequency * block < 1.0 => {
+                NoiseTerm::Sinusoid(sinusoid) if 4.0 * sinusoid.frequency * block < 1.0 => {
                     let turn = Some(TAU * sinusoid.frequency * block);
                     modes.push(Mode { decay: 1.0, turn, drive: 0.0, variance: square / 2.0 });
                 }

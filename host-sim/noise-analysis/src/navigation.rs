@@ -81,8 +81,8 @@ impl Contrast {
         let (c, t) = (self.calibration as f64, self.time as f64);
         let places = [(-c, ratio), (0.0, -1.0 - ratio), (t, 1.0)];
         let of = |m: f64| -> f64 {
-            let structure = |term: &allan_core::model::Term| {
-                term.value * term.value * term.kind.process().structure(m.abs(), model.sample_period())
+            let structure = |term: &allan_core::model::FittedTerm| {
+                term.value * term.value * term.kind.process().sum_variance(m.abs(), model.sample_period())
             };
             model.terms().iter().filter(|term| term.value > 0.0).map(structure).sum()
         };
@@ -143,11 +143,11 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use allan_core::Kind;
-    use allan_core::model::Term;
+    use allan_core::NoiseTerm;
+    use allan_core::model::FittedTerm;
 
     fn model(terms: [f64; 3]) -> Model {
-        Model::new(0.1, Kind::DECLARED.into_iter().zip(terms).map(|(kind, value)| Term::exact(kind, value)))
+        Model::new(0.1, NoiseTerm::BASELINE.into_iter().zip(terms).map(|(kind, value)| FittedTerm::exact(kind, value)))
     }
 
     #[test]

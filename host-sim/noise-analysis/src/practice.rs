@@ -9,7 +9,7 @@ use crate::series::Series;
 use crate::spectra::{Welch, correlation_time};
 use crate::uniform_series::UniformSeries;
 use crate::units::{GRAVITY, conversions};
-use allan_core::{Kind, Model};
+use allan_core::{Model, NoiseTerm};
 use serde::Serialize;
 
 /// Stretches of Welch's estimate: long enough for the nulls of the part's filter, short enough for a precise level.
@@ -121,16 +121,16 @@ impl Practice {
 }
 
 /// Name of a term's coefficient: behind a filter, N is still N.
-fn name(kind: &Kind) -> &'static str {
+fn name(kind: &NoiseTerm) -> &'static str {
     match kind {
-        Kind::Filtered(_) => Kind::AngleRandomWalk.name(),
+        NoiseTerm::Filtered(_) => NoiseTerm::AngleRandomWalk.name(),
         kind => kind.name(),
     }
 }
 
 fn coefficients(model: &Model, unit: &str) -> Vec<Coefficient> {
     let rate_hz = 1.0 / model.sample_period();
-    let of = |term: &allan_core::model::Term| {
+    let of = |term: &allan_core::model::FittedTerm| {
         let (kind, value, low, high) = (name(&term.kind), term.value, term.low, term.high);
         let converted = move |conversion: crate::units::Conversion| Coefficient {
             kind: kind.to_owned(),
@@ -174,8 +174,8 @@ fn angle_random_walk(whole: &UniformSeries, model: &Model, unit: &str) -> Option
     let reach = LINE_WIDTHS / (WELCH_SAMPLES as f64 * whole.sample_period());
     let near = |frequency: f64| {
         model.terms().iter().any(|term| match term.kind {
-            Kind::Sinusoid(sinusoid) => (frequency - sinusoid.frequency).abs() < reach,
-            Kind::Resonance(resonance) => {
+            NoiseTerm::Sinusoid(sinusoid) => (frequency - sinusoid.frequency).abs() < reach,
+            NoiseTerm::Resonance(resonance) => {
                 (frequency - resonance.frequency).abs() < reach + LINE_WIDTHS * resonance.bandwidth
             }
             _ => false,
@@ -188,7 +188,7 @@ fn angle_random_walk(whole: &UniformSeries, model: &Model, unit: &str) -> Option
 }
 
 fn records(model: &Model, half: f64) -> Vec<Record> {
-    let of = |(index, term): (usize, &allan_core::model::Term)| {
+    let of = |(index, term): (usize, &allan_core::model::FittedTerm)| {
         let wanted = record_length::wanted(model, index, half);
         // Both halves grow.
         let more = |length: f64| 2.0 * (length - half) / 3600.0;

@@ -2,7 +2,7 @@
 
 use allan_core::Model;
 use allan_core::confidence::NORMAL_975;
-use allan_core::model::Term;
+use allan_core::model::FittedTerm;
 use nalgebra::{DMatrix, DVector};
 
 /// Relative half-width of the 95 % bounds that is asked for.
@@ -35,7 +35,7 @@ pub fn wanted(model: &Model, term: usize, duration: f64) -> Option<f64> {
 /// information; `None` for a term of 0.
 #[must_use]
 pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> {
-    let present: Vec<&Term> = model.terms().iter().filter(|term| term.value > 0.0).collect();
+    let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
     let position = present.iter().position(|of| std::ptr::eq(*of, &model.terms()[term]))?;
     let period = model.sample_period();
     let mut information = DMatrix::zeros(present.len(), present.len());
@@ -45,7 +45,7 @@ pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> 
     while first < ordinates {
         let count = (first / 16).clamp(1, ordinates - first);
         let frequency = (first as f64 + (count - 1) as f64 / 2.0) / (2.0 * duration);
-        let density = |term: &&Term| term.value * term.value * term.kind.process().density(frequency, period);
+        let density = |term: &&FittedTerm| term.value * term.value * term.kind.process().density(frequency, period);
         let densities = DVector::from_iterator(present.len(), present.iter().map(density));
         let total = densities.sum();
         if total > 0.0 {
@@ -61,11 +61,11 @@ pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use allan_core::Kind;
+    use allan_core::NoiseTerm;
 
     fn model(n: f64, k: f64) -> Model {
-        let terms = [Term::exact(Kind::AngleRandomWalk, n), Term::exact(Kind::RateRandomWalk, k)];
-        Model::new(0.01, terms.map(|term| Term { low: 0.9 * term.value, high: 1.1 * term.value, ..term }))
+        let terms = [FittedTerm::exact(NoiseTerm::AngleRandomWalk, n), FittedTerm::exact(NoiseTerm::RateRandomWalk, k)];
+        Model::new(0.01, terms.map(|term| FittedTerm { low: 0.9 * term.value, high: 1.1 * term.value, ..term }))
     }
 
     #[test]

@@ -5,8 +5,8 @@
 
 pub use crate::findings::{Effect, Parameter};
 use crate::practice::Practice;
-use allan_core::Point;
-use allan_core::read_off::percentage_accuracy;
+use allan_core::AllanPoint;
+use allan_core::slope_method::percentage_accuracy;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -75,7 +75,7 @@ pub struct CurvePoint {
 impl CurvePoint {
     /// A point of a curve of `samples` samples, in the curve's unit.
     #[must_use]
-    pub fn of(point: &Point, samples: u64) -> Self {
+    pub fn of(point: &AllanPoint, samples: u64) -> Self {
         Self {
             n: point.n,
             tau_s: point.tau,

@@ -28,7 +28,7 @@ mod tests;
 pub use parts::Parts;
 pub use stationarity::{Stationarity, stationarity};
 
-use allan_core::{Curve, Point};
+use allan_core::{AllanPoint, Curve};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Chance, over all that is compared in a channel, at which something that stands still is taken to move.
@@ -36,11 +36,11 @@ pub const SIGNIFICANCE: f64 = 0.01;
 
 /// `mean edf·(ln(m/v) + v/m − 1)` over the octaves with `n ≤ M/8`, of variances that no single model gives.
 ///
-/// The figure of [`ModelError`](allan_core::check::ModelError), but with the degrees of freedom of the kind of noise that
+/// The figure of [`ModelError`](allan_core::model::Discrepancy), but with the degrees of freedom of the kind of noise that
 /// the curve itself shows: the same for all that is compared, so that a model which claims to be uncertain gains nothing.
 pub fn deviance_per_point<const POINTS: usize>(curve: &Curve<POINTS>, modelled: impl Fn(u64) -> f64) -> f64 {
     let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8);
-    let of = |point: &Point| {
+    let of = |point: &AllanPoint| {
         let ratio = point.avar / modelled(point.n);
         point.edf * (ratio - 1.0 - ratio.ln())
     };

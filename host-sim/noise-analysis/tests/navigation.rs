@@ -1,8 +1,8 @@
 //! What a model says of the future, beside simulated data that it has not seen.
 
-use allan_core::model::Term;
+use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
-use allan_core::{Kind, Model};
+use allan_core::{Model, NoiseTerm};
 use noise_analysis::innovation::{Innovations, innovations};
 use noise_analysis::navigation::drifts;
 use noise_analysis::uniform_series::UniformSeries;
@@ -23,8 +23,8 @@ fn simulated(noise: [f64; 3], seed: u64) -> Vec<f64> {
     (0..SAMPLES).map(|_| source.sample()[OutputRegister::GyroZ as usize]).collect()
 }
 
-fn model(extra: Option<Term>) -> Model {
-    let terms = Kind::DECLARED.into_iter().zip(NOISE).map(|(kind, value)| Term::exact(kind, value));
+fn model(extra: Option<FittedTerm>) -> Model {
+    let terms = NoiseTerm::BASELINE.into_iter().zip(NOISE).map(|(kind, value)| FittedTerm::exact(kind, value));
     Model::new(PERIOD, terms.chain(extra))
 }
 
@@ -97,12 +97,13 @@ fn the_innovations_of_a_wrong_model_are_not() {
     }
     let lacking = of(values.clone(), &model(None));
     assert!(lacking.whiteness < 1e-6 && lacking.normalised > lacking.consistent.1, "{lacking:?}");
-    let knowing = of(values, &model(Some(Term::exact(Kind::Markov(Markov { time_constant }), 0.03))));
+    let knowing = of(values, &model(Some(FittedTerm::exact(NoiseTerm::Markov(Markov { time_constant }), 0.03))));
     assert!(knowing.whiteness > 1e-3, "{knowing:?}");
     assert!((knowing.normalised - 1.0).abs() < 4.0 * (2.0 / knowing.count as f64).sqrt(), "{knowing:?}");
     // Too much N is seen as well.
     let [n, b, k] = NOISE;
-    let terms = Kind::DECLARED.into_iter().zip([1.1 * n, b, k]).map(|(kind, value)| Term::exact(kind, value));
+    let terms =
+        NoiseTerm::BASELINE.into_iter().zip([1.1 * n, b, k]).map(|(kind, value)| FittedTerm::exact(kind, value));
     let loud = of(simulated(NOISE, 8), &Model::new(PERIOD, terms));
     assert!(loud.normalised < loud.consistent.0, "{loud:?}");
     assert_eq!(innovations(&model(None), &UniformSeries::new(PERIOD, vec![0.0; 100])), None);

@@ -1,8 +1,8 @@
 //! The explanation of a recording as text: a sentence for each fault of its sampling, then tables.
 
 use crate::formatting::{NONE, TextTable, count, duration, interval, number, words};
-use allan_core::Kind;
-use allan_core::model::Term;
+use allan_core::NoiseTerm;
+use allan_core::model::FittedTerm;
 use noise_analysis::explain::slow_part::SlowPart;
 use noise_analysis::explain::{ChannelExplanation, Explanation};
 use noise_analysis::time_course::companion::Companion;
@@ -83,7 +83,7 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
 /// The added terms in the order in which they were added, with their values in the final model.
 fn added_term_table(channels: &[ChannelExplanation]) -> TextTable {
     let of = |channel: &ChannelExplanation| {
-        let row = |found: &allan_core::trace::Found| {
+        let row = |found: &allan_core::trace::AddedTerm| {
             let term = &channel.trace.after.terms()[found.term];
             vec![
                 channel.channel.name.to_owned(),
@@ -98,21 +98,21 @@ fn added_term_table(channels: &[ChannelExplanation]) -> TextTable {
                 ),
             ]
         };
-        channel.trace.found.iter().map(row).collect::<Vec<_>>()
+        channel.trace.added.iter().map(row).collect::<Vec<_>>()
     };
     let header = ["channel", "term", "shape", "coefficient", "score", "residual before"];
     TextTable::new(header, 3, channels.iter().flat_map(of))
 }
 
 /// Names, values and intervals of the parameters of a term's shape.
-fn shape_parameters(term: &Term) -> String {
+fn shape_parameters(term: &FittedTerm) -> String {
     let parameters = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
     let of = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
         let bounds = if low < high { format!(" [{}]", interval(low, high)) } else { String::new() };
         format!("{} {}{bounds}", words(name), number(value))
     };
     let stages = match term.kind {
-        Kind::Filtered(filter) => Some(format!("stages {}", filter.stages)),
+        NoiseTerm::Filtered(filter) => Some(format!("stages {}", filter.stages)),
         _ => None,
     };
     stages.into_iter().chain(parameters.map(of)).collect::<Vec<_>>().join(", ")

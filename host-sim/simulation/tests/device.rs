@@ -1,4 +1,4 @@
-//! The firmware's application on the host: commands, reports, epochs, recovery, what is kept over a restart.
+//! The firmware's application on the host: commands, reports, epochs, recovery, and the state retained over a restart.
 
 use adis16405_driver::{Channel, OutputWord};
 use embedded_hal::spi::SpiDevice;
@@ -14,14 +14,14 @@ fn device() -> Device {
     Device::new(VirtualAdis16405::new(NoiseModel::paper(), 1), Device::blank_memory())
 }
 
-struct Heard {
+struct Transcript {
     messages: Vec<Message>,
     lines: Vec<String>,
 }
 
-fn hear(bytes: &[u8]) -> Heard {
+fn hear(bytes: &[u8]) -> Transcript {
     let mut decoder = Decoder::new();
-    let mut heard = Heard { messages: Vec::new(), lines: Vec::new() };
+    let mut heard = Transcript { messages: Vec::new(), lines: Vec::new() };
     for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
         match received {
             Received::Message { message, .. } => heard.messages.push(message),
@@ -33,7 +33,7 @@ fn hear(bytes: &[u8]) -> Heard {
     heard
 }
 
-impl Heard {
+impl Transcript {
     fn logs(&self) -> Vec<&str> {
         self.messages
             .iter()
@@ -56,7 +56,7 @@ impl Heard {
             .expect("a report")
     }
 
-    /// Splits reports: hello, eight channels, health; what an epoch adds is left out.
+    /// Number of reports, each of hello, eight channels and health; other messages are left out.
     fn reports(&self) -> usize {
         let extra = |message: &&Message| {
             matches!(message, Message::Log(_) | Message::Raw(_) | Message::Validation(_) | Message::Learned(_))
@@ -74,8 +74,8 @@ impl Heard {
     }
 }
 
-/// Runs on to `until_us`, pressing `keys` first.
-fn after(device: &mut Device, keys: &str, until_us: u64) -> Heard {
+/// Sends `keys`, then runs to `until_us`.
+fn after(device: &mut Device, keys: &str, until_us: u64) -> Transcript {
     device.press(keys.as_bytes());
     hear(&device.run_until(until_us))
 }
@@ -92,7 +92,7 @@ fn a_report_is_due_every_ten_seconds_and_on_request() {
 }
 
 #[test]
-fn the_sensor_is_named_and_its_rate_measured() {
+fn a_report_has_product_id_and_measured_rate() {
     let mut device = device();
     let heard = after(&mut device, "", 10 * SECOND + SECOND / 2);
     assert_eq!(heard.logs().len(), 1, "{:?}", heard.logs());
@@ -105,7 +105,7 @@ fn the_sensor_is_named_and_its_rate_measured() {
 }
 
 #[test]
-fn rate_range_and_filter_are_set_and_refused_by_name() {
+fn rate_range_and_filter_are_set_or_refused_with_the_reason() {
     let mut device = device();
     after(&mut device, "", SECOND);
     after(&mut device, "f 819.2\rn 5\rg 75\r", 2 * SECOND);
@@ -130,9 +130,9 @@ fn rate_range_and_filter_are_set_and_refused_by_name() {
     assert_eq!(after(&mut device, "\rr", until).health().bad_commands, 2);
 }
 
-/// The numbers of the table are those of the frames.
+/// The table has the numbers of the frames.
 #[test]
-fn the_table_shows_what_the_report_says() {
+fn the_table_shows_the_numbers_of_the_report() {
     let mut device = device();
     after(&mut device, "", 9 * SECOND);
     let heard = after(&mut device, "tr", 9 * SECOND + 1);
@@ -157,7 +157,7 @@ fn the_table_shows_what_the_report_says() {
 }
 
 #[test]
-fn people_get_help_status_version_and_counters() {
+fn commands_show_help_status_version_and_counters() {
     let mut device = device();
     after(&mut device, "", SECOND);
     let lines = after(&mut device, "?", 2 * SECOND).lines;
@@ -178,9 +178,9 @@ fn people_get_help_status_version_and_counters() {
     }
 }
 
-/// Keys in quick succession are all answered, in order; those that are too many are told so.
+/// Keys in quick succession are all answered, in order; those beyond the queue are answered with "busy".
 #[test]
-fn no_key_takes_the_answer_of_another() {
+fn queued_keys_are_answered_in_order() {
     let mut device = device();
     after(&mut device, "", SECOND);
     let lines = after(&mut device, "?sks", 2 * SECOND).lines;
@@ -211,7 +211,7 @@ fn the_raw_stream_is_complete() {
         .flat_map(|raw| &raw.bursts)
         .map(|burst| OutputWord(u16::from_be_bytes(burst.words[1])).counts(Channel::GyroX))
         .collect();
-    // What the part handed out itself, sample by sample.
+    // The counts of the same part, sample by sample.
     let mut twin = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 1), Device::blank_memory());
     after(&mut twin, "", SECOND);
     let mut expected = Vec::new();
@@ -229,8 +229,8 @@ fn the_raw_stream_is_complete() {
     assert!(after(&mut device, "w0\r", 6 * SECOND).messages.len() <= 1, "the stream ends");
 }
 
-/// The sensor is reset behind the firmware's back: what it sends with other settings is not used, it is configured
-/// again, and the statistics go on with a gap.
+/// A reset of the sensor that the firmware did not command: its samples with other settings are not used, it is
+/// configured again, and the statistics go on with a gap.
 #[test]
 fn a_sensor_that_was_reset_is_configured_again() {
     let mut device = device();
@@ -248,7 +248,8 @@ fn a_sensor_that_was_reset_is_configured_again() {
     assert!(u64::from(health.used + lost).abs_diff((6.0 * 204.8) as u64) < 10, "{health:?}");
 }
 
-/// Epochs: accumulate, report, learn, begin again. From the second on the model of the one before is checked.
+/// An epoch accumulates, reports, fits its model and begins again. From the second on, the model of the one before is
+/// checked.
 #[test]
 fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
     let mut device = device();
@@ -274,7 +275,7 @@ fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
 }
 
 #[test]
-fn forgetting_begins_again() {
+fn the_statistics_are_reset_on_command() {
     let mut device = device();
     after(&mut device, "", 5 * SECOND);
     assert_eq!(after(&mut device, "clear\r", 6 * SECOND).lines, ["statistics reset"]);

@@ -1,4 +1,4 @@
-//! The loop on the device: an epoch teaches, the next one shows what that was worth on data that it had not seen.
+//! The loop on the device: one epoch fits a model, the next one checks it on data that the fit has not seen.
 
 use adis16405_driver::Channel;
 use link::{ChannelMessage, Decoder, Health, LearnedMessage, Message, Received, ValidationMessage};
@@ -10,20 +10,20 @@ use virtual_sensor::{
 const SECOND: u64 = 1_000_000;
 const EPOCH_S: u64 = 100;
 const SEED: u64 = 1;
-/// What gyro x follows, deg/s/°C.
+/// Sensitivity of gyro x to the temperature, °/s/°C.
 const SENSITIVITY: f64 = 0.05;
 
-/// A part that warms up by 8 °C in a room that is heated in turns of 80 s, and whose gyro x follows if `hidden`.
-fn part(hidden: bool) -> VirtualAdis16405 {
+/// A part that warms up by 8 °C in a room with a temperature cycle of 80 s; with `with_effect` its gyro x follows it.
+fn part(with_effect: bool) -> VirtualAdis16405 {
     let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 80.0 };
     let effect = InjectedEffect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY };
     let environment = Environment { temperature, ..Environment::default() };
-    let effects = if hidden { vec![effect] } else { vec![] };
+    let effects = if with_effect { vec![effect] } else { vec![] };
     VirtualAdis16405::with_scenario(&SensorScenario { environment, effects }, NoiseModel::paper(), SEED)
 }
 
 #[derive(Default)]
-struct Heard {
+struct Transcript {
     checked: Vec<ValidationMessage>,
     learnt: Vec<LearnedMessage>,
     channels: Vec<ChannelMessage>,
@@ -31,8 +31,8 @@ struct Heard {
     lines: Vec<String>,
 }
 
-impl Heard {
-    fn of(bytes: &[u8]) -> Self {
+impl Transcript {
+    fn decode(bytes: &[u8]) -> Self {
         let (mut decoder, mut heard) = (Decoder::new(), Self::default());
         for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
             match received {
@@ -49,16 +49,16 @@ impl Heard {
     }
 }
 
-/// What a device says over some epochs.
-fn epochs(part: VirtualAdis16405, epochs: u64) -> (Device, Heard) {
+/// Runs a device for some epochs; returns it and what it sent.
+fn epochs(part: VirtualAdis16405, epochs: u64) -> (Device, Transcript) {
     let mut device = Device::new(part, Device::blank_memory());
     device.press(format!("i0\re{EPOCH_S}\r").as_bytes());
-    let heard = Heard::of(&device.run_until((epochs * EPOCH_S + 1) * SECOND));
+    let heard = Transcript::decode(&device.run_until((epochs * EPOCH_S + 1) * SECOND));
     (device, heard)
 }
 
 #[test]
-fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
+fn an_injected_temperature_effect_is_subtracted_in_the_next_epoch() {
     let (mut device, heard) = epochs(part(true), 3);
     let (_, twin) = epochs(part(false), 3);
     assert_eq!((heard.learnt.len(), heard.checked.len()), (18, 12), "the first epoch has nothing to check");
@@ -73,16 +73,16 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
         // The part is at 36 °C and warms.
         assert!((36.0..=36.0 + 8.0 + 3.0).contains(&cause.reference), "{cause:?}");
     }
-    let of_gyro_x = |heard: &Heard| heard.checked.iter().filter(|c| c.channel == 1).cloned().collect::<Vec<_>>();
-    let taught = heard.learnt.iter().filter(|learnt| learnt.channel == 1);
-    for ((checked, twin), learnt) in of_gyro_x(&heard).iter().zip(&of_gyro_x(&twin)).zip(taught) {
+    let of_gyro_x = |heard: &Transcript| heard.checked.iter().filter(|c| c.channel == 1).cloned().collect::<Vec<_>>();
+    let learnt_gyro_x = heard.learnt.iter().filter(|learnt| learnt.channel == 1);
+    for ((checked, twin), learnt) in of_gyro_x(&heard).iter().zip(&of_gyro_x(&twin)).zip(learnt_gyro_x) {
         assert_eq!(checked.epoch, learnt.epoch + 1);
-        let doubt = (learnt.regressors[0].high - learnt.regressors[0].low) / 2.0 / SENSITIVITY;
+        let relative_error = (learnt.regressors[0].high - learnt.regressors[0].low) / 2.0 / SENSITIVITY;
         for (drift, without) in checked.drift.iter().zip(&twin.drift) {
             println!("epoch {}, n = {}: {:.2e} -> {:.2e}", checked.epoch, drift.n, drift.raw, drift.compensated);
-            // What would be left with nothing hidden, and a part of the effect that the interval leaves open. A tenth more
-            // for what the rounding of the temperature, 0.04 degC, adds.
-            assert!(drift.compensated <= 1.1 * without.raw + doubt * drift.raw, "{drift:?}, {without:?}");
+            // At most the drift without the effect, and the part of the effect that the confidence interval leaves open; a
+            // tenth more for the rounding of the temperature, 0.04 °C.
+            assert!(drift.compensated <= 1.1 * without.raw + relative_error * drift.raw, "{drift:?}, {without:?}");
         }
         // A cycle of amplitude A has σ = A·sin²(πτ/T)/(πτ/T), 0.64·A at a quarter of the cycle: 0.095 deg/s of 0.05 times
         // 3 degC. The gyro's own noise has there, at 20 s, √(0.0368²/20 + (0.664·0.0093)² + 0.0013²·20/3) = 0.011.
@@ -91,11 +91,11 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
         assert!(quarter.raw > 4.0 * quarter.compensated, "{quarter:?}");
         // The gyro's own mean moves by 0.013 deg/s from one epoch to the next: K²·100 s·2/3 and the flicker noise.
         let shift = checked.shift.expect("means of both epochs");
-        assert!(shift.compensated.abs() <= doubt * shift.raw.abs() + 3.0 * 0.013, "{shift:?}");
+        assert!(shift.compensated.abs() <= relative_error * shift.raw.abs() + 3.0 * 0.013, "{shift:?}");
     }
     let lines = {
         device.press(b"t");
-        Heard::of(&device.run_until((3 * EPOCH_S + 2) * SECOND)).lines
+        Transcript::decode(&device.run_until((3 * EPOCH_S + 2) * SECOND)).lines
     };
     for expected in ["gyro_x sensitivity to temp: 5.", "gyro_x unseen: drift at "] {
         assert!(lines.iter().any(|line| line.starts_with(expected)), "{expected}: {lines:#?}");
@@ -103,7 +103,7 @@ fn a_hidden_temperature_effect_is_subtracted_in_the_next_epoch() {
 }
 
 #[test]
-fn where_nothing_is_hidden_nothing_is_subtracted() {
+fn without_an_effect_nothing_is_subtracted() {
     let (_, heard) = epochs(part(false), 3);
     assert!(heard.learnt.iter().all(|learnt| learnt.regressors.is_empty()));
     for checked in &heard.checked {
@@ -112,19 +112,18 @@ fn where_nothing_is_hidden_nothing_is_subtracted() {
     }
 }
 
-/// Every sample that was used is in exactly one epoch.
 #[test]
-fn no_sample_falls_between_two_epochs() {
+fn every_used_sample_is_in_exactly_one_epoch() {
     let (mut device, mut heard) = epochs(part(false), 3);
     device.press(b"r");
-    let last = Heard::of(&device.run_until((3 * EPOCH_S + 2) * SECOND));
+    let last = Transcript::decode(&device.run_until((3 * EPOCH_S + 2) * SECOND));
     heard.channels.extend(last.channels);
     let gyro_x = heard.channels.iter().filter(|report| report.channel == 1);
     let samples: u64 = gyro_x.map(|report| report.samples).sum();
     assert_eq!(samples, u64::from(last.health.expect("a report").used));
 }
 
-/// A restart forgets what channels had in common, and the epoch that it falls into teaches no sensitivity.
+/// A restart loses the covariances of the channels, so the epoch that contains it learns no sensitivity.
 #[test]
 fn an_epoch_with_a_restart_in_it_subtracts_nothing() {
     let memory = Device::blank_memory();
@@ -134,7 +133,7 @@ fn an_epoch_with_a_restart_in_it_subtracts_nothing() {
     let part = device.bus().part().clone();
     let start_us = part.now() / 1000;
     let mut restarted = Device::new(part, memory);
-    let heard = Heard::of(&restarted.run_until(start_us + (2 * EPOCH_S + 1) * SECOND));
+    let heard = Transcript::decode(&restarted.run_until(start_us + (2 * EPOCH_S + 1) * SECOND));
     let causes: Vec<usize> = heard.learnt.iter().filter(|l| l.channel == 1).map(|l| l.regressors.len()).collect();
     assert_eq!(causes, [0, 1], "{:?}", heard.learnt);
 }

@@ -1,8 +1,9 @@
 //! The estimator: on average, at its worst, and what reads beside it.
 
-use crate::report;
+use crate::late_state;
+use crate::report::report;
 use crate::timer::instructions;
-use allan_core::{Between, Cascade, Coupling, Hadamard};
+use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
 use core::hint::black_box;
 use cortex_m_semihosting::{hprint, hprintln};
 
@@ -35,7 +36,7 @@ pub(crate) fn count() {
     report("push_slice_p8", SAMPLES as u32, || cascade.push_slice(black_box(&sensor)));
     report("gap_p8", 10, || (0..10).for_each(|_| cascade.gap(black_box(1))));
     beside(&sensor);
-    let curve = Cascade::<OCTAVES, 8>::after_constant(0, 1 << 24);
+    let curve = late_state::after_constant::<OCTAVES, 8>(0, 1 << 24);
     report("curve_p8", 10, || (0..10).for_each(|_| drop(black_box(black_box(&curve).curve(0.01)))));
     hprintln!("bytes p4 {}", Cascade::<OCTAVES, 4>::memory());
     hprintln!("bytes p8 {}", Cascade::<OCTAVES, 8>::memory());
@@ -44,7 +45,7 @@ pub(crate) fn count() {
 
 /// In a long record, and in the first 2048 samples after a gap.
 fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
-    let mut cascade = black_box(Cascade::<OCTAVES, OVERLAP>::after_constant(0, 1 << 20));
+    let mut cascade = black_box(late_state::after_constant::<OCTAVES, OVERLAP>(0, 1 << 20));
     samples.iter().for_each(|&sample| cascade.push(sample));
     report(name, SAMPLES as u32, || samples.iter().for_each(|&sample| cascade.push(sample)));
     cascade.gap(1);
@@ -57,7 +58,7 @@ fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
 /// The push that completes a difference at every octave, with differences beyond 16 bits.
 fn worst<const OVERLAP: usize>(name: &str) {
     let mut cascades = black_box([const { Cascade::<OCTAVES, OVERLAP>::new() }; WORST]);
-    cascades.fill_with(|| Cascade::after_constant(0, (1 << 26) - 1));
+    cascades.fill_with(|| late_state::after_constant::<OCTAVES, OVERLAP>(0, (1 << 26) - 1));
     report(name, WORST as u32, || cascades.iter_mut().for_each(|cascade| cascade.push(black_box(1 << 23))));
     black_box(&cascades);
 }
@@ -66,7 +67,7 @@ fn worst<const OVERLAP: usize>(name: &str) {
 fn beside(samples: &[i32; SAMPLES]) {
     let mut coupling = black_box(Coupling::<OCTAVES>::new());
     let mut hadamard = black_box(Hadamard::<OCTAVES, 8>::new());
-    let mut between = black_box(Between::<OCTAVES, 8>::new());
+    let mut between = black_box(FractionalOctaves::<OCTAVES, 8>::new());
     let pushes = run(samples, |_, _| ());
     for (name, total) in [
         ("coupling_p8", run(samples, |a, b| coupling.observe(a, b))),

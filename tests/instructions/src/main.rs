@@ -1,16 +1,16 @@
-//! Counts instructions on an emulated Arm MPS2 board and says them over semihosting, a line each.
+//! Counts instructions on an emulated Arm MPS2 board and prints them over semihosting, one per line.
 #![no_std]
 #![no_main]
 
 mod end;
 mod estimator;
 mod functions;
+#[path = "../../../allan-core/tests/support/late_state.rs"]
+mod late_state;
+mod report;
 mod timer;
 
-use core::hint::black_box;
 use cortex_m_rt::entry;
-use cortex_m_semihosting::hprintln;
-use timer::instructions;
 
 #[entry]
 fn main() -> ! {
@@ -18,10 +18,4 @@ fn main() -> ! {
     estimator::count();
     functions::count();
     end::success()
-}
-
-/// Says how many instructions each of `times` runs took on average.
-fn report(name: &str, times: u32, work: impl FnOnce()) {
-    let tenths = instructions(work) / u64::from(black_box(times) / 10);
-    hprintln!("count {} {}.{}", name, tenths / 10, tenths % 10);
 }

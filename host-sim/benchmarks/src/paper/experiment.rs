@@ -3,8 +3,8 @@
 use super::slopes::{deviations, read_off};
 use super::{RATE_HZ, SECONDS, TRUTH};
 use adis16405_driver::{Channel, GyroRange};
-use allan_core::term::Filter;
-use allan_core::{Cascade, Kind, Model, fit::fit};
+use allan_core::term::MovingAverageFilter;
+use allan_core::{Cascade, Model, NoiseTerm, fit::fit};
 use serde::Serialize;
 use virtual_sensor::{NoiseModel, OutputRegister, VirtualAdis16405};
 
@@ -14,7 +14,7 @@ const LSB: f64 = Channel::GyroZ.lsb(GyroRange::Dps300);
 /// Write 7 to the lower byte of SMPL_PRD: eight ticks of 1/1638.4 s.
 const PERIOD_OF_EIGHT_TICKS: u16 = 0xB607;
 /// The part's filter after a reset: two averages over four samples each.
-const FILTER: Filter = Filter::bartlett(4);
+const FILTER: MovingAverageFilter = MovingAverageFilter::bartlett(4);
 
 /// Which seeds to run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,12 +105,12 @@ impl Experiment {
                 .enumerate()
                 .map(|(octave, n)| Scatter {
                     tau_s: tau(n),
-                    formula: allan_core::read_off::percentage_accuracy(samples(), n) / 100.0,
+                    formula: allan_core::slope_method::percentage_accuracy(samples(), n) / 100.0,
                     confidence: confidence(&truth, octave),
                     plain: relative(over(&hours, |hour| hour.plain[octave])),
                     overlapped: relative(over(&hours, |hour| hour.overlapped[octave])),
                     shares: each(|term| {
-                        let kind = Kind::DECLARED[term];
+                        let kind = NoiseTerm::BASELINE[term];
                         TRUTH[term] * TRUTH[term] * kind.avar(n, 1.0 / RATE_HZ) / unfiltered(n)
                     }),
                 })
@@ -125,8 +125,8 @@ fn samples() -> u64 {
 
 /// The terms that the fit looks for: N behind the part's filter, B, K, and the rounding to counts, which is white noise too
 /// but comes after the filter.
-fn terms() -> [Kind; 4] {
-    [Kind::Filtered(FILTER), Kind::BiasInstability, Kind::RateRandomWalk, Kind::AngleRandomWalk]
+fn terms() -> [NoiseTerm; 4] {
+    [NoiseTerm::Filtered(FILTER), NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk, NoiseTerm::AngleRandomWalk]
 }
 
 /// Of the rounding, as an N: `LSB·√(dt/12)`.
@@ -139,13 +139,13 @@ fn truth() -> Model {
     let terms = terms()
         .into_iter()
         .zip(TRUTH.into_iter().chain([rounding()]))
-        .map(|(kind, value)| allan_core::model::Term::exact(kind, value));
+        .map(|(kind, value)| allan_core::model::FittedTerm::exact(kind, value));
     Model::new(1.0 / RATE_HZ, terms)
 }
 
 /// Variance of the noise before the filter.
 fn unfiltered(n: u64) -> f64 {
-    Kind::DECLARED.iter().zip(TRUTH).map(|(kind, value)| value * value * kind.avar(n, 1.0 / RATE_HZ)).sum()
+    NoiseTerm::BASELINE.iter().zip(TRUTH).map(|(kind, value)| value * value * kind.avar(n, 1.0 / RATE_HZ)).sum()
 }
 
 /// Relative standard deviation of the overlapped deviation by the degrees of freedom of the true mixture.

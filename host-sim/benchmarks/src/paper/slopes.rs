@@ -1,6 +1,6 @@
 //! The paper's equations 7 to 9: three coefficients from three stretches of the curve.
 
-use allan_core::Point;
+use allan_core::AllanPoint;
 use std::f64::consts::{LN_2, PI};
 use std::ops::RangeInclusive;
 
@@ -24,7 +24,7 @@ pub fn read_off(points: impl Iterator<Item = (f64, f64)> + Clone) -> [Option<f64
 }
 
 /// Averaging time and Allan deviation of each point.
-pub(super) fn deviations(points: &[Point]) -> impl Iterator<Item = (f64, f64)> + Clone + '_ {
+pub(super) fn deviations(points: &[AllanPoint]) -> impl Iterator<Item = (f64, f64)> + Clone + '_ {
     points.iter().map(|point| (point.tau, point.avar.sqrt()))
 }
 

@@ -8,8 +8,8 @@ use super::place::{Place, Scene};
 use super::shape;
 use super::{Case, Group, Kind, Plan, case, truth};
 use adis16405_driver::Channel;
-use allan_core::Kind as Term;
-use allan_core::term::{Filter, Markov, Resonance};
+use allan_core::NoiseTerm as Term;
+use allan_core::term::{Markov, MovingAverageFilter, Resonance};
 use noise_analysis::report::{
     ChannelReport, Effect as Reported, ModelError, ModelReport, Parameter, ReadOff, Report, SCHEMA,
 };
@@ -46,7 +46,7 @@ fn densities_are_those_of_the_terms() {
                 spectrum::resonance(20.0, 2.0, PERIOD_S, frequency),
                 Term::Resonance(Resonance { frequency: 20.0, bandwidth: 2.0 }),
             ),
-            (spectrum::filter(3, PERIOD_S, frequency), Term::Filtered(Filter::bartlett(8))),
+            (spectrum::filter(3, PERIOD_S, frequency), Term::Filtered(MovingAverageFilter::bartlett(8))),
         ];
         for (ours, term) in pairs {
             let theirs = term.process().density(frequency, PERIOD_S);

@@ -2,11 +2,11 @@
 
 use super::draw::Case;
 use adis16405_driver::{Channel, GyroRange};
-use allan_core::check::ModelError;
 use allan_core::fit::fit_shapes;
-use allan_core::model::Term;
-use allan_core::term::{Filter, Markov, Resonance, Sinusoid};
-use allan_core::{Cascade, Kind, Model};
+use allan_core::model::Discrepancy;
+use allan_core::model::FittedTerm;
+use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
+use allan_core::{Cascade, Model, NoiseTerm};
 use firmware::{OCTAVES, OVERLAP};
 use recordings::recording::Sample;
 use simulation::output_register;
@@ -87,10 +87,10 @@ pub(super) fn unseen_error(case: &Case, channel: Channel) -> Result<Option<Unsee
     let recording = Simulation { scenario: hidden, ..case.simulation.clone() }.run(|_| ())?;
     let (first, second) = recording.samples.split_at(recording.samples.len() / 2);
     let curve = |samples: &[Sample]| curve(samples, channel, recording.range);
-    let mut kinds: Vec<Kind> = model.terms().iter().map(|term| term.kind).collect();
+    let mut kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
     kinds.dedup();
     let fitted = fit_shapes(&curve(first), &kinds);
-    let error = |model: &Model| Some(ModelError::between(model, &curve(second))?.deviance_per_point);
+    let error = |model: &Model| Some(Discrepancy::between(model, &curve(second))?.deviance_per_point);
     Ok(error(&model).zip(error(&fitted)).map(|(model, fitted)| UnseenError { model, fitted }))
 }
 
@@ -106,36 +106,37 @@ fn model(noise: &ChannelNoise, channel: Channel, effects: &[InjectedEffect]) -> 
         InjectedEffect::FilterBandwidth { taps_log2 } => Some(1u16 << taps_log2),
         _ => None,
     });
-    let white = taps.map_or(Kind::AngleRandomWalk, |taps| Kind::Filtered(Filter::bartlett(taps)));
+    let white =
+        taps.map_or(NoiseTerm::AngleRandomWalk, |taps| NoiseTerm::Filtered(MovingAverageFilter::bartlett(taps)));
     let declared = [
-        Term::exact(white, noise.angle_random_walk),
-        Term::exact(Kind::AngleRandomWalk, rounding),
-        Term::exact(Kind::BiasInstability, noise.bias_instability),
-        Term::exact(Kind::RateRandomWalk, noise.rate_random_walk),
+        FittedTerm::exact(white, noise.angle_random_walk),
+        FittedTerm::exact(NoiseTerm::AngleRandomWalk, rounding),
+        FittedTerm::exact(NoiseTerm::BiasInstability, noise.bias_instability),
+        FittedTerm::exact(NoiseTerm::RateRandomWalk, noise.rate_random_walk),
     ];
     let own = effects.iter().filter(|effect| effect.channels().contains(&output_register(channel)));
     Model::new(period_s, declared.into_iter().chain(own.filter_map(term)))
 }
 
-fn term(effect: &InjectedEffect) -> Option<Term> {
+fn term(effect: &InjectedEffect) -> Option<FittedTerm> {
     let (kind, value) = match *effect {
         InjectedEffect::Sinusoid { frequency_hz, amplitude, .. } => {
-            (Kind::Sinusoid(Sinusoid { frequency: frequency_hz }), amplitude)
+            (NoiseTerm::Sinusoid(Sinusoid { frequency: frequency_hz }), amplitude)
         }
         InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
-            (Kind::Resonance(Resonance { frequency: frequency_hz, bandwidth: bandwidth_hz }), deviation)
+            (NoiseTerm::Resonance(Resonance { frequency: frequency_hz, bandwidth: bandwidth_hz }), deviation)
         }
         InjectedEffect::Markov { time_constant_s, deviation, .. } => {
-            (Kind::Markov(Markov { time_constant: time_constant_s }), deviation)
+            (NoiseTerm::Markov(Markov { time_constant: time_constant_s }), deviation)
         }
         InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
-            (Kind::Markov(Markov { time_constant: time_constant_s }), 0.5 * amplitude)
+            (NoiseTerm::Markov(Markov { time_constant: time_constant_s }), 0.5 * amplitude)
         }
-        InjectedEffect::Quantization { coefficient, .. } => (Kind::Quantization, coefficient),
-        InjectedEffect::RateRamp { slope, .. } => (Kind::RateRamp, slope.abs()),
+        InjectedEffect::Quantization { coefficient, .. } => (NoiseTerm::Quantization, coefficient),
+        InjectedEffect::RateRamp { slope, .. } => (NoiseTerm::RateRamp, slope.abs()),
         _ => return None,
     };
-    Some(Term::exact(kind, value))
+    Some(FittedTerm::exact(kind, value))
 }
 
 fn curve(samples: &[Sample], channel: Channel, range: GyroRange) -> allan_core::Curve<OCTAVES> {

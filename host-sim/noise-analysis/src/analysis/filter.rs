@@ -4,9 +4,9 @@
 //! times than the filter is.
 
 use super::study::Study;
-use allan_core::Kind;
+use allan_core::NoiseTerm;
 use allan_core::fit::{fit_shapes, goodness};
-use allan_core::term::Filter;
+use allan_core::term::MovingAverageFilter;
 use allan_core::trace::Trace;
 
 /// By how much the deviance may rise with the filter of the other channels instead of a channel's own: chance does more
@@ -31,7 +31,7 @@ pub(super) fn agree(channels: &mut [Channel]) {
     if channels.len() >= FEWEST && 2 * showing < channels.len() {
         for channel in channels {
             if let Some((term, _, _)) = own(&channel.study.trace) {
-                channel.study.trace.found.retain(|found| found.term != term);
+                channel.study.trace.added.retain(|found| found.term != term);
             }
         }
         return;
@@ -42,11 +42,11 @@ pub(super) fn agree(channels: &mut [Channel]) {
             continue;
         }
         let study = &mut *channel.study;
-        let mut kinds: Vec<Kind> = study.trace.after.terms().iter().map(|known| known.kind).collect();
-        kinds[term] = Kind::Filtered(common);
+        let mut kinds: Vec<NoiseTerm> = study.trace.after.terms().iter().map(|known| known.kind).collect();
+        kinds[term] = NoiseTerm::Filtered(common);
         // At the filter's own rate, what comes behind it is told from what passes it: rounding, if nothing else.
-        if common.decimation == 1.0 && !kinds.contains(&Kind::AngleRandomWalk) {
-            kinds.push(Kind::AngleRandomWalk);
+        if common.decimation == 1.0 && !kinds.contains(&NoiseTerm::AngleRandomWalk) {
+            kinds.push(NoiseTerm::AngleRandomWalk);
         }
         let model = fit_shapes(&study.following.curve, &kinds);
         let judged = goodness(&study.following.curve, &model);
@@ -57,25 +57,26 @@ pub(super) fn agree(channels: &mut [Channel]) {
 }
 
 /// Where in the model a filter is that was found missing, which, and with what score.
-fn own(trace: &Trace) -> Option<(usize, Filter, f64)> {
-    trace.found.iter().find_map(|found| match trace.after.terms()[found.term].kind {
-        Kind::Filtered(filter) => Some((found.term, filter, found.score)),
+fn own(trace: &Trace) -> Option<(usize, MovingAverageFilter, f64)> {
+    trace.added.iter().find_map(|found| match trace.after.terms()[found.term].kind {
+        NoiseTerm::Filtered(filter) => Some((found.term, filter, found.score)),
         _ => None,
     })
 }
 
 /// By the channels whose noise reaches from one count to the next.
-fn most_evident(channels: &[Channel]) -> Option<Filter> {
+fn most_evident(channels: &[Channel]) -> Option<MovingAverageFilter> {
     let dithered = channels.iter().filter(|channel| channel.dithered);
-    let shown: Vec<(Filter, f64)> =
+    let shown: Vec<(MovingAverageFilter, f64)> =
         dithered.filter_map(|channel| own(&channel.study.trace)).map(|(_, filter, score)| (filter, score)).collect();
-    let evidence =
-        |of: Filter| shown.iter().filter(|(filter, _)| is_alike(*filter, of)).map(|(_, score)| score).sum::<f64>();
+    let evidence = |of: MovingAverageFilter| {
+        shown.iter().filter(|(filter, _)| is_alike(*filter, of)).map(|(_, score)| score).sum::<f64>()
+    };
     let clearest = shown.iter().map(|&(filter, score)| (filter, evidence(filter), score));
     clearest.max_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2))).map(|(filter, _, _)| filter)
 }
 
 /// Whether two filters differ at most in what a clock does.
-fn is_alike(a: Filter, b: Filter) -> bool {
+fn is_alike(a: MovingAverageFilter, b: MovingAverageFilter) -> bool {
     (a.stages, a.taps, a.decimation == 1.0) == (b.stages, b.taps, b.decimation == 1.0)
 }

@@ -5,7 +5,7 @@ use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::Model;
-use allan_core::term::{Kind, Resonance, Sinusoid};
+use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
 
 /// Lines closer than this share of their frequency, or than a few of their widths, are one that wanders.
 const NEAR: f64 = 0.03;
@@ -77,18 +77,18 @@ fn found(series: &Series, known: Option<&Model>) -> Vec<spectra::SpectralLine> {
 
 /// By how much the Markov terms of a model raise the density of its other noise.
 fn background(model: &Model, frequency: f64) -> f64 {
-    let part = |of: &dyn Fn(&Kind) -> bool| {
+    let part = |of: &dyn Fn(&NoiseTerm) -> bool| {
         let terms = model.terms().iter().copied().filter(|term| of(&term.kind));
         Model::new(model.sample_period(), terms).density(frequency)
     };
-    let markov = part(&|kind| matches!(kind, Kind::Markov(_)));
-    let noise = part(&|kind| !matches!(kind, Kind::Markov(_) | Kind::Resonance(_) | Kind::Sinusoid(_)));
+    let markov = part(&|kind| matches!(kind, NoiseTerm::Markov(_)));
+    let noise = part(&|kind| !matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)));
     // Where a filter leaves nothing, rounding does.
     1.0 + markov / noise.max(LEAST_NOISE * markov)
 }
 
 /// The terms that a trace may add for them.
-pub(super) fn kinds(lines: &[Line]) -> Vec<Kind> {
+pub(super) fn kinds(lines: &[Line]) -> Vec<NoiseTerm> {
     lines.iter().map(Line::kind).collect()
 }
 
@@ -130,7 +130,7 @@ impl Line {
 
     /// Whether it is a sinusoid.
     pub(super) fn is_steady(&self) -> bool {
-        matches!(self.kind(), Kind::Sinusoid(_))
+        matches!(self.kind(), NoiseTerm::Sinusoid(_))
     }
 
     /// Whether it is broad enough to be taken for a part of the background, and the reverse.
@@ -139,12 +139,12 @@ impl Line {
     }
 
     /// A sinusoid, or a resonance where the phase is lost often.
-    pub(super) fn kind(&self) -> Kind {
+    pub(super) fn kind(&self) -> NoiseTerm {
         let (frequency, bandwidth) = (self.frequency.value, self.width.value);
         if bandwidth * self.duration_s < CHANGES {
-            Kind::Sinusoid(Sinusoid { frequency })
+            NoiseTerm::Sinusoid(Sinusoid { frequency })
         } else {
-            Kind::Resonance(Resonance { frequency, bandwidth })
+            NoiseTerm::Resonance(Resonance { frequency, bandwidth })
         }
     }
 }

@@ -8,17 +8,17 @@ use crate::findings::BoundedEstimate;
 use crate::findings::MeasuredValue;
 use crate::report::{Effect, Parameter};
 use allan_core::confidence::NORMAL_975;
-use allan_core::model::Term;
+use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
-use allan_core::telegraph::Verdict;
-use allan_core::term::{Filter, Kind, Markov};
-use allan_core::trace::Found;
+use allan_core::telegraph::KurtosisRatio;
+use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm};
+use allan_core::trace::AddedTerm;
 use measurement::{ChannelProfile, Quantity};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// A term's parameters by name.
-pub(super) fn parameters(term: &Term, unit: &str) -> BTreeMap<String, Parameter> {
+pub(super) fn parameters(term: &FittedTerm, unit: &str) -> BTreeMap<String, Parameter> {
     let coefficient =
         Parameter { value: term.value, low: term.low, high: term.high, unit: coefficient_unit(&term.kind, unit) };
     let shapes = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
@@ -37,14 +37,14 @@ fn shape_unit(name: &str) -> &'static str {
 }
 
 /// A term that the declared model lacks.
-pub(super) fn term_effect(term: &Term, found: &Found, unit: &str, period_s: f64) -> Effect {
+pub(super) fn term_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64) -> Effect {
     added_effect(term, found, unit, period_s, &meaning(&term.kind))
 }
 
 /// A filter that the declared model lacks, in a sensor whose own samples come at `internal_rate_hz`.
 pub(super) fn filter_effect(
-    (term, filter): (&Term, &Filter),
-    found: &Found,
+    (term, filter): (&FittedTerm, &MovingAverageFilter),
+    found: &AddedTerm,
     unit: &str,
     period_s: f64,
     internal_rate_hz: f64,
@@ -52,7 +52,7 @@ pub(super) fn filter_effect(
     added_effect(term, found, unit, period_s, &filter_meaning(filter, internal_rate_hz))
 }
 
-fn added_effect(term: &Term, found: &Found, unit: &str, period_s: f64, meaning: &str) -> Effect {
+fn added_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64, meaning: &str) -> Effect {
     let residual = found.residual;
     let evidence = format!(
         "{:+.1} % at tau = {} s ({:.0} sigma) before it was added, which takes {:.0} sigma off the fit; {meaning}",
@@ -72,7 +72,13 @@ fn estimated(estimate: MeasuredValue, unit: &str) -> Parameter {
 }
 
 /// A Markov term whose fourth moments show two levels.
-pub(super) fn telegraph_effect(term: &Term, found: &Found, verdict: &Verdict, unit: &str, period_s: f64) -> Effect {
+pub(super) fn telegraph_effect(
+    term: &FittedTerm,
+    found: &AddedTerm,
+    verdict: &KurtosisRatio,
+    unit: &str,
+    period_s: f64,
+) -> Effect {
     let markov = term_effect(term, found, unit, period_s);
     let mut parameters = markov.parameters;
     parameters.remove("deviation");
@@ -100,7 +106,7 @@ pub(super) fn unbounded_effect(found: &Unbounded, unit: &str) -> Effect {
 }
 
 /// A Markov term that stands in the place of the white noise.
-pub(super) fn low_pass_effect(term: &Term, markov: Markov, found: &Found, period_s: f64) -> Effect {
+pub(super) fn low_pass_effect(term: &FittedTerm, markov: Markov, found: &AddedTerm, period_s: f64) -> Effect {
     let corner = |time_constant: f64| 0.5 / (PI * time_constant);
     let (shortest, longest) = term.shape[0];
     let bandwidth = Parameter {
@@ -159,7 +165,7 @@ pub(super) fn followed_effects(followed: &[(ChannelProfile, Sensitivity)], unit:
 pub(super) fn line_effect(line: &Line, unit: &str) -> Effect {
     let (kind, root) = (line.kind(), 2f64.sqrt());
     let parameters = match kind {
-        Kind::Resonance(_) => {
+        NoiseTerm::Resonance(_) => {
             vec![("deviation", estimated(line.deviation, unit)), ("bandwidth", estimated(line.width, "Hz"))]
         }
         _ => {
@@ -214,19 +220,21 @@ fn seconds(tau: f64) -> String {
 }
 
 /// What a term may physically be.
-fn meaning(kind: &Kind) -> String {
+fn meaning(kind: &NoiseTerm) -> String {
     match kind {
-        Kind::Quantization => "steps of the angle: a counter or an integrator before the output".to_owned(),
-        Kind::RateRamp => "a steady drift: warming up, or ageing".to_owned(),
-        Kind::Filtered(_) => "a low-pass filter before the sampling".to_owned(),
-        Kind::Markov(_) => "a correlated fluctuation: thermal or electronic".to_owned(),
-        Kind::Resonance(_) => "a narrow band: a mechanical resonance or an unsteady vibration".to_owned(),
-        Kind::Sinusoid(_) => "a steady line: a vibration, or an interference folded into the band".to_owned(),
-        Kind::AngleRandomWalk | Kind::BiasInstability | Kind::RateRandomWalk => "part of the declared model".to_owned(),
+        NoiseTerm::Quantization => "steps of the angle: a counter or an integrator before the output".to_owned(),
+        NoiseTerm::RateRamp => "a steady drift: warming up, or ageing".to_owned(),
+        NoiseTerm::Filtered(_) => "a low-pass filter before the sampling".to_owned(),
+        NoiseTerm::Markov(_) => "a correlated fluctuation: thermal or electronic".to_owned(),
+        NoiseTerm::Resonance(_) => "a narrow band: a mechanical resonance or an unsteady vibration".to_owned(),
+        NoiseTerm::Sinusoid(_) => "a steady line: a vibration, or an interference folded into the band".to_owned(),
+        NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk => {
+            "part of the declared model".to_owned()
+        }
     }
 }
 
-fn filter_meaning(filter: &Filter, internal_rate_hz: f64) -> String {
+fn filter_meaning(filter: &MovingAverageFilter, internal_rate_hz: f64) -> String {
     let window = if filter.stages == 2 { "Bartlett window" } else { "moving average" };
     if filter.decimation == 1.0 {
         return format!("neighbours correlate as behind a {window} of {} taps a stage", filter.taps);

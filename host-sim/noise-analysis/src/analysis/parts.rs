@@ -3,7 +3,7 @@
 
 use super::{Estimator, repairs::Repairs};
 use crate::OCTAVES;
-use allan_core::regression::Shared;
+use allan_core::regression::CovarianceCurve;
 use allan_core::{Cascade, Coupling, Curve};
 use measurement::{ChannelProfile, Measurement};
 
@@ -125,7 +125,7 @@ impl Part {
     }
 
     /// What two channels have in common, in the product of their units.
-    pub(super) fn shared(&self, a: usize, b: usize) -> Shared<OCTAVES> {
+    pub(super) fn shared(&self, a: usize, b: usize) -> CovarianceCurve<OCTAVES> {
         let (high, low) = (a.max(b), a.min(b));
         let mut points = self.couplings[high * (high - 1) / 2 + low].points();
         points.iter_mut().for_each(|point| point.covariance *= self.lsb[a] * self.lsb[b]);

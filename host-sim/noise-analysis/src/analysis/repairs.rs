@@ -9,7 +9,7 @@ use crate::findings::{Correction, Detection};
 use crate::report::Effect;
 use crate::series::Series;
 use crate::trace::{deliveries, sample_clock};
-use allan_core::Kind;
+use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
 use std::collections::BTreeSet;
 
@@ -102,7 +102,7 @@ impl Repairs {
 
     /// Whether a channel has a ramp.
     pub(super) fn ramps(&self, channel: ChannelProfile) -> bool {
-        self.effects(channel).any(|effect| effect.kind == Kind::RateRamp.name())
+        self.effects(channel).any(|effect| effect.kind == NoiseTerm::RateRamp.name())
     }
 
     /// How a channel follows a slow cause.

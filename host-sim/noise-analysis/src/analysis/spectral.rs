@@ -3,7 +3,8 @@
 use super::lines::{self, Line};
 use super::study::{Following, Study};
 use crate::series::Series;
-use allan_core::{Kind, Model};
+use allan_core::term::MovingAverageFilter;
+use allan_core::{Model, NoiseTerm};
 
 /// Share of a line's deviation that must be left when what the channel follows is taken off; else it is that's line.
 const OWN: f64 = 0.5;
@@ -12,20 +13,25 @@ const LEAKING: f64 = 0.1;
 
 /// Traces what a channel lacks, with the lines of its spectrum. `rest` are its samples without what it follows, if it
 /// follows anything.
-pub(super) fn study(following: Following, series: &Series, rest: Option<&Series>) -> (Study, Vec<Line>) {
+pub(super) fn study(
+    following: Following,
+    series: &Series,
+    rest: Option<&Series>,
+    filters: &[MovingAverageFilter],
+) -> (Study, Vec<Line>) {
     let mut lines = lines::of(series, None);
     if let Some(rest) = rest {
         let left = lines::of(rest, None);
         let is_own = |line: &Line, left: &Line| line.is_same(left) && left.deviation.value > OWN * line.deviation.value;
         lines.retain(|line| left.iter().any(|left| is_own(line, left)));
     }
-    let mut study = Study::traced(following, &lines::kinds(&lines));
-    let correlated = study.trace.after.terms().iter().any(|term| matches!(term.kind, Kind::Markov(_)));
+    let mut study = Study::traced(following, &lines::kinds(&lines), filters);
+    let correlated = study.trace.after.terms().iter().any(|term| matches!(term.kind, NoiseTerm::Markov(_)));
     if correlated && lines.iter().any(Line::is_broad) {
         // A hump may be the foot of a process that the spectrum's background has no form for.
         lines.retain(|line| !line.is_broad());
         lines.extend(lines::of(series, Some(&study.trace.after)).into_iter().filter(Line::is_broad));
-        study = Study::traced(study.following, &lines::kinds(&lines));
+        study = Study::traced(study.following, &lines::kinds(&lines), filters);
     }
     lines.retain(|line| line.is_steady() || !leaks(&study.trace.after, line.frequency.value));
     (study, lines)
@@ -33,8 +39,8 @@ pub(super) fn study(following: Following, series: &Series, rest: Option<&Series>
 
 /// How long the impulse response of the filters in a model is, s.
 pub(super) fn filter_s(model: &Model) -> f64 {
-    let length = |kind: &Kind| match kind {
-        Kind::Filtered(filter) => {
+    let length = |kind: &NoiseTerm| match kind {
+        NoiseTerm::Filtered(filter) => {
             f64::from(filter.stages) * f64::from(filter.taps) * model.sample_period() / filter.decimation
         }
         _ => 0.0,
@@ -44,8 +50,8 @@ pub(super) fn filter_s(model: &Model) -> f64 {
 
 /// Whether a hump at `frequency` Hz may be what leaks into the nulls of a filter that a model has.
 fn leaks(model: &Model, frequency: f64) -> bool {
-    let gain = |kind: &Kind| match kind {
-        Kind::Filtered(filter) if filter.decimation == 1.0 => {
+    let gain = |kind: &NoiseTerm| match kind {
+        NoiseTerm::Filtered(filter) if filter.decimation == 1.0 => {
             // 1 at low frequencies, where no noise is left out.
             kind.process().density(frequency, model.sample_period())
         }

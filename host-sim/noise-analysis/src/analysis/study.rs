@@ -4,10 +4,10 @@ use super::parts::Part;
 use super::repairs::is_slow;
 use crate::OCTAVES;
 use crate::detectors::bias::BiasSensitivity;
-use allan_core::regression::{Beside, Covariate, Sensitivity, Shared};
-use allan_core::term::Markov;
-use allan_core::trace::{Lines, Trace, trace};
-use allan_core::{Curve, Kind};
+use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
+use allan_core::term::{Markov, MovingAverageFilter};
+use allan_core::trace::{LineCandidates, Trace, trace};
+use allan_core::{Curve, NoiseTerm};
 use measurement::{ChannelProfile, Quantity};
 
 /// Probability of the residual under a model below which another one is tried.
@@ -22,8 +22,8 @@ pub(super) struct Surroundings {
     /// Where the covariates stand in the part.
     members: Vec<usize>,
     covariates: Vec<Covariate<OCTAVES>>,
-    with_channel: Vec<Shared<OCTAVES>>,
-    mutual: Vec<Shared<OCTAVES>>,
+    with_channel: Vec<CovarianceCurve<OCTAVES>>,
+    mutual: Vec<CovarianceCurve<OCTAVES>>,
 }
 
 /// What a channel follows in one part.
@@ -59,7 +59,7 @@ impl Surroundings {
     }
 
     /// What `work` makes of the channel beside its covariates.
-    fn beside<T>(&self, work: impl FnOnce(&Beside<OCTAVES>) -> T) -> T {
+    fn beside<T>(&self, work: impl FnOnce(&CovariateRegression<OCTAVES>) -> T) -> T {
         let covariance = |with: Option<usize>, covariate: usize, n: u64| {
             let shared = match with {
                 None => &self.with_channel[covariate],
@@ -70,7 +70,7 @@ impl Surroundings {
             };
             shared.iter().find(|point| point.n == n).map(|point| point.covariance)
         };
-        work(&Beside { channel: &self.channel, covariates: &self.covariates, covariance: &covariance })
+        work(&CovariateRegression { channel: &self.channel, covariates: &self.covariates, covariance: &covariance })
     }
 }
 
@@ -85,7 +85,7 @@ impl Following {
         slow: impl Fn(ChannelProfile) -> Option<BiasSensitivity>,
     ) -> Self {
         let surroundings = Surroundings::of(part, channel, None);
-        let mut followed: Vec<Sensitivity> = surroundings.beside(|beside| beside.followed()).into_iter().collect();
+        let mut followed: Vec<Sensitivity> = surroundings.beside(|beside| beside.sensitivities()).into_iter().collect();
         for (covariate, &member) in surroundings.members.iter().enumerate() {
             let cause = part.channels[member];
             let Some(BiasSensitivity { sensitivity: value, error }) = slow(cause) else {
@@ -94,8 +94,8 @@ impl Following {
             };
             match followed.iter_mut().find(|known| known.covariate == covariate) {
                 Some(known) if known.error <= error => {}
-                Some(known) => *known = Sensitivity { covariate, value, error, freedom: FREE },
-                None => followed.push(Sensitivity { covariate, value, error, freedom: FREE }),
+                Some(known) => *known = Sensitivity { covariate, value, error, degrees_of_freedom: FREE },
+                None => followed.push(Sensitivity { covariate, value, error, degrees_of_freedom: FREE }),
             }
         }
         let curve = surroundings.beside(|beside| beside.compensated(&followed));
@@ -117,13 +117,13 @@ impl Following {
 impl Study {
     /// Leaves it at the declared model.
     pub(super) fn declared(following: Following) -> Self {
-        let trace = Trace::declared(&following.curve);
+        let trace = Trace::baseline(&following.curve);
         Self { following, trace }
     }
 
     /// Traces what the channel lacks; `lines` are those that a spectrum has shown.
-    pub(super) fn traced(following: Following, lines: &[Kind]) -> Self {
-        let trace = traced(&following.curve, lines);
+    pub(super) fn traced(following: Following, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
+        let trace = traced(&following.curve, lines, filters);
         Self { following, trace }
     }
 
@@ -135,7 +135,7 @@ impl Study {
     /// Correlation times of the Markov processes that were found, s.
     pub(super) fn correlation_times(&self) -> impl Iterator<Item = f64> {
         self.trace.after.terms().iter().filter_map(|term| match term.kind {
-            Kind::Markov(Markov { time_constant }) => Some(time_constant),
+            NoiseTerm::Markov(Markov { time_constant }) => Some(time_constant),
             _ => None,
         })
     }
@@ -143,12 +143,12 @@ impl Study {
 
 /// With the lines of the spectrum, or, where these do not explain the curve, with what the curve itself shows: a line that
 /// wanders is many in the spectrum of a long record and one in the curve.
-fn traced(curve: &Curve<OCTAVES>, lines: &[Kind]) -> Trace {
-    let known = trace(curve, Lines::Known(lines));
+fn traced(curve: &Curve<OCTAVES>, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Trace {
+    let known = trace(curve, LineCandidates::Spectrum(lines), filters);
     if lines.is_empty() || known.after_goodness.p_value > UNEXPLAINED {
         return known;
     }
-    let own = trace(curve, Lines::InTheCurve);
+    let own = trace(curve, LineCandidates::Curve, filters);
     if own.after_goodness.deviance < known.after_goodness.deviance { own } else { known }
 }
 

@@ -6,8 +6,8 @@
 use crate::OCTAVES;
 use allan_core::Curve;
 use allan_core::fit::{fit_shapes, goodness};
-use allan_core::model::Term;
-use allan_core::term::{Kind, Markov};
+use allan_core::model::FittedTerm;
+use allan_core::term::{Markov, NoiseTerm};
 use allan_core::trace::Trace;
 use measurement::ChannelProfile;
 
@@ -20,9 +20,9 @@ const AS_GOOD: f64 = 4.0;
 /// A walk that goes too far.
 pub(super) struct Unbounded {
     /// K, in the channel's unit.
-    pub walk: Term,
+    pub walk: FittedTerm,
     /// The process in its place.
-    pub process: Term,
+    pub process: FittedTerm,
     /// How far K would take the bias in an hour, in initial bias errors.
     pub too_far: f64,
 }
@@ -30,15 +30,15 @@ pub(super) struct Unbounded {
 /// The process that is in the place of a walk in `channel`, if that walk goes too far.
 pub(super) fn unbounded(curve: &Curve<OCTAVES>, trace: &Trace, channel: ChannelProfile) -> Option<Unbounded> {
     let model = &trace.after;
-    let walk = *model.terms().iter().find(|term| term.kind == Kind::RateRandomWalk)?;
+    let walk = *model.terms().iter().find(|term| term.kind == NoiseTerm::RateRandomWalk)?;
     let bias = channel.initial_bias_error?;
     let too_far = walk.low * HOUR_S.sqrt() / bias;
     if too_far <= 1.0 {
         return None;
     }
     let time_constant = FIRST * curve.points().last()?.tau;
-    let others = model.terms().iter().map(|term| term.kind).filter(|kind| *kind != Kind::RateRandomWalk);
-    let kinds: Vec<Kind> = others.chain([Kind::Markov(Markov { time_constant })]).collect();
+    let others = model.terms().iter().map(|term| term.kind).filter(|kind| *kind != NoiseTerm::RateRandomWalk);
+    let kinds: Vec<NoiseTerm> = others.chain([NoiseTerm::Markov(Markov { time_constant })]).collect();
     let bounded = fit_shapes(curve, &kinds);
     if goodness(curve, &bounded).deviance > trace.after_goodness.deviance + AS_GOOD {
         return None;
@@ -51,7 +51,7 @@ pub(super) fn unbounded(curve: &Curve<OCTAVES>, trace: &Trace, channel: ChannelP
 mod tests {
     use super::*;
     use allan_core::Cascade;
-    use allan_core::trace::{Lines, trace};
+    use allan_core::trace::{LineCandidates, trace};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -71,7 +71,7 @@ mod tests {
         let curve = cascade.curve(PERIOD_S).scaled(1e-3);
         unbounded(
             &curve,
-            &trace(&curve, Lines::Known(&[])),
+            &trace(&curve, LineCandidates::Spectrum(&[]), &measurement::adis16405::profile(0.05).filters),
             measurement::adis16405::profile(0.05).channel("gyro_z").unwrap(),
         )
     }
@@ -86,7 +86,7 @@ mod tests {
             found_there.too_far
         );
         // Any correlation time that is as long: σ²·2/τ = K² is all that the curve knows.
-        let Kind::Markov(Markov { time_constant }) = found_there.process.kind else { panic!() };
+        let NoiseTerm::Markov(Markov { time_constant }) = found_there.process.kind else { panic!() };
         let walk = found_there.process.value * (2.0 / time_constant).sqrt();
         assert!((walk / 2.0 - 1.0).abs() < 0.2, "{:?}", found_there.process);
         assert!(found(0.02, 1e9).is_none(), "1.2 deg/s in an hour");

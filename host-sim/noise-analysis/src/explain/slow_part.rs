@@ -4,7 +4,7 @@
 //! learnt in the fitted half at one octave and applied to the unseen half at all.
 
 use crate::{OCTAVES, OVERLAP};
-use allan_core::{Cascade, Coupling, Noise};
+use allan_core::{Cascade, Coupling, PowerLaw};
 use measurement::{ChannelProfile, Measurement};
 use nalgebra::{DMatrix, DVector};
 
@@ -72,7 +72,12 @@ impl SlowPart {
         let edf = |n: u64| {
             let cascade = &fitted.cascades[0];
             let (_, count) = cascade.sum_of_squares(n.ilog2() as usize).unwrap_or_default();
-            allan_core::confidence::edf(n, count, (OVERLAP as u64).min(n) as u32, Noise::Flicker.shares())
+            allan_core::confidence::edf(
+                n,
+                count,
+                (OVERLAP as u64).min(n) as u32,
+                PowerLaw::Flicker.variance_fractions(),
+            )
         };
         let octaves = || (0..OCTAVES).map(|octave| 1_u64 << octave).take_while(|&n| n <= longest);
         let learnt_at = octaves().filter(|&n| edf(n) >= FREEDOM_PER_WEIGHT * others as f64).last()?;

@@ -2,7 +2,7 @@
 
 use crate::findings::BoundedEstimate;
 use crate::uniform_series::UniformSeries;
-use allan_core::{Kind, Model};
+use allan_core::{Model, NoiseTerm};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Averages per correlation time.
@@ -25,7 +25,7 @@ const REACH: f64 = 4.0;
 #[must_use]
 pub(crate) fn correlation_time(series: &UniformSeries, model: &Model) -> Option<BoundedEstimate> {
     let expected = model.terms().iter().find_map(|term| match term.kind {
-        Kind::Markov(markov) if term.value > 0.0 => Some(markov.time_constant),
+        NoiseTerm::Markov(markov) if term.value > 0.0 => Some(markov.time_constant),
         _ => None,
     })?;
     let width = (expected / PER_TIME / series.sample_period()).round().max(1.0) as usize;
@@ -89,12 +89,13 @@ fn covariance_of_others(model: &Model, width: usize) -> [f64; LAGS] {
     let width = width as f64;
     std::array::from_fn(|lag| {
         let distance = (lag + 1) as f64;
-        let covariance = |term: &allan_core::model::Term| {
-            let v = |m: f64| term.kind.process().structure(m * width, model.sample_period());
+        let covariance = |term: &allan_core::model::FittedTerm| {
+            let v = |m: f64| term.kind.process().sum_variance(m * width, model.sample_period());
             let second = v(distance + 1.0) - 2.0 * v(distance) + v(distance - 1.0);
             term.value * term.value * second / (2.0 * width * width)
         };
-        let present = model.terms().iter().filter(|term| term.value > 0.0 && !matches!(term.kind, Kind::Markov(_)));
+        let present =
+            model.terms().iter().filter(|term| term.value > 0.0 && !matches!(term.kind, NoiseTerm::Markov(_)));
         present.map(covariance).sum()
     })
 }
@@ -118,7 +119,7 @@ fn fit_exponential(correlation: &[f64; LAGS], spacing: f64, expected: f64) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use allan_core::model::Term;
+    use allan_core::model::FittedTerm;
     use allan_core::term::Markov;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -130,9 +131,9 @@ mod tests {
     const RECORDS: u64 = 100;
 
     fn model(walk: f64) -> Model {
-        let markov = Kind::Markov(Markov { time_constant: 1.3 * TIME });
-        let terms = [(Kind::AngleRandomWalk, 0.3), (markov, 1.0), (Kind::RateRandomWalk, walk)];
-        Model::new(PERIOD, terms.map(|(kind, value)| Term::exact(kind, value)))
+        let markov = NoiseTerm::Markov(Markov { time_constant: 1.3 * TIME });
+        let terms = [(NoiseTerm::AngleRandomWalk, 0.3), (markov, 1.0), (NoiseTerm::RateRandomWalk, walk)];
+        Model::new(PERIOD, terms.map(|(kind, value)| FittedTerm::exact(kind, value)))
     }
 
     /// A Markov process of deviation 1 in white noise and a random walk; the expected time is 30 % off.
@@ -180,7 +181,7 @@ mod tests {
     fn has_no_estimate_without_a_process_or_for_a_short_record() {
         let series = |samples| UniformSeries::new(PERIOD, vec![0.0; samples]);
         assert_eq!(correlation_time(&series(1_000), &model(0.0)), None);
-        let white = Model::new(PERIOD, [Term::exact(Kind::AngleRandomWalk, 1.0)]);
+        let white = Model::new(PERIOD, [FittedTerm::exact(NoiseTerm::AngleRandomWalk, 1.0)]);
         assert_eq!(correlation_time(&series(SAMPLES), &white), None);
         // A channel that never changes has no correlation.
         assert_eq!(correlation_time(&series(SAMPLES), &model(0.0)), None);

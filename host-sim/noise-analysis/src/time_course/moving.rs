@@ -2,9 +2,9 @@
 
 use super::{SIGNIFICANCE, chi_square_tail};
 use allan_core::confidence::octave_correlation;
-use allan_core::model::Term;
+use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Sinusoid};
-use allan_core::{Curve, Kind, Model, Point};
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 
 /// What can move.
 pub const STATES: usize = 2;
@@ -73,9 +73,9 @@ impl Moving {
     /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the evidence.
     #[must_use]
     pub fn of<const POINTS: usize>(model: Model, epochs: &[Curve<POINTS>]) -> (Self, Option<Evidence>) {
-        let is_line = |term: &Term| match term.kind {
-            Kind::Sinusoid(_) => term.value > 0.0,
-            Kind::Resonance(line) => term.value > 0.0 && line.bandwidth < WIDEST * line.frequency,
+        let is_line = |term: &FittedTerm| match term.kind {
+            NoiseTerm::Sinusoid(_) => term.value > 0.0,
+            NoiseTerm::Resonance(line) => term.value > 0.0 && line.bandwidth < WIDEST * line.frequency,
             _ => false,
         };
         let lines: Vec<usize> = (0..model.terms().len()).filter(|&at| is_line(&model.terms()[at])).collect();
@@ -119,9 +119,9 @@ impl Moving {
     /// The model in a state.
     #[must_use]
     pub fn at(&self, [level, line]: State) -> Model {
-        let moved = |(at, term): (usize, &Term)| {
+        let moved = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
-            if matches!(term.kind, Kind::AngleRandomWalk | Kind::Filtered(_)) {
+            if matches!(term.kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_)) {
                 term.value *= (level / 2.0).exp();
             }
             if self.line == Some(at) {
@@ -135,12 +135,12 @@ impl Moving {
     /// The model in a state, with a line of another width and amplitude, whose logarithms change by so much.
     pub fn along(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
         let moved = self.at([level, line]);
-        let changed = |(at, term): (usize, &Term)| {
+        let changed = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
             if self.line == Some(at) {
                 term.value *= amplitude.exp();
-                if let Kind::Resonance(line) = term.kind {
-                    term.kind = Kind::Resonance(Resonance { bandwidth: line.bandwidth * width.exp(), ..line });
+                if let NoiseTerm::Resonance(line) = term.kind {
+                    term.kind = NoiseTerm::Resonance(Resonance { bandwidth: line.bandwidth * width.exp(), ..line });
                 }
             }
             term
@@ -165,7 +165,7 @@ impl Moving {
     /// The state of an epoch.
     #[must_use]
     pub fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, free: Free) -> Estimate {
-        let points: Vec<(&Point, f64)> = epoch
+        let points: Vec<(&AllanPoint, f64)> = epoch
             .points()
             .iter()
             .filter(|point| point.n <= epoch.samples() / 8 && point.avar > 0.0)
@@ -181,7 +181,7 @@ impl Moving {
         let deviance = |level: f64, avars: &[f64]| {
             let more = level.exp() - 1.0;
             let modelled = avars.iter().zip(&white).map(|(all, white)| all + more * white);
-            let of = |((point, edf), modelled): (&(&Point, f64), f64)| {
+            let of = |((point, edf), modelled): (&(&AllanPoint, f64), f64)| {
                 let ratio = point.avar / modelled;
                 edf * (ratio - 1.0 - ratio.ln())
             };
@@ -210,9 +210,9 @@ impl Moving {
 
     /// Standard deviations by the sandwich `H⁻¹·S·H⁻¹`, and how much likelier chance moves the points along the last
     /// state than if they were independent.
-    fn uncertainty(&self, points: &[(&Point, f64)], state: State, free: Free) -> (State, f64) {
+    fn uncertainty(&self, points: &[(&AllanPoint, f64)], state: State, free: Free) -> (State, f64) {
         const STEP: f64 = 1e-3;
-        let slope = |index: usize, point: &Point| {
+        let slope = |index: usize, point: &AllanPoint| {
             let at = |step: f64| {
                 let mut moved = state;
                 moved[index] += step;
@@ -229,7 +229,7 @@ impl Moving {
             let mut sum = 0.0;
             for (i, (a, _)) in points.iter().enumerate() {
                 for (j, (b, _)) in points.iter().enumerate() {
-                    let (a, b) = (self.model.shares(a.n), self.model.shares(b.n));
+                    let (a, b) = (self.model.variance_fractions(a.n), self.model.variance_fractions(b.n));
                     sum += along[i] * along[j] * octave_correlation(i.abs_diff(j), a, b);
                 }
             }
@@ -256,10 +256,10 @@ impl Moving {
     }
 }
 
-fn shifted(kind: Kind, factor: f64) -> Kind {
+fn shifted(kind: NoiseTerm, factor: f64) -> NoiseTerm {
     match kind {
-        Kind::Sinusoid(line) => Kind::Sinusoid(Sinusoid { frequency: line.frequency * factor }),
-        Kind::Resonance(line) => Kind::Resonance(Resonance { frequency: line.frequency * factor, ..line }),
+        NoiseTerm::Sinusoid(line) => NoiseTerm::Sinusoid(Sinusoid { frequency: line.frequency * factor }),
+        NoiseTerm::Resonance(line) => NoiseTerm::Resonance(Resonance { frequency: line.frequency * factor, ..line }),
         other => other,
     }
 }

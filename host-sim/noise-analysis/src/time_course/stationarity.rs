@@ -1,7 +1,7 @@
 //! Whether the two quarters of the fitted half have the same noise.
 
 use super::SIGNIFICANCE;
-use allan_core::{Curve, Model, Point};
+use allan_core::{AllanPoint, Curve, Model};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// The octave at which two stretches of a channel differ most.
@@ -35,7 +35,7 @@ pub fn stationarity<const POINTS: usize>(
     model: &Model,
 ) -> Option<Stationarity> {
     let longest = earlier.samples().min(later.samples()) / 8;
-    let compare = |(before, after): (&Point, &Point)| {
+    let compare = |(before, after): (&AllanPoint, &AllanPoint)| {
         let ratio = after.avar / before.avar;
         let law = FisherSnedecor::new(model.edf(after), model.edf(before)).ok()?;
         let p_value = (2.0 * law.cdf(ratio).min(law.sf(ratio))).min(1.0);

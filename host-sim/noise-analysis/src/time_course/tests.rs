@@ -9,7 +9,7 @@ use super::{Parts, SIGNIFICANCE, deviance_per_point, stationarity};
 use crate::series::Series;
 use allan_core::fit::{fit, fit_shapes};
 use allan_core::term::{Resonance, Sinusoid};
-use allan_core::{Kind, Model};
+use allan_core::{Model, NoiseTerm};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -58,7 +58,7 @@ fn oscillating(seed: u64, frequency: impl Fn(usize) -> f64) -> Series {
     })
 }
 
-const OSCILLATION: Kind = Kind::Resonance(Resonance { frequency: 20.0, bandwidth: 1.0 });
+const OSCILLATION: NoiseTerm = NoiseTerm::Resonance(Resonance { frequency: 20.0, bandwidth: 1.0 });
 
 fn false_alarms(of: impl Fn(u64) -> f64) -> usize {
     (0..RECORDS).filter(|&seed| of(seed) < SIGNIFICANCE).count()
@@ -68,7 +68,7 @@ fn false_alarms(of: impl Fn(u64) -> f64) -> usize {
 fn quarters_of_the_same_noise_are_told_to_be_the_same() {
     let alarms = false_alarms(|seed| {
         let parts = Parts::of(&drifting(seed, |_| 1.0)).expect("long enough");
-        let model = fit(&parts.fitted, &Kind::DECLARED);
+        let model = fit(&parts.fitted, &NoiseTerm::BASELINE);
         stationarity(&parts.quarters[0], &parts.quarters[1], &model).expect("octaves").p_value
     });
     assert!(alarms <= MOST_FALSE_ALARMS, "{alarms} of {RECORDS}");
@@ -78,7 +78,7 @@ fn quarters_of_the_same_noise_are_told_to_be_the_same() {
 fn quarters_with_a_memory_are_told_to_be_the_same() {
     let alarms = false_alarms(|seed| {
         let parts = Parts::of(&oscillating(seed, |_| 20.0)).expect("long enough");
-        let model = fit_shapes(&parts.fitted, &[Kind::AngleRandomWalk, OSCILLATION]);
+        let model = fit_shapes(&parts.fitted, &[NoiseTerm::AngleRandomWalk, OSCILLATION]);
         stationarity(&parts.quarters[0], &parts.quarters[1], &model).expect("octaves").p_value
     });
     assert!(alarms <= MOST_FALSE_ALARMS, "{alarms} of {RECORDS}");
@@ -89,7 +89,7 @@ fn a_level_that_rises_is_found_and_the_later_quarter_chosen() {
     // The first octave of a quarter has 2/3 of 16,384 degrees of freedom: a ratio of variances is known to 1.9 %, so
     // 12 % are clear, though seven octaves were looked at.
     let parts = Parts::of(&drifting(1, |at| if at < SAMPLES / 4 { 1.0 } else { 1.06 })).expect("long enough");
-    let model = fit(&parts.fitted, &Kind::DECLARED);
+    let model = fit(&parts.fitted, &NoiseTerm::BASELINE);
     let found = stationarity(&parts.quarters[0], &parts.quarters[1], &model).expect("octaves");
     assert!(found.moves() && (found.ratio - 1.06 * 1.06).abs() < 4.0 * 0.019, "{found:?}");
     assert_eq!(predictive_part(Some(found)), Part::LatestQuarter);
@@ -100,13 +100,13 @@ fn a_level_that_rises_is_found_and_the_later_quarter_chosen() {
 fn epochs_of_the_same_noise_do_not_move() {
     let level = false_alarms(|seed| {
         let parts = Parts::of(&drifting(seed, |_| 1.0)).expect("long enough");
-        let (moving, _) = Moving::of(fit(&parts.fitted, &Kind::DECLARED), &parts.fitted_epochs);
+        let (moving, _) = Moving::of(fit(&parts.fitted, &NoiseTerm::BASELINE), &parts.fitted_epochs);
         moving.evidence(&parts.fitted_epochs, Free::Nothing, Free::Level).p_value
     });
     assert!(level <= MOST_FALSE_ALARMS, "level: {level} of {RECORDS}");
     let line = false_alarms(|seed| {
         let parts = Parts::of(&oscillating(seed, |_| 20.0)).expect("long enough");
-        let model = fit_shapes(&parts.fitted, &[Kind::AngleRandomWalk, OSCILLATION]);
+        let model = fit_shapes(&parts.fitted, &[NoiseTerm::AngleRandomWalk, OSCILLATION]);
         Moving::of(model, &parts.fitted_epochs).1.map_or(1.0, |evidence| evidence.p_value)
     });
     assert!(line <= MOST_FALSE_ALARMS, "line: {line} of {RECORDS}");
@@ -130,9 +130,9 @@ fn the_state_of_an_epoch_is_as_certain_as_it_says() {
 
 /// N and K of [`drifting`], by their definitions.
 fn truth() -> Model {
-    use allan_core::model::Term;
-    let white = Term::exact(Kind::AngleRandomWalk, PERIOD.sqrt());
-    let walk = Term::exact(Kind::RateRandomWalk, 0.003 / PERIOD.sqrt());
+    use allan_core::model::FittedTerm;
+    let white = FittedTerm::exact(NoiseTerm::AngleRandomWalk, PERIOD.sqrt());
+    let walk = FittedTerm::exact(NoiseTerm::RateRandomWalk, 0.003 / PERIOD.sqrt());
     Model::new(PERIOD, [white, walk])
 }
 
@@ -141,8 +141,8 @@ fn a_line_that_moves_is_followed() {
     // From 22 Hz to 18 Hz, the middle of the record at 20 Hz.
     let falling = |at: usize| 22.0 - 4.0 * at as f64 / SAMPLES as f64;
     let parts = Parts::of(&oscillating(7, falling)).expect("long enough");
-    let start = Kind::Resonance(Resonance { frequency: 21.0, bandwidth: 1.0 });
-    let model = fit_shapes(&parts.fitted, &[Kind::AngleRandomWalk, start]);
+    let start = NoiseTerm::Resonance(Resonance { frequency: 21.0, bandwidth: 1.0 });
+    let model = fit_shapes(&parts.fitted, &[NoiseTerm::AngleRandomWalk, start]);
     let (moving, evidence) = Moving::of(model, &parts.fitted_epochs);
     let centre = moving.line_frequency().unwrap_or_else(|| panic!("no line moves: {evidence:?}"));
     let epochs = &parts.fitted_epochs;
@@ -164,7 +164,8 @@ fn a_pure_line_that_stands_still_does_not_move() {
     let mut noise = drifting(3, |_| 1.0);
     noise.values.iter_mut().enumerate().for_each(|(at, value)| *value += (16.0 * line(at)).round() / 16.0);
     let parts = Parts::of(&noise).expect("long enough");
-    let kinds = [Kind::AngleRandomWalk, Kind::RateRandomWalk, Kind::Sinusoid(Sinusoid { frequency: 3.0 })];
+    let kinds =
+        [NoiseTerm::AngleRandomWalk, NoiseTerm::RateRandomWalk, NoiseTerm::Sinusoid(Sinusoid { frequency: 3.0 })];
     let (moving, evidence) = Moving::of(fit_shapes(&parts.fitted, &kinds), &parts.fitted_epochs);
     assert_eq!(moving.line_frequency(), None, "{evidence:?}");
 }
@@ -218,7 +219,7 @@ fn a_level_goes_as_far_as_its_steps_let_expect() {
         }
         let parts = Parts::of(&drifting(seed, |at| (log_variance[at / epoch] / 2.0).exp())).expect("long enough");
         assert_eq!(parts.epoch, epoch);
-        let moving = Moving::still(fit(&parts.fitted, &Kind::DECLARED));
+        let moving = Moving::still(fit(&parts.fitted, &NoiseTerm::BASELINE));
         let (fitted, unseen) = (&parts.fitted_epochs, &parts.unseen_epochs);
         let drift = expected(&moving, Free::Level, fitted, fitted.len(), unseen.len());
         let half = |from: usize| log_variance[from..from + 16].iter().sum::<f64>() / 16.0;

@@ -4,7 +4,7 @@
 //! epochs hardly knows of it.
 
 use super::control::LONGEST_TAKEN_OVER;
-use allan_core::{Curve, Point};
+use allan_core::{AllanPoint, Curve};
 
 /// The curve of `part` with the median of its `epochs` at the octaves that they tell well.
 ///
@@ -13,7 +13,7 @@ use allan_core::{Curve, Point};
 #[must_use]
 pub fn typical<const POINTS: usize>(part: &Curve<POINTS>, epochs: &[Curve<POINTS>]) -> Curve<POINTS> {
     let mut typical = part.clone();
-    typical.change_avar(|point| median(epochs, point.n).unwrap_or(point.avar));
+    typical.replace_avar(|point| median(epochs, point.n).unwrap_or(point.avar));
     typical
 }
 
@@ -22,7 +22,7 @@ fn median<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> 
         let point = epoch.points().iter().find(|point| point.n == n)?;
         (n * LONGEST_TAKEN_OVER <= epoch.samples()).then_some(*point)
     };
-    let points: Vec<Point> = epochs.iter().filter_map(told).collect();
+    let points: Vec<AllanPoint> = epochs.iter().filter_map(told).collect();
     let mut avars: Vec<f64> = points.iter().map(|point| point.avar).collect();
     avars.sort_by(f64::total_cmp);
     let (lower, upper) = (avars.get(avars.len().checked_sub(1)? / 2)?, avars.get(avars.len() / 2)?);

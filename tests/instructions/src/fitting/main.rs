@@ -10,9 +10,10 @@ mod stack;
 mod timer;
 
 use allan_core::fit::{fit, goodness};
-use allan_core::regression::{Beside, Covariate};
-use allan_core::trace::{Lines, Trace, trace_while};
-use allan_core::{Cascade, Coupling, Curve, Kind, Model};
+use allan_core::regression::{Covariate, CovariateRegression};
+use allan_core::term::MovingAverageFilter;
+use allan_core::trace::{LineCandidates, Trace, trace_while};
+use allan_core::{Cascade, Coupling, Curve, Model, NoiseTerm};
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
@@ -21,6 +22,19 @@ const OCTAVES: usize = 24;
 /// An hour and a half at 204.8 samples a second: 20 points.
 const SAMPLES: u32 = 1 << 20;
 const SAMPLE_PERIOD: f64 = 1.0 / 204.8;
+/// The filters that the trace tries: as many as the firmware has it try.
+const FILTERS: [MovingAverageFilter; 10] = [
+    MovingAverageFilter::bartlett(2),
+    MovingAverageFilter::bartlett(4),
+    MovingAverageFilter::bartlett(8),
+    MovingAverageFilter::bartlett(16),
+    MovingAverageFilter::bartlett(32),
+    MovingAverageFilter::bartlett(64),
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 6.1 },
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 8.1 },
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 10.1 },
+    MovingAverageFilter { stages: 2, taps: 8, decimation: 12.1 },
+];
 /// Of a channel and two covariates.
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
@@ -47,14 +61,14 @@ fn main() -> ! {
     let quiet = black_box(record(0));
     let toned = black_box(record(100));
     let mut model = Model::new(SAMPLE_PERIOD, []);
-    measure("fit", || model = black_box(fit(&quiet, &Kind::DECLARED)));
+    measure("fit", || model = black_box(fit(&quiet, &NoiseTerm::BASELINE)));
     measure("goodness", || _ = black_box(goodness(&quiet, &model)));
     // Where it stands, as on a device: its result is none of its stack.
     let mut result = Trace::empty();
     let mut traced = |curve| {
-        result.declare(curve);
-        assert!(trace_while(&mut result, curve, Lines::InTheCurve, &mut || true), "nobody says no");
-        result.found.len()
+        result.fit_baseline(curve);
+        assert!(trace_while(&mut result, curve, LineCandidates::Curve, &FILTERS, &mut || true), "nobody says no");
+        result.added.len()
     };
     let mut found = [0; 2];
     measure("trace_nothing", || found[0] = black_box(traced(&quiet)));
@@ -92,9 +106,9 @@ fn sensitivities() {
         let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
         points[pair].iter().find(|point| point.n == n).map(|point| point.covariance)
     };
-    let beside = Beside { channel: &channel, covariates: &covariates, covariance: &covariance };
+    let beside = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
     let mut followed = Default::default();
-    measure("sensitivities", || followed = black_box(beside.followed()));
+    measure("sensitivities", || followed = black_box(beside.sensitivities()));
     assert!(followed.iter().map(|of| of.covariate).eq([0]), "{followed:?}");
 }
 

@@ -13,7 +13,7 @@ mod ours;
 mod python;
 mod score;
 
-use allan_core::Kind;
+use allan_core::NoiseTerm;
 use anyhow::Result;
 use case::{BATCH, CASES, Case, SAMPLES};
 use clap::Parser;
@@ -83,7 +83,7 @@ fn main() -> Result<()> {
 fn own(case: &Case, batch: &[Vec<f64>], methods: &mut Vec<(String, Scores)>) {
     let true_kinds = ours::true_kinds(case);
     for series in batch {
-        for (method, kinds) in [("ours, true terms", &true_kinds[..]), ("ours, N, B and K", &Kind::DECLARED[..])] {
+        for (method, kinds) in [("ours, true terms", &true_kinds[..]), ("ours, N, B and K", &NoiseTerm::BASELINE[..])] {
             let model = ours::fitted(case, series, kinds);
             let scores = scores(methods, method);
             scores.add(ours::coefficients(&model), case.truth);

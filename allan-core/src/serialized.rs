@@ -1,0 +1,143 @@
+//! Serialisation of an estimator's whole state with serde: a deserialised estimator continues to the bit.
+//!
+//! The state is a sequence of a header (version, type and parameters), the 64-bit words of the estimator in the order of
+//! its fields, and a CRC-32 of both. Deserialising refuses another version, type or size, a wrong checksum, and words that
+//! no sequence of samples leads to; the error says which.
+
+use core::fmt;
+use core::marker::PhantomData;
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+use serde::de::{self, SeqAccess, Visitor};
+use serde::ser::SerializeTuple;
+use serde::{Deserializer, Serializer};
+
+const VERSION: u8 = 1;
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// An estimator whose state is a fixed number of 64-bit words.
+pub(crate) trait StateWords: Clone {
+    const EMPTY: Self;
+    /// Identifies the type in the header.
+    const KIND: u8;
+    const OCTAVES: usize;
+    /// 0 if the type has no such parameter.
+    const OVERLAP: usize;
+    const WORDS: usize;
+
+    /// Calls `visit` with every word in order, for reading or for writing.
+    fn visit_words<E>(&mut self, visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E>;
+
+    /// A property of the state that no sequence of samples leads to, if there is one.
+    fn inconsistency(&self) -> Option<&'static str>;
+}
+
+const fn header<S: StateWords>() -> [u8; 4] {
+    [VERSION, S::KIND, S::OCTAVES as u8, S::OVERLAP as u8]
+}
+
+pub(crate) fn serialize<S: StateWords, Z: Serializer>(state: &S, serializer: Z) -> Result<Z::Ok, Z::Error> {
+    let mut tuple = serializer.serialize_tuple(S::WORDS + 2)?;
+    let mut digest = started_digest::<S>();
+    tuple.serialize_element(&u32::from_be_bytes(header::<S>()))?;
+    state.clone().visit_words(|word| {
+        digest.update(&word.to_le_bytes());
+        tuple.serialize_element(word)
+    })?;
+    tuple.serialize_element(&digest.finalize())?;
+    tuple.end()
+}
+
+pub(crate) fn deserialize<'de, S: StateWords, D: Deserializer<'de>>(deserializer: D) -> Result<S, D::Error> {
+    deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor(PhantomData))
+}
+
+fn started_digest<S: StateWords>() -> Digest<'static, u32> {
+    let mut digest = CRC.digest();
+    digest.update(&header::<S>());
+    digest
+}
+
+struct StateVisitor<S>(PhantomData<S>);
+
+impl<'de, S: StateWords> Visitor<'de> for StateVisitor<S> {
+    type Value = S;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let [version, kind, octaves, overlap] = header::<S>();
+        write!(f, "an estimator's state: version {version}, type {kind}, {octaves} octaves, {overlap}-fold overlap")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut words: A) -> Result<S, A::Error> {
+        let short = |at: usize| de::Error::invalid_length(at, &self);
+        let found = words.next_element::<u32>()?.ok_or_else(|| short(0))?;
+        if found != u32::from_be_bytes(header::<S>()) {
+            let [version, kind, octaves, overlap] = found.to_be_bytes();
+            return Err(de::Error::custom(format_args!(
+                "version {version}, type {kind}, {octaves} octaves, {overlap}-fold overlap where there should be {}",
+                Expected(&self)
+            )));
+        }
+        let mut state = S::EMPTY;
+        let mut digest = started_digest::<S>();
+        let mut at = 1;
+        state.visit_words(|word| {
+            *word = words.next_element()?.ok_or_else(|| short(at))?;
+            digest.update(&word.to_le_bytes());
+            at += 1;
+            Ok(())
+        })?;
+        let checksum: u32 = words.next_element()?.ok_or_else(|| short(at))?;
+        if checksum != digest.finalize() {
+            return Err(de::Error::custom("an estimator's state with a wrong checksum"));
+        }
+        match state.inconsistency() {
+            Some(reason) => {
+                Err(de::Error::custom(format_args!("an estimator's state that no samples lead to: {reason}")))
+            }
+            None => Ok(state),
+        }
+    }
+}
+
+struct Expected<'a, S>(&'a StateVisitor<S>);
+
+impl<S: StateWords> fmt::Display for Expected<'_, S> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.0.expecting(f)
+    }
+}
+
+/// Visits a signed word as the same bits.
+pub(crate) fn visit_signed<E>(word: &mut i64, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
+    let mut bits = *word as u64;
+    visit(&mut bits)?;
+    *word = bits as i64;
+    Ok(())
+}
+
+/// Visits the two halves of a wide sum, the lower one first.
+pub(crate) fn visit_wide<E>(sum: &mut u128, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
+    let (mut low, mut high) = (*sum as u64, (*sum >> 64) as u64);
+    visit(&mut low)?;
+    visit(&mut high)?;
+    *sum = u128::from(high) << 64 | u128::from(low);
+    Ok(())
+}
+
+/// Implements serde's traits for a type with these const parameters through its [`StateWords`].
+macro_rules! serde_by_words {
+    ($($parameter:ident),+ for $type:ty) => {
+        impl<$(const $parameter: usize),+> serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                crate::serialized::serialize(self, serializer)
+            }
+        }
+
+        impl<'de, $(const $parameter: usize),+> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                crate::serialized::deserialize(deserializer)
+            }
+        }
+    };
+}
+pub(crate) use serde_by_words;

@@ -1,0 +1,164 @@
+//! The interface of a process, and the processes with elementary closed forms: the power laws of IEEE Std 952 and the
+//! sinusoid.
+
+use crate::math::{abs, ln, sin};
+use core::f64::consts::{LN_2, PI};
+
+/// A random or deterministic process with a coefficient of 1, sampled every `sample_period` seconds.
+pub trait Process {
+    /// `V(m)`, the variance of the sum of `m` samples in units of the coefficient squared. Terms of `V` to which second
+    /// differences are blind (constant, linear and quadratic in the phase) are left out, so `V` may be negative.
+    ///
+    /// The Allan variance is `[4V(n) − V(2n)]/(2n²)`.
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64;
+
+    /// Two-sided power spectral density at `frequency` in Hz, aliases included, in unit²/Hz; 0 for deterministic terms.
+    fn density(&self, frequency: f64, sample_period: f64) -> f64;
+
+    /// Allan variance at averaging factor `n`, in units of the coefficient squared.
+    fn avar(&self, n: u64, sample_period: f64) -> f64 {
+        let n = n as f64;
+        (4.0 * self.sum_variance(n, sample_period) - self.sum_variance(2.0 * n, sample_period)) / (2.0 * n * n)
+    }
+
+    /// Sets `table` to [`sum_variance`](Self::sum_variance) at 0, 1, 2 … strides of `stride` samples, up to a common factor and to
+    /// an error that is negligible for the correlations of second differences at these strides.
+    fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
+        for (k, entry) in table.iter_mut().enumerate() {
+            *entry = self.sum_variance(k as f64 * stride, sample_period);
+        }
+    }
+
+    /// Sum of the squares of the halved covariances of second differences at the lags `2n + stride, 2n + 2·stride …`, in
+    /// units of the coefficient to the fourth; 0 for processes whose second differences are uncorrelated there.
+    fn squared_covariance_tail(&self, _n: u64, _stride: f64, _sample_period: f64) -> f64 {
+        0.0
+    }
+}
+
+/// Quantization of the angle: `σ² = 3Q²/τ²` (IEEE 952), exact at every `n`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Quantization;
+
+/// White rate noise: `σ² = N²/τ` (IEEE 952), exact at every `n`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AngleRandomWalk;
+
+/// Flicker rate noise, averaged over each sampling interval: `σ² = (2 ln 2/π)·B²` (IEEE 952), exact at every `n`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BiasInstability;
+
+/// A random walk of the rate, sampled every `dt` seconds: `σ² = K²·dt·(2n² + 1)/(6n)`, which is 1.5 times the `K²τ/3` of
+/// IEEE 952 at `n = 1` and tends to it at large `n`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RateRandomWalk;
+
+/// A linear trend of the rate: `σ² = R²τ²/2` (IEEE 952), exact at every `n`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RateRamp;
+
+impl Process for Quantization {
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
+        if m == 0.0 { 0.0 } else { 2.0 / (sample_period * sample_period) }
+    }
+
+    fn density(&self, frequency: f64, sample_period: f64) -> f64 {
+        let sine = sin(PI * frequency * sample_period);
+        4.0 * sine * sine / sample_period
+    }
+}
+
+impl Process for AngleRandomWalk {
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
+        m / sample_period
+    }
+
+    fn density(&self, _frequency: f64, _sample_period: f64) -> f64 {
+        1.0
+    }
+
+    fn avar(&self, n: u64, sample_period: f64) -> f64 {
+        1.0 / (n as f64 * sample_period)
+    }
+}
+
+impl Process for BiasInstability {
+    fn sum_variance(&self, m: f64, _sample_period: f64) -> f64 {
+        if m == 0.0 { 0.0 } else { -m * m * ln(m) / PI }
+    }
+
+    /// `B²/(2π|f|)` after the averaging over the sampling interval, with its aliases.
+    fn density(&self, frequency: f64, sample_period: f64) -> f64 {
+        let f = frequency * sample_period;
+        let sine = sin(PI * f);
+        let cube = |x: f64| x * x * x;
+        let aliases: f64 = (1..=20).map(f64::from).map(|k| 1.0 / cube(k + f) + 1.0 / cube(k - f)).sum();
+        // The remaining aliases: the integral of 2/k³.
+        let rest = 1.0 / (20.5 * 20.5);
+        sample_period * sine * sine / (2.0 * PI * PI * PI) * (1.0 / cube(abs(f)) + aliases + rest)
+    }
+
+    fn avar(&self, _n: u64, _sample_period: f64) -> f64 {
+        2.0 * LN_2 / PI
+    }
+}
+
+impl Process for RateRandomWalk {
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
+        -(m * m * m - m) * sample_period / 6.0
+    }
+
+    fn density(&self, frequency: f64, sample_period: f64) -> f64 {
+        let sine = sin(PI * frequency * sample_period);
+        sample_period * sample_period / (4.0 * sine * sine)
+    }
+
+    fn avar(&self, n: u64, sample_period: f64) -> f64 {
+        let n = n as f64;
+        sample_period * (2.0 * n * n + 1.0) / (6.0 * n)
+    }
+}
+
+impl Process for RateRamp {
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
+        -(m * m * m * m) * sample_period * sample_period / 12.0
+    }
+
+    fn density(&self, _frequency: f64, _sample_period: f64) -> f64 {
+        0.0
+    }
+
+    fn avar(&self, n: u64, sample_period: f64) -> f64 {
+        let tau = n as f64 * sample_period;
+        tau * tau / 2.0
+    }
+}
+
+/// A sinusoid of amplitude 1, sampled every `dt` seconds: `σ² = sin⁴(πf·n·dt)/(n²·sin²(πf·dt))`.
+///
+/// The form for continuous time is `[sin²(πfτ)/(πfτ)]²` (IEEE 952). A frequency above half the sample rate gives the
+/// variance of its alias.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sinusoid {
+    /// f: frequency, Hz, above 0.
+    pub frequency: f64,
+}
+
+impl Process for Sinusoid {
+    fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
+        let half = PI * self.frequency * sample_period;
+        let ratio = sin(half * m) / sin(half);
+        ratio * ratio / 2.0
+    }
+
+    fn density(&self, _frequency: f64, _sample_period: f64) -> f64 {
+        0.0
+    }
+
+    fn avar(&self, n: u64, sample_period: f64) -> f64 {
+        let half = PI * self.frequency * sample_period;
+        let ratio = sin(half * n as f64);
+        let ratio = ratio * ratio / (n as f64 * sin(half));
+        ratio * ratio
+    }
+}
