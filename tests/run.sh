@@ -32,7 +32,7 @@ run() { printf '+ %s\n' "$*"; "$@"; }
 # One choice of crates and features, so that nothing is built twice. The emulator rigless asks for a newer Rust than it needs.
 host() {
     run cargo "$1" --locked --workspace --ignore-rust-version \
-        --features adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde "${@:2}"
+        --features adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde "${@:2}"
 }
 lint() { run cargo clippy --locked "$@" -- -D warnings; }
 document() { RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps "$@"; }
