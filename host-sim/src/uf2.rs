@@ -1,46 +1,77 @@
 //! An image for a Raspberry Pi Pico as UF2, the file that its boot loader takes by drag and drop.
 //!
-//! The conversion is that of the crate `elf2flash-core`: a block of 512 bytes for each page of 256 bytes of flash
-//! (<https://github.com/microsoft/uf2>).
+//! The format is <https://github.com/microsoft/uf2>: blocks of 512 bytes, each with a page of 256 bytes of flash.
 
-use elf2flash_core::boards::RP2040;
-use elf2flash_core::{Elf2Uf2Error, NoProgress, elf2uf2};
+use object::Endianness::Little;
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader, ProgramHeader};
+use std::collections::BTreeMap;
 
-/// Addresses at which the RP2040 maps its flash: 16 MiB at most.
-const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
+/// Bytes of flash in a block.
+const PAGE_BYTES: usize = 256;
 /// Length of a block, bytes.
 const BLOCK_BYTES: usize = 512;
-/// Offset of the flash address in a block.
-const ADDRESS_OFFSET: usize = 12;
+/// First two and last word of every block.
+const MAGIC: [u32; 3] = [0x0A32_4655, 0x9E5D_5157, 0x0AB1_6F30];
+/// Flag: the word before the payload is the family of the processor.
+const FAMILY_PRESENT: u32 = 0x2000;
+/// The family RP2040.
+const RP2040: u32 = 0xE48B_FF56;
+/// Addresses at which the RP2040 maps its flash: 16 MiB at most.
+const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
 /// Why an image was not converted.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Uf2Error {
-    /// The file is no ELF, is cut short, or has nothing to load.
-    #[error("no complete ELF image")]
-    Elf(#[from] Elf2Uf2Error),
-    /// A segment is loaded to an address that is not flash of an RP2040.
-    #[error("the page at {0:#010x} is outside the flash at 0x10000000: is it an image for the Pico?")]
-    OutsideFlash(u32),
+    /// The file is not a complete little-endian 32-bit ELF.
+    #[error("no complete 32-bit little-endian ELF: {0}")]
+    Elf(#[from] object::read::Error),
+    /// The contents of a segment lie outside of the file.
+    #[error("the ELF is cut short: the segment at {0:#010x} is not in it")]
+    CutShort(u32),
+    /// No segment is loaded to the flash of an RP2040.
+    #[error("nothing in it is for the flash at 0x10000000: is it an image for the Pico?")]
+    NoFlash,
 }
 
-/// Converts the loadable segments of an ELF image to the blocks of a UF2 file, in the order of their addresses.
-/// Bytes of a page that no segment fills are zero.
+/// Converts those loadable segments of an ELF image that lie in flash to the blocks of a UF2 file, in the order of their
+/// addresses. Bytes of a page that no segment fills are zero.
 ///
 /// # Errors
-/// The file is no complete ELF, or not all of it is for the flash of an RP2040.
-///
-/// # Panics
-/// Two segments of the ELF overlap, which no linker writes.
+/// The file is no complete ELF, or nothing in it is for the flash of an RP2040.
 pub fn from_elf(elf: &[u8]) -> Result<Vec<u8>, Uf2Error> {
-    let mut blocks = Vec::new();
-    elf2uf2(elf, &mut blocks, &RP2040, NoProgress)?;
-    let addresses = blocks.chunks_exact(BLOCK_BYTES).filter_map(|block| block[ADDRESS_OFFSET..].first_chunk());
-    match addresses.map(|bytes| u32::from_le_bytes(*bytes)).find(|address| !FLASH.contains(address)) {
-        Some(address) => Err(Uf2Error::OutsideFlash(address)),
-        None => Ok(blocks),
+    let header = FileHeader32::<object::Endianness>::parse(elf)?;
+    let endian = header.endian()?;
+    if endian != Little {
+        return Err(Uf2Error::NoFlash);
     }
+    let mut pages = BTreeMap::<u32, [u8; PAGE_BYTES]>::new();
+    for segment in header.program_headers(endian, elf)? {
+        let address = segment.p_paddr(endian);
+        if segment.p_type(endian) != PT_LOAD || !FLASH.contains(&address) {
+            continue;
+        }
+        let bytes = segment.data(endian, elf).map_err(|()| Uf2Error::CutShort(address))?;
+        for (at, &byte) in (address..FLASH.end).zip(bytes) {
+            let page = pages.entry(at & !(PAGE_BYTES as u32 - 1)).or_insert([0; PAGE_BYTES]);
+            page[at as usize % PAGE_BYTES] = byte;
+        }
+    }
+    if pages.is_empty() {
+        return Err(Uf2Error::NoFlash);
+    }
+    let count = pages.len() as u32;
+    let block = |(number, (address, page)): (u32, (u32, [u8; PAGE_BYTES]))| {
+        let head = [MAGIC[0], MAGIC[1], FAMILY_PRESENT, address, PAGE_BYTES as u32, number, count, RP2040];
+        let mut block = Vec::with_capacity(BLOCK_BYTES);
+        head.iter().for_each(|word| block.extend(word.to_le_bytes()));
+        block.extend(page);
+        block.resize(BLOCK_BYTES - 4, 0);
+        block.extend(MAGIC[2].to_le_bytes());
+        block
+    };
+    Ok((0..).zip(pages).flat_map(block).collect())
 }
 
 #[cfg(test)]
@@ -53,6 +84,7 @@ mod tests {
         elf[..7].copy_from_slice(b"\x7FELF\x01\x01\x01");
         elf[20] = 1; // version
         elf[28..32].copy_from_slice(&52_u32.to_le_bytes());
+        elf[40] = 52; // length of the header
         elf[42] = 32; // length of a program header
         elf[44] = 1;
         for field in [1, 84, address, address, bytes.len() as u32, bytes.len() as u32, 5, 4] {
@@ -62,9 +94,9 @@ mod tests {
         elf
     }
 
-    /// The offsets and numbers are those of the specification's table.
+    /// Offsets and numbers are those of the table in the specification.
     #[test]
-    fn blocks_are_as_the_specification_says() {
+    fn the_blocks_follow_the_specification() {
         let bytes: Vec<u8> = (0..300_u32).map(|k| k as u8).collect();
         let uf2 = from_elf(&elf(0x1000_0100, &bytes)).unwrap();
         assert_eq!(uf2.len(), 2 * 512);
@@ -81,12 +113,23 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_no_image_for_the_pico_are_refused() {
+    fn what_is_no_image_for_the_pico_is_refused() {
         assert!(matches!(from_elf(b"MZ"), Err(Uf2Error::Elf(_))));
-        assert!(matches!(from_elf(&elf(0x0800_0000, &[1])), Err(Uf2Error::OutsideFlash(0x0800_0000))));
+        assert_eq!(from_elf(&elf(0x0800_0000, &[1])), Err(Uf2Error::NoFlash));
         let whole = elf(0x1000_0000, &[1, 2, 3]);
-        for length in 6..whole.len() {
-            assert!(matches!(from_elf(&whole[..length]), Err(Uf2Error::Elf(_))), "{length} bytes");
+        for length in 0..whole.len() {
+            assert!(from_elf(&whole[..length]).is_err(), "{length} bytes");
+        }
+    }
+
+    /// Damage gives an error or another image, never a panic.
+    #[test]
+    fn every_single_bit_error_in_the_headers_is_survived() {
+        let whole = elf(0x1000_0000, &[1, 2, 3]);
+        for bit in 0..8 * 84 {
+            let mut damaged = whole.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            let _ = from_elf(&damaged);
         }
     }
 }
