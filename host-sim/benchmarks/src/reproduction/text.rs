@@ -34,9 +34,9 @@ impl ReproductionResult {
         writeln!(out, "{}", text_table(header, 1, (0..3).map(row)))?;
         writeln!(
             out,
-            "true curve: slope method on the true curve, without estimation noise. It takes the curve for one"
+            "true curve: slope method on the true curve, without estimation noise. It attributes the curve to"
         )?;
-        writeln!(out, "term, where N, B and K add up: their fractions of the variance are below.\n")?;
+        writeln!(out, "one term, but N, B and K add up: their fractions of the variance are below.\n")?;
         writeln!(out, "standard deviation of the Allan deviation at an octave, %: predicted, and over the seeds")?;
         let percent = |value: f64, decimals: usize| format!("{:.decimals$}", 100.0 * value);
         let row = |octave: &OctaveScatter| {
@@ -74,15 +74,8 @@ impl FourMethods {
         let [variance, white] = [found.variance, found.white_variance].map(number);
         let [whole, quarters, markov] = [found.decay_s, found.decay_in_quarters_s, found.markov_time_s].map(optional);
         writeln!(out, "autocorrelation: variance {variance} (°/s)², white part {white} (°/s)²")?;
-        writeln!(
-            out,
-            "decay to 1/e: {whole} s in the record, {quarters} s in its quarters (flicker noise and walk have no"
-        )?;
-        writeln!(
-            out,
-            "correlation time); time constant of a Markov process: {markov}
-"
-        )?;
+        writeln!(out, "decay to 1/e: {whole} s in the record, {quarters} s in its quarters: flicker noise and walk")?;
+        writeln!(out, "have no correlation time; time constant of a Markov process: {markov}\n")?;
         writeln!(out, "Allan deviation, °/s: measured, and by equation (5) from Welch's spectrum")?;
         writeln!(out, "segments of {} s resolve τ up to {} s", number(self.segment_s), number(self.resolved_s))?;
         let rows = self.spectrum.iter().map(|octave| {
