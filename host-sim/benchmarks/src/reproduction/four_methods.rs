@@ -160,7 +160,7 @@ fn white_autocovariances(samples: &[f64]) -> Vec<f64> {
 }
 
 /// N by the autocorrelation. White noise of variance `N²·RATE_HZ` behind the filter, whose weights have the sum 1, is
-/// correlated over `2·TAPS − 1` lags on either side; its autocovariances add up to the variance before the filter. The
+/// correlated at lags below `2·TAPS − 1`; its autocovariances at all lags add up to the variance before the filter. The
 /// rounding adds `LSB²/12` at lag 0. Value and bounds are by Student's distribution of the estimates from [`PARTS`] parts.
 fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
     let coefficient = |part: &[f64]| {
