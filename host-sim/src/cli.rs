@@ -1,7 +1,7 @@
 //! What can be said on the command line.
 
 use adis16405_driver::GyroRange;
-use benchmarks::undeclared::{self, Kind, Plan};
+use benchmarks::undeclared::{self, EffectKind, UndeclaredPlan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recordings::serial;
 use simulation::Simulation;
@@ -88,7 +88,7 @@ pub enum Command {
 pub struct Undeclared {
     /// Kind that is hidden alone; may be repeated [default: all].
     #[arg(long, value_enum)]
-    pub kind: Vec<Kind>,
+    pub kind: Vec<EffectKind>,
     /// Recordings a kind.
     #[arg(long, default_value_t = 40)]
     pub per_kind: u64,
@@ -105,7 +105,7 @@ pub struct Undeclared {
     #[arg(long)]
     pub jobs: Option<NonZeroUsize>,
     /// First seed of each group of recordings.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..undeclared::GROUP / 2))]
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..undeclared::SEEDS_PER_GROUP / 2))]
     pub seed: u64,
     /// Take the seeds that are kept for the end.
     #[arg(long)]
@@ -114,10 +114,10 @@ pub struct Undeclared {
 
 impl Undeclared {
     /// What is asked for.
-    pub fn plan(&self) -> Plan {
+    pub fn plan(&self) -> UndeclaredPlan {
         let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        Plan {
-            kinds: if self.kind.is_empty() { Kind::ALL.to_vec() } else { self.kind.clone() },
+        UndeclaredPlan {
+            kinds: if self.kind.is_empty() { EffectKind::ALL.to_vec() } else { self.kind.clone() },
             per_kind: self.per_kind,
             empty: self.nothing,
             pairs: self.pairs,

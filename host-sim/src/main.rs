@@ -2,8 +2,8 @@
 
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
-use benchmarks::paper::Experiment;
-use benchmarks::undeclared::Plan;
+use benchmarks::reproduction::Reproduction;
+use benchmarks::undeclared::UndeclaredPlan;
 use clap::Parser;
 use host_sim::cli::{Cli, Command, Explain, Input, Output};
 use host_sim::monitor;
@@ -71,7 +71,7 @@ fn run(mut cli: Cli) -> Result<()> {
             report_of(input, &recording)?
         }
         Some(Command::Paper { seeds, first_seed }) => {
-            return paper(Experiment { seeds: *seeds, first_seed: *first_seed }, &cli.output);
+            return paper(Reproduction { seeds: *seeds, first_seed: *first_seed }, &cli.output);
         }
         Some(Command::Explain(arguments)) => return explain_all(arguments, &cli.output),
         Some(Command::Undeclared(arguments)) => return benchmark(&arguments.plan(), &cli.output),
@@ -157,7 +157,7 @@ fn draw(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()
     Ok(())
 }
 
-fn benchmark(plan: &Plan, output: &Output) -> Result<()> {
+fn benchmark(plan: &UndeclaredPlan, output: &Output) -> Result<()> {
     if output.page.is_some() || output.kalibr.is_some() {
         bail!("undeclared is not of one sensor: leave out --page and --kalibr");
     }
@@ -179,7 +179,7 @@ fn benchmark(plan: &Plan, output: &Output) -> Result<()> {
     Ok(())
 }
 
-fn paper(experiment: Experiment, output: &Output) -> Result<()> {
+fn paper(experiment: Reproduction, output: &Output) -> Result<()> {
     if output.page.is_some() || output.kalibr.is_some() {
         bail!("paper is not of one sensor: leave out --page and --kalibr");
     }

@@ -1,4 +1,4 @@
-//! Yardsticks of the noise analysis.
+//! Benchmarks of the noise analysis on simulated recordings, whose true noise and effects are known.
 
-pub mod paper;
+pub mod reproduction;
 pub mod undeclared;

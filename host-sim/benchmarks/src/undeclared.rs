@@ -1,90 +1,77 @@
-//! Undeclared effects: recordings whose hidden effects are drawn at random, and how well an analysis that is given the
-//! recording and nothing else names them.
+//! Benchmark of undeclared effects: effects drawn at random are hidden in simulated recordings, and the analysis, which
+//! is given the recording only, is scored by whether it names them.
 //!
 //! ```text
-//! seed ─► draw (noise, surroundings, effect; size from limit) ─► virtual sensor ─► analysis ─► report ─┐
-//!           └──────────────────────────── truth ───────────────────────────────────────► examine ─► table
+//! seed ─► draw (noise, environment, effects; sizes from the detection limit) ─► virtual sensor ─► analysis ─► report ─┐
+//!           └──────────────────────────── truth ──────────────────────────────────────────────────────► score ─► table
 //! ```
 //!
-//! A part of the seeds is sealed: it is not looked at while the method is being made.
+//! Development uses the open seeds; the sealed seeds are run only to measure the finished method.
 
-pub mod draw;
-pub mod examine;
-pub mod kind;
-pub mod limit;
-mod place;
-mod shape;
-mod size;
-pub mod table;
+mod channel_under_test;
+mod detection_limit;
+mod draw;
+mod effect;
+mod score;
+mod table;
 mod truth;
 
 #[cfg(test)]
 mod tests;
 
-pub use draw::Case;
-pub use examine::{ExamineError, Outcome, examine};
-pub use kind::Kind;
-pub use table::Table;
+pub use draw::{DrawnRecording, RecordingGroup};
+pub use effect::EffectKind;
+pub use score::{EffectScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
+pub use table::{Proportion, STRONG, ScoreTable};
 
-use serde::Serialize;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
-/// Distance of the sealed seeds from the open ones. Those at 2⁴⁰ are spent: the method has changed since they were run.
+/// Offset of the sealed seeds from the open ones. The method has been changed after the seeds at 2⁴⁰ were run, so these
+/// are no longer used.
 const SEALED: u64 = 1 << 41;
-/// Distance of the seeds of one group of recordings from those of the next.
-pub const GROUP: u64 = 1 << 20;
+/// Number of seeds that are reserved for each group of recordings.
+pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
-/// What to make and examine.
+/// Which recordings to simulate and score.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    /// Kinds that are hidden alone.
-    pub kinds: Vec<Kind>,
-    /// Recordings a kind.
+pub struct UndeclaredPlan {
+    /// Kinds that are hidden as single effects.
+    pub kinds: Vec<EffectKind>,
+    /// Number of recordings per kind.
     pub per_kind: u64,
-    /// Recordings with nothing hidden.
+    /// Number of recordings without an effect.
     pub empty: u64,
-    /// Recordings with two effects.
+    /// Number of recordings with two effects.
     pub pairs: u64,
     /// Length of a recording, s.
     pub seconds: f64,
-    /// First seed of each group; with the numbers of recordings below [`GROUP`].
+    /// First seed of each group; its sum with any number of recordings is below [`SEEDS_PER_GROUP`].
     pub seed: u64,
-    /// Whether the seeds are those that were kept sealed.
+    /// Whether the sealed seeds are used instead of the open ones.
     pub sealed: bool,
-    /// Recordings that are examined at a time.
+    /// Number of threads.
     pub jobs: usize,
 }
 
-/// A group of recordings of the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Group {
-    /// Nothing is hidden.
-    Nothing,
-    /// One effect.
-    Single(Kind),
-    /// Two effects.
-    Pair,
-}
-
-impl Plan {
-    /// Every recording: its group, its seed and what it hides.
-    fn recordings(&self) -> Vec<(Group, u64)> {
-        let seed = |group: u64, number: u64| group * GROUP + self.seed + number + if self.sealed { SEALED } else { 0 };
-        let nothing = (0..self.empty).map(|number| (Group::Nothing, seed(0, number)));
+impl UndeclaredPlan {
+    /// Group and seed of each recording.
+    fn recordings(&self) -> Vec<(RecordingGroup, u64)> {
+        let base = self.seed + if self.sealed { SEALED } else { 0 };
+        let seed = |group: u64, number: u64| group * SEEDS_PER_GROUP + base + number;
+        let nothing = (0..self.empty).map(|number| (RecordingGroup::Nothing, seed(0, number)));
         let singles = self.kinds.iter().flat_map(|&kind| {
-            (0..self.per_kind).map(move |number| (Group::Single(kind), seed(2 + kind as u64, number)))
+            (0..self.per_kind).map(move |number| (RecordingGroup::Single(kind), seed(2 + kind as u64, number)))
         });
-        let pairs = (0..self.pairs).map(|number| (Group::Pair, seed(1, number)));
+        let pairs = (0..self.pairs).map(|number| (RecordingGroup::Pair, seed(1, number)));
         nothing.chain(singles).chain(pairs).collect()
     }
 
-    /// Makes and examines every recording. `progress` hears the number done.
+    /// Simulates and scores every recording. `progress` is called with the number of finished recordings and of all.
     ///
     /// # Errors
-    /// The first recording that cannot be made or laid along a timeline.
-    pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<Table, ExamineError> {
+    /// That of the first recording, in the order of the plan, that cannot be simulated or has no timeline.
+    pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ScoreTable, ScoreError> {
         let recordings = self.recordings();
         let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
         let results = Mutex::new(Vec::with_capacity(recordings.len()));
@@ -94,29 +81,18 @@ impl Plan {
                     while !failed.load(Ordering::Relaxed) {
                         let at = next.fetch_add(1, Ordering::Relaxed);
                         let Some(&(group, seed)) = recordings.get(at) else { break };
-                        let outcome = examine(&case(group, self.seconds, seed));
-                        failed.fetch_or(outcome.is_err(), Ordering::Relaxed);
-                        // A thread that panicked took nothing half-done into the list.
-                        results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((at, group, outcome));
+                        let score = score_recording(&DrawnRecording::from_group(group, self.seconds, seed));
+                        failed.fetch_or(score.is_err(), Ordering::Relaxed);
+                        // The list is valid even if a thread panicked: it is only changed by `push`.
+                        results.lock().unwrap_or_else(PoisonError::into_inner).push((at, group, score));
                         progress(done.fetch_add(1, Ordering::Relaxed) + 1, recordings.len());
                     }
                 });
             }
         });
-        let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
         results.sort_by_key(|(at, ..)| *at);
-        let outcomes: Result<Vec<_>, _> =
-            results.into_iter().map(|(_, group, outcome)| Ok((group, outcome?))).collect();
-        Ok(Table { outcomes: outcomes? })
-    }
-}
-
-/// The recording of a group and a seed.
-#[must_use]
-pub fn case(group: Group, seconds: f64, seed: u64) -> Case {
-    match group {
-        Group::Nothing => Case::draw(&[], seconds, seed),
-        Group::Single(kind) => Case::draw(&[kind], seconds, seed),
-        Group::Pair => Case::draw(&Case::pair(seed), seconds, seed),
+        let outcomes: Result<Vec<_>, _> = results.into_iter().map(|(_, group, score)| Ok((group, score?))).collect();
+        Ok(ScoreTable { outcomes: outcomes? })
     }
 }

@@ -18,7 +18,7 @@ mod periodogram;
 mod smooth_shape;
 mod welch;
 
-pub(crate) use autocorrelation::correlation_time;
+pub use autocorrelation::correlation_time;
 pub(crate) use lines::find_lines_over;
 pub use lines::{SpectralLine, find_lines};
 pub use smooth_shape::{SpectralBand, SpectralShape};

@@ -1,67 +1,99 @@
-//! A recording with hidden effects, drawn at random.
+//! Recordings with hidden effects, drawn at random from a seed.
 //!
-//! Every recording has its own noise, a temperature and a supply that change, a host with a clock of its own, and now
-//! and then a motion: what an estimator must not take for an effect, or take for the cause of one.
+//! Each recording has its own noise, a changing temperature and supply voltage, a host with its own clock error, and
+//! sometimes a motion. The analysis must not report these as effects, and must find those effects that depend on them.
 
-use super::kind::Kind;
-use super::limit::spectrum::Record;
-use super::place::Scene;
-use super::size::hide;
+use super::channel_under_test::{RecordLength, RecordingConditions};
+use super::detection_limit::smallest_size;
+use super::effect::{EffectKind, draw_unit, log_uniform, scaled, size};
 use noise_analysis::trace::sample_clock::HOST_CLOCK;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use serde::Serialize;
 use simulation::{HostClock, SAMPLE_RATE_HZ, Simulation};
-use virtual_sensor::{Environment, NoiseModel, OutputRegister, SensorScenario};
+use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
-/// Strength of a single effect: from undetectable to gross.
+/// Range of the strength (size over detection limit) of a single effect.
 const STRENGTH: (f64, f64) = (0.3, 30.0);
-/// Strength of each effect of a pair: all are to be found.
+/// Range of the strength of each effect of a pair, above the limit.
 const STRENGTH_OF_PAIR: (f64, f64) = (2.0, 30.0);
-/// Recordings with a motion that no effect needs, of all.
+/// Fraction of the recordings with a motion although no effect depends on it.
 const MOVED: f64 = 0.2;
 /// Mean delay of a host's time stamps, s.
 const LATENCY_S: f64 = 50e-6;
 
-/// A recording to be made, and the truth about it.
+/// Largest quantum of the angle, over the standard deviation of the white angle increment of a sample. The error of a
+/// coarser quantum is not white.
+const LARGEST_QUANTUM: f64 = 1.0;
+/// Largest fraction of dropped or repeated samples.
+const LARGEST_FRACTION: f64 = 0.02;
+/// Largest relative error of the sample clock.
+const LARGEST_CLOCK_ERROR: f64 = 0.01;
+/// Number of draws after which a set of effects is accepted although an effect is too weak.
+const DRAWS: usize = 100;
+
+/// The groups of recordings in the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordingGroup {
+    /// No effect.
+    Nothing,
+    /// One effect.
+    Single(EffectKind),
+    /// Two effects.
+    Pair,
+}
+
+/// A recording to be simulated, with its true effects.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Case {
-    /// From which everything follows.
+pub struct DrawnRecording {
+    /// All other fields follow from it, the length and the kinds.
     pub seed: u64,
-    /// What is hidden, in the order of the simulation's effects.
-    pub kinds: Vec<Kind>,
-    /// Size over the smallest that any test could see, effect by effect; see [`limit`](super::limit).
+    /// Kinds of the hidden effects, in the order of those of `simulation`.
+    pub kinds: Vec<EffectKind>,
+    /// Size of each effect over its detection limit.
     pub strengths: Vec<f64>,
-    /// What makes the recording.
+    /// The simulation with the hidden effects.
     pub simulation: Simulation,
 }
 
-impl Case {
-    /// Hides effects of `kinds` in a recording of `seconds` seconds.
+impl DrawnRecording {
+    /// The recording of `seconds` seconds of a group and a seed.
     #[must_use]
-    pub fn draw(kinds: &[Kind], seconds: f64, seed: u64) -> Self {
+    pub fn from_group(group: RecordingGroup, seconds: f64, seed: u64) -> Self {
+        match group {
+            RecordingGroup::Nothing => Self::draw(&[], seconds, seed),
+            RecordingGroup::Single(kind) => Self::draw(&[kind], seconds, seed),
+            RecordingGroup::Pair => Self::draw(&Self::pair(seed), seconds, seed),
+        }
+    }
+
+    /// A recording of `seconds` seconds with effects of `kinds`.
+    #[must_use]
+    pub fn draw(kinds: &[EffectKind], seconds: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX);
         let noise = noise(&mut random);
-        let surroundings = surroundings(&mut random, kinds.contains(&Kind::Acceleration));
+        let surroundings = surroundings(&mut random, kinds.contains(&EffectKind::Acceleration));
         let host =
             HostClock { latency_s: LATENCY_S, clock_ratio: 1.0 + HOST_CLOCK * random.sample::<f64, _>(StandardNormal) };
-        let scene =
-            Scene { noise: &noise, surroundings, record: Record { seconds, period_s: 1.0 / SAMPLE_RATE_HZ }, seed };
-        // An accelerometer that moves shows nothing else.
+        let record = RecordLength { seconds, period_s: 1.0 / SAMPLE_RATE_HZ };
+        let conditions = RecordingConditions { noise: &noise, environment: surroundings, record, seed };
+        // In a moving accelerometer the motion hides any other effect.
         let channels = if surroundings.motion.deviation_g > 0.0 {
             &OutputRegister::INERTIAL[..3]
         } else {
             &OutputRegister::INERTIAL
         };
         let channel = |random: &mut ChaCha8Rng| channels.choose(random).copied().unwrap_or(OutputRegister::GyroX);
-        // Two effects meet in one channel as often as not.
+        // Half of the pairs are in one channel.
         let shared = random.random_bool(0.5).then(|| channel(&mut random));
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
         let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
-        let (effects, strengths) = hide(kinds, range, at_least, &scene, channel, &mut random);
+        let (effects, strengths) = draw_effects(kinds, range, at_least, &conditions, channel, &mut random);
         let hidden = SensorScenario { environment: surroundings, effects };
         Self {
             seed,
@@ -71,23 +103,76 @@ impl Case {
         }
     }
 
-    /// Two different kinds.
+    /// The two different kinds of the pair of a seed.
     #[must_use]
-    pub fn pair(seed: u64) -> [Kind; 2] {
+    pub fn pair(seed: u64) -> [EffectKind; 2] {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX - 1);
-        let first = random.random_range(0..Kind::ALL.len());
-        let second = (first + random.random_range(1..Kind::ALL.len())) % Kind::ALL.len();
-        [Kind::ALL[first], Kind::ALL[second]]
+        let first = random.random_range(0..EffectKind::ALL.len());
+        let second = (first + random.random_range(1..EffectKind::ALL.len())) % EffectKind::ALL.len();
+        [EffectKind::ALL[first], EffectKind::ALL[second]]
     }
 }
 
-/// Between `low` and `high`, each factor as likely as any other.
-pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
-    low * (random.random::<f64>() * (high / low).ln()).exp()
+/// Effects of `kinds`, each in a channel from `channel`, with their strengths: size over the detection limit beside the
+/// other effects. The strength of an effect beside the effects before it is drawn from `range`, as far as the size of its
+/// kind has no upper limit. Sets with a strength below `at_least` are drawn again.
+fn draw_effects(
+    kinds: &[EffectKind],
+    range: (f64, f64),
+    at_least: f64,
+    conditions: &RecordingConditions<'_>,
+    channel: impl Fn(&mut ChaCha8Rng) -> OutputRegister,
+    random: &mut ChaCha8Rng,
+) -> (Vec<InjectedEffect>, Vec<f64>) {
+    let mut drawn = (Vec::new(), Vec::new());
+    for _ in 0..DRAWS {
+        let mut effects: Vec<InjectedEffect> = Vec::new();
+        for &kind in kinds {
+            let channel = channel(random);
+            let strength = log_uniform(random, range.0, range.1);
+            let unit = draw_unit(kind, channel, conditions.record, random);
+            let limit = smallest_size(&unit, conditions, &effects);
+            effects.push(with_strength(unit, strength, limit, conditions));
+        }
+        let strengths = (0..effects.len()).map(|at| strength(&effects, at, conditions)).collect();
+        drawn = (effects, strengths);
+        if drawn.1.iter().all(|strength| *strength >= at_least) {
+            break;
+        }
+    }
+    drawn
 }
 
-/// The paper's noise, each coefficient of each channel between half of it and twice.
+/// Strength of the effect at the index `at` beside the others.
+fn strength(effects: &[InjectedEffect], at: usize, conditions: &RecordingConditions<'_>) -> f64 {
+    let others: Vec<InjectedEffect> =
+        effects.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, effect)| effect.clone()).collect();
+    size(&effects[at]) / smallest_size(&effects[at], conditions, &others)
+}
+
+/// `unit` at `strength` times `limit`, or at the largest size of its kind.
+fn with_strength(
+    unit: InjectedEffect,
+    strength: f64,
+    limit: f64,
+    conditions: &RecordingConditions<'_>,
+) -> InjectedEffect {
+    // The significance of a number of events grows with its square root.
+    let squared = strength * strength * limit;
+    let size = match unit {
+        InjectedEffect::Quantization { channel, .. } => {
+            let white = conditions.noise.channel(channel).angle_random_walk * conditions.record.period_s.sqrt();
+            (strength * limit).min(LARGEST_QUANTUM * white / 12f64.sqrt())
+        }
+        InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => squared.min(LARGEST_FRACTION),
+        InjectedEffect::SampleClock { .. } => squared.min(LARGEST_CLOCK_ERROR),
+        _ => strength * limit,
+    };
+    scaled(unit, size)
+}
+
+/// The noise of the paper, with each coefficient of each inertial channel multiplied by a factor from 0.5 to 2.
 fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     let mut noise = NoiseModel::paper();
     for channel in OutputRegister::INERTIAL {
@@ -99,6 +184,7 @@ fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     noise
 }
 
+/// A random environment. `moved` says whether an effect needs a motion.
 fn surroundings(random: &mut ChaCha8Rng, moved: bool) -> Environment {
     let temperature = TemperatureProfile {
         rise_c: log_uniform(random, 2.0, 12.0),

@@ -1,49 +1,48 @@
-//! What came of all recordings, in numbers.
+//! The scores of all recordings: their summary and the tables of the terminal.
 
-mod text;
-
-use super::Group;
-use super::examine::{Answer, Estimate, Outcome, Unseen};
-use super::kind::Kind;
+use super::draw::RecordingGroup;
+use super::effect::EffectKind;
+use super::score::{EffectScore, ParameterScore, RecordingScore, UnseenErrors};
 use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
 
-/// From this strength on an effect is to be named.
+/// Smallest strength at which an effect is required to be named.
 pub const STRONG: f64 = 2.0;
-/// Upper ends of the classes of strength.
+/// Upper limits of the classes of strength.
 const CLASSES: [f64; 5] = [0.5, 1.0, 2.0, 5.0, f64::INFINITY];
 const CLASS_NAMES: [&str; 5] = ["< 0.5", "0.5…1", "1…2", "2…5", "≥ 5"];
 
-/// The outcomes of all recordings, in the order of the plan.
+/// The scores of all recordings, in the order of the plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Table {
-    /// Each with the group that it belongs to.
-    pub outcomes: Vec<(Group, Outcome)>,
+pub struct ScoreTable {
+    /// Group and score of each recording.
+    pub outcomes: Vec<(RecordingGroup, RecordingScore)>,
 }
 
-/// How often something came out so.
+/// A number of cases out of all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Share {
-    /// So often.
+pub struct Proportion {
+    /// Cases that fulfil the criterion.
     pub yes: usize,
-    /// Of so many.
+    /// All cases.
     pub all: usize,
 }
 
-impl Share {
-    fn of(answers: impl IntoIterator<Item = bool>) -> Self {
-        answers
-            .into_iter()
-            .fold(Self::default(), |share, yes| Self { yes: share.yes + usize::from(yes), all: share.all + 1 })
+impl Proportion {
+    fn count(cases: impl IntoIterator<Item = bool>) -> Self {
+        let add = |sum: Self, yes| Self { yes: sum.yes + usize::from(yes), all: sum.all + 1 };
+        cases.into_iter().fold(Self::default(), add)
     }
 
-    /// In percent; `None` of none.
+    /// In percent; `None` if there is no case.
     #[must_use]
     pub fn percent(self) -> Option<f64> {
         (self.all > 0).then(|| 100.0 * self.yes as f64 / self.all as f64)
     }
 }
 
-impl std::fmt::Display for Share {
+impl std::fmt::Display for Proportion {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.percent() {
             Some(percent) => f.pad(&format!("{percent:.0} %")),
@@ -52,66 +51,68 @@ impl std::fmt::Display for Share {
     }
 }
 
-impl Table {
-    fn outcomes(&self, group: Group) -> impl Iterator<Item = &Outcome> {
+impl ScoreTable {
+    fn outcomes(&self, group: RecordingGroup) -> impl Iterator<Item = &RecordingScore> {
         self.outcomes.iter().filter(move |(of, _)| *of == group).map(|(_, outcome)| outcome)
     }
 
-    fn singles(&self) -> impl Iterator<Item = &Outcome> {
-        self.outcomes.iter().filter(|(group, _)| matches!(group, Group::Single(_))).map(|(_, outcome)| outcome)
+    fn singles(&self) -> impl Iterator<Item = &RecordingScore> {
+        self.outcomes.iter().filter(|(group, _)| matches!(group, RecordingGroup::Single(_))).map(|(_, outcome)| outcome)
     }
 
-    fn answers(&self, kind: Kind) -> impl Iterator<Item = &Answer> {
-        self.outcomes(Group::Single(kind)).flat_map(|outcome| &outcome.answers)
+    fn answers(&self, kind: EffectKind) -> impl Iterator<Item = &EffectScore> {
+        self.outcomes(RecordingGroup::Single(kind)).flat_map(|outcome| &outcome.answers)
     }
 
-    /// Single effects of at least twice the limit that were named.
+    /// Single effects of a strength of at least [`STRONG`] that were named.
     #[must_use]
-    pub fn named(&self) -> Share {
+    pub fn named(&self) -> Proportion {
         let strong = self.singles().flat_map(|outcome| &outcome.answers).filter(|answer| answer.strength >= STRONG);
-        Share::of(strong.map(|answer| answer.named))
+        Proportion::count(strong.map(|answer| answer.named))
     }
 
-    /// Recordings with nothing hidden in which something is reported.
+    /// Recordings without an effect in which an effect is reported.
     #[must_use]
-    pub fn false_alarms(&self) -> Share {
-        Share::of(self.outcomes(Group::Nothing).map(|outcome| !outcome.false_alarms.is_empty()))
+    pub fn false_alarms(&self) -> Proportion {
+        Proportion::count(self.outcomes(RecordingGroup::Nothing).map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
-    /// Recordings with one effect in which something else is reported as well.
+    /// Recordings with one effect in which another one is reported.
     #[must_use]
-    pub fn something_else(&self) -> Share {
-        Share::of(self.singles().map(|outcome| !outcome.false_alarms.is_empty()))
+    pub fn something_else(&self) -> Proportion {
+        Proportion::count(self.singles().map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
     /// Pairs of which both were named.
     #[must_use]
-    pub fn both(&self) -> Share {
-        Share::of(self.outcomes(Group::Pair).map(|outcome| outcome.answers.iter().all(|answer| answer.named)))
+    pub fn both(&self) -> Proportion {
+        Proportion::count(
+            self.outcomes(RecordingGroup::Pair).map(|outcome| outcome.answers.iter().all(|answer| answer.named)),
+        )
     }
 
-    /// Parameters of strong single effects that are as near as they are to be: frequencies and rates of a clock within
-    /// 2 %, the others within 10 %.
+    /// Parameters of strong single effects within the required accuracy: 2 % for frequencies and the sample rate, 10 % for
+    /// the others.
     #[must_use]
-    pub fn near(&self) -> Share {
-        Share::of(self.estimates(None).map(Estimate::is_near))
+    pub fn near(&self) -> Proportion {
+        Proportion::count(self.estimates(None).map(ParameterScore::is_near))
     }
 
-    /// Intervals of all named single effects that hold the truth.
+    /// 95 % intervals of the parameters of all named single effects that contain the true value.
     #[must_use]
-    pub fn coverage(&self) -> Share {
-        Share::of(self.singles().flat_map(|outcome| &outcome.estimates).map(Estimate::is_covered))
+    pub fn coverage(&self) -> Proportion {
+        Proportion::count(self.singles().flat_map(|outcome| &outcome.estimates).map(ParameterScore::is_covered))
     }
 
-    /// Recordings with a strong effect whose unseen error is within 1.5 times what `which` compares it with.
+    /// Recordings with a strong single effect whose errors on unseen data fulfil `which`.
     #[must_use]
-    pub fn unseen(&self, which: fn(&Unseen) -> bool) -> Share {
+    pub fn unseen(&self, which: fn(&UnseenErrors) -> bool) -> Proportion {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
-        Share::of(strong.filter_map(|outcome| outcome.unseen).map(|unseen| which(&unseen)))
+        Proportion::count(strong.filter_map(|outcome| outcome.unseen).map(|unseen| which(&unseen)))
     }
 
-    /// Of strong single effects, of one kind or of all.
-    fn estimates(&self, kind: Option<Kind>) -> impl Iterator<Item = &Estimate> {
+    /// Parameters of strong single effects, of one kind or of all.
+    fn estimates(&self, kind: Option<EffectKind>) -> impl Iterator<Item = &ParameterScore> {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
         strong
             .flat_map(|outcome| &outcome.estimates)
@@ -119,7 +120,7 @@ impl Table {
     }
 }
 
-impl Estimate {
+impl ParameterScore {
     fn is_near(&self) -> bool {
         self.relative_error <= if matches!(self.name, "frequency" | "rate_hz") { 0.02 } else { 0.1 }
     }
@@ -129,29 +130,199 @@ impl Estimate {
     }
 }
 
-impl Unseen {
-    /// Most of the unseen error, over another's, that counts as no worse.
-    const NO_WORSE: f64 = 1.5;
+impl UnseenErrors {
+    /// Largest ratio to another error that counts as equally good.
+    const TOLERANCE: f64 = 1.5;
 
-    /// Whether the error after is no worse than the true model's.
+    /// Whether the model with the added terms is as good as the true model.
     #[must_use]
     pub fn is_near_truth(&self) -> bool {
-        self.after <= Self::NO_WORSE * self.truth
+        self.after <= Self::TOLERANCE * self.truth
     }
 
-    /// Whether the error after is no worse than that of the true terms, fitted.
+    /// Whether the model with the added terms is as good as the fitted true terms.
     #[must_use]
     pub fn is_near_true_terms(&self) -> bool {
-        self.after <= Self::NO_WORSE * self.refitted
+        self.after <= Self::TOLERANCE * self.refitted
     }
 
-    /// Whether the true terms, fitted, are no worse than the true model.
+    /// Whether the fitted true terms are as good as the true model.
     #[must_use]
     pub fn are_true_terms_near_truth(&self) -> bool {
-        self.refitted <= Self::NO_WORSE * self.truth
+        self.refitted <= Self::TOLERANCE * self.truth
     }
 }
 
-fn is_strong(outcome: &Outcome) -> bool {
-    outcome.answers.iter().all(|answer| answer.strength >= STRONG)
+impl ScoreTable {
+    /// Writes all tables and the summary as text.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.write_rates(out)?;
+        self.write_confusion(out)?;
+        self.write_parameters(out)?;
+        self.write_unseen(out)?;
+        self.write_summary(out)
+    }
+
+    fn kinds(&self) -> Vec<EffectKind> {
+        EffectKind::ALL.into_iter().filter(|kind| self.answers(*kind).next().is_some()).collect()
+    }
+
+    fn write_rates(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "Named, by strength (size over the detection limit); \"waveform given\": detected by a test that is given"
+        )?;
+        writeln!(out, "channel and waveform of the effect, and has to estimate the noise\n")?;
+        write!(out, "{:<18}", "")?;
+        for name in CLASS_NAMES {
+            write!(out, "{name:>12}")?;
+        }
+        writeln!(out, "{:>26}", "≥ 2, waveform given")?;
+        for kind in self.kinds() {
+            write!(out, "{:<18}", kind.name())?;
+            let mut from = 0.0;
+            for to in CLASSES {
+                let within = self.answers(kind).filter(|answer| (from..to).contains(&answer.strength));
+                let share = Proportion::count(within.map(|answer| answer.named));
+                let cell = if share.all == 0 { "–".to_owned() } else { format!("{}/{}", share.yes, share.all) };
+                write!(out, "{cell:>12}")?;
+                from = to;
+            }
+            let strong = self.answers(kind).filter(|answer| answer.strength >= STRONG);
+            let share = Proportion::count(strong.filter_map(|answer| answer.shape_known));
+            let cell = if share.all == 0 { String::new() } else { format!("{}/{}", share.yes, share.all) };
+            writeln!(out, "{cell:>26}")?;
+        }
+        Ok(())
+    }
+
+    fn write_confusion(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "\nConfusion: strong effects (rows) and the effects that were named in their channels (columns)\n"
+        )?;
+        let initials = |kind: EffectKind| kind.name().chars().take(5).collect::<String>();
+        write!(out, "{:<18}", "")?;
+        for kind in EffectKind::ALL {
+            write!(out, "{:>6}", initials(kind))?;
+        }
+        writeln!(out, "{:>6}{:>6}", "other", "none")?;
+        for kind in self.kinds() {
+            let mut named: BTreeMap<Option<&str>, usize> = BTreeMap::new();
+            for answer in self.answers(kind).filter(|answer| answer.strength >= STRONG) {
+                let name = if answer.named { Some(kind.name()) } else { answer.instead.as_deref() };
+                *named.entry(name).or_insert(0) += 1;
+            }
+            write!(out, "{:<18}", kind.name())?;
+            for column in EffectKind::ALL {
+                write!(out, "{:>6}", cell(named.remove(&Some(column.name()))))?;
+            }
+            let none = named.remove(&None);
+            writeln!(out, "{:>6}{:>6}", cell((!named.is_empty()).then(|| named.values().sum())), cell(none))?;
+        }
+        Ok(())
+    }
+
+    fn write_parameters(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "\nParameters of strong effects that were named\n")?;
+        writeln!(
+            out,
+            "{:<34}{:>8}{:>14}{:>14}{:>12}{:>10}",
+            "", "number", "median error", "90 % within", "accurate", "coverage"
+        )?;
+        for kind in self.kinds() {
+            let mut names: Vec<&str> = self.estimates(Some(kind)).map(|estimate| estimate.name).collect();
+            names.sort_unstable();
+            names.dedup();
+            for name in names {
+                let of = || self.estimates(Some(kind)).filter(|estimate| estimate.name == name);
+                let errors: Vec<f64> = of().map(|estimate| 100.0 * estimate.relative_error).collect();
+                writeln!(
+                    out,
+                    "{:<34}{:>8}{:>14}{:>14}{:>12}{:>10}",
+                    format!("{} {name}", kind.name()),
+                    errors.len(),
+                    percent(quantile(&errors, 0.5)),
+                    percent(quantile(&errors, 0.9)),
+                    Proportion::count(of().map(ParameterScore::is_near)).to_string(),
+                    Proportion::count(of().map(ParameterScore::is_covered)).to_string(),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_unseen(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "\nDeviance per point on unseen data, medians over strong effects\n")?;
+        let heads = ["before", "after", "true terms", "true model"];
+        writeln!(out, "{:<18}{:>12}{:>12}{:>14}{:>14}", "", heads[0], heads[1], heads[2], heads[3])?;
+        for kind in self.kinds() {
+            let strong = self.outcomes(RecordingGroup::Single(kind)).filter(|outcome| is_strong(outcome));
+            let unseen: Vec<_> = strong.filter_map(|outcome| outcome.unseen).collect();
+            let median = |of: fn(&UnseenErrors) -> f64| {
+                quantile(&unseen.iter().map(of).collect::<Vec<_>>(), 0.5)
+                    .map_or("–".to_owned(), |v| format!("{v:.2}"))
+            };
+            writeln!(
+                out,
+                "{:<18}{:>12}{:>12}{:>14}{:>14}",
+                kind.name(),
+                median(|unseen| unseen.before),
+                median(|unseen| unseen.after),
+                median(|unseen| unseen.refitted),
+                median(|unseen| unseen.truth),
+            )?;
+        }
+        Ok(())
+    }
+
+    fn write_summary(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out)?;
+        let lines = [
+            ("named: single effects of twice the limit or more", self.named()),
+            ("an effect reported although nothing was hidden", self.false_alarms()),
+            ("another effect reported although one was hidden", self.something_else()),
+            ("both effects of a pair named", self.both()),
+            ("parameters within 10 % (frequencies 2 %)", self.near()),
+            ("95 % intervals that contain the true value", self.coverage()),
+            ("error on unseen data within 1.5 times the true model's", self.unseen(UnseenErrors::is_near_truth)),
+            ("… within 1.5 times that of the fitted true terms", self.unseen(UnseenErrors::is_near_true_terms)),
+            ("fitted true terms within 1.5 times the true model", self.unseen(UnseenErrors::are_true_terms_near_truth)),
+        ];
+        for (what, share) in lines {
+            let percent = share.percent().map_or("–".to_owned(), |percent| format!("{percent:.1} %"));
+            writeln!(out, "{what:<56}{percent:>8}   ({} of {})", share.yes, share.all)?;
+        }
+        let mut alarms: BTreeMap<&str, usize> = BTreeMap::new();
+        for alarm in self.outcomes(RecordingGroup::Nothing).flat_map(|outcome| &outcome.false_alarms) {
+            *alarms.entry(alarm).or_insert(0) += 1;
+        }
+        for (alarm, count) in alarms {
+            writeln!(out, "  false alarm, nothing hidden: {alarm} × {count}")?;
+        }
+        Ok(())
+    }
+}
+
+fn is_strong(score: &RecordingScore) -> bool {
+    score.answers.iter().all(|answer| answer.strength >= STRONG)
+}
+
+fn cell(count: Option<usize>) -> String {
+    count.map_or(".".to_owned(), |count| count.to_string())
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or("–".to_owned(), |value| format!("{value:.2} %"))
+}
+
+/// The smallest of `values` that at least the fraction `level` of them does not exceed.
+fn quantile(values: &[f64], level: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = (level * sorted.len() as f64).ceil() as usize;
+    sorted.get(at.saturating_sub(1)).copied()
 }

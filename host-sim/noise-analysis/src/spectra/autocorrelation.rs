@@ -23,7 +23,7 @@ const REACH: f64 = 4.0;
 /// jackknife over segments of the record (R. Miller, "The jackknife – a review", Biometrika 61, 1974). `None` without a
 /// Markov process in the model, or for a record of fewer than 160 correlation times.
 #[must_use]
-pub(crate) fn correlation_time(series: &UniformSeries, model: &Model) -> Option<BoundedEstimate> {
+pub fn correlation_time(series: &UniformSeries, model: &Model) -> Option<BoundedEstimate> {
     let expected = model.terms().iter().find_map(|term| match term.kind {
         NoiseTerm::Markov(markov) if term.value > 0.0 => Some(markov.time_constant),
         _ => None,

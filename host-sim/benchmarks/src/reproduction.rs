@@ -1,0 +1,19 @@
+//! Reproduction of the paper on simulated hours of its gyro z, whose true coefficients are known.
+//!
+//! ```text
+//! seed ─► published gyro (virtual sensor) ─► slope method and fit ─► bias and scatter over the seeds
+//!                                         └► four methods on the record of the first seed
+//! ```
+//!
+//! Source: L. Hristov, E. Iontchev and R. Miletiev, "Error modeling of MEMS ADIS 16405".
+
+mod bias_and_scatter;
+mod four_methods;
+mod published_gyro;
+mod text;
+
+pub use bias_and_scatter::{OctaveScatter, RelativeError, Reproduction, ReproductionResult};
+pub use four_methods::{
+    Autocorrelation, FourMethods, InnovationTest, MethodCoefficients, SpectrumOctave, allan_weight,
+};
+pub use published_gyro::{INTERVALS, RATE_HZ, SECONDS, SYMBOLS, TRUTH, slope_coefficients};

@@ -1,0 +1,267 @@
+//! The four methods that section 2.2 of the paper names, on one simulated record of its gyro z: Allan variance,
+//! autocorrelation, power spectral density with equation (5), and Kalman innovations.
+
+use super::published_gyro::{
+    LSB, OCTAVES, RATE_HZ, SECONDS, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,
+    true_model,
+};
+use allan_core::fit::{fit, fit_shapes};
+use allan_core::term::Markov;
+use allan_core::{Curve, Model, NoiseTerm};
+use noise_analysis::innovation::innovations;
+use noise_analysis::spectra::{Welch, correlation_time};
+use noise_analysis::uniform_series::UniformSeries;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::f64::consts::{E, PI};
+
+/// Samples of a segment of Welch's spectrum: 640 s, so that ten overlapping segments cover the record.
+const SEGMENT: usize = 1 << 17;
+/// Segment length over the largest averaging time at which (5) is compared. The integrand is largest at f = 0.37/τ, which
+/// is then the sixth point of the spectrum, beyond those that the removed mean and the window change.
+const SEGMENT_PER_TAU: f64 = 16.0;
+/// Lags, in samples, at which the autocovariance has no contribution of the filtered white noise any more.
+const SLOW_LAGS: std::ops::Range<usize> = 8..64;
+/// Parts of the record whose estimates give the bounds of the autocorrelation method.
+const PARTS: usize = 16;
+
+/// N, B and K by one method, in deg/√s, deg/s and deg/s^1.5; `None` for what the method does not give.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MethodCoefficients {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Estimates.
+    pub values: [Option<f64>; 3],
+    /// Lower and upper 95 % bounds.
+    pub bounds: [Option<(f64, f64)>; 3],
+}
+
+/// What the autocorrelation gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Autocorrelation {
+    /// Variance of the samples, (deg/s)².
+    pub variance: f64,
+    /// Its white part, (deg/s)²: the variance less the autocovariance at lags 8 to 63, extrapolated to lag 0.
+    pub white_variance: f64,
+    /// Lag in s at which the autocovariance of 1 s means is 1/e of that at 1 s, in the whole record.
+    pub decay_s: Option<f64>,
+    /// The same in the quarters of the record, mean of the four lags.
+    pub decay_in_quarters_s: Option<f64>,
+    /// Time constant of a Markov process by the estimator of the report, s; `None` where the fitted process is too slow
+    /// for the record (fewer than 160 time constants).
+    pub markov_time_s: Option<f64>,
+}
+
+/// The measured Allan deviation at one octave beside that by equation (5) from the measured spectrum.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpectrumOctave {
+    /// Averaging time, s.
+    pub tau_s: f64,
+    /// Measured Allan deviation with 8-fold overlap, deg/s.
+    pub measured: f64,
+    /// Allan deviation by equation (5), deg/s.
+    pub by_spectrum: f64,
+    /// Relative standard deviation of `measured` by its degrees of freedom under the true model.
+    pub measured_error: f64,
+    /// Relative standard deviation of `by_spectrum` by the degrees of freedom of the spectrum.
+    pub by_spectrum_error: f64,
+    /// Whether the segments of the spectrum are long enough for this averaging time.
+    pub resolved: bool,
+}
+
+/// Innovations of a Kalman filter on the second half of the record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InnovationTest {
+    /// Model of the filter, fitted to the first half.
+    pub model: &'static str,
+    /// Mean of the squared innovations over their expected variance; 1 for a true model.
+    pub normalised: f64,
+    /// Bounds that contain `normalised` for 95 % of true models.
+    pub consistent: (f64, f64),
+    /// Correlation of neighbouring innovations.
+    pub correlation: f64,
+    /// p-value of the Ljung-Box test for whiteness over 20 lags.
+    pub whiteness_p: f64,
+}
+
+/// The results of the four methods.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FourMethods {
+    /// Seed of the record.
+    pub seed: u64,
+    /// Coefficients, one entry per method.
+    pub coefficients: Vec<MethodCoefficients>,
+    /// Variance and correlation times.
+    pub autocorrelation: Autocorrelation,
+    /// Length of a segment of the spectrum, s.
+    pub segment_s: f64,
+    /// Largest averaging time that the segments resolve, s.
+    pub resolved_s: f64,
+    /// Equation (5), one entry per octave up to the length of a segment.
+    pub spectrum: Vec<SpectrumOctave>,
+    /// Innovations of the fitted model, and of its N alone.
+    pub innovations: Vec<InnovationTest>,
+}
+
+impl FourMethods {
+    /// Simulates the record of `seed` and applies the four methods.
+    #[must_use]
+    pub fn analyze(seed: u64) -> Self {
+        let counts = simulate_counts(seed);
+        let samples: Vec<f64> = counts.iter().map(|&count| LSB * f64::from(count)).collect();
+        let grid = UniformSeries::new(1.0 / RATE_HZ, samples.clone());
+        let (plain, overlapped) = (allan_curve::<1>(&counts), allan_curve::<8>(&counts));
+        let welch = Welch::estimate(&grid, SEGMENT);
+        let mut coefficients = vec![
+            MethodCoefficients {
+                method: "Allan, slopes",
+                values: slope_coefficients(deviations(plain.points())),
+                bounds: [None; 3],
+            },
+            fitted_coefficients(&fit(&overlapped, &fitted_terms())),
+            correlation_coefficients(&samples),
+        ];
+        coefficients.extend(welch.as_ref().map(spectral_coefficients));
+        let half = counts.len() / 2;
+        let unseen = UniformSeries::new(1.0 / RATE_HZ, samples[half..].to_vec());
+        Self {
+            seed,
+            coefficients,
+            autocorrelation: autocorrelation(&samples, &grid, &overlapped),
+            segment_s: SEGMENT as f64 / RATE_HZ,
+            resolved_s: SEGMENT as f64 / RATE_HZ / SEGMENT_PER_TAU,
+            spectrum: welch.map_or_else(Vec::new, |welch| spectrum_octaves(&welch, &overlapped)),
+            innovations: innovation_tests(&fit(&allan_curve::<8>(&counts[..half]), &fitted_terms()), &unseen),
+        }
+    }
+}
+
+fn fitted_coefficients(model: &Model) -> MethodCoefficients {
+    let term = |index: usize| &model.terms()[index];
+    MethodCoefficients {
+        method: "Allan, fit",
+        values: [0, 1, 2].map(|index| Some(term(index).value)),
+        bounds: [0, 1, 2].map(|index| Some((term(index).low, term(index).high))),
+    }
+}
+
+/// Mean of the products of `values` at a distance of `lag`, less the square of their mean.
+fn autocovariance(values: &[f64], lag: usize) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let products = values.iter().zip(&values[lag..]).map(|(a, b)| (a - mean) * (b - mean));
+    products.sum::<f64>() / (values.len() - lag) as f64
+}
+
+/// Autocovariances from lag 0 on, less the mean of those in [`SLOW_LAGS`], which is their extrapolation to lag 0: within
+/// 64 samples the autocovariance of flicker noise and of the walk changes by less than 0.1 % of the white variance.
+fn white_autocovariances(samples: &[f64]) -> Vec<f64> {
+    let slow = SLOW_LAGS.map(|lag| autocovariance(samples, lag)).sum::<f64>() / SLOW_LAGS.len() as f64;
+    (0..2 * usize::from(TAPS) - 1).map(|lag| autocovariance(samples, lag) - slow).collect()
+}
+
+/// N by the autocorrelation. White noise of variance `N²·RATE_HZ` behind the filter, whose weights have the sum 1, is
+/// correlated at lags below `2·TAPS − 1`; its autocovariances at all lags add up to the variance before the filter. The
+/// rounding adds `LSB²/12` at lag 0. Value and bounds are by Student's distribution of the estimates from [`PARTS`] parts.
+fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
+    let coefficient = |part: &[f64]| {
+        let covariances = white_autocovariances(part);
+        let sum = covariances[0] + 2.0 * covariances[1..].iter().sum::<f64>();
+        ((sum - LSB * LSB / 12.0) / RATE_HZ).max(0.0).sqrt()
+    };
+    let parts: Vec<f64> = samples.chunks_exact(samples.len() / PARTS).map(coefficient).collect();
+    let count = parts.len() as f64;
+    let mean = parts.iter().sum::<f64>() / count;
+    let variance = parts.iter().map(|part| (part - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let quantile = StudentsT::new(0.0, 1.0, count - 1.0).map_or(f64::NAN, |student| student.inverse_cdf(0.975));
+    let half_width = quantile * (variance / count).sqrt();
+    MethodCoefficients {
+        method: "autocorrelation",
+        values: [Some(mean), None, None],
+        bounds: [Some((mean - half_width, mean + half_width)), None, None],
+    }
+}
+
+fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>) -> Autocorrelation {
+    let second = RATE_HZ as usize;
+    let means: Vec<f64> = samples.chunks_exact(second).map(|part| part.iter().sum::<f64>() / second as f64).collect();
+    let decay = |means: &[f64]| {
+        let lag = (1..means.len()).find(|&lag| autocovariance(means, lag) < autocovariance(means, 1) / E)?;
+        Some((lag * second) as f64 / RATE_HZ)
+    };
+    let quarters: Option<Vec<f64>> = means.chunks_exact(means.len() / 4).map(decay).collect();
+    let [white, _, _, rounding] = fitted_terms();
+    let markov = NoiseTerm::Markov(Markov { time_constant: SECONDS / 100.0 });
+    Autocorrelation {
+        variance: autocovariance(samples, 0),
+        white_variance: white_autocovariances(samples)[0],
+        decay_s: decay(&means),
+        decay_in_quarters_s: quarters.map(|lags| lags.iter().sum::<f64>() / lags.len() as f64),
+        markov_time_s: correlation_time(grid, &fit_shapes(curve, &[white, markov, rounding])).map(|time| time.value),
+    }
+}
+
+/// N, B and K by the fitted shape of the spectrum: the one-sided densities are 2N², B²/(πf) and K²/(2π²f²). B and K are
+/// `None` below 1 % of the density at one cycle per segment.
+fn spectral_coefficients(welch: &Welch) -> MethodCoefficients {
+    let (shape, bands) = welch.shape(|_| false);
+    let n = shape.angle_random_walk();
+    let bounds =
+        shape.angle_random_walk_error(&bands).map(|error| (n * (1.0 - 1.96 * error), n * (1.0 + 1.96 * error)));
+    let lowest = RATE_HZ / SEGMENT as f64;
+    let [_, flicker, walk, _] = shape.densities;
+    let significant = |density: f64| density > 0.01 * shape.density(lowest);
+    let b = significant(flicker / lowest).then(|| (PI * flicker).sqrt());
+    let k = significant(walk / lowest.powi(2)).then(|| (2.0 * PI * PI * walk).sqrt());
+    MethodCoefficients { method: "spectrum", values: [Some(n), b, k], bounds: [bounds, None, None] }
+}
+
+/// Weight of the one-sided density at `frequency` in the Allan variance of samples at the averaging factor `n`.
+///
+/// Equation (5), σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df over 0 … ∞, has the two-sided density: with S = N² it gives N²/τ. With
+/// the one-sided density, which is twice that, the factor is 2. A mean of `n` samples has the transfer function
+/// sin(πfτ)/(n·sin(πf/RATE_HZ)) where one of a continuous signal has sin(πfτ)/(πfτ), and the integral ends at half the
+/// sample rate: the density of the samples already contains what is aliased from above.
+#[must_use]
+pub fn allan_weight(frequency: f64, n: u64) -> f64 {
+    let phase = PI * frequency / RATE_HZ;
+    let n = n as f64;
+    if phase == 0.0 { 0.0 } else { 2.0 * (n * phase).sin().powi(4) / (n * phase.sin()).powi(2) }
+}
+
+fn spectrum_octaves(welch: &Welch, curve: &Curve<OCTAVES>) -> Vec<SpectrumOctave> {
+    // Neighbouring points under a Hann window correlate by (2/3)² and (1/6)², so a sum has this much more variance.
+    const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+    let (segment_s, truth) = (SEGMENT as f64 / RATE_HZ, true_model());
+    let octave = |point: &allan_core::AllanPoint| {
+        let terms: Vec<f64> =
+            welch.points().map(|(f, density)| allan_weight(f, point.n) * density / segment_s).collect();
+        let avar: f64 = terms.iter().sum();
+        let squares: f64 = terms.iter().map(|term| term * term).sum();
+        SpectrumOctave {
+            tau_s: point.tau,
+            measured: point.avar.sqrt(),
+            by_spectrum: avar.sqrt(),
+            measured_error: 1.0 / (2.0 * truth.edf(point)).sqrt(),
+            by_spectrum_error: 0.5 * (NEIGHBOURS * squares / welch.ordinates()).sqrt() / avar,
+            resolved: SEGMENT_PER_TAU * point.tau <= segment_s,
+        }
+    };
+    curve.points().iter().filter(|point| point.tau < segment_s).map(octave).collect()
+}
+
+fn innovation_tests(fitted: &Model, unseen: &UniformSeries) -> Vec<InnovationTest> {
+    let white =
+        fitted.terms().iter().filter(|term| matches!(term.kind, NoiseTerm::Filtered(_) | NoiseTerm::AngleRandomWalk));
+    let only_n = Model::new(1.0 / RATE_HZ, white.copied());
+    let test = |(name, model): (&'static str, &Model)| {
+        let found = innovations(model, unseen)?;
+        Some(InnovationTest {
+            model: name,
+            normalised: found.normalised,
+            consistent: found.consistent,
+            correlation: found.correlation,
+            whiteness_p: found.whiteness,
+        })
+    };
+    [("N, B, K", fitted), ("N only", &only_n)].into_iter().filter_map(test).collect()
+}

@@ -1,0 +1,297 @@
+//! Two-sided power spectral densities of the channel in which an effect is to be detected, and Whittle's likelihood ratio
+//! of an effect in it.
+
+use adis16405_driver::GyroRange;
+use std::f64::consts::PI;
+use virtual_sensor::{ChannelNoise, Environment, InjectedEffect, NoiseModel, OutputRegister};
+
+/// Iterations of the fit of N, B and K. Each halves the remaining distance to the optimum, roughly.
+const ITERATIONS: usize = 60;
+/// Number of intervals of the logarithmic frequency grid.
+const GRID: usize = 1500;
+/// Lower limit of the filter's power gain in divisions: at the nulls the gain is 0.
+const LEAST_GAIN: f64 = 1e-3;
+
+/// Length and sample period of a recording.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RecordLength {
+    pub(super) seconds: f64,
+    pub(super) period_s: f64,
+}
+
+/// Two-sided density of N, B and K of `noise`, sampled, unit²/Hz.
+pub(super) fn baseline_density(noise: &ChannelNoise, period_s: f64, frequency: f64) -> f64 {
+    let [white, flicker, walk] = baseline_densities(period_s, frequency);
+    noise.angle_random_walk.powi(2) * white
+        + noise.bias_instability.powi(2) * flicker
+        + noise.rate_random_walk.powi(2) * walk
+}
+
+/// Two-sided densities of N, B and K of 1.
+fn baseline_densities(period_s: f64, frequency: f64) -> [f64; 3] {
+    // The one-sided density of B is B²/(πf), twice the two-sided one.
+    [1.0, 0.5 / (PI * frequency), (period_s / (2.0 * (PI * frequency * period_s).sin())).powi(2)]
+}
+
+/// Two-sided density of a sampled Gauss-Markov process of standard deviation 1, 1/Hz.
+pub(super) fn markov_density(time_constant_s: f64, period_s: f64, frequency: f64) -> f64 {
+    let decay = (-period_s / time_constant_s).exp();
+    let angle = 2.0 * PI * frequency * period_s;
+    period_s * (1.0 - decay * decay) / (1.0 - 2.0 * decay * angle.cos() + decay * decay)
+}
+
+/// Two-sided density of a sampled resonance of standard deviation 1 at `centre_hz`, whose full width at half maximum is
+/// `bandwidth_hz`, 1/Hz.
+pub(super) fn resonance_density(centre_hz: f64, bandwidth_hz: f64, period_s: f64, frequency: f64) -> f64 {
+    let side = |offset: f64| markov_density(1.0 / (PI * bandwidth_hz), period_s, offset);
+    0.5 * (side(frequency - centre_hz) + side(frequency + centre_hz))
+}
+
+/// Two-sided density of the rate that is differenced from an angle with a white error of standard deviation 1.
+pub(super) fn quantization_density(period_s: f64, frequency: f64) -> f64 {
+    4.0 * (PI * frequency * period_s).sin().powi(2) / period_s
+}
+
+/// Power gain of two moving averages over 2^`taps_log2` samples each.
+pub(super) fn filter_gain(taps_log2: u8, period_s: f64, frequency: f64) -> f64 {
+    let taps = f64::from(1u32 << taps_log2);
+    let half = PI * frequency * period_s;
+    ((taps * half).sin() / (taps * half.sin())).powi(4)
+}
+
+/// Densities of an observed and a modelled output at one frequency.
+struct Densities {
+    /// Modelled per unit of N², B² and K², behind the filter.
+    baseline: [f64; 3],
+    /// Modelled without a free parameter.
+    known: f64,
+    /// Of the output.
+    truth: f64,
+}
+
+impl Densities {
+    fn modelled(&self, squares: &[f64; 3]) -> f64 {
+        self.known + squares.iter().zip(&self.baseline).map(|(square, density)| square * density).sum::<f64>()
+    }
+}
+
+impl RecordLength {
+    /// Frequencies in Hz, each with the number of Fourier frequencies that it represents. The grid is logarithmic from
+    /// 1/`seconds` to half the sample rate, with additional frequencies around a `peak` given by its centre and width.
+    fn grid(self, peak: Option<(f64, f64)>) -> Vec<(f64, f64)> {
+        let (lowest, highest) = (1.0 / self.seconds, 0.5 / self.period_s);
+        let step = (highest / lowest).ln() / GRID as f64;
+        let mut edges: Vec<f64> = (0..=GRID).map(|at| lowest * (step * at as f64).exp()).collect();
+        if let Some((centre_hz, width_hz)) = peak {
+            edges.extend((-400..=400).map(|at| centre_hz + 0.05 * width_hz * f64::from(at)));
+            edges.retain(|edge| (lowest..=highest).contains(edge));
+            edges.sort_by(f64::total_cmp);
+        }
+        let interval = |pair: &[f64]| (0.5 * (pair[0] + pair[1]), (pair[1] - pair[0]) * self.seconds);
+        edges.windows(2).map(interval).filter(|(_, count)| *count > 0.0).collect()
+    }
+
+    /// Expected log likelihood ratio (Whittle) of noise of density `truth` against the best fit of N, B and K behind a
+    /// filter of power gain `gain`, to which noise of density `known` is added. The fit starts from the coefficients of
+    /// `noise`.
+    pub(super) fn ratio_against_baseline(
+        self,
+        noise: &ChannelNoise,
+        (gain, known): (impl Fn(f64) -> f64, impl Fn(f64) -> f64),
+        peak: Option<(f64, f64)>,
+        truth: impl Fn(f64) -> f64,
+    ) -> f64 {
+        let grid = self.grid(peak);
+        let at = |&(frequency, _): &(f64, f64)| {
+            let gain = gain(frequency);
+            let baseline = baseline_densities(self.period_s, frequency).map(|density| gain * density);
+            Densities { baseline, known: known(frequency), truth: truth(frequency) }
+        };
+        let densities: Vec<Densities> = grid.iter().map(at).collect();
+        let mut squares = [
+            noise.angle_random_walk.powi(2),
+            noise.bias_instability.powi(2).max(1e-12),
+            noise.rate_random_walk.powi(2).max(1e-15),
+        ];
+        for _ in 0..ITERATIONS {
+            // This multiplicative step never increases the deviance and keeps the squares positive.
+            let (mut over, mut under) = ([0.0; 3], [0.0; 3]);
+            for (densities, (_, count)) in densities.iter().zip(&grid) {
+                let modelled = densities.modelled(&squares);
+                for ((over, under), density) in over.iter_mut().zip(&mut under).zip(&densities.baseline) {
+                    *over += count * density * densities.truth / (modelled * modelled);
+                    *under += count * density / modelled;
+                }
+            }
+            for ((square, over), under) in squares.iter_mut().zip(over).zip(under) {
+                *square *= (over / under).sqrt();
+            }
+        }
+        let deviance = |(densities, (_, count)): (&Densities, &(f64, f64))| {
+            let ratio = densities.truth / densities.modelled(&squares);
+            count * (ratio - 1.0 - ratio.ln())
+        };
+        densities.iter().zip(&grid).map(deviance).sum()
+    }
+
+    /// Expected log likelihood ratio of one process of density `shared` in all channels, whose own densities are
+    /// `separate`, against independent processes of the same density.
+    pub(super) fn ratio_of_common_mode(self, shared: impl Fn(f64) -> f64, separate: &[&dyn Fn(f64) -> f64]) -> f64 {
+        let at = |(frequency, count): &(f64, f64)| {
+            let ratios = separate.iter().map(|own| shared(*frequency) / own(*frequency));
+            let (sum, logs) = ratios.fold((0.0, 0.0), |(sum, logs), ratio: f64| (sum + ratio, logs + ratio.ln_1p()));
+            count * (logs - sum.ln_1p())
+        };
+        self.grid(None).iter().map(at).sum()
+    }
+
+    /// Expected log likelihood ratio of a waveform of density `waveform` that is known up to its size, in noise of density
+    /// `noise`: half the ratio of its energy to the noise (matched filter).
+    pub(super) fn ratio_of_waveform(self, waveform: impl Fn(f64) -> f64, noise: impl Fn(f64) -> f64) -> f64 {
+        self.grid(None).iter().map(|&(frequency, count)| count * waveform(frequency) / noise(frequency)).sum()
+    }
+
+    /// Mean of a function of frequency up to half the sample rate.
+    pub(super) fn mean(self, function: impl Fn(f64) -> f64) -> f64 {
+        let (sum, counts) = self
+            .grid(None)
+            .iter()
+            .fold((0.0, 0.0), |(sum, counts), &(frequency, count)| (sum + count * function(frequency), counts + count));
+        sum / counts
+    }
+
+    /// Expected log likelihood ratio of a sinusoid of amplitude 1 in noise of the two-sided density `noise` at its
+    /// frequency: `T/(4S)`.
+    pub(super) fn ratio_of_sinusoid(self, noise: f64) -> f64 {
+        self.seconds / (4.0 * noise)
+    }
+}
+
+/// What is known of a recording before effects are hidden in it.
+pub(super) struct RecordingConditions<'a> {
+    pub(super) noise: &'a NoiseModel,
+    pub(super) environment: Environment,
+    pub(super) record: RecordLength,
+    pub(super) seed: u64,
+}
+
+/// A channel with its noise and the effects that are already hidden. The test of the detection limit knows all
+/// parameters of these other effects.
+pub(super) struct ChannelUnderTest<'a> {
+    pub(super) channel: OutputRegister,
+    pub(super) noise: &'a ChannelNoise,
+    pub(super) record: RecordLength,
+    others: &'a [InjectedEffect],
+}
+
+impl<'a> ChannelUnderTest<'a> {
+    pub(super) fn new(
+        conditions: &RecordingConditions<'a>,
+        channel: OutputRegister,
+        others: &'a [InjectedEffect],
+    ) -> Self {
+        Self { channel, noise: conditions.noise.channel(channel), record: conditions.record, others }
+    }
+
+    /// Size of a count, in the unit of the channel.
+    pub(super) fn resolution(&self) -> f64 {
+        simulation::channel(self.channel).lsb(GyroRange::Dps300)
+    }
+
+    fn others(&self) -> impl Iterator<Item = &InjectedEffect> {
+        self.others.iter().filter(|effect| effect.channels().contains(&self.channel))
+    }
+
+    /// Power gain of the sensor's filter.
+    pub(super) fn gain(&self, frequency: f64) -> f64 {
+        let filter = |effect: &InjectedEffect| match *effect {
+            InjectedEffect::FilterBandwidth { taps_log2 } => filter_gain(taps_log2, self.record.period_s, frequency),
+            _ => 1.0,
+        };
+        self.others.iter().map(filter).product()
+    }
+
+    /// Correlation time in s and variance of each Markov, common-mode and telegraph process among the other effects.
+    pub(super) fn processes(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.others().filter_map(|effect| match *effect {
+            InjectedEffect::Markov { time_constant_s, deviation, .. }
+            | InjectedEffect::CommonMode { time_constant_s, deviation, .. } => {
+                Some((time_constant_s, deviation * deviation))
+            }
+            InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
+                Some((time_constant_s, 0.25 * amplitude * amplitude))
+            }
+            _ => None,
+        })
+    }
+
+    /// Density of the spikes among the other effects.
+    fn spike_density(&self) -> f64 {
+        let period_s = self.record.period_s;
+        let spikes = |effect: &InjectedEffect| match *effect {
+            InjectedEffect::Spikes { rate_per_hour, size, .. } => {
+                size * size * rate_per_hour * period_s / 3600.0 * period_s
+            }
+            _ => 0.0,
+        };
+        self.others().map(spikes).sum()
+    }
+
+    /// Density of all white noise before the filter.
+    pub(super) fn white_density(&self) -> f64 {
+        self.noise.angle_random_walk.powi(2) + self.spike_density()
+    }
+
+    /// Density of the other effects before the filter.
+    fn added_density(&self, frequency: f64) -> f64 {
+        let period_s = self.record.period_s;
+        let slow: f64 =
+            self.processes().map(|(time_s, variance)| variance * markov_density(time_s, period_s, frequency)).sum();
+        let resonances = self.others().map(|effect| match *effect {
+            InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+                deviation * deviation * resonance_density(frequency_hz, bandwidth_hz, period_s, frequency)
+            }
+            _ => 0.0,
+        });
+        slow + resonances.sum::<f64>() + self.spike_density()
+    }
+
+    /// Density of what is added behind the filter: the rounding to counts, and the quantization effect.
+    pub(super) fn rounding_density(&self, frequency: f64) -> f64 {
+        let period_s = self.record.period_s;
+        let angle = |effect: &InjectedEffect| match *effect {
+            InjectedEffect::Quantization { coefficient, .. } => {
+                coefficient * coefficient * quantization_density(period_s, frequency)
+            }
+            _ => 0.0,
+        };
+        self.resolution().powi(2) / 12.0 * period_s + self.others().map(angle).sum::<f64>()
+    }
+
+    /// Density of the output without N, B and K.
+    pub(super) fn known_density(&self, frequency: f64) -> f64 {
+        self.gain(frequency) * self.added_density(frequency) + self.rounding_density(frequency)
+    }
+
+    /// Density of the output.
+    pub(super) fn density(&self, frequency: f64) -> f64 {
+        let baseline = baseline_density(self.noise, self.record.period_s, frequency);
+        self.gain(frequency) * baseline + self.known_density(frequency)
+    }
+
+    /// Density of the output divided by the gain of the filter: effects are added before the filter.
+    pub(super) fn density_before_filter(&self, frequency: f64) -> f64 {
+        self.density(frequency) / self.gain(frequency).max(LEAST_GAIN)
+    }
+
+    /// Probability that two neighbouring samples round to the same count: `q/(√(2π)·σ)` for differences of standard
+    /// deviation σ ≫ q, the size of a count.
+    pub(super) fn equal_probability(&self) -> f64 {
+        let period_s = self.record.period_s;
+        let rounding = self.resolution().powi(2) / 12.0 * period_s;
+        let of_difference = |frequency: f64| {
+            (self.density(frequency) - rounding) / period_s * 4.0 * (PI * frequency * period_s).sin().powi(2)
+        };
+        (self.resolution() / (2.0 * PI * self.record.mean(of_difference)).sqrt()).min(1.0)
+    }
+}

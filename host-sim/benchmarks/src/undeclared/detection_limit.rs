@@ -1,0 +1,320 @@
+//! Detection limit: the smallest size at which a test that knows the truth detects an effect in half of the recordings.
+//!
+//! That is the size at which the expected log likelihood ratio, of the truth against the best description without the
+//! effect, is `z²/2`. This is exact for Gaussian data whose mean is shifted by `z` standard deviations and approximate for
+//! the other effects. `z` is the point that a standard normal variable exceeds with a probability of 1 % divided by the
+//! number of independent places (frequencies, times, directions) where the effect could be. The description without the
+//! effect has free N, B and K; that of a telegraph signal also has a Markov process, and that of a common mode has
+//! independent processes. The other effect of a pair is known exactly.
+//!
+//! | effect | log likelihood ratio |
+//! |---|---|
+//! | Markov, resonance, quantization, filter | Whittle's, over the Fourier frequencies |
+//! | common mode | Whittle's, one process in all channels against independent processes |
+//! | telegraph | hidden Markov chain against Kalman filter, on a simulated signal |
+//! | sinusoid, acceleration | matched filter, with the density of the noise at their frequencies |
+//! | ramp, step, temperature, supply | regression on block means with the covariance of the noise |
+//! | spikes | mixture of normal distributions |
+//! | dropped and repeated samples | Poisson counts |
+//! | sample clock | normal, with the tolerance of the host's clock |
+
+use super::channel_under_test::{
+    ChannelUnderTest, RecordLength, RecordingConditions, filter_gain, markov_density, quantization_density,
+    resonance_density,
+};
+use super::effect::GYROS;
+use nalgebra::DVector;
+use noise_analysis::detectors::block_means::BLOCKS;
+use noise_analysis::detectors::block_means::{NoiseCovariance, flicker_covariance, markov_covariance};
+use noise_analysis::distributions::quantile;
+use noise_analysis::trace::sample_clock::HOST_CLOCK;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::f64::consts::{LN_2, PI};
+use virtual_sensor::EffectSource;
+use virtual_sensor::{InjectedEffect, OutputRegister, SensorScenario};
+
+/// Probability of a false alarm at the limit.
+const FALSE_ALARM: f64 = 0.01;
+/// Number of distinguishable time constants: octaves in half an hour.
+const TIME_CONSTANTS: f64 = 12.0;
+/// Number of independent times of a step.
+const TIMES: f64 = 40.0;
+/// Number of axes along which an acceleration may act.
+const AXES: f64 = 3.0;
+/// Steps per correlation time of a simulated telegraph signal; the level is constant within a step.
+const TELEGRAPH_STEPS: f64 = 20.0;
+/// Number of steps of a simulated telegraph signal. The log likelihood ratio is proportional to it.
+const TELEGRAPH_LENGTH: usize = 20_000;
+
+/// Size at the detection limit of an effect with the parameters of `unit`, beside the effects `others`.
+pub(super) fn smallest_size(
+    unit: &InjectedEffect,
+    conditions: &RecordingConditions<'_>,
+    others: &[InjectedEffect],
+) -> f64 {
+    let record = conditions.record;
+    let (seconds, period_s) = (record.seconds, record.period_s);
+    let samples = seconds / period_s;
+    let in_channel = |channel: OutputRegister| ChannelUnderTest::new(conditions, channel, others);
+    match *unit {
+        InjectedEffect::Sinusoid { channel, frequency_hz, .. } => {
+            let noise = in_channel(channel).density_before_filter(frequency_hz);
+            (required_ratio(0.5 * samples) / record.ratio_of_sinusoid(noise)).sqrt()
+        }
+        InjectedEffect::Resonance { channel, frequency_hz, bandwidth_hz, .. } => {
+            let density = |frequency: f64| resonance_density(frequency_hz, bandwidth_hz, period_s, frequency);
+            let places = 0.5 / period_s / bandwidth_hz;
+            smallest_deviation(&in_channel(channel), places, Some((frequency_hz, bandwidth_hz)), density)
+        }
+        InjectedEffect::Markov { channel, time_constant_s, .. } => {
+            smallest_markov(&in_channel(channel), time_constant_s)
+        }
+        InjectedEffect::Telegraph { channel, time_constant_s, .. } => {
+            smallest_telegraph(&in_channel(channel), time_constant_s, conditions.seed)
+        }
+        InjectedEffect::CommonMode { time_constant_s, .. } => {
+            let gyros = GYROS.map(in_channel);
+            let separate = gyros.each_ref().map(|gyro| |frequency: f64| gyro.density_before_filter(frequency));
+            let separate: [&dyn Fn(f64) -> f64; 3] = [&separate[0], &separate[1], &separate[2]];
+            let density = |frequency: f64| markov_density(time_constant_s, period_s, frequency);
+            solve_size(required_ratio(TIME_CONSTANTS), |size| {
+                record.ratio_of_common_mode(|frequency| size * size * density(frequency), &separate)
+            })
+        }
+        InjectedEffect::Quantization { channel, .. } => {
+            let place = in_channel(channel);
+            // Quantization is added behind the filter.
+            let density = |frequency: f64| quantization_density(period_s, frequency) / place.gain(frequency);
+            smallest_deviation(&place, 1.0, None, density)
+        }
+        InjectedEffect::FilterBandwidth { taps_log2 } => {
+            let place = in_channel(OutputRegister::GyroX);
+            let truth = |frequency: f64| {
+                let rounding = place.rounding_density(frequency);
+                (place.density(frequency) - rounding) * filter_gain(taps_log2, period_s, frequency) + rounding
+            };
+            // The size of a filter is fixed at 1; this limit makes its strength the ratio of `z` to the required one.
+            (required_ratio(1.0) / ratio_against_baseline(&place, None, truth)).sqrt()
+        }
+        InjectedEffect::RateRamp { channel, .. } => {
+            smallest_waveform(1.0, &in_channel(channel), |block| block as f64 * block_s(record))
+        }
+        InjectedEffect::BiasStep { channel, time_s, .. } => {
+            let at = time_s / block_s(record);
+            smallest_waveform(TIMES, &in_channel(channel), |block| (1.0 - (at - block as f64)).clamp(0.0, 1.0))
+        }
+        InjectedEffect::Temperature { channel, .. } => {
+            let means = environment_means(conditions, OutputRegister::Temp);
+            smallest_waveform(1.0, &in_channel(channel), |block| means[block])
+        }
+        InjectedEffect::Supply { channel, .. } => {
+            let means = environment_means(conditions, OutputRegister::Supply);
+            smallest_waveform(1.0, &in_channel(channel), |block| means[block])
+        }
+        InjectedEffect::Acceleration { channel, .. } => {
+            let (place, motion) = (in_channel(channel), conditions.environment.motion);
+            let force = |frequency: f64| {
+                motion.deviation_g.powi(2) * markov_density(motion.time_constant_s, period_s, frequency)
+            };
+            let noise = |frequency: f64| place.density_before_filter(frequency);
+            (required_ratio(AXES) / record.ratio_of_waveform(force, noise)).sqrt()
+        }
+        InjectedEffect::Spikes { channel, rate_per_hour, .. } => {
+            let place = in_channel(channel);
+            let probability = rate_per_hour * period_s / 3600.0;
+            let relative = solve_size(required_ratio(1.0), |size| ratio_of_spikes(samples, probability, size));
+            relative / record.mean(|frequency| period_s / place.density_before_filter(frequency)).sqrt()
+        }
+        InjectedEffect::DroppedSamples { .. } => smallest_count(0.0) / samples,
+        InjectedEffect::RepeatedSamples { .. } => {
+            let equal = |&channel: &OutputRegister| in_channel(channel).equal_probability();
+            smallest_count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
+        }
+        InjectedEffect::SampleClock { .. } => {
+            solve_size(required_ratio(1.0), |off| ratio_of_clock(off * HOST_CLOCK)) * HOST_CLOCK
+        }
+    }
+}
+
+fn smallest_markov(place: &ChannelUnderTest<'_>, time_constant_s: f64) -> f64 {
+    let period_s = place.record.period_s;
+    smallest_deviation(place, TIME_CONSTANTS, None, |frequency| markov_density(time_constant_s, period_s, frequency))
+}
+
+/// Smallest amplitude at which a telegraph signal is both detected and distinguished from a Markov process.
+fn smallest_telegraph(place: &ChannelUnderTest<'_>, time_constant_s: f64, seed: u64) -> f64 {
+    let density = place.density_before_filter(0.5 / (PI * time_constant_s));
+    let unit = (density / time_constant_s).sqrt();
+    let distinguished = solve_size(required_ratio(1.0), |relative| {
+        ratio_of_telegraph(relative * unit, time_constant_s, density, place.record, seed)
+    });
+    (2.0 * smallest_markov(place, time_constant_s)).max(unit * distinguished)
+}
+
+/// Standard deviation at the limit of a process that has the density `unit_density` for a deviation of 1 and could be at
+/// `places` places. `peak` is the centre and the width of a peak of the density, Hz.
+fn smallest_deviation(
+    place: &ChannelUnderTest<'_>,
+    places: f64,
+    peak: Option<(f64, f64)>,
+    unit_density: impl Fn(f64) -> f64,
+) -> f64 {
+    // The search is for the ratio to the white noise of a sample, to begin near the result.
+    let white = place.noise.angle_random_walk / place.record.period_s.sqrt();
+    let ratio = |relative: f64| {
+        let square = (relative * white).powi(2);
+        let truth =
+            |frequency: f64| place.density(frequency) + square * place.gain(frequency) * unit_density(frequency);
+        ratio_against_baseline(place, peak, truth)
+    };
+    white * solve_size(required_ratio(places), ratio)
+}
+
+fn ratio_against_baseline(place: &ChannelUnderTest<'_>, peak: Option<(f64, f64)>, truth: impl Fn(f64) -> f64) -> f64 {
+    let known = |frequency: f64| place.known_density(frequency);
+    place.record.ratio_against_baseline(place.noise, (|frequency| place.gain(frequency), known), peak, truth)
+}
+
+/// Log likelihood ratio `z²/2` at which an effect that could be at `places` places is detected in half of the recordings.
+pub(super) fn required_ratio(places: f64) -> f64 {
+    let z = quantile(FALSE_ALARM / places.max(1.0));
+    0.5 * z * z
+}
+
+/// The size at which `ratio(size)`, which increases with the size, equals `required`.
+pub(super) fn solve_size(required: f64, ratio: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (1e-9f64, 1e6f64);
+    for _ in 0..60 {
+        let middle = (low * high).sqrt();
+        if ratio(middle) < required { low = middle } else { high = middle }
+    }
+    (low * high).sqrt()
+}
+
+/// Expected log likelihood ratio of a telegraph signal (hidden Markov chain of two levels, `amplitude` apart) against a
+/// Gauss-Markov process of the same covariance (Kalman filter), in white noise of two-sided density `density`.
+pub(super) fn ratio_of_telegraph(
+    amplitude: f64,
+    time_constant_s: f64,
+    density: f64,
+    record: RecordLength,
+    seed: u64,
+) -> f64 {
+    let step_s = (time_constant_s / TELEGRAPH_STEPS).max(record.period_s);
+    let noise = density / step_s;
+    let (half, decay) = (0.5 * amplitude, (-step_s / time_constant_s).exp());
+    let variance = half * half;
+    let stay = 0.5 * (1.0 + decay);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let (mut up, mut belief) = (true, 0.5);
+    let (mut estimate, mut uncertainty) = (0.0, variance);
+    let mut ratio = 0.0;
+    for _ in 0..TELEGRAPH_LENGTH {
+        up ^= !random.random_bool(stay);
+        let white: f64 = random.sample(StandardNormal);
+        let value = if up { half } else { -half } + noise.sqrt() * white;
+
+        let [above, below] = [half, -half].map(|level| -0.5 * (value - level).powi(2) / noise);
+        let nearer = above.max(below);
+        let (above, below) = (belief * (above - nearer).exp(), (1.0 - belief) * (below - nearer).exp());
+        let total = (above + below).max(f64::MIN_POSITIVE);
+        ratio += total.ln() + nearer - 0.5 * noise.ln();
+        belief = stay * above / total + (1.0 - stay) * below / total;
+
+        let spread = uncertainty + noise;
+        let error: f64 = value - estimate;
+        ratio += 0.5 * (error * error / spread + spread.ln());
+        let gain = uncertainty / spread;
+        estimate = decay * (estimate + gain * error);
+        uncertainty = decay * decay * uncertainty * (1.0 - gain) + (1.0 - decay * decay) * variance;
+    }
+    ratio * record.seconds / step_s / TELEGRAPH_LENGTH as f64
+}
+
+/// Expected log likelihood ratio of `samples` samples of which the fraction `probability` is shifted by `size`
+/// standard deviations of the noise, in either direction.
+pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 {
+    // Integration over the noise of a sample: ±8 σ in steps of 0.05 σ.
+    let step = 0.05;
+    // The exponentials below overflow for larger sizes; the limit is far below.
+    let size = size.min(37.0);
+    let gain = |value: f64| {
+        let raised = 0.5 * ((size * value - 0.5 * size * size).exp() + (-size * value - 0.5 * size * size).exp());
+        (probability * (raised - 1.0)).ln_1p()
+    };
+    let mean = |centre: f64| {
+        let density = |deviation: f64| (-0.5 * deviation * deviation).exp() / (2.0 * std::f64::consts::PI).sqrt();
+        let at = |k: i32| f64::from(k) * step;
+        (-160..=160).map(|k| step * density(at(k)) * gain(centre + at(k))).sum::<f64>()
+    };
+    samples * ((1.0 - probability) * mean(0.0) + probability * mean(size))
+}
+
+/// Mean number of events at the limit, in addition to a mean of `by_chance` other events: the number at which the median
+/// count is the smallest count that chance alone exceeds or reaches with a probability of at most 1 %.
+pub(super) fn smallest_count(by_chance: f64) -> f64 {
+    let mut fewest = 1u64;
+    while noise_analysis::distributions::poisson_tail(fewest, by_chance) > FALSE_ALARM {
+        fewest += 1;
+    }
+    // The median of a Poisson variable is about its mean less 1/3. At least one event has a probability of ½ at a mean of
+    // ln 2.
+    if fewest == 1 { LN_2 } else { fewest as f64 - 1.0 / 3.0 - by_chance }
+}
+
+/// Expected log likelihood ratio of a sample clock whose rate differs by the fraction `off` from the nominal one, measured
+/// with a host's clock.
+fn ratio_of_clock(off: f64) -> f64 {
+    0.5 * (off / HOST_CLOCK).powi(2)
+}
+
+/// Size at the limit of a waveform that has the block means `unit` for a size of 1 and could be at `places` places.
+fn smallest_waveform(places: f64, place: &ChannelUnderTest<'_>, unit: impl Fn(usize) -> f64) -> f64 {
+    let values: Vec<f64> = (0..BLOCKS).map(unit).collect();
+    (required_ratio(places) / ratio_of_block_means(&values, place)).sqrt()
+}
+
+/// Length of a block, s.
+fn block_s(record: RecordLength) -> f64 {
+    record.seconds / BLOCKS as f64
+}
+
+/// Expected log likelihood ratio of the block means `values` against a constant, in noise of known covariance.
+pub(super) fn ratio_of_block_means(values: &[f64], place: &ChannelUnderTest<'_>) -> f64 {
+    let block_s = block_s(place.record);
+    // Variance of the mean of a block.
+    let white = (place.white_density() + place.resolution().powi(2) / 12.0 * place.record.period_s) / block_s;
+    let walk = place.noise.rate_random_walk.powi(2) * block_s / white;
+    let mut coloured = flicker_covariance();
+    coloured.iter_mut().for_each(|entry| *entry *= place.noise.bias_instability.powi(2) / white);
+    for (time_s, variance) in place.processes() {
+        for (entry, unit) in coloured.iter_mut().zip(markov_covariance(time_s / block_s)) {
+            *entry += variance / white * unit;
+        }
+    }
+    let numbers: Vec<usize> = (0..BLOCKS).collect();
+    let fills = vec![1.0; BLOCKS];
+    let values = DVector::from_column_slice(values);
+    let energy = |noise: NoiseCovariance| values.dot(&noise.weighted(&values));
+    0.5 * NoiseCovariance::with_coloured(&numbers, &fills, &coloured, walk).map_or(0.0, energy) / white
+}
+
+/// Block means of the change that the environment makes in `channel`.
+fn environment_means(conditions: &RecordingConditions<'_>, channel: OutputRegister) -> Vec<f64> {
+    let RecordLength { seconds, period_s } = conditions.record;
+    let environment = SensorScenario { environment: conditions.environment, effects: Vec::new() };
+    let mut source = EffectSource::new(&environment, conditions.seed);
+    let width = (seconds / period_s / BLOCKS as f64) as usize;
+    (0..BLOCKS)
+        .map(|block| {
+            let value = |at: usize| {
+                let mut values = [0.0; 12];
+                source.disturb(&mut values, (block * width + at) as f64 * period_s, period_s);
+                values[channel as usize]
+            };
+            (0..width).map(value).sum::<f64>() / width as f64
+        })
+        .collect()
+}

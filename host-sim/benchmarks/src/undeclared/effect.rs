@@ -1,0 +1,220 @@
+//! The effects that are hidden: their kinds, how their parameters are drawn, and their sizes.
+
+use super::channel_under_test::RecordLength;
+use clap::ValueEnum;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use simulation::SAMPLE_RATE_HZ;
+use std::f64::consts::PI;
+use virtual_sensor::{InjectedEffect, OutputRegister};
+
+pub(super) const GYROS: [OutputRegister; 3] = [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ];
+
+/// Which variant of the virtual sensor's effect is hidden.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
+#[value(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "each is documented at the virtual sensor's effect of the same name")]
+pub enum EffectKind {
+    Sinusoid,
+    Resonance,
+    Markov,
+    Telegraph,
+    Quantization,
+    RateRamp,
+    FilterBandwidth,
+    Temperature,
+    Supply,
+    Acceleration,
+    CommonMode,
+    Spikes,
+    BiasStep,
+    DroppedSamples,
+    RepeatedSamples,
+    SampleClock,
+}
+
+impl EffectKind {
+    /// Every kind, in the order of the tables.
+    pub const ALL: [Self; 16] = [
+        Self::Sinusoid,
+        Self::Resonance,
+        Self::Markov,
+        Self::Telegraph,
+        Self::Quantization,
+        Self::RateRamp,
+        Self::FilterBandwidth,
+        Self::Temperature,
+        Self::Supply,
+        Self::Acceleration,
+        Self::CommonMode,
+        Self::Spikes,
+        Self::BiasStep,
+        Self::DroppedSamples,
+        Self::RepeatedSamples,
+        Self::SampleClock,
+    ];
+
+    /// The name of this kind in a report.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sinusoid => "sinusoid",
+            Self::Resonance => "resonance",
+            Self::Markov => "markov",
+            Self::Telegraph => "telegraph",
+            Self::Quantization => "quantization",
+            Self::RateRamp => "rate_ramp",
+            Self::FilterBandwidth => "filter_bandwidth",
+            Self::Temperature => "temperature",
+            Self::Supply => "supply",
+            Self::Acceleration => "acceleration",
+            Self::CommonMode => "common_mode",
+            Self::Spikes => "spikes",
+            Self::BiasStep => "bias_step",
+            Self::DroppedSamples => "dropped_samples",
+            Self::RepeatedSamples => "repeated_samples",
+            Self::SampleClock => "sample_clock",
+        }
+    }
+}
+
+/// A random value between `low` and `high` whose logarithm is uniformly distributed.
+pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+    low * (random.random::<f64>() * (high / low).ln()).exp()
+}
+
+/// An effect of `kind` of size 1 with random parameters, in `channel`, or in another gyro where `channel` does not
+/// suit the kind.
+pub(super) fn draw_unit(
+    kind: EffectKind,
+    channel: OutputRegister,
+    record: RecordLength,
+    random: &mut ChaCha8Rng,
+) -> InjectedEffect {
+    // An accelerometer's noise is about one count, so the error of a coarser quantum would not be white there.
+    let of_gyros = matches!(kind, EffectKind::Quantization | EffectKind::Acceleration);
+    let channel = if of_gyros && !GYROS.contains(&channel) { GYROS[random.random_range(0..3)] } else { channel };
+    let nyquist = 0.5 / record.period_s;
+    let sign = |random: &mut ChaCha8Rng| if random.random_bool(0.5) { 1.0 } else { -1.0 };
+    match kind {
+        EffectKind::Sinusoid => {
+            let frequency_hz = log_uniform(random, 0.1, 0.9 * nyquist);
+            InjectedEffect::Sinusoid { channel, frequency_hz, amplitude: 1.0, phase_rad: random.random_range(-PI..PI) }
+        }
+        EffectKind::Resonance => {
+            let frequency_hz = log_uniform(random, 1.0, 0.8 * nyquist);
+            let bandwidth_hz = frequency_hz * log_uniform(random, 0.02, 0.2);
+            InjectedEffect::Resonance { channel, frequency_hz, bandwidth_hz, deviation: 1.0 }
+        }
+        EffectKind::Markov => {
+            InjectedEffect::Markov { channel, time_constant_s: log_uniform(random, 0.05, 60.0), deviation: 1.0 }
+        }
+        EffectKind::Telegraph => {
+            InjectedEffect::Telegraph { channel, time_constant_s: log_uniform(random, 0.05, 20.0), amplitude: 1.0 }
+        }
+        EffectKind::CommonMode => {
+            let channels = GYROS.to_vec();
+            InjectedEffect::CommonMode { channels, time_constant_s: log_uniform(random, 10.0, 100.0), deviation: 1.0 }
+        }
+        EffectKind::Quantization => InjectedEffect::Quantization { channel, coefficient: 1.0 },
+        EffectKind::FilterBandwidth => InjectedEffect::FilterBandwidth { taps_log2: random.random_range(1..=6) },
+        EffectKind::RateRamp => InjectedEffect::RateRamp { channel, slope: sign(random) },
+        EffectKind::BiasStep => {
+            let size = sign(random);
+            InjectedEffect::BiasStep { channel, time_s: record.seconds * random.random_range(0.15..0.85), size }
+        }
+        EffectKind::Temperature => InjectedEffect::Temperature { channel, sensitivity: sign(random) },
+        EffectKind::Supply => InjectedEffect::Supply { channel, sensitivity: sign(random) },
+        EffectKind::Acceleration => {
+            let direction = [0; 3].map(|_| random.random_range(-1.0..1.0f64));
+            let length = direction.iter().map(|part| part * part).sum::<f64>().sqrt().max(1e-3);
+            InjectedEffect::Acceleration { channel, sensitivity: direction.map(|part| part / length) }
+        }
+        EffectKind::Spikes => {
+            InjectedEffect::Spikes { channel, rate_per_hour: log_uniform(random, 10.0, 2000.0), size: 1.0 }
+        }
+        EffectKind::DroppedSamples => InjectedEffect::DroppedSamples { fraction: 1.0 },
+        EffectKind::RepeatedSamples => InjectedEffect::RepeatedSamples { fraction: 1.0 },
+        EffectKind::SampleClock => InjectedEffect::SampleClock { ratio: 1.0 + sign(random) },
+    }
+}
+
+/// Absolute value of the parameter that [`draw_unit`] sets to 1.
+pub(super) fn size(effect: &InjectedEffect) -> f64 {
+    match *effect {
+        InjectedEffect::Sinusoid { amplitude, .. } | InjectedEffect::Telegraph { amplitude, .. } => amplitude,
+        InjectedEffect::Resonance { deviation, .. }
+        | InjectedEffect::Markov { deviation, .. }
+        | InjectedEffect::CommonMode { deviation, .. } => deviation,
+        InjectedEffect::Quantization { coefficient, .. } => coefficient,
+        InjectedEffect::RateRamp { slope, .. } => slope.abs(),
+        InjectedEffect::FilterBandwidth { .. } => 1.0,
+        InjectedEffect::Temperature { sensitivity, .. } | InjectedEffect::Supply { sensitivity, .. } => {
+            sensitivity.abs()
+        }
+        InjectedEffect::Acceleration { sensitivity, .. } => {
+            sensitivity.iter().map(|part| part * part).sum::<f64>().sqrt()
+        }
+        InjectedEffect::Spikes { size, .. } | InjectedEffect::BiasStep { size, .. } => size.abs(),
+        InjectedEffect::DroppedSamples { fraction } | InjectedEffect::RepeatedSamples { fraction } => fraction,
+        InjectedEffect::SampleClock { ratio } => (ratio - 1.0).abs(),
+    }
+}
+
+/// The same effect with its size multiplied by `factor`. The size of a filter is fixed.
+pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect {
+    match &mut effect {
+        InjectedEffect::Sinusoid { amplitude: size, .. }
+        | InjectedEffect::Telegraph { amplitude: size, .. }
+        | InjectedEffect::Resonance { deviation: size, .. }
+        | InjectedEffect::Markov { deviation: size, .. }
+        | InjectedEffect::CommonMode { deviation: size, .. }
+        | InjectedEffect::Quantization { coefficient: size, .. }
+        | InjectedEffect::RateRamp { slope: size, .. }
+        | InjectedEffect::Temperature { sensitivity: size, .. }
+        | InjectedEffect::Supply { sensitivity: size, .. }
+        | InjectedEffect::Spikes { size, .. }
+        | InjectedEffect::BiasStep { size, .. }
+        | InjectedEffect::DroppedSamples { fraction: size }
+        | InjectedEffect::RepeatedSamples { fraction: size } => *size *= factor,
+        InjectedEffect::Acceleration { sensitivity, .. } => sensitivity.iter_mut().for_each(|part| *part *= factor),
+        InjectedEffect::SampleClock { ratio } => *ratio = 1.0 + (*ratio - 1.0) * factor,
+        InjectedEffect::FilterBandwidth { .. } => {}
+    }
+    effect
+}
+
+/// Names of the parameters of `effect` as in a report, with their values. Times are counted from the start of the sensor.
+pub(super) fn parameters(effect: &InjectedEffect) -> Vec<(&'static str, f64)> {
+    match *effect {
+        InjectedEffect::Sinusoid { frequency_hz, amplitude, .. } => {
+            vec![("frequency", frequency_hz), ("amplitude", amplitude)]
+        }
+        InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+            vec![("frequency", frequency_hz), ("bandwidth", bandwidth_hz), ("deviation", deviation)]
+        }
+        InjectedEffect::Markov { time_constant_s, deviation, .. }
+        | InjectedEffect::CommonMode { time_constant_s, deviation, .. } => {
+            vec![("time_constant", time_constant_s), ("deviation", deviation)]
+        }
+        InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
+            vec![("time_constant", time_constant_s), ("amplitude", amplitude)]
+        }
+        InjectedEffect::Quantization { coefficient, .. } => vec![("value", coefficient)],
+        InjectedEffect::RateRamp { slope, .. } => vec![("slope", slope)],
+        InjectedEffect::FilterBandwidth { taps_log2 } => vec![("taps", f64::from(1u32 << taps_log2))],
+        InjectedEffect::Temperature { sensitivity, .. } | InjectedEffect::Supply { sensitivity, .. } => {
+            vec![("sensitivity", sensitivity)]
+        }
+        InjectedEffect::Acceleration { sensitivity: [x, y, z], .. } => {
+            vec![("sensitivity_x", x), ("sensitivity_y", y), ("sensitivity_z", z)]
+        }
+        InjectedEffect::Spikes { rate_per_hour, size, .. } => vec![("rate", rate_per_hour), ("size", size)],
+        InjectedEffect::BiasStep { time_s, size, .. } => vec![("time", time_s), ("size", size)],
+        InjectedEffect::DroppedSamples { fraction } | InjectedEffect::RepeatedSamples { fraction } => {
+            vec![("fraction", fraction)]
+        }
+        InjectedEffect::SampleClock { ratio } => vec![("rate_hz", SAMPLE_RATE_HZ * ratio)],
+    }
+}

@@ -1,0 +1,233 @@
+//! The score of one recording: it is simulated, analysed without its truth, and the report is compared with the truth.
+
+use super::draw::DrawnRecording;
+use super::effect::{EffectKind, parameters};
+use super::truth::{detects_known_waveform, true_model_errors};
+use adis16405_driver::Channel;
+use noise_analysis::analysis::analyze;
+use noise_analysis::report::{ChannelReport, Report};
+use recordings::timeline::{TimelineError, measurement};
+use serde::Serialize;
+use simulation::SimulationError;
+use virtual_sensor::InjectedEffect;
+
+/// Channels that the analysis is given: those that are scored, and those that effects depend on.
+const RECORDED: [Channel; 8] = [
+    Channel::Supply,
+    Channel::GyroX,
+    Channel::GyroY,
+    Channel::GyroZ,
+    Channel::AcclX,
+    Channel::AcclY,
+    Channel::AcclZ,
+    Channel::Temp,
+];
+
+/// Why a recording could not be scored.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScoreError {
+    /// It could not be simulated.
+    #[error("seed {seed}: {reason}")]
+    Record {
+        /// Seed of the recording.
+        seed: u64,
+        /// The cause.
+        reason: SimulationError,
+    },
+    /// It has no timeline.
+    #[error("seed {seed}: {reason}")]
+    Timeline {
+        /// Seed of the recording.
+        seed: u64,
+        /// The cause.
+        reason: TimelineError,
+    },
+}
+
+/// An estimated parameter of an effect that was named. Values are in the unit of the report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterScore {
+    /// Kind of the effect.
+    pub kind: EffectKind,
+    /// Name as in the report.
+    pub name: &'static str,
+    /// True value.
+    pub truth: f64,
+    /// Estimate.
+    pub value: f64,
+    /// Lower 95 % bound.
+    pub low: f64,
+    /// Upper 95 % bound.
+    pub high: f64,
+    /// Absolute error over the absolute value of the parameter; for a sensitivity to three axes, over its length.
+    pub relative_error: f64,
+}
+
+/// A hidden effect and whether it was named.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectScore {
+    /// Kind of the effect.
+    pub kind: EffectKind,
+    /// Size over the detection limit.
+    pub strength: f64,
+    /// Whether the report lists it in its channels.
+    pub named: bool,
+    /// Whether a test that is given channel and waveform, but not the noise, detects it; absent in pairs, and for effects
+    /// that are not a known waveform of the bias.
+    pub shape_known: Option<bool>,
+    /// First other effect that the report lists in its channels, if it was not named.
+    pub instead: Option<String>,
+}
+
+/// Deviance per point on the half of the recording that the fit has not seen, in the first channel with an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UnseenErrors {
+    /// Of the baseline model.
+    pub before: f64,
+    /// Of the model with the added terms.
+    pub after: f64,
+    /// Of the true model.
+    pub truth: f64,
+    /// Of the true terms, fitted to the other half: the difference to `truth` is due to the fit.
+    pub refitted: f64,
+}
+
+/// The score of one recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordingScore {
+    /// Seed of the recording.
+    pub seed: u64,
+    /// One for each hidden effect.
+    pub answers: Vec<EffectScore>,
+    /// Reported effects that were not hidden, as `channel: kind`.
+    pub false_alarms: Vec<String>,
+    /// Parameters of the effects that were named.
+    pub estimates: Vec<ParameterScore>,
+    /// Absent where nothing is hidden, or where an error is not finite.
+    pub unseen: Option<UnseenErrors>,
+}
+
+/// Simulates a recording, analyses it and compares the report with the truth.
+///
+/// # Errors
+/// The recording cannot be simulated, or has no timeline.
+pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreError> {
+    let seed = drawn.seed;
+    let failed = |reason| ScoreError::Record { seed, reason };
+    let mut recording = drawn.simulation.run(|_| ()).map_err(failed)?;
+    recording.channels.retain(|channel| RECORDED.contains(channel));
+    let measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
+    let report = analyze(&measurement);
+    let begin_s = recording.samples.first().and_then(|sample| sample.clock.time_s).unwrap_or(0.0);
+    let mut score = compare(drawn, &report, begin_s);
+    let effects = &drawn.simulation.scenario.effects;
+    if let ([answer], [effect]) = (&mut score.answers[..], &effects[..]) {
+        answer.shape_known = detects_known_waveform(effect, &measurement, begin_s);
+    }
+    if let Some(channel) = effects
+        .first()
+        .map(|effect| effect.channels().first().map_or(Channel::GyroX, |&output| simulation::channel(output)))
+    {
+        let truth = true_model_errors(drawn, channel).map_err(failed)?;
+        let of = report.channels.iter().find(|report| report.name == channel.name());
+        score.unseen = of.zip(truth).and_then(|(report, truth)| {
+            let before = report.before.unseen.deviance_per_point?;
+            Some(UnseenErrors {
+                before,
+                after: report.after.unseen.deviance_per_point?,
+                truth: truth.model,
+                refitted: truth.fitted,
+            })
+        });
+    }
+    Ok(score)
+}
+
+/// Compares a report with the truth. `begin_s` is the time from the start of the sensor to the first sample.
+pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> RecordingScore {
+    let moved = drawn.simulation.scenario.environment.motion.deviation_g > 0.0;
+    // Accelerometers are not scored during a motion: its effect on them can resemble any kind.
+    let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
+    let scored: Vec<(Channel, &ChannelReport)> = Channel::INERTIAL
+        .into_iter()
+        .filter(is_scored)
+        .filter_map(|channel| Some((channel, report.channels.iter().find(|of| of.name == channel.name())?)))
+        .collect();
+    let effects = &drawn.simulation.scenario.effects;
+    let answers = drawn
+        .kinds
+        .iter()
+        .zip(effects)
+        .zip(&drawn.strengths)
+        .map(|((&kind, effect), &strength)| score_effect(kind, effect, strength, &scored))
+        .collect();
+    let is_true =
+        |channel: Channel, kind: &str| effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel));
+    let false_alarms = scored
+        .iter()
+        .flat_map(|(channel, report)| report.effects.iter().map(move |effect| (*channel, effect)))
+        .filter(|(channel, effect)| !is_true(*channel, &effect.kind))
+        .map(|(channel, effect)| format!("{}: {}", channel.name(), effect.kind))
+        .collect();
+    let estimates = drawn
+        .kinds
+        .iter()
+        .zip(effects)
+        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, begin_s))
+        .collect();
+    RecordingScore { seed: drawn.seed, answers, false_alarms, estimates, unseen: None }
+}
+
+/// Whether `effect` is in `channel`. Effects without channels concern the samples of all channels.
+fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
+    effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
+}
+
+/// An effect counts as named if the report lists it in at least half of its channels; dropped and repeated samples and the
+/// sample clock count as named if they are listed in one channel.
+fn score_effect(
+    kind: EffectKind,
+    effect: &InjectedEffect,
+    strength: f64,
+    scored: &[(Channel, &ChannelReport)],
+) -> EffectScore {
+    let affected: Vec<&ChannelReport> =
+        scored.iter().filter(|(channel, _)| shows_in(effect, *channel)).map(|(_, report)| *report).collect();
+    let listing = affected.iter().filter(|report| report.effects.iter().any(|found| found.kind == kind.name())).count();
+    let once = matches!(kind, EffectKind::DroppedSamples | EffectKind::RepeatedSamples | EffectKind::SampleClock);
+    let named = listing >= if once { 1 } else { affected.len().div_ceil(2).max(1) };
+    let other = affected.iter().flat_map(|report| &report.effects).find(|found| found.kind != kind.name());
+    EffectScore {
+        kind,
+        strength,
+        named,
+        shape_known: None,
+        instead: other.filter(|_| !named).map(|found| found.kind.clone()),
+    }
+}
+
+/// The estimated parameters of `effect` in the first of its channels that lists it.
+fn score_parameters(
+    kind: EffectKind,
+    effect: &InjectedEffect,
+    scored: &[(Channel, &ChannelReport)],
+    begin_s: f64,
+) -> Vec<ParameterScore> {
+    let found = scored
+        .iter()
+        .filter(|(channel, _)| shows_in(effect, *channel))
+        .find_map(|(_, report)| report.effects.iter().find(|found| found.kind == kind.name()));
+    let Some(found) = found else { return Vec::new() };
+    let parameters = parameters(effect);
+    let length = parameters.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
+    let score = |&(name, truth): &(&'static str, f64)| {
+        let estimate = found.parameters.get(name)?;
+        let truth = if kind == EffectKind::BiasStep && name == "time" { truth - begin_s } else { truth };
+        let scale = if kind == EffectKind::Acceleration { length } else { truth.abs() };
+        let relative_error = (estimate.value - truth).abs() / scale;
+        let (value, low, high) = (estimate.value, estimate.low, estimate.high);
+        Some(ParameterScore { kind, name, truth, value, low, high, relative_error })
+    };
+    parameters.iter().filter_map(score).collect()
+}
