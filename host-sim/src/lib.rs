@@ -1,5 +1,4 @@
-//! The command line of the noise observatory.
+//! Parts of the command `host-sim` that tests of the whole system use as well.
 
-pub mod cli;
 pub mod monitor;
 pub mod uf2;

@@ -5,7 +5,7 @@ use link::{
     BootCause, ChannelMessage, DecoderCounters, Health, Hello, LearnedMessage, Message, RawBurst, RawMessage, Received,
     ReportedAddedTerm, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedTerm, ValidationMessage,
 };
-use recordings::serial::Cable;
+use recordings::serial::SerialLink;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 use std::time::Instant;
@@ -14,7 +14,11 @@ use std::time::Instant;
 ///
 /// # Errors
 /// The port fails, or `out` cannot be written.
-pub fn show<P: Read + Write>(cable: &mut Cable<P>, deadline: Option<Instant>, out: &mut impl Write) -> io::Result<()> {
+pub fn show<P: Read + Write>(
+    cable: &mut SerialLink<P>,
+    deadline: Option<Instant>,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let mut formatter = MessageFormatter::default();
     while let Some(received) = cable.next(deadline)? {
         for line in formatter.lines(&received) {

@@ -2,8 +2,8 @@
 //!
 //! Times are written with as many digits as they need to be read back exactly.
 
-use super::table::{self, Table};
-use super::{InputError, Reason};
+use crate::delimited_text::{self, Lines};
+use crate::input_error::{InputError, Reason};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::fmt::Write as _;
@@ -18,7 +18,7 @@ const TIME: &str = "time_s";
 const MOSI: &str = "mosi";
 const MISO: &str = "miso";
 
-/// What crossed the bus while chip select was low.
+/// Bytes of one SPI transaction, chip select low.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
     /// When chip select went low, s.
@@ -29,24 +29,32 @@ pub struct Frame {
     pub miso: Vec<u8>,
 }
 
+/// Whether the first line of `file` is that of a frame log.
+///
+/// # Errors
+/// The file cannot be opened, or its first line cannot be read.
+pub fn is_frame_log(file: &Path) -> Result<bool, InputError> {
+    Lines::open(file)?.begin_with(HEADER)
+}
+
 /// An open log, read frame by frame.
-pub struct Frames {
+pub struct FrameLogReader {
     file: PathBuf,
-    table: Table,
+    lines: Lines,
     line: u64,
     last_s: f64,
 }
 
-impl Frames {
+impl FrameLogReader {
     /// Opens a log, plain or gzip.
     ///
     /// # Errors
     /// The file cannot be read or does not start with [`HEADER`].
     pub fn open(file: &Path) -> Result<Self, InputError> {
-        let mut table = Table::open(file)?;
-        match table.next()? {
+        let mut lines = Lines::open(file)?;
+        match lines.next()? {
             None => Err(InputError::file(file, Reason::Empty)),
-            Some((_, HEADER)) => Ok(Self { file: file.to_owned(), table, line: 1, last_s: f64::NEG_INFINITY }),
+            Some((_, HEADER)) => Ok(Self { file: file.to_owned(), lines, line: 1, last_s: f64::NEG_INFINITY }),
             Some((line, _)) => Err(InputError::line(file, line, Reason::NotFrameLog)),
         }
     }
@@ -59,10 +67,10 @@ impl Frames {
     /// The next frame; `None` at the end of the log.
     ///
     /// # Errors
-    /// A line is not two equally long rows of 16-bit words at a finite time that is not before the last.
+    /// A line does not have a finite time, not before that of the last line, and two equally long rows of 16-bit words.
     #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
     pub fn next(&mut self) -> Result<Option<Frame>, InputError> {
-        let Some((line, text)) = self.table.next()? else {
+        let Some((line, text)) = self.lines.next()? else {
             return Ok(None);
         };
         let frame = parse(text, self.last_s).map_err(|(column, reason)| match column {
@@ -76,11 +84,11 @@ impl Frames {
 }
 
 fn parse(text: &str, last_s: f64) -> Result<Frame, (Option<&'static str>, Reason)> {
-    let fields: Vec<&str> = text.split(',').map(table::field).collect();
+    let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
     let &[time, mosi, miso] = fields.as_slice() else {
         return Err((None, Reason::FieldCount { found: fields.len(), expected: 3 }));
     };
-    let time_s = table::time(time).map_err(|reason| (Some(TIME), reason))?;
+    let time_s = delimited_text::time(time).map_err(|reason| (Some(TIME), reason))?;
     if time_s < last_s {
         return Err((Some(TIME), Reason::TimeBackwards { before: last_s, now: time_s }));
     }
@@ -98,18 +106,18 @@ fn parse(text: &str, last_s: f64) -> Result<Frame, (Option<&'static str>, Reason
 fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
     let nibble = |digit: u8| (digit as char).to_digit(16).map(|value| value as u8);
     if text.len() % 2 == 1 {
-        return Err(Reason::NotHex(table::quote(text)));
+        return Err(Reason::NotHex(delimited_text::quote(text)));
     }
     text.as_bytes()
         .chunks_exact(2)
         .map(|pair| Some(nibble(pair[0])? << 4 | nibble(pair[1])?))
         .collect::<Option<Vec<u8>>>()
-        .ok_or_else(|| Reason::NotHex(table::quote(text)))
+        .ok_or_else(|| Reason::NotHex(delimited_text::quote(text)))
 }
 
 /// A log that is being written; gzip if the name ends in `.gz`.
 #[derive(Debug)]
-pub struct FrameLog {
+pub struct FrameLogWriter {
     sink: Sink,
     line: String,
 }
@@ -120,11 +128,11 @@ enum Sink {
     Gzip(GzEncoder<BufWriter<File>>),
 }
 
-impl FrameLog {
+impl FrameLogWriter {
     /// Creates `file` and writes the header.
     ///
     /// # Errors
-    /// As the operating system answers.
+    /// The file cannot be created or written.
     pub fn create(file: &Path) -> io::Result<Self> {
         let plain = BufWriter::new(File::create(file)?);
         let sink = if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz")) {
@@ -140,7 +148,7 @@ impl FrameLog {
     /// Adds one frame.
     ///
     /// # Errors
-    /// As the operating system answers.
+    /// The file cannot be written.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
         self.line.clear();
         // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
@@ -158,7 +166,7 @@ impl FrameLog {
     /// Writes what is buffered and closes the file; without it a gzip log is truncated.
     ///
     /// # Errors
-    /// As the operating system answers.
+    /// The file cannot be written.
     pub fn finish(self) -> io::Result<()> {
         match self.sink {
             Sink::Plain(mut plain) => plain.flush(),

@@ -1,4 +1,4 @@
-//! What is wrong with an input file, and where.
+//! Errors of an input file: which file, line and column, and the reason.
 
 use std::fmt;
 use std::io;
@@ -13,7 +13,7 @@ pub struct InputError {
     pub line: Option<u64>,
     /// Name of the column, where one column is at fault.
     pub column: Option<String>,
-    /// What is wrong there.
+    /// Why it is refused.
     pub reason: Reason,
 }
 
@@ -21,7 +21,7 @@ pub struct InputError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The operating system's answer.
+    /// The file cannot be read.
     #[error("{0}")]
     Io(io::Error),
     /// A folder where a file is expected.
@@ -30,10 +30,10 @@ pub enum Reason {
     /// A folder without a table in it.
     #[error("no file in it ends in .csv or .csv.gz")]
     NoTables,
-    /// Not a single byte, or only blank lines.
+    /// No byte, or only blank lines.
     #[error("the file is empty")]
     Empty,
-    /// A header and nothing after it.
+    /// A header without a row after it.
     #[error("no data after the header")]
     NoData,
     /// The gzip stream ends before its trailer.
@@ -42,10 +42,10 @@ pub enum Reason {
     /// The gzip stream is damaged.
     #[error("damaged gzip: {0}")]
     DamagedGzip(io::Error),
-    /// Bytes that are no text.
+    /// Bytes that are not UTF-8.
     #[error("not UTF-8 text")]
     NotText,
-    /// More bytes without a line end than a row can have.
+    /// More than 65536 bytes without a line end.
     #[error("the line is longer than 65536 bytes")]
     LongLine,
     /// The header names no channel of the part.
@@ -54,7 +54,7 @@ pub enum Reason {
     /// A frame log where a table of counts is expected.
     #[error("this is an SPI frame log; read it with `replay`")]
     FrameLog,
-    /// A column that is neither a channel nor a clock.
+    /// A column that is neither a channel nor a time stamp.
     #[error("unknown column; known are sample, time_s and <channel>_counts")]
     UnknownColumn,
     /// A name that occurs twice in the header.
@@ -87,7 +87,7 @@ pub enum Reason {
         /// Largest count of the field.
         high: i16,
     },
-    /// A clock that runs backwards.
+    /// A time that decreases.
     #[error("time {now} s is before {before} s of the row above")]
     TimeBackwards {
         /// Of the row above, s.

@@ -1,17 +1,15 @@
-//! Recordings of a sensor: tables of counts, SPI frame logs and the serial line, and the time base of their samples.
+//! Recordings of an ADIS16405: tables of register counts, SPI frame logs, the serial port, and the time base of the samples.
 //!
-//! A file is checked where it is read. What a reader returns holds only counts that fit their field and clocks that do
-//! not run backwards; everything else is an [`InputError`] that names the file and the line.
+//! Each format is checked where it is read: a [`Recording`](recording::Recording) holds only counts that fit their register
+//! field and time stamps that do not decrease. Everything else is an [`InputError`] with the file, the line and the reason.
+//! [`time_base::measurement`] turns a recording into the [`Measurement`](measurement::Measurement) that is analysed.
 
-pub mod csv;
-pub mod folder;
+pub mod count_table;
+mod delimited_text;
 pub mod frame_log;
 mod input_error;
-mod open;
 pub mod recording;
 pub mod serial;
-mod table;
-pub mod timeline;
+pub mod time_base;
 
 pub use input_error::{InputError, Reason};
-pub use open::{Input, is_frame_log, open};

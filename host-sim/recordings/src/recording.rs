@@ -1,41 +1,41 @@
-//! Samples in memory, each with its clock and with what was wrong with it.
+//! Samples in memory, each with its time stamp and its faults.
 //!
-//! Counts from a table and bursts from the bus meet in [`Recorder`]: the same words are judged by the same code, so that
-//! both ways give the same recording.
+//! [`Recorder`] takes the rows of a table and the bursts from the bus alike and checks both with the driver's
+//! [`BurstValidator`], so that the same words give the same recording either way.
 
 use adis16405_driver::{Burst, BurstValidator, Channel, Counts, Faults, GyroRange};
 
-/// What the channels that were not recorded read: 0, and a supply of 5 V (2068 counts of 2.418 mV).
+/// Counts that stand for the channels that a table lacks: 0, and a supply of 5 V (2068 counts of 2.418 mV).
 pub const NOT_RECORDED: [i16; 12] = {
     let mut counts = [0; 12];
     counts[Channel::Supply as usize] = 2068;
     counts
 };
 
-/// What tells when a sample was taken.
+/// When a sample was taken, as far as the recording says it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Clock {
+pub struct TimeStamp {
     /// Running number of the sample; grows by one a sample, by more across a gap.
     pub index: Option<u64>,
     /// The host's time at which the sample was read, s.
     pub time_s: Option<f64>,
 }
 
-impl Clock {
-    /// A sample that carries only the time at which it was read, s.
-    pub fn at(time_s: f64) -> Self {
+impl TimeStamp {
+    /// The time stamp of a sample without an index that was read at `time_s`, in s.
+    pub fn from_time(time_s: f64) -> Self {
         Self { index: None, time_s: Some(time_s) }
     }
 }
 
 /// One sample of all channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct RecordedSample {
     /// When it was taken.
-    pub clock: Clock,
-    /// Register counts; only those of [`Recording::channels`] mean anything.
+    pub time_stamp: TimeStamp,
+    /// Register counts; those of channels outside [`Recording::channels`] are [`NOT_RECORDED`].
     pub counts: Counts,
-    /// What the burst itself shows to be wrong.
+    /// Faults that the burst and the bursts before it show.
     pub faults: Faults,
 }
 
@@ -44,10 +44,10 @@ pub struct Sample {
 pub struct Recording {
     /// The channels that were recorded, in the order of the burst.
     pub channels: Vec<Channel>,
-    /// Range in which the rates were taken.
+    /// Range of the gyroscopes, which sets the size of their counts.
     pub range: GyroRange,
-    /// As they were read, unusable ones included.
-    pub samples: Vec<Sample>,
+    /// All samples, those with faults included.
+    pub samples: Vec<RecordedSample>,
 }
 
 /// Builds a [`Recording`] burst by burst.
@@ -55,15 +55,17 @@ pub struct Recording {
 pub struct Recorder {
     recording: Recording,
     validator: BurstValidator,
-    judged: Faults,
+    /// Faults that can be told with the channels that are recorded.
+    detectable: Faults,
 }
 
 impl Recorder {
     /// Starts an empty recording of `channels`.
     pub fn new(mut channels: Vec<Channel>, range: GyroRange) -> Self {
         channels.sort();
-        // Re-reads and frozen outputs show in the six inertial words together; fewer may be equal by chance.
-        let judged = if Channel::INERTIAL.iter().all(|c| channels.contains(c)) {
+        // A sample that was read twice and a frozen output are told by equal counts of all six inertial channels; fewer
+        // channels may be equal by chance.
+        let detectable = if Channel::INERTIAL.iter().all(|c| channels.contains(c)) {
             Faults::all()
         } else {
             Faults::all() - Faults::REPEATED - Faults::FROZEN
@@ -71,22 +73,22 @@ impl Recorder {
         Self {
             recording: Recording { channels, range, samples: Vec::new() },
             validator: BurstValidator::default(),
-            judged,
+            detectable,
         }
     }
 
-    /// Adds a burst that was read at `clock`.
-    pub fn push(&mut self, clock: Clock, burst: &Burst) {
-        let faults = self.validator.validate(burst).faults & self.judged;
-        self.recording.samples.push(Sample { clock, counts: burst.counts(), faults });
+    /// Adds a burst.
+    pub fn push(&mut self, time_stamp: TimeStamp, burst: &Burst) {
+        let faults = self.validator.validate(burst).faults & self.detectable;
+        self.recording.samples.push(RecordedSample { time_stamp, counts: burst.counts(), faults });
     }
 
-    /// The range in which the rates of the following bursts are taken.
+    /// Sets the gyroscopes' range of the whole recording, bursts that were added before included.
     pub fn set_range(&mut self, range: GyroRange) {
         self.recording.range = range;
     }
 
-    /// The recording so far, complete.
+    /// The recording of all bursts that were added.
     pub fn finish(self) -> Recording {
         self.recording
     }

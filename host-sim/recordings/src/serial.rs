@@ -1,6 +1,6 @@
-//! A recording off the serial cable: the firmware's stream of raw bursts as a frame log.
+//! The serial link to a device that runs the firmware, and the recording of its raw bursts as a frame log.
 
-use crate::frame_log::{Frame, FrameLog};
+use crate::frame_log::{Frame, FrameLogWriter};
 use adis16405_driver::{BURST_REQUEST, Register};
 use link::{Decoder, DecoderCounters, Message, RawMessage, Received};
 use std::collections::VecDeque;
@@ -8,131 +8,134 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What the firmware's boards speak, Bd.
+/// Baud rate of the firmware's boards, Bd.
 pub const BAUD: u32 = 460_800;
 
-/// How long a read waits before the clock is looked at.
-const PATIENCE: Duration = Duration::from_millis(50);
+/// Longest time that a read waits for bytes. Deadlines are checked as often.
+const READ_TIMEOUT: Duration = Duration::from_millis(50);
 
-/// A port that a device hangs on, real or a pseudo-terminal.
+/// Longest time without a burst during a recording.
+const MAX_SILENCE: Duration = Duration::from_secs(10);
+
+/// Opens the serial port `port`, a device file or a pseudo-terminal, at `baud` Bd.
 ///
 /// # Errors
 /// There is no such port, or it cannot be set up.
 pub fn open(port: &str, baud: u32) -> io::Result<Box<dyn serialport::SerialPort>> {
-    serialport::new(port, baud).timeout(PATIENCE).open().map_err(io::Error::from)
+    serialport::new(port, baud).timeout(READ_TIMEOUT).open().map_err(io::Error::from)
 }
 
-/// Finds messages and lines in what a device sends, and sends it commands.
-pub struct Cable<P> {
+/// Receives the messages and text lines of a device and sends it commands.
+pub struct SerialLink<P> {
     port: P,
     decoder: Decoder,
-    found: VecDeque<Received>,
+    received: VecDeque<Received>,
 }
 
-impl<P: Read + Write> Cable<P> {
-    /// A cable in `port`, whose reads should time out now and then.
+impl<P: Read + Write> SerialLink<P> {
+    /// A link over `port`. Its reads must time out, or [`next`](Self::next) does not return at its deadline.
     pub fn new(port: P) -> Self {
-        Self { port, decoder: Decoder::new(), found: VecDeque::new() }
+        Self { port, decoder: Decoder::new(), received: VecDeque::new() }
     }
 
-    /// Sends a command and Enter.
+    /// Sends a command line, ended by a carriage return.
     ///
     /// # Errors
-    /// The port does not take it.
-    pub fn command(&mut self, text: &str) -> io::Result<()> {
+    /// The port cannot be written.
+    pub fn send_command(&mut self, text: &str) -> io::Result<()> {
         self.port.write_all(format!("{text}\r").as_bytes())?;
         self.port.flush()
     }
 
-    /// The next message or line; `None` when the other end has hung up, or at `deadline`.
+    /// The next message or text line; `None` when the device has disconnected, or at `deadline`.
     ///
     /// # Errors
     /// The port fails.
     pub fn next(&mut self, deadline: Option<Instant>) -> io::Result<Option<Received>> {
         let mut bytes = [0; 4096];
-        while self.found.is_empty() {
+        while self.received.is_empty() {
             if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
                 return Ok(None);
             }
             match self.port.read(&mut bytes) {
                 Ok(0) => return Ok(None),
-                Ok(count) => self.found.extend(bytes[..count].iter().filter_map(|&byte| self.decoder.push(byte))),
+                Ok(count) => self.received.extend(bytes[..count].iter().filter_map(|&byte| self.decoder.push(byte))),
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
-                Err(error) if is_hangup(&error) => return Ok(None),
+                Err(error) if is_disconnected(&error) => return Ok(None),
                 Err(error) => return Err(error),
             }
         }
-        Ok(self.found.pop_front())
+        Ok(self.received.pop_front())
     }
 
-    /// What was found and lost so far.
+    /// Numbers of messages received, missing and damaged so far.
     pub fn counters(&self) -> DecoderCounters {
         self.decoder.counters()
     }
 }
 
-/// A pseudo-terminal whose other end was closed answers "input/output error".
-fn is_hangup(error: &io::Error) -> bool {
+/// Whether the other end has closed the port: a pseudo-terminal then answers EIO.
+fn is_disconnected(error: &io::Error) -> bool {
     const EIO: i32 = 5;
     error.kind() == ErrorKind::BrokenPipe || error.raw_os_error() == Some(EIO)
 }
 
-/// How long the device may be silent.
-const SILENCE: Duration = Duration::from_secs(10);
-
 /// Why a device gave no recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum CableError {
+pub enum SerialRecordingError {
     /// The port failed.
     #[error("serial port: {0}")]
     Port(io::Error),
     /// The log could not be written.
     #[error("recording: {0}")]
     Log(io::Error),
-    /// No raw stream came for [`SILENCE`], or the device hung up.
+    /// No burst came for 10 s, or the device disconnected.
     #[error("the device sent no bursts for 10 s, after {0} of them")]
     Silent(u64),
 }
 
-/// What a recording off the cable holds.
+/// Counts of a recording over the serial link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Recorded {
+pub struct SerialRecordingSummary {
     /// Bursts in the log.
     pub bursts: u64,
-    /// Sample periods between the first and the last of which no burst came: lost on the device or on the line.
+    /// Sample periods between the first and the last burst of which no burst came: lost on the device or on the link.
     pub missing: u64,
-    /// What became of the bytes.
+    /// Of the link.
     pub counters: DecoderCounters,
 }
 
-/// Turns the stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off.
+/// Turns the raw stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off.
 ///
 /// # Errors
-/// The device is silent, or the port or the file fails; what came until then is in the file.
-pub fn record<P: Read + Write>(cable: &mut Cable<P>, file: &Path, seconds: f64) -> Result<Recorded, CableError> {
-    let mut tape = Tape::create(file).map_err(CableError::Log)?;
-    cable.command("w 1").map_err(CableError::Port)?;
+/// The device is silent, or the port or the file fails. The bursts that came until then are in the file.
+pub fn record<P: Read + Write>(
+    link: &mut SerialLink<P>,
+    file: &Path,
+    seconds: f64,
+) -> Result<SerialRecordingSummary, SerialRecordingError> {
+    let mut recorder = RawStreamRecorder::create(file).map_err(SerialRecordingError::Log)?;
+    link.send_command("w 1").map_err(SerialRecordingError::Port)?;
     let outcome = loop {
-        if tape.seconds() >= seconds {
+        if recorder.seconds() >= seconds {
             break Ok(());
         }
-        let deadline = Instant::now() + SILENCE;
-        match next_raw(cable, deadline) {
-            Ok(Some(raw)) => tape.write(&raw).map_err(CableError::Log)?,
-            Ok(None) => break Err(CableError::Silent(tape.bursts)),
-            Err(error) => break Err(CableError::Port(error)),
+        match next_raw(link, Instant::now() + MAX_SILENCE) {
+            Ok(Some(raw)) => recorder.write(&raw).map_err(SerialRecordingError::Log)?,
+            Ok(None) => break Err(SerialRecordingError::Silent(recorder.bursts)),
+            Err(error) => break Err(SerialRecordingError::Port(error)),
         }
     };
-    // A device that hung up cannot be told any more.
-    let _ = cable.command("w 0");
-    let (bursts, missing) = (tape.bursts, tape.missing());
-    tape.finish().map_err(CableError::Log)?;
-    outcome.map(|()| Recorded { bursts, missing, counters: cable.counters() })
+    // A device that has disconnected cannot be told; the outcome says so already.
+    let _ = link.send_command("w 0");
+    let (bursts, missing) = (recorder.bursts, recorder.missing());
+    recorder.finish().map_err(SerialRecordingError::Log)?;
+    outcome.map(|()| SerialRecordingSummary { bursts, missing, counters: link.counters() })
 }
 
-fn next_raw<P: Read + Write>(cable: &mut Cable<P>, deadline: Instant) -> io::Result<Option<RawMessage>> {
-    while let Some(received) = cable.next(Some(deadline))? {
+fn next_raw<P: Read + Write>(link: &mut SerialLink<P>, deadline: Instant) -> io::Result<Option<RawMessage>> {
+    while let Some(received) = link.next(Some(deadline))? {
         if let Received::Message { message: Message::Raw(raw), .. } = received {
             return Ok(Some(raw));
         }
@@ -140,29 +143,30 @@ fn next_raw<P: Read + Write>(cable: &mut Cable<P>, deadline: Instant) -> io::Res
     Ok(None)
 }
 
-/// A frame log that is written from the raw stream.
-pub struct Tape {
-    log: FrameLog,
+/// Writes the raw stream of a device to a frame log.
+pub struct RawStreamRecorder {
+    log: FrameLogWriter,
+    /// Register SENS_AVG as last written to the log.
     sens_avg: Option<u16>,
     bursts: u64,
-    /// Number and time of the first and the last burst.
+    /// Sample number and time in µs of the first and the last burst.
     span: Option<[(u64, u64); 2]>,
 }
 
-impl Tape {
+impl RawStreamRecorder {
     /// Creates the log.
     ///
     /// # Errors
-    /// As the operating system answers.
+    /// The file cannot be created.
     pub fn create(file: &Path) -> io::Result<Self> {
-        Ok(Self { log: FrameLog::create(file)?, sens_avg: None, bursts: 0, span: None })
+        Ok(Self { log: FrameLogWriter::create(file)?, sens_avg: None, bursts: 0, span: None })
     }
 
-    /// Adds the bursts of one message, each at the time of its data-ready edge. Where the range changes, and at the
-    /// start, the write to SENS_AVG that set it is put in front, so that a replay knows it.
+    /// Adds the bursts of one message, each at the time of its data-ready edge. At the start and where SENS_AVG changes, a
+    /// frame that writes it comes first, from which a replay takes the gyroscopes' range.
     ///
     /// # Errors
-    /// As the operating system answers.
+    /// The file cannot be written.
     pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
         let (mut number, mut at_us) = (raw.first, raw.at_us);
         if self.sens_avg.replace(raw.sens_avg) != Some(raw.sens_avg) {
@@ -185,7 +189,7 @@ impl Tape {
     /// Writes what is buffered and closes the log.
     ///
     /// # Errors
-    /// As the operating system answers.
+    /// The file cannot be written.
     pub fn finish(self) -> io::Result<()> {
         self.log.finish()
     }
@@ -195,7 +199,7 @@ impl Tape {
         self.span.map_or(0.0, |[(_, first), (_, last)]| seconds(last.saturating_sub(first)))
     }
 
-    /// Sample periods of which no burst came.
+    /// Sample periods between the first and the last burst of which no burst came.
     pub fn missing(&self) -> u64 {
         self.span.map_or(0, |[(first, _), (last, _)]| (last.saturating_sub(first) + 1).saturating_sub(self.bursts))
     }

@@ -1,7 +1,7 @@
 //! The emulated bus with a frame log of every transaction.
 
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
-use recordings::frame_log::{Frame, FrameLog};
+use recordings::frame_log::{Frame, FrameLogWriter};
 use std::cell::RefCell;
 use std::io;
 use std::rc::Rc;
@@ -11,7 +11,7 @@ use virtual_sensor::EmulatedBus;
 #[derive(Debug)]
 pub(crate) struct LoggedBus {
     bus: EmulatedBus,
-    log: Rc<RefCell<FrameLog>>,
+    log: Rc<RefCell<FrameLogWriter>>,
     failure: Rc<RefCell<Option<io::Error>>>,
     frame: Frame,
 }
@@ -28,7 +28,7 @@ impl Error for LoggedBusError {
 
 impl LoggedBus {
     /// Logs the transactions of `bus` to `log`.
-    pub(crate) fn new(bus: EmulatedBus, log: Rc<RefCell<FrameLog>>) -> Self {
+    pub(crate) fn new(bus: EmulatedBus, log: Rc<RefCell<FrameLogWriter>>) -> Self {
         Self { bus, log, failure: Rc::default(), frame: Frame::default() }
     }
 

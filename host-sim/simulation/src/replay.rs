@@ -5,9 +5,9 @@
 
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
-use recordings::csv::Rows;
-use recordings::frame_log::{Frame, Frames};
-use recordings::recording::{Clock, Recorder, Recording};
+use recordings::count_table::CountTable;
+use recordings::frame_log::{Frame, FrameLogReader};
+use recordings::recording::{Recorder, Recording, TimeStamp};
 use recordings::{InputError, Reason};
 use std::cell::RefCell;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub struct Replay {
 /// # Errors
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
 pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    if recordings::is_frame_log(file)? { replay_log(file, range) } else { replay_table(file, range) }
+    if recordings::frame_log::is_frame_log(file)? { replay_log(file, range) } else { replay_table(file, range) }
 }
 
 /// Replays a table of counts: every row as the burst that the part would have sent.
@@ -35,14 +35,14 @@ pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
 /// # Errors
 /// As [`replay`].
 pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    let mut rows = Rows::open(file)?;
+    let mut rows = CountTable::open(file)?;
     let mut recorder = Recorder::new(rows.channels(), range);
     let mut player = Player::new();
     while let Some(row) = rows.next()? {
         let answer = Burst::from_counts(&row.counts).to_bytes();
         let burst =
             player.burst(&BURST_REQUEST, &answer).map_err(|reason| InputError::line(file, rows.line(), reason))?;
-        recorder.push(row.clock, &burst);
+        recorder.push(row.time_stamp, &burst);
     }
     Ok(Replay { recording: recorder.finish(), other_transactions: 0 })
 }
@@ -52,7 +52,7 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
 /// # Errors
 /// As [`replay`], or the log has no burst.
 pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    let mut frames = Frames::open(file)?;
+    let mut frames = FrameLogReader::open(file)?;
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
     let mut player = Player::new();
     let mut bursts = 0u64;
@@ -62,7 +62,7 @@ pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
             let burst = player
                 .burst(&frame.mosi, &frame.miso)
                 .map_err(|reason| InputError::line(file, frames.line(), reason))?;
-            recorder.push(Clock::at(frame.time_s), &burst);
+            recorder.push(TimeStamp::from_time(frame.time_s), &burst);
             bursts += 1;
         } else {
             other_transactions += 1;

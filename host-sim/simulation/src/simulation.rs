@@ -6,8 +6,8 @@ use embedded_hal::spi::SpiDevice;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::Exp1;
-use recordings::frame_log::FrameLog;
-use recordings::recording::{Clock, Recorder, Recording};
+use recordings::frame_log::FrameLogWriter;
+use recordings::recording::{Recorder, Recording, TimeStamp};
 use std::cell::RefCell;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -148,7 +148,7 @@ impl Simulation {
     pub fn run_logged(&self, file: &Path, progress: impl FnMut(u64)) -> Result<Recording, SimulationError> {
         let samples = self.samples()?;
         let fail = |reason| SimulationError::Log { file: file.to_owned(), reason };
-        let log = Rc::new(RefCell::new(FrameLog::create(file).map_err(fail)?));
+        let log = Rc::new(RefCell::new(FrameLogWriter::create(file).map_err(fail)?));
         let bus = self.bus();
         let logged = LoggedBus::new(bus.clone(), Rc::clone(&log));
         let failure = logged.failure();
@@ -185,7 +185,7 @@ impl Simulation {
             let ready_ns = bus.wait_for_data().ok_or(SimulationError::Silent(taken))?;
             if let Some(time_s) = stamps.next(ready_ns) {
                 let burst = driver.burst().map_err(|e| SimulationError::Driver(e.to_string()))?;
-                recorder.push(Clock::at(time_s), &burst);
+                recorder.push(TimeStamp::from_time(time_s), &burst);
             }
         }
         progress(samples);

@@ -197,7 +197,7 @@ fn samples_go_missing_repeat_and_come_at_another_rate() {
     assert!(stale.samples.iter().all(|sample| !sample.faults.contains(Faults::NO_NEW_DATA)));
 
     let fast = record(NoiseModel::noiseless(), vec![InjectedEffect::SampleClock { ratio: 1.001 }], 20.0);
-    let time = |at: usize| fast.samples[at].clock.time_s.unwrap();
+    let time = |at: usize| fast.samples[at].time_stamp.time_s.unwrap();
     assert!(((time(4095) - time(0)) * 204.8 * 1.001 / 4095.0 - 1.0).abs() < 1e-8);
 }
 

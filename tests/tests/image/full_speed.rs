@@ -6,9 +6,9 @@ use crate::{image, sensor, stack_suffices};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
 use link::Message;
 use noise_analysis::analysis::analyze;
-use recordings::frame_log::{Frame, FrameLog};
-use recordings::serial::Tape;
-use recordings::timeline::measurement;
+use recordings::frame_log::{Frame, FrameLogWriter};
+use recordings::serial::RawStreamRecorder;
+use recordings::time_base::measurement;
 use simulation::replay_log;
 use std::path::Path;
 
@@ -109,7 +109,7 @@ fn a_recording_off_the_cable_analyses_to_the_identical_report(decoded: &Decoded,
         serde_json::to_string(&analyze(&measurement)).expect("a report")
     };
     let cable = folder.path().join("cable.csv");
-    let mut tape = Tape::create(&cable).expect("a log");
+    let mut tape = RawStreamRecorder::create(&cable).expect("a log");
     for message in &decoded.messages {
         if let Message::Raw(raw) = message {
             tape.write(raw).expect("room");
@@ -119,7 +119,7 @@ fn a_recording_off_the_cable_analyses_to_the_identical_report(decoded: &Decoded,
     let recorded = decoded.raw().len();
     tape.finish().expect("room");
     let sensor = folder.path().join("sensor.csv");
-    let mut log = FrameLog::create(&sensor).expect("a log");
+    let mut log = FrameLogWriter::create(&sensor).expect("a log");
     for (sample, bytes) in &bursts[..recorded] {
         let frame = Frame { time_s: *sample as f64 / RATE_HZ, mosi: BURST_REQUEST.to_vec(), miso: bytes.to_vec() };
         log.write(&frame).expect("room");

@@ -6,7 +6,7 @@ use super::truth::{detects_known_waveform, true_model_errors};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, Report};
-use recordings::timeline::{TimelineError, measurement};
+use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
 use simulation::SimulationError;
 use virtual_sensor::InjectedEffect;
@@ -41,7 +41,7 @@ pub enum ScoreError {
         /// Seed of the recording.
         seed: u64,
         /// The cause.
-        reason: TimelineError,
+        reason: TimeBaseError,
     },
 }
 
@@ -119,7 +119,7 @@ pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreEr
     recording.channels.retain(|channel| RECORDED.contains(channel));
     let measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
     let report = analyze(&measurement);
-    let begin_s = recording.samples.first().and_then(|sample| sample.clock.time_s).unwrap_or(0.0);
+    let begin_s = recording.samples.first().and_then(|sample| sample.time_stamp.time_s).unwrap_or(0.0);
     let mut score = compare(drawn, &report, begin_s);
     let effects = &drawn.simulation.scenario.effects;
     if let ([answer], [effect]) = (&mut score.answers[..], &effects[..]) {

@@ -15,7 +15,7 @@ use noise_analysis::detectors::block_means::NoiseGrids;
 use noise_analysis::detectors::gls_regression::GlsRegression;
 use noise_analysis::series::Series;
 use noise_analysis::{OCTAVES, OVERLAP};
-use recordings::recording::Sample;
+use recordings::recording::RecordedSample;
 use simulation::output_register;
 use simulation::{SAMPLE_RATE_HZ, Simulation, SimulationError};
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister, SensorScenario};
@@ -62,7 +62,7 @@ pub(super) fn true_model_errors(
     };
     let recording = Simulation { scenario: hidden, ..drawn.simulation.clone() }.run(|_| ())?;
     let (first, second) = recording.samples.split_at(recording.samples.len() / 2);
-    let curve = |samples: &[Sample]| curve(samples, channel, recording.range);
+    let curve = |samples: &[RecordedSample]| curve(samples, channel, recording.range);
     let mut kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
     kinds.dedup();
     let fitted = fit_shapes(&curve(first), &kinds);
@@ -116,7 +116,7 @@ fn term(effect: &InjectedEffect) -> Option<FittedTerm> {
     Some(FittedTerm::exact(kind, value))
 }
 
-fn curve(samples: &[Sample], channel: Channel, range: GyroRange) -> allan_core::Curve<OCTAVES> {
+fn curve(samples: &[RecordedSample], channel: Channel, range: GyroRange) -> allan_core::Curve<OCTAVES> {
     let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
     for sample in samples {
         cascade.push(i32::from(sample.counts.get(channel)));
@@ -157,7 +157,7 @@ mod tests {
             let mut simulation = DrawnRecording::from_group(RecordingGroup::Nothing, 100.0, 3).simulation;
             simulation.scenario.effects = vec![effect.clone()];
             let recording = simulation.run(|_| ()).unwrap();
-            detects_known_waveform(effect, &recordings::timeline::measurement(&recording, None).unwrap(), 0.2)
+            detects_known_waveform(effect, &recordings::time_base::measurement(&recording, None).unwrap(), 0.2)
         };
         let channel = OutputRegister::GyroX;
         let step = |size: f64| InjectedEffect::BiasStep { channel, time_s: 50.0, size };

@@ -35,7 +35,7 @@ impl Case {
 
     fn of(simulation: Simulation) -> Self {
         let recording = simulation.run(|_| ()).unwrap();
-        Self { measurement: recordings::timeline::measurement(&recording, None).unwrap() }
+        Self { measurement: recordings::time_base::measurement(&recording, None).unwrap() }
     }
 
     fn series(&self, channel: Channel) -> Series {

@@ -1,11 +1,9 @@
-//! What the tests of the command line share.
-
-#![allow(dead_code, reason = "each test file uses a part of it")]
+//! Runs the program and writes its input files.
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
@@ -24,29 +22,16 @@ pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     bytes
 }
 
-/// Puts a file into a folder.
+/// Writes a file into a temporary folder.
 pub(crate) fn write(dir: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
     let path = dir.path().join(name);
     std::fs::write(&path, bytes).expect("written");
     path
 }
 
-/// Compresses.
+/// `bytes` as a gzip stream.
 pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).expect("memory");
     encoder.finish().expect("memory")
-}
-
-/// A measured recording, or `None`, with a word why, where there is none.
-pub(crate) fn recording(test: &str, name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("ADIS_RECORDINGS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    let file = folder.join(name);
-    if file.exists() {
-        return Some(file);
-    }
-    // Not by a macro, which the test harness would hide.
-    writeln!(std::io::stderr(), "skipped {test}: {} is absent (set ADIS_RECORDINGS)", file.display()).expect("stderr");
-    None
 }

@@ -1,14 +1,12 @@
-//! A recording gives the same report whether its counts are read or its bursts are replayed.
+//! A recording gives the same report whether its counts are read or its bursts are replayed over the emulated bus.
 
-mod common;
-
-use common::{gzip, host_sim, json_of, write};
-use recordings::frame_log::{Frame, FrameLog, Frames};
+use crate::program::{self, gzip, host_sim, json_of, write};
+use recordings::frame_log::{Frame, FrameLogReader, FrameLogWriter};
 use std::fmt::Write;
 use std::path::Path;
 use tempfile::tempdir;
 
-/// Counts that fill their fields; a linear congruential generator, so that the test needs no other.
+/// A table of pseudo-random counts that fill their register fields, from a linear congruential generator.
 fn noise(rows: usize, clock: &str, columns: &[&str]) -> String {
     let mut text = format!("{clock}{}\n", columns.join(","));
     let mut state = 12_345u64;
@@ -33,6 +31,7 @@ fn noise(rows: usize, clock: &str, columns: &[&str]) -> String {
     text
 }
 
+/// The JSON report of `analyze`, after checking that `replay` prints and writes the same.
 fn same_both_ways(file: &Path, rate: &[&str]) -> Vec<u8> {
     let dir = tempdir().expect("a folder");
     let file = file.to_str().expect("UTF-8");
@@ -45,7 +44,7 @@ fn same_both_ways(file: &Path, rate: &[&str]) -> Vec<u8> {
 }
 
 #[test]
-fn tables_of_every_kind() {
+fn tables_of_any_columns_compression_and_line_ends_give_the_same_report() {
     let dir = tempdir().expect("a folder");
     let all = "supply,gyro_x,gyro_y,gyro_z,accl_x,accl_y,accl_z,magn_x,magn_y,magn_z,temp,aux_adc";
     let all: Vec<String> = all.split(',').map(|c| format!("{c}_counts")).collect();
@@ -66,29 +65,31 @@ fn tables_of_every_kind() {
     }
 }
 
-#[test]
-fn the_real_recordings() {
-    for (name, rate) in
-        [("adis16405-burst/launch10.csv.gz", &[][..]), ("adis16405-static/run1.csv.gz", &["--rate", "100"])]
-    {
-        let Some(file) = common::recording("the_real_recordings", name) else {
-            continue;
-        };
-        let json = String::from_utf8(same_both_ways(&file, rate)).expect("UTF-8");
-        let report: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-        if name.contains("launch10") {
-            assert_eq!(report["flagged"]["repeated"], 45);
-            assert_eq!(report["dropped"]["gap"], 15);
-            assert_eq!(report["samples"], 49_425);
-        } else {
-            assert_eq!(report["samples"], 1_000_000);
-            assert_eq!(report["dropped"], serde_json::json!({"gap": 0}));
-        }
-    }
+fn measured_report(test: &str, file: &str, rate: &[&str]) -> Option<serde_json::Value> {
+    let json = same_both_ways(&system_tests::recording(test, file)?, rate);
+    Some(serde_json::from_slice(&json).expect("JSON"))
 }
 
 #[test]
-fn what_is_recorded_replays() {
+fn the_measured_burst_recording_has_the_same_report() {
+    let test = "the_measured_burst_recording_has_the_same_report";
+    let Some(report) = measured_report(test, "adis16405-burst/launch10.csv.gz", &[]) else { return };
+    assert_eq!(report["flagged"]["repeated"], 45);
+    assert_eq!(report["dropped"]["gap"], 15);
+    assert_eq!(report["samples"], 49_425);
+}
+
+#[test]
+#[ignore = "long: 70 s; run with --long"]
+fn the_measured_long_recording_has_the_same_report() {
+    let test = "the_measured_long_recording_has_the_same_report";
+    let Some(report) = measured_report(test, "adis16405-static/run1.csv.gz", &["--rate", "100"]) else { return };
+    assert_eq!(report["samples"], 1_000_000);
+    assert_eq!(report["dropped"], serde_json::json!({"gap": 0}));
+}
+
+#[test]
+fn a_recorded_simulation_replays_to_the_same_report() {
     let dir = tempdir().expect("a folder");
     for name in ["log.csv", "log.csv.gz"] {
         let log = dir.path().join(name);
@@ -111,7 +112,7 @@ fn dropped(report: &serde_json::Value) -> u64 {
 }
 
 #[test]
-fn frames_round_trip() {
+fn frames_are_read_back_as_written() {
     let dir = tempdir().expect("a folder");
     let frames: Vec<Frame> = [0.0, 1e-9, 0.1 + 0.2, 1.0 / 3.0, 123_456_789.123_456_79, 1e300]
         .into_iter()
@@ -124,12 +125,12 @@ fn frames_round_trip() {
         .collect();
     for name in ["frames", "frames.gz"] {
         let file = dir.path().join(name);
-        let mut log = FrameLog::create(&file).expect("created");
+        let mut log = FrameLogWriter::create(&file).expect("created");
         for frame in &frames {
             log.write(frame).expect("written");
         }
         log.finish().expect("closed");
-        let mut reader = Frames::open(&file).expect("opened");
+        let mut reader = FrameLogReader::open(&file).expect("opened");
         for frame in &frames {
             assert_eq!(reader.next().expect("a line").as_ref(), Some(frame));
         }
@@ -138,7 +139,7 @@ fn frames_round_trip() {
 }
 
 #[test]
-fn the_log_names_the_range() {
+fn the_gyro_range_is_read_from_the_log() {
     // SENS_AVG is at 0x38, its upper byte at 0x39; 0b001 is ±75 deg/s (data sheet).
     let dir = tempdir().expect("a folder");
     let burst = |count: u16| {
@@ -148,7 +149,7 @@ fn the_log_names_the_range() {
     let rows: String = (0..8).map(|i| format!("{}.5,{}\n", i + 1, burst(i * i))).collect();
     let log = |write: &str| format!("time_s,mosi,miso\n{write}{rows}");
     let adev = |text: &str| {
-        let file = common::write(&dir, "log.csv", text.as_bytes());
+        let file = program::write(&dir, "log.csv", text.as_bytes());
         let report = json_of(&dir, &["replay", file.to_str().expect("UTF-8")]);
         let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
         let gyro = report["channels"][1].clone();

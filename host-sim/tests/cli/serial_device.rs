@@ -1,17 +1,18 @@
-//! The command line at the end of a cable: a pseudo-terminal with the firmware's application behind it.
+//! The command on a serial port: a pseudo-terminal that the firmware's application serves.
 
+use crate::program::host_sim;
 use serialport::{SerialPort, TTYPort};
 use simulation::Device;
 use std::io::{ErrorKind, Read, Write};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// Runs `host-sim` with these arguments, `PORT` replaced by that of a device whose time goes ten times as fast and whose
-/// line has noise on it now and then.
+/// Runs `host-sim` with these arguments, `PORT` replaced by the port of a simulated device. The device runs faster than real
+/// time and sends bytes that are no message once a second of its time.
 fn with_device(arguments: &[&str]) -> Output {
     let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
     let port = far.name().expect("a name");
@@ -31,20 +32,21 @@ fn with_device(arguments: &[&str]) -> Output {
             if now_us % 1_000_000 == 0 {
                 sent.extend(b"\xFFnoise\xFE\0");
             }
-            // Nobody may be listening any more.
+            // The program may have closed the port.
             let _ = near.write_all(&sent);
         }
     });
-    let arguments = arguments.iter().map(|&argument| if argument == "PORT" { port.as_str() } else { argument });
-    let output = Command::new(env!("CARGO_BIN_EXE_host-sim")).args(arguments).output().expect("host-sim runs");
+    let with_port = |&argument: &&str| if argument == "PORT" { port.clone() } else { argument.to_owned() };
+    let arguments: Vec<String> = arguments.iter().map(with_port).collect();
+    let output = host_sim(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
     over.store(true, Relaxed);
-    device.join().expect("the device goes on");
+    device.join().expect("the device did not panic");
     drop(far);
     output
 }
 
 #[test]
-fn the_monitor_shows_reports_and_counts_noise() {
+fn the_monitor_shows_reports_and_counts_damaged_messages() {
     let output = with_device(&["monitor", "PORT", "--seconds", "3", "--send", "i 2", "--send", "?"]);
     let text = String::from_utf8(output.stdout).expect("text");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -58,16 +60,15 @@ fn the_monitor_shows_reports_and_counts_noise() {
 }
 
 #[test]
-fn a_recording_off_the_cable_is_analysed_and_replayed_alike() {
+fn a_recording_of_a_device_and_its_replay_have_the_same_report() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a name").to_owned();
-    let (log, first, second) = (path("cable.csv.gz"), path("first.json"), path("second.json"));
+    let (log, first, second) = (path("device.csv.gz"), path("first.json"), path("second.json"));
     let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "--json", &first]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     assert!(errors.contains(" 0 missing between them") && errors.contains(" 0 missing by their numbers"), "{errors}");
-    let replay = Command::new(env!("CARGO_BIN_EXE_host-sim")).args(["replay", &log, "--json", &second]).output();
-    assert!(replay.expect("host-sim runs").status.success());
+    assert!(host_sim(&["replay", &log, "--json", &second]).status.success());
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a report"));
     assert_eq!(first, second);
     let report: serde_json::Value = serde_json::from_str(&first).expect("JSON");
@@ -78,11 +79,11 @@ fn a_recording_off_the_cable_is_analysed_and_replayed_alike() {
 }
 
 #[test]
-fn a_port_that_is_none_is_named() {
+fn the_error_names_a_port_that_does_not_exist() {
     for arguments in
         [&["monitor", "/dev/no-such-port"][..], &["record", "/tmp/never.csv", "--port", "/dev/no-such-port"]]
     {
-        let output = Command::new(env!("CARGO_BIN_EXE_host-sim")).args(arguments).output().expect("host-sim runs");
+        let output = host_sim(arguments);
         assert!(!output.status.success());
         assert!(String::from_utf8_lossy(&output.stderr).contains("/dev/no-such-port"));
     }

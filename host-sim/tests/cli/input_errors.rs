@@ -1,8 +1,6 @@
-//! Every kind of bad input ends in one line that names the place and the reason, with exit status 1 and no panic.
+//! Bad input ends in one line that names the place and the reason, with exit status 1 and no panic.
 
-mod common;
-
-use common::{gzip, host_sim, write};
+use crate::program::{gzip, host_sim, write};
 use std::path::Path;
 use std::process::Output;
 use tempfile::tempdir;
@@ -14,13 +12,13 @@ fn error_line(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(!stderr.contains("panicked"), "{stderr}");
     assert_eq!(stderr.lines().count(), 1, "one line: {stderr}");
-    assert!(output.stdout.is_empty(), "no half report: {}", String::from_utf8_lossy(&output.stdout));
+    assert!(output.stdout.is_empty(), "a report is printed: {}", String::from_utf8_lossy(&output.stdout));
     let line = stderr.trim_end().to_owned();
     assert!(line.starts_with("error: "), "{line}");
     line
 }
 
-/// Runs both ways over `file` and checks that both name every one of `names` (`replay` and `analyze` read alike).
+/// Checks that `analyze` and `replay` both refuse `file` with a line that contains its name and each of `names`.
 fn refuses(file: &Path, rate: &[&str], names: &[&str]) {
     for command in ["analyze", "replay"] {
         let arguments = [&[command, file.to_str().expect("UTF-8")], rate].concat();
@@ -33,7 +31,7 @@ fn refuses(file: &Path, rate: &[&str], names: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_tables() {
+fn files_that_are_no_tables_are_refused() {
     let dir = tempdir().expect("a folder");
     refuses(&dir.path().join("missing.csv"), &[], &["No such file"]);
     refuses(dir.path(), &[], &["directory"]);
@@ -45,7 +43,7 @@ fn files_that_are_no_tables() {
 }
 
 #[test]
-fn headers() {
+fn wrong_headers_are_refused() {
     let dir = tempdir().expect("a folder");
     refuses(&write(&dir, "none.csv", b"a,b\n1,2\n"), &[], &["line 1", "no known column", "gyro_x_counts"]);
     refuses(&write(&dir, "clock.csv", b"time_s\n0\n"), &[], &["line 1", "no known column"]);
@@ -62,7 +60,7 @@ fn headers() {
 }
 
 #[test]
-fn fields() {
+fn wrong_fields_are_refused_with_their_line_and_column() {
     let dir = tempdir().expect("a folder");
     for (name, row, reasons) in [
         ("text.csv", "abc,1", ["column gyro_x_counts", "\"abc\" is not a whole number"]),
@@ -77,7 +75,7 @@ fn fields() {
     ] {
         let file = write(&dir, name, format!("{GOOD}\n{row}\n").as_bytes());
         refuses(&file, &["--rate", "100"], &[&["line 8"], reasons.as_slice()].concat());
-        // With the line ends of another system the line is the same.
+        // CR LF line ends do not change the line number.
         let file = write(&dir, name, format!("{GOOD}\n{row}\n").replace('\n', "\r\n").as_bytes());
         refuses(&file, &["--rate", "100"], &[&["line 8"], reasons.as_slice()].concat());
     }
@@ -87,7 +85,7 @@ fn fields() {
 }
 
 #[test]
-fn clocks() {
+fn time_stamps_that_decrease_or_are_no_numbers_are_refused() {
     let dir = tempdir().expect("a folder");
     for (name, clock, rows, reason) in [
         ("back.csv", "time_s", ["0.0", "0.2", "0.1"], "time 0.1 s is before 0.2 s"),
@@ -105,7 +103,7 @@ fn clocks() {
 }
 
 #[test]
-fn gzip_streams() {
+fn damaged_gzip_streams_are_refused() {
     let dir = tempdir().expect("a folder");
     let rows: String = (0..20_000).map(|i| format!("{}\n", i * 7919 % 8000)).collect();
     let whole = gzip(format!("gyro_x_counts\n{rows}").as_bytes());
@@ -118,13 +116,13 @@ fn gzip_streams() {
     flipped[middle] ^= 0xFF;
     let flipped = write(&dir, "flipped.csv.gz", &flipped);
     refuses(&flipped, &["--rate", "100"], &["line "]);
-    // Plain text under a gzip name is read by what it is.
+    // Plain text in a file named .gz is read as plain text.
     let plain = write(&dir, "plain.csv.gz", GOOD.as_bytes());
     assert!(host_sim(&["analyze", plain.to_str().expect("UTF-8"), "--rate", "100"]).status.success());
 }
 
 #[test]
-fn rates_and_lengths() {
+fn impossible_rates_and_short_records_are_refused() {
     let dir = tempdir().expect("a folder");
     let good = write(&dir, "good.csv", GOOD.as_bytes());
     for rate in ["0", "-100", "NaN", "inf"] {
@@ -138,7 +136,7 @@ fn rates_and_lengths() {
 }
 
 #[test]
-fn frame_logs() {
+fn wrong_frame_logs_are_refused() {
     let dir = tempdir().expect("a folder");
     let burst = "3E".to_owned() + &"0".repeat(50);
     for (name, row, reasons) in [
@@ -164,7 +162,7 @@ fn frame_logs() {
 }
 
 #[test]
-fn simulations_and_outputs() {
+fn impossible_durations_and_outputs_are_refused() {
     let dir = tempdir().expect("a folder");
     let log = dir.path().join("log.csv");
     let log = log.to_str().expect("UTF-8");
@@ -182,7 +180,7 @@ fn simulations_and_outputs() {
 }
 
 #[test]
-fn wrong_usage_is_told_apart() {
+fn wrong_usage_has_exit_status_2() {
     assert_eq!(host_sim(&["analyze"]).status.code(), Some(2));
     assert_eq!(host_sim(&["measure"]).status.code(), Some(2));
     assert_eq!(host_sim(&["analyze", "x.csv", "--rate", "fast"]).status.code(), Some(2));

@@ -1,10 +1,14 @@
-//! Tables of register counts: one row a sample, one column a channel.
+//! Tables of register counts in CSV: one row a sample, one column a channel.
 
-use super::table::{self, Table};
-use super::{InputError, Reason, frame_log};
-use crate::recording::{Clock, NOT_RECORDED, Recorder, Recording};
+use crate::delimited_text::{self, Lines};
+use crate::frame_log;
+use crate::input_error::{InputError, Reason};
+use crate::recording::{NOT_RECORDED, Recorder, Recording, TimeStamp};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use std::path::{Path, PathBuf};
+
+/// Endings of the names of tables.
+const ENDINGS: [&str; 2] = [".csv", ".csv.gz"];
 
 /// Suffix of every column that holds counts.
 const COUNTS: &str = "_counts";
@@ -19,50 +23,68 @@ enum Column {
 
 /// Reads a table, plain or gzip, into a recording whose rates were taken in `range`.
 ///
-/// The header names the columns: `<channel>_counts` for any of the twelve channels in any order, and the optional clocks
+/// The header names the columns: `<channel>_counts` for any of the twelve channels in any order, and the optional time stamps
 /// `sample` (an index that grows by one a sample) and `time_s`.
 ///
 /// # Errors
-/// The file cannot be read, or does not hold what its header promises.
+/// The file cannot be read, the header has an unknown column or no channel, or a row does not have one field in range for
+/// each column.
 pub fn read(file: &Path, range: GyroRange) -> Result<Recording, InputError> {
-    let mut rows = Rows::open(file)?;
-    let mut recorder = Recorder::new(rows.channels(), range);
-    while let Some(row) = rows.next()? {
-        recorder.push(row.clock, &Burst::from_counts(&row.counts));
+    let mut table = CountTable::open(file)?;
+    let mut recorder = Recorder::new(table.channels(), range);
+    while let Some(row) = table.next()? {
+        recorder.push(row.time_stamp, &Burst::from_counts(&row.counts));
     }
     Ok(recorder.finish())
 }
 
+/// The tables in the folder `path` in the order of their names; `path` itself if it is no folder.
+///
+/// # Errors
+/// The folder cannot be read, or no name in it ends in `.csv` or `.csv.gz`.
+pub fn tables_in(path: &Path) -> Result<Vec<PathBuf>, InputError> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let fail = |error| InputError::file(path, Reason::Io(error));
+    let entries: Result<Vec<PathBuf>, _> =
+        path.read_dir().map_err(fail)?.map(|entry| entry.map(|entry| entry.path())).collect();
+    let is_table = |file: &PathBuf| ENDINGS.iter().any(|ending| file.to_string_lossy().ends_with(ending));
+    let mut tables: Vec<PathBuf> = entries.map_err(fail)?.into_iter().filter(is_table).collect();
+    tables.sort();
+    if tables.is_empty() { Err(InputError::file(path, Reason::NoTables)) } else { Ok(tables) }
+}
+
 /// One row of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
-    /// When it was taken.
-    pub clock: Clock,
-    /// Inside their fields; channels that the table lacks are as in [`NOT_RECORDED`].
+pub struct CountRow {
+    /// When the sample was taken.
+    pub time_stamp: TimeStamp,
+    /// In the range of their register fields; channels that the table lacks are as in [`NOT_RECORDED`].
     pub counts: Counts,
 }
 
 /// An open table, read row by row.
-pub struct Rows {
+pub struct CountTable {
     file: PathBuf,
-    table: Table,
+    lines: Lines,
     columns: Vec<Column>,
     line: u64,
-    last: Option<Clock>,
+    last: Option<TimeStamp>,
 }
 
-impl Rows {
+impl CountTable {
     /// Opens a table and reads its header.
     ///
     /// # Errors
     /// As [`read`].
     pub fn open(file: &Path) -> Result<Self, InputError> {
-        let mut table = Table::open(file)?;
-        let Some((line, header)) = table.next()? else {
+        let mut lines = Lines::open(file)?;
+        let Some((line, header)) = lines.next()? else {
             return Err(InputError::file(file, Reason::Empty));
         };
         let columns = columns(file, line, header)?;
-        Ok(Self { file: file.to_owned(), table, columns, line, last: None })
+        Ok(Self { file: file.to_owned(), lines, columns, line, last: None })
     }
 
     /// The channels that the table has, in the order of the burst.
@@ -82,19 +104,19 @@ impl Rows {
     /// # Errors
     /// As [`read`].
     #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
-    pub fn next(&mut self) -> Result<Option<Row>, InputError> {
-        let Some((line, text)) = self.table.next()? else {
+    pub fn next(&mut self) -> Result<Option<CountRow>, InputError> {
+        let Some((line, text)) = self.lines.next()? else {
             return match self.last {
                 Some(_) => Ok(None),
                 None => Err(InputError::file(&self.file, Reason::NoData)),
             };
         };
         let checked =
-            row(&self.columns, text).and_then(|row| follows(self.last.unwrap_or_default(), row.clock).map(|()| row));
+            row(&self.columns, text).and_then(|row| order(self.last.unwrap_or_default(), row.time_stamp).map(|()| row));
         match checked {
             Ok(row) => {
                 self.line = line;
-                self.last = Some(row.clock);
+                self.last = Some(row.time_stamp);
                 Ok(Some(row))
             }
             Err((Some(column), reason)) => Err(InputError::field(&self.file, line, &column.name(), reason)),
@@ -103,11 +125,11 @@ impl Rows {
     }
 }
 
-/// A column, where one is at fault, and the reason.
-type Fault = (Option<Column>, Reason);
+/// The column, where one is at fault, and the reason.
+type ColumnFault = (Option<Column>, Reason);
 
 impl Column {
-    fn of(name: &str) -> Option<Self> {
+    fn from_name(name: &str) -> Option<Self> {
         match name {
             "sample" => Some(Self::Index),
             "time_s" => Some(Self::Time),
@@ -138,14 +160,14 @@ fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputErr
     if header == frame_log::HEADER {
         return Err(InputError::line(file, line, Reason::FrameLog));
     }
-    let names: Vec<&str> = header.split(',').map(table::field).collect();
-    if !names.iter().any(|name| Column::of(name).is_some_and(|c| c.channel().is_some())) {
+    let names: Vec<&str> = header.split(',').map(delimited_text::field).collect();
+    if !names.iter().any(|name| Column::from_name(name).is_some_and(|c| c.channel().is_some())) {
         return Err(InputError::line(file, line, Reason::NoChannel));
     }
     let mut columns = Vec::with_capacity(names.len());
     for name in names {
-        let fail = |reason| InputError::field(file, line, &table::quote(name), reason);
-        let column = Column::of(name).ok_or_else(|| fail(Reason::UnknownColumn))?;
+        let fail = |reason| InputError::field(file, line, &delimited_text::quote(name), reason);
+        let column = Column::from_name(name).ok_or_else(|| fail(Reason::UnknownColumn))?;
         if columns.contains(&column) {
             return Err(fail(Reason::DuplicateColumn));
         }
@@ -154,18 +176,18 @@ fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputErr
     Ok(columns)
 }
 
-fn row(columns: &[Column], text: &str) -> Result<Row, Fault> {
-    let mut clock = Clock::default();
+fn row(columns: &[Column], text: &str) -> Result<CountRow, ColumnFault> {
+    let mut time_stamp = TimeStamp::default();
     let mut counts = NOT_RECORDED;
-    let mut fields = text.split(',').map(table::field);
+    let mut fields = text.split(',').map(delimited_text::field);
     for (position, &column) in columns.iter().enumerate() {
         let Some(field) = fields.next() else {
             return Err((None, Reason::FieldCount { found: position, expected: columns.len() }));
         };
         let fail = |reason| (Some(column), reason);
         match column {
-            Column::Index => clock.index = Some(index(field).map_err(fail)?),
-            Column::Time => clock.time_s = Some(table::time(field).map_err(fail)?),
+            Column::Index => time_stamp.index = Some(index(field).map_err(fail)?),
+            Column::Time => time_stamp.time_s = Some(delimited_text::time(field).map_err(fail)?),
             Column::Counts(channel) => counts[channel as usize] = count(channel, field).map_err(fail)?,
         }
     }
@@ -174,11 +196,11 @@ fn row(columns: &[Column], text: &str) -> Result<Row, Fault> {
         let found = columns.len() + surplus;
         return Err((None, Reason::FieldCount { found, expected: columns.len() }));
     }
-    Ok(Row { clock, counts: Counts::new(counts) })
+    Ok(CountRow { time_stamp, counts: Counts::new(counts) })
 }
 
 fn count(channel: Channel, text: &str) -> Result<i16, Reason> {
-    let value: i64 = text.parse().map_err(|_| Reason::NotInteger(table::quote(text)))?;
+    let value: i64 = text.parse().map_err(|_| Reason::NotInteger(delimited_text::quote(text)))?;
     let (low, high) = channel.limits();
     i16::try_from(value).ok().filter(|count| (low..=high).contains(count)).ok_or(Reason::OutOfField {
         value,
@@ -188,11 +210,12 @@ fn count(channel: Channel, text: &str) -> Result<i16, Reason> {
 }
 
 fn index(text: &str) -> Result<u64, Reason> {
-    text.parse().map_err(|_| Reason::NotInteger(table::quote(text)))
+    text.parse().map_err(|_| Reason::NotInteger(delimited_text::quote(text)))
 }
 
-/// Whether `now` may stand in the row after `before`. Equal times are late deliveries read in one go; equal indices are not.
-fn follows(before: Clock, now: Clock) -> Result<(), Fault> {
+/// Checks that the index grows from row to row and that the time does not decrease: samples that the host has read together
+/// may have equal times.
+fn order(before: TimeStamp, now: TimeStamp) -> Result<(), ColumnFault> {
     if let (Some(before), Some(now)) = (before.index, now.index)
         && now <= before
     {

@@ -1,0 +1,123 @@
+//! Comma-separated text from a plain or gzip file, line by line, with the number of every line as an editor shows it.
+//!
+//! The crate `csv` is not used because the line number that it reports is wrong after a blank line and in files with CR LF
+//! line ends.
+
+use crate::input_error::{InputError, Reason};
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+/// First two bytes of every gzip member (RFC 1952, section 2.3.1).
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
+/// Longest line that is read, bytes.
+const MAX_LINE_BYTES: u64 = 1 << 16;
+
+/// Size of each read buffer, bytes.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// An open file, read one line at a time.
+pub(crate) struct Lines {
+    file: PathBuf,
+    input: BufReader<Box<dyn Read>>,
+    line: u64,
+    bytes: Vec<u8>,
+}
+
+impl Lines {
+    /// Opens `file`. Whether it is compressed is told by its first bytes, not by its name.
+    ///
+    /// # Errors
+    /// The file is missing, unreadable, a directory or empty.
+    pub(crate) fn open(file: &Path) -> Result<Self, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let mut raw = File::open(file).map_err(|e| fail(Reason::Io(e)))?;
+        if raw.metadata().map_err(|e| fail(Reason::Io(e)))?.is_dir() {
+            return Err(fail(Reason::Directory));
+        }
+        // The first bytes are chained in front again instead of seeking: the file may be a pipe.
+        let mut start = Vec::with_capacity(2);
+        raw.by_ref().take(2).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
+        if start.is_empty() {
+            return Err(fail(Reason::Empty));
+        }
+        let compressed = start == GZIP_MAGIC;
+        let whole = BufReader::with_capacity(BUFFER_BYTES, Cursor::new(start).chain(raw));
+        let bytes: Box<dyn Read> = if compressed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) };
+        let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
+        Ok(Self { file: file.to_owned(), input, line: 0, bytes: Vec::new() })
+    }
+
+    /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file.
+    ///
+    /// # Errors
+    /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or not UTF-8.
+    pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
+        loop {
+            self.line += 1;
+            self.bytes.clear();
+            let read = (&mut self.input)
+                .take(MAX_LINE_BYTES)
+                .read_until(b'\n', &mut self.bytes)
+                .map_err(|e| InputError::line(&self.file, self.line, read_failure(e)))?;
+            if read == 0 {
+                return Ok(None);
+            }
+            if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
+                return Err(InputError::line(&self.file, self.line, Reason::LongLine));
+            }
+            if !self.bytes.trim_ascii().is_empty() {
+                break;
+            }
+        }
+        match std::str::from_utf8(&self.bytes) {
+            Ok(text) => Ok(Some((self.line, text.trim_start_matches('\u{feff}').trim()))),
+            Err(_) => Err(InputError::line(&self.file, self.line, Reason::NotText)),
+        }
+    }
+
+    /// Whether the file begins with the line `header`; more than its length is not read.
+    ///
+    /// # Errors
+    /// The file cannot be read or decompressed.
+    pub(crate) fn begin_with(mut self, header: &str) -> Result<bool, InputError> {
+        let mut first = Vec::new();
+        self.input
+            .by_ref()
+            .take(header.len() as u64 + 2)
+            .read_until(b'\n', &mut first)
+            .map_err(|e| InputError::line(&self.file, 1, read_failure(e)))?;
+        Ok(first.trim_ascii() == header.as_bytes())
+    }
+}
+
+/// Tells damaged compression from a failing disk.
+fn read_failure(error: io::Error) -> Reason {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
+        io::ErrorKind::InvalidInput => Reason::DamagedGzip(error),
+        _ => Reason::Io(error),
+    }
+}
+
+/// A field without the blanks and the quotation marks around it.
+pub(crate) fn field(raw: &str) -> &str {
+    let trimmed = raw.trim();
+    trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed)
+}
+
+/// The first 32 characters of a field, for an error message.
+pub(crate) fn quote(text: &str) -> String {
+    text.chars().take(32).collect()
+}
+
+/// A finite time in seconds.
+pub(crate) fn time(text: &str) -> Result<f64, Reason> {
+    match text.parse::<f64>() {
+        Ok(time) if time.is_finite() => Ok(time),
+        Ok(_) => Err(Reason::NotFinite(quote(text))),
+        Err(_) => Err(Reason::NotNumber(quote(text))),
+    }
+}

@@ -1,0 +1,51 @@
+//! `record`, and the command without a subcommand: recordings of the virtual sensor or of a device, and their reports.
+
+use crate::analyze::analyze_recording;
+use crate::output::{note, progress_bar};
+use adis16405_driver::GyroRange;
+use anyhow::{Context, Result};
+use host_sim::monitor;
+use noise_analysis::report::Report;
+use recordings::recording::Recording;
+use recordings::serial::{self, SerialLink};
+use simulation::Simulation;
+use std::path::Path;
+
+/// Length of a recording if none is given, s.
+pub(crate) const DEFAULT_S: f64 = 60.0;
+
+/// The report of the virtual sensor.
+pub(crate) fn simulate(simulation: &Simulation) -> Result<Report> {
+    analyze_recording(&run(simulation, None)?, None).context("virtual sensor")
+}
+
+/// The same; every bus transaction is written to the frame log `log`.
+pub(crate) fn record_simulation(log: &Path, simulation: &Simulation) -> Result<Report> {
+    analyze_recording(&run(simulation, Some(log))?, None).context("virtual sensor")
+}
+
+fn run(simulation: &Simulation, log: Option<&Path>) -> Result<Recording> {
+    let bar = progress_bar(simulation.samples()?, "{msg} {wide_bar} {pos}/{len} samples, {eta} left");
+    bar.set_message("virtual ADIS16405");
+    let progress = |taken| bar.set_position(taken);
+    let recording = match log {
+        Some(file) => simulation.run_logged(file, progress),
+        None => simulation.run(progress),
+    };
+    bar.finish_and_clear();
+    Ok(recording?)
+}
+
+/// Writes `seconds` of the raw bursts of the device on `port` to the frame log `log` and reports on them.
+pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> Result<Report> {
+    let mut link = SerialLink::new(serial::open(port, baud).with_context(|| port.to_owned())?);
+    let recorded = serial::record(&mut link, log, seconds).with_context(|| port.to_owned())?;
+    note(format_args!(
+        "{} bursts, {} missing between them; {}",
+        recorded.bursts,
+        recorded.missing,
+        monitor::summary(&recorded.counters)
+    ));
+    let recording = simulation::replay(log, GyroRange::default())?.recording;
+    analyze_recording(&recording, None).with_context(|| port.to_owned())
+}
