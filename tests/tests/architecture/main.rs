@@ -1,6 +1,6 @@
 //! The workspace's architecture: which crate may depend on which, no circle of modules, no two public types of one name.
 //!
-//! `WORKSPACE_ROOT` names another checkout to look at.
+//! `WORKSPACE_ROOT` names another checkout to check.
 
 mod fixtures;
 mod modules;
@@ -13,24 +13,31 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Each crate with the crates of the workspace that it may depend on. Dependencies for tests alone are free.
+///
+/// What the table keeps apart: the driver and `allan-core` know neither each other nor the rest. `measurement` is what
+/// `recordings` hands to `noise-analysis`, so that recordings contain no statistics and the analysis no file, driver,
+/// firmware or virtual sensor; `measurement` and `recordings` need `allan-core` at most for the description of a sensor's
+/// filters. The virtual sensor is written from the data sheet alone, so that it can check the driver. Reports are made of
+/// findings: those of `noise-analysis` and the models of `allan-core` in them. Nothing but the command needs the
+/// benchmarks.
 #[rustfmt::skip]
 const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("adis16405-driver", ""),
     ("allan-core", ""),
     ("link", ""),
     ("firmware", "adis16405-driver allan-core link"),
-    ("recordings", "adis16405-driver link"),
-    ("noise-analysis", "allan-core recordings"),
+    ("measurement", "allan-core"),
+    ("recordings", "adis16405-driver link measurement"),
+    ("noise-analysis", "allan-core measurement"),
     ("virtual-sensor", ""),
     ("simulation", "adis16405-driver firmware link recordings virtual-sensor"),
-    ("reports", "allan-core noise-analysis recordings"),
-    ("benchmarks", "adis16405-driver allan-core noise-analysis recordings reports simulation virtual-sensor"),
-    ("host-sim", "adis16405-driver allan-core benchmarks firmware link noise-analysis recordings reports simulation \
-                  virtual-sensor"),
+    ("reports", "allan-core noise-analysis"),
+    ("benchmarks", "adis16405-driver allan-core measurement noise-analysis recordings reports simulation virtual-sensor"),
+    ("host-sim", "adis16405-driver benchmarks link measurement noise-analysis recordings reports simulation"),
     ("system-tests", ""),
     ("driver-footprint", "adis16405-driver"),
     ("instruction-counts", "allan-core"),
-    ("peers-accuracy", "adis16405-driver allan-core host-sim noise-analysis recordings virtual-sensor"),
+    ("peers-accuracy", "allan-core noise-analysis virtual-sensor"),
 ];
 
 struct Package {
@@ -72,7 +79,7 @@ fn packages() -> Vec<Package> {
     list(&metadata["packages"]).into_iter().map(package).collect()
 }
 
-/// Sets of files each of which uses, in the end, every other one of its set.
+/// Sets of files each of which uses every other one of its set, directly or through further files.
 fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     let reached = |from: &Path| {
         let mut reached = BTreeSet::new();
@@ -113,9 +120,9 @@ fn describe_circles(uses: &Uses, root: &Path) -> String {
     let between = between_modules(uses);
     let of_files = circles(uses);
     let module = |files: &BTreeSet<&Path>| files.iter().map(|file| file.with_extension("")).collect();
-    let told: Vec<BTreeSet<PathBuf>> = of_files.iter().map(module).collect();
+    let described: Vec<BTreeSet<PathBuf>> = of_files.iter().map(module).collect();
     let mut of_modules = circles(&between);
-    of_modules.retain(|circle| !told.contains(&module(circle)));
+    of_modules.retain(|circle| !described.contains(&module(circle)));
     let mut text = String::new();
     for (uses, circle) in
         of_files.iter().map(|circle| (uses, circle)).chain(of_modules.iter().map(|circle| (&between, circle)))
