@@ -17,8 +17,8 @@ pub fn recording(test: &str, file: &str) -> Option<PathBuf> {
     path
 }
 
-/// Says on standard error that a test was skipped, and appends `TEST: REASON` to the file that `SKIPPED_TESTS` names, of
-/// which `run.sh` counts the tests.
+/// Says on standard error that a test was skipped, and appends `TEST: REASON` to the file that `SKIPPED_TESTS` names,
+/// of which `run.sh` counts the tests.
 pub fn note_skipped(test: &str, reason: &str) {
     // Not by a macro, whose output the test harness would capture.
     writeln!(std::io::stderr(), "skipped {test}: {reason}").expect("standard error");

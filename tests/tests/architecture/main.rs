@@ -1,4 +1,5 @@
-//! The workspace's architecture: which crate may depend on which, no circle of modules, no two public types of one name.
+//! The workspace's architecture: which crate may depend on which, no circle of modules, no two public types of one
+//! name.
 //!
 //! `WORKSPACE_ROOT` names another checkout to check.
 
@@ -14,12 +15,11 @@ use std::process::Command;
 
 /// Each crate with the crates of the workspace that it may depend on. Dependencies for tests alone are free.
 ///
-/// What the table keeps apart: the driver and `allan-core` know neither each other nor the rest. `measurement` is what
-/// `recordings` hands to `noise-analysis`, so that recordings contain no statistics and the analysis no file, driver,
-/// firmware or virtual sensor; `measurement` and `recordings` need `allan-core` at most for the description of a sensor's
-/// filters. The virtual sensor is written from the data sheet alone, so that it can check the driver. Reports are made of
-/// findings: those of `noise-analysis` and the models of `allan-core` in them. Nothing but the command needs the
-/// benchmarks.
+/// The driver and `allan-core` know neither each other nor the rest. `measurement` is what `recordings` hands to
+/// `noise-analysis`: so recordings contain no statistics, and the analysis no file, driver, firmware or virtual sensor.
+/// `measurement` needs `allan-core` only for the description of a sensor's filters. The virtual sensor is written from
+/// the data sheet alone, so that it can check the driver. Reports are made of findings: those of `noise-analysis` and
+/// the models of `allan-core` in them. Only the command depends on the benchmarks.
 #[rustfmt::skip]
 const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("adis16405-driver", ""),
