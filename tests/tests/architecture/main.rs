@@ -1,5 +1,5 @@
-//! The workspace's architecture: which crate may depend on which, no circle of modules, no two public types of one
-//! name.
+//! The architecture of the workspace: crates depend on those that a table allows, modules form no circle, and no two
+//! public types have the same name.
 //!
 //! `WORKSPACE_ROOT` names another checkout to check.
 
@@ -99,14 +99,14 @@ fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     circles.into_iter().collect()
 }
 
-/// The uses between the modules of each folder, every one taken together with the modules below it.
+/// The uses between the modules of each folder, where a module includes those below it.
 fn between_modules(uses: &Uses) -> Uses {
     let mut between = Uses::new();
     for (file, used) in uses {
         for (other, names) in used {
             let same = file.components().zip(other.components()).take_while(|(one, another)| one == another).count();
             let module = |path: &Path| path.components().take(same + 1).collect::<PathBuf>().with_extension("");
-            // A file and those in the folder of its name are one module of the folder around them.
+            // `a.rs` and the files in `a/` are one module of the folder that contains both.
             if module(file) != module(other) {
                 between.entry(module(file)).or_default().entry(module(other)).or_default().extend(names.clone());
             }
@@ -115,7 +115,7 @@ fn between_modules(uses: &Uses) -> Uses {
     between
 }
 
-/// The circles of files, and those of modules that are more than one file each: what uses what, and by which names.
+/// The circles of files, and those of modules of several files each, with the names by which each uses the next.
 fn describe_circles(uses: &Uses, root: &Path) -> String {
     let between = between_modules(uses);
     let of_files = circles(uses);
@@ -139,7 +139,7 @@ fn describe_circles(uses: &Uses, root: &Path) -> String {
     text
 }
 
-/// Names of public types that are defined more than once, with the places.
+/// Names of public types that are defined more than once, each with its files.
 fn describe_double_names(types: &[(String, PathBuf)], root: &Path) -> String {
     let mut places: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (name, file) in types {
@@ -173,7 +173,7 @@ fn no_modules_of_a_crate_use_each_other_in_a_circle() {
 }
 
 #[test]
-fn no_two_public_types_of_the_workspace_have_one_name() {
+fn no_two_public_types_of_the_workspace_share_a_name() {
     let roots = packages().into_iter().flat_map(|package| package.roots);
     let types: Vec<(String, PathBuf)> = roots.flat_map(|file| Crate::read(&file).public_types).collect();
     let double = describe_double_names(&types, &workspace());
