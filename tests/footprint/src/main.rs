@@ -24,7 +24,9 @@ fn main() -> ! {
     core::hint::black_box(methods::asynchronous(bus));
     core::hint::black_box(bus);
     debug::exit(debug::EXIT_SUCCESS);
-    loop {}
+    loop {
+        cortex_m::asm::wfi();
+    }
 }
 
 /// The calls that sampling needs: start, burst, validation, values.
