@@ -153,6 +153,7 @@ fn report_after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
 
 /// The end of a burst raises no interrupt, so that the main loop waits for the bus without end.
 #[test]
+#[ignore = "long: eight emulated seconds of a busy loop take half a minute; run with --long"]
 fn the_watchdog_ends_a_hang() {
     let (hello, _) = report_after(Event::LoseBurstEnd, 3.0, 15.0);
     assert_eq!(hello.boot.cause, BootCause::Watchdog);
