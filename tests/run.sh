@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long]
 #
-# Needs rustup with its default toolchain and a C compiler. What else is missing is installed, and said: by rustup, by
+# Needs rustup with its default toolchain and a C compiler. Installs, with a message, what else is missing: by rustup, by
 # apt-get (as root, or with sudo), and Node.js with npm, for the emulator of the Pico, from PyPI into the target folder.
-# With --long also the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
+# With --long it also runs the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
 # The last line says how many tests passed, failed and were skipped.
 set -euo pipefail
 cd "$(dirname "$0")/.."

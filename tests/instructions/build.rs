@@ -1,4 +1,4 @@
-//! Hands the linker the emulated board's memory map; does nothing for a host build.
+//! Gives the linker the memory map of the emulated board; does nothing for a host build.
 
 use std::{env, fs, path::PathBuf};
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The estimator's speed beside its peers', on the same machine in the same run: nanoseconds a sample and channel.
+# Prints the time that the estimator and its peers take per sample and channel, in ns, on this machine.
 #
-# Installs allantools into a virtual environment and builds two crates, all below target/peers. numpy takes the
-# vector instructions of the machine that it runs on; so may the crates.
+# Installs allantools into a virtual environment and builds two crates, all below target/peers. numpy uses the
+# vector instructions of the machine, and so the crates are compiled for it too.
 set -euo pipefail
 cd "$(dirname "$0")/speed"
 

@@ -1,4 +1,4 @@
-//! What the tests of several crates share: the measured recordings, and how a test says that it was skipped.
+//! Shared by the tests of several crates: the measured recordings, and the report of a skipped test.
 //!
 //! The tests of the noise observatory as a whole live in `tests/`.
 
@@ -6,8 +6,8 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// A measured recording by its path in the folder that `ADIS_RECORDINGS` names. Where it is absent the test is noted as
-/// skipped: it returns without a further word.
+/// The path of a measured recording in the folder that `ADIS_RECORDINGS` names. If it is absent, the test is reported as
+/// skipped, and should return.
 pub fn recording(test: &str, file: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("ADIS_RECORDINGS").map(PathBuf::from);
     let path = folder.map(|folder| folder.join(file)).filter(|path| path.exists());
@@ -17,14 +17,14 @@ pub fn recording(test: &str, file: &str) -> Option<PathBuf> {
     path
 }
 
-/// Says on standard error that a test was skipped, and appends `TEST: REASON` to the file that `SKIPPED_TESTS` names, of
-/// which `run.sh` counts the tests.
+/// Reports on standard error that a test was skipped, and appends `TEST: REASON` to the file that `SKIPPED_TESTS` names,
+/// of which `run.sh` counts the tests.
 pub fn note_skipped(test: &str, reason: &str) {
-    // Not by a macro, whose output the test harness would capture.
+    // The output of `eprintln!` would be captured by the test harness.
     writeln!(std::io::stderr(), "skipped {test}: {reason}").expect("standard error");
     if let Some(file) = std::env::var_os("SKIPPED_TESTS") {
         let mut file = OpenOptions::new().create(true).append(true).open(file).expect("the file for skipped tests");
-        // One write, so that the lines of tests that run beside each other stay whole.
+        // A single write keeps the lines of tests that run at the same time whole.
         file.write_all(format!("{test}: {reason}\n").as_bytes()).expect("room");
     }
 }

@@ -1,4 +1,4 @@
-//! Measured recordings through the whole system, against figures that were published for them.
+//! Measured recordings through the whole system, compared with figures published for them.
 
 use serde_json::Value;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Vec<u8> {
     std::fs::read(json).expect("the report")
 }
 
-/// The program: the one that `HOST_SIM` names, or built by cargo in the profile of the tests.
+/// The path of the program: `HOST_SIM`, or built by cargo in the profile of the tests.
 fn host_sim() -> PathBuf {
     if let Some(program) = std::env::var_os("HOST_SIM") {
         return program.into();
@@ -50,8 +50,8 @@ const RUN_1_GYRO_X: [f64; 15] = [
 ];
 
 #[test]
-fn a_static_recording_has_the_published_deviations_on_both_ways() {
-    let test = "a_static_recording_has_the_published_deviations_on_both_ways";
+fn a_static_recording_has_the_published_deviations_analyzed_and_replayed() {
+    let test = "a_static_recording_has_the_published_deviations_analyzed_and_replayed";
     let Some(run_1) = recording(test, "adis16405-static/run1.csv.gz") else { return };
     let analysed = report(&["analyze", "--rate", "100"], &run_1);
     assert_eq!(analysed, report(&["replay", "--rate", "100"], &run_1), "replayed over the bus");
@@ -78,8 +78,8 @@ fn a_static_recording_has_the_published_deviations_on_both_ways() {
 }
 
 #[test]
-fn a_burst_recording_with_gaps_and_re_reads_has_the_same_report_on_both_ways() {
-    let test = "a_burst_recording_with_gaps_and_re_reads_has_the_same_report_on_both_ways";
+fn a_burst_recording_with_gaps_and_re_reads_has_the_same_report_analyzed_and_replayed() {
+    let test = "a_burst_recording_with_gaps_and_re_reads_has_the_same_report_analyzed_and_replayed";
     let Some(launch) = recording(test, "adis16405-burst/launch10.csv.gz") else { return };
     let analysed = report(&["analyze"], &launch);
     assert_eq!(analysed, report(&["replay"], &launch), "replayed over the bus");

@@ -24,5 +24,5 @@ pub use environment::{Environment, Motion, SupplyProfile, TemperatureProfile};
 pub use noise::{ChannelNoise, NoiseModel, NoiseSource};
 pub use part::VirtualAdis16405;
 pub use registers::OutputRegister;
-pub use signal_chain::BartlettFilter;
+pub use signal_chain::CascadedBoxFilter;
 pub use spi::{Violation, ViolationKind};

@@ -28,7 +28,7 @@ const STIMULUS: [(OutputRegister, f64); 6] = [
 pub(crate) struct SignalChain {
     noise: NoiseSource,
     effects: EffectSource,
-    filters: [BartlettFilter; 12],
+    filters: [CascadedBoxFilter; 12],
     counts: [i16; 12],
     unfiltered: [i16; 12],
     rates: [f64; 3],
@@ -39,7 +39,7 @@ impl SignalChain {
         Self {
             noise: NoiseSource::new(model, seed, 1.0),
             effects: EffectSource::new(scenario, seed),
-            filters: std::array::from_fn(|_| BartlettFilter::new(0)),
+            filters: std::array::from_fn(|_| CascadedBoxFilter::new(0)),
             counts: [0; 12],
             unfiltered: [0; 12],
             rates: [0.0; 3],
@@ -80,7 +80,7 @@ impl SignalChain {
     /// Restarts the filters with the number of taps that SENS_AVG selects.
     pub(crate) fn restart_filters(&mut self, registers: &RegisterFile) {
         let taps = SensAvg::decode(registers).taps_log2;
-        self.filters = std::array::from_fn(|_| BartlettFilter::new(taps));
+        self.filters = std::array::from_fn(|_| CascadedBoxFilter::new(taps));
     }
 
     /// Takes the sample at `time_s`. The random numbers drawn do not depend on the registers.
@@ -150,11 +150,11 @@ fn has_filter(channel: OutputRegister) -> bool {
 
 /// The digital filter of one channel: two cascaded averages of 2^M samples each (Bartlett window).
 #[derive(Clone, Debug)]
-pub struct BartlettFilter {
+pub struct CascadedBoxFilter {
     stages: [MovingAverage; 2],
 }
 
-impl BartlettFilter {
+impl CascadedBoxFilter {
     /// `taps_log2` is M, 0 to 6 in the part; M = 0 does not filter.
     pub fn new(taps_log2: u8) -> Self {
         let stage = MovingAverage { window: vec![0.0; 1 << taps_log2], position: 0, filled: false };

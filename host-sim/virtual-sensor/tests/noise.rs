@@ -1,6 +1,6 @@
 //! The noise source against the Allan variance of each coefficient, and the digital filter against its impulse response.
 
-use virtual_sensor::{BartlettFilter, NoiseModel, NoiseSource, OutputRegister};
+use virtual_sensor::{CascadedBoxFilter, NoiseModel, NoiseSource, OutputRegister};
 
 const SAMPLES: usize = 1 << 14;
 const SEEDS: u64 = 60;
@@ -77,7 +77,7 @@ fn channels_and_seeds_are_independent_and_repeatable() {
 
 #[test]
 fn the_impulse_response_of_the_filter_is_a_triangle() {
-    let mut filter = BartlettFilter::new(2);
+    let mut filter = CascadedBoxFilter::new(2);
     filter.filter(0.0);
     let response: Vec<f64> = (0..8).map(|k| 16.0 * filter.filter(if k == 0 { 1.0 } else { 0.0 })).collect();
     assert_eq!(response, [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
@@ -85,12 +85,12 @@ fn the_impulse_response_of_the_filter_is_a_triangle() {
 
 #[test]
 fn a_filter_of_one_tap_changes_nothing() {
-    let mut filter = BartlettFilter::new(0);
+    let mut filter = CascadedBoxFilter::new(0);
     assert_eq!([3.0, -1.0, 0.25].map(|value| filter.filter(value)), [3.0, -1.0, 0.25]);
 }
 
 #[test]
 fn a_constant_passes_the_filter_from_the_first_sample() {
-    let mut filter = BartlettFilter::new(6);
+    let mut filter = CascadedBoxFilter::new(6);
     assert_eq!([0.1; 200].map(|value| (filter.filter(value) - 0.1).abs() < 1e-15), [true; 200]);
 }

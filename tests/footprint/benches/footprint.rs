@@ -1,4 +1,4 @@
-//! Prints what the driver takes of a Cortex-M4F: flash, and instructions for a burst counted by QEMU.
+//! Prints what the driver takes of a Cortex-M4F: bytes of flash, and instructions for a burst, counted by QEMU.
 
 use driver_footprint::{build, driver_bytes};
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 fn main() {
     println!("flash of the driver alone, built as the firmware is:");
     for (features, what) in [
-        ("burst", "init, burst, verdict, integer values"),
+        ("burst", "init, burst, validation, integer values"),
         ("everything", "every method, blocking (with arithmetic of f64)"),
         ("asynchronous", "every method, async (with arithmetic of f64)"),
     ] {
@@ -18,7 +18,7 @@ fn main() {
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(build("counted"))
         .output()
-        .expect("qemu-system-arm starts; Debian has it in the package of that name");
+        .expect("qemu-system-arm starts; it is the Debian package of that name");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     for line in String::from_utf8_lossy(&output.stdout).lines() {
         let (name, count) = line.split_once(' ').expect("a name and a number");

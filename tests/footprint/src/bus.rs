@@ -1,11 +1,11 @@
-//! A bus whose answers the compiler does not know.
+//! A bus that always gives the same answer, which the compiler cannot predict.
 
 use core::convert::Infallible;
 use core::hint::black_box;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-/// Answers as a healthy part: all words 0x8814, new data and, as a supply, 5 V.
+/// Answers 0x8814 to every word: new data, no error and, as a supply, 5 V.
 #[derive(Clone, Copy)]
 pub(crate) struct Bus {
     answer: [u8; 2],

@@ -1,4 +1,4 @@
-//! Builds the image with some features and reads what it takes of the flash out of its ELF.
+//! Builds the image with some features, and reads its size in flash from its ELF.
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg(not(target_os = "none"))]
 
@@ -7,11 +7,11 @@ use std::process::Command;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The image with these features, optimised as the firmware is.
+/// Builds the image with these features, optimised as the firmware is, and returns the path of its ELF.
 pub fn build(features: &str) -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate is in tests/");
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate lies in tests/");
     let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
-    // A directory of its own: the tests' own cargo may hold the lock of the other one.
+    // Not the target folder of the tests, which the cargo that runs the tests may have locked.
     let directory = workspace.join(directory).join("footprint");
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
@@ -24,7 +24,7 @@ pub fn build(features: &str) -> PathBuf {
     directory.join(TARGET).join("image").join("footprint")
 }
 
-/// Bytes of flash that the image takes: what its program headers load (ELF for Arm, 32 bits, little-endian).
+/// Bytes of flash that the image takes, which are those that its program headers load (ELF of 32 bits, little-endian).
 pub fn flash_bytes(image: &Path) -> u32 {
     const LOAD: u32 = 1;
     let elf = std::fs::read(image).expect("the image is readable");
@@ -36,7 +36,7 @@ pub fn flash_bytes(image: &Path) -> u32 {
     headers.filter(|&header| word(header) == LOAD).map(|header| word(header + 16)).sum()
 }
 
-/// Flash that features add to an image without the driver.
+/// Bytes of flash that these features add to the image without the driver.
 pub fn driver_bytes(features: &str) -> u32 {
     flash_bytes(&build(features)) - flash_bytes(&build(""))
 }

@@ -1,18 +1,17 @@
-//! The estimator: on average, at its worst, and what reads beside it.
+//! Instructions of the estimator, on average and at most, and of the estimators that read its sums.
 
+use crate::emulator::instructions;
 use crate::late_state;
-use crate::report::report;
-use crate::timer::instructions;
 use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
 use core::hint::black_box;
 use cortex_m_semihosting::{hprint, hprintln};
 
 const OCTAVES: usize = 24;
 const SAMPLES: usize = 4_000;
-/// Estimators that stand right before their longest push.
+/// Number of estimators whose next push is the longest one.
 const WORST: usize = 100;
 
-/// Noise with a standard deviation of 20 counts, as of a gyro at rest, times a factor.
+/// Noise with a standard deviation of 20 counts, as that of a gyro at rest, times a factor.
 fn noise(factor: i32) -> [i32; SAMPLES] {
     let mut state = 1_u64;
     let mut uniform = || {
@@ -35,7 +34,7 @@ pub(crate) fn count() {
     let mut cascade = black_box(Cascade::<OCTAVES, 8>::new());
     report("push_slice_p8", SAMPLES as u32, || cascade.push_slice(black_box(&sensor)));
     report("gap_p8", 10, || (0..10).for_each(|_| cascade.gap(black_box(1))));
-    beside(&sensor);
+    additional_estimators(&sensor);
     let curve = late_state::after_constant::<OCTAVES, 8>(0, 1 << 24);
     report("curve_p8", 10, || (0..10).for_each(|_| drop(black_box(black_box(&curve).curve(0.01)))));
     hprintln!("bytes p4 {}", Cascade::<OCTAVES, 4>::memory());
@@ -43,7 +42,7 @@ pub(crate) fn count() {
     hprintln!("bytes p16 {}", Cascade::<OCTAVES, 16>::memory());
 }
 
-/// In a long record, and in the first 2048 samples after a gap.
+/// Counts pushes in a long record, and those of the first 2040 samples after a gap.
 fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
     let mut cascade = black_box(late_state::after_constant::<OCTAVES, OVERLAP>(0, 1 << 20));
     samples.iter().for_each(|&sample| cascade.push(sample));
@@ -55,7 +54,7 @@ fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
     black_box(&cascade);
 }
 
-/// The push that completes a difference at every octave, with differences beyond 16 bits.
+/// Counts the push that completes a difference at every octave, with differences of more than 16 bits.
 fn worst<const OVERLAP: usize>(name: &str) {
     let mut cascades = black_box([const { Cascade::<OCTAVES, OVERLAP>::new() }; WORST]);
     cascades.fill_with(|| late_state::after_constant::<OCTAVES, OVERLAP>(0, (1 << 26) - 1));
@@ -63,23 +62,25 @@ fn worst<const OVERLAP: usize>(name: &str) {
     black_box(&cascades);
 }
 
-/// What a sample of one channel, and of two for the coupling, costs more when the sums are read a second time.
-fn beside(samples: &[i32; SAMPLES]) {
+type Channel = Cascade<OCTAVES, 8>;
+
+/// Counts what the estimators that read the sums of one channel, or of two for the coupling, add to a sample.
+fn additional_estimators(samples: &[i32; SAMPLES]) {
     let mut coupling = black_box(Coupling::<OCTAVES>::new());
     let mut hadamard = black_box(Hadamard::<OCTAVES, 8>::new());
-    let mut between = black_box(FractionalOctaves::<OCTAVES, 8>::new());
+    let mut fractional = black_box(FractionalOctaves::<OCTAVES, 8>::new());
     let pushes = run(samples, |_, _| ());
     for (name, total) in [
         ("coupling_p8", run(samples, |a, b| coupling.observe(a, b))),
         ("hadamard_p8", run(samples, |a, _| hadamard.observe(a))),
-        ("between_p8", run(samples, |a, _| between.observe(a))),
+        ("fractional_p8", run(samples, |a, _| fractional.observe(a))),
     ] {
         hprintln!("count {} {}", name, (total - pushes) / SAMPLES as u64);
     }
 }
 
-fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Pushed, &Pushed)) -> u64 {
-    let (mut a, mut b) = (Pushed::new(), Pushed::new());
+fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Channel, &Channel)) -> u64 {
+    let (mut a, mut b) = (Channel::new(), Channel::new());
     instructions(|| {
         for &sample in samples {
             a.push(sample);
@@ -89,4 +90,8 @@ fn run(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Pushed, &Pushed)) -> u
     })
 }
 
-type Pushed = Cascade<OCTAVES, 8>;
+/// Prints how many instructions each of the `times` runs in `work` took on average.
+fn report(name: &str, times: u32, work: impl FnOnce()) {
+    let tenths = instructions(work) / u64::from(black_box(times) / 10);
+    hprintln!("count {} {}.{}", name, tenths / 10, tenths % 10);
+}

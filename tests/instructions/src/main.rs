@@ -2,20 +2,18 @@
 #![no_std]
 #![no_main]
 
-mod end;
+mod emulator;
 mod estimator;
 mod functions;
 #[path = "../../../allan-core/tests/support/late_state.rs"]
 mod late_state;
-mod report;
-mod timer;
 
 use cortex_m_rt::entry;
 
 #[entry]
 fn main() -> ! {
-    timer::start();
+    emulator::start();
     estimator::count();
     functions::count();
-    end::success()
+    emulator::success()
 }

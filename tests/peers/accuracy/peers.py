@@ -1,4 +1,4 @@
-"""The peers that are Python packages (requirements.txt), asked by the program in src/.
+"""Runs the peers that are Python packages (requirements.txt) for the program in src/.
 
 Reads from standard input, for each batch, a line `series samples terms` and then the series as little-endian doubles at
 100 Hz; answers with one line of JSON.

@@ -1,18 +1,18 @@
-//! The checks on small crates: what must be found, and what must not.
+//! The checks, applied to small crates with and without what they must find.
 
 use crate::modules::Crate;
 use crate::{Package, circles, describe_circles, describe_dependencies, describe_double_names};
 use std::path::Path;
 
-/// Writes a crate and reads it: pairs of a file's name in `src` and its text.
-fn with_crate<T>(files: &[(&str, &str)], look: impl FnOnce(&Crate, &Path) -> T) -> T {
+/// Writes a crate from pairs of a file's name in `src` and its text, and reads it.
+fn with_crate<T>(files: &[(&str, &str)], inspect: impl FnOnce(&Crate, &Path) -> T) -> T {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
         let file = folder.path().join(name);
         std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
         std::fs::write(file, text).expect("room");
     }
-    look(&Crate::read(&folder.path().join("lib.rs")), folder.path())
+    inspect(&Crate::read(&folder.path().join("lib.rs")), folder.path())
 }
 
 /// The files of each circle.
@@ -31,7 +31,7 @@ fn circles_of(files: &[(&str, &str)]) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn a_tree_is_accepted() {
+fn a_tree_has_no_circle() {
     let lib = "pub mod curve; mod fit; pub use fit::{Fit, fit}; #[cfg(test)] mod tests;";
     let curve =
         "use std::fmt; pub struct Curve; impl fmt::Debug for Curve {} #[cfg(test)] mod tests { use crate::Fit; }";
@@ -69,7 +69,7 @@ fn a_circle_of_parent_and_child_is_found() {
         circles_of(&[("lib.rs", "mod parent;"), ("parent.rs", parent), ("parent/child.rs", child)]),
         [["parent.rs", "parent/child.rs"]]
     );
-    // The child alone uses the other; that the parent hands its items on is no use.
+    // The parent only re-exports the child's item, which does not count as a use.
     let parent = "mod child; pub use child::Child; pub struct Parent;";
     assert_eq!(
         circles_of(&[("lib.rs", "mod parent;"), ("parent.rs", parent), ("parent/child.rs", child)]),
@@ -102,7 +102,7 @@ fn a_circle_of_folders_is_found() {
 }
 
 #[test]
-fn public_types_of_one_name_are_found_and_re_exports_are_not() {
+fn public_types_that_share_a_name_are_found_and_re_exports_are_not() {
     let lib = "mod a; mod b; pub use a::Line; pub struct Curve; struct Private;";
     let a = "pub struct Line; pub(crate) struct Inner; bitflags! { pub struct Curve: u8 {} }";
     let b = "pub enum Line {} pub(crate) struct Inner; pub struct Private;";

@@ -1,6 +1,7 @@
-//! The workspace's architecture: which crate may depend on which, no circle of modules, no two public types of one name.
+//! The architecture of the workspace: crates depend on those that a table allows, modules form no circle, and no two
+//! public types have the same name.
 //!
-//! `WORKSPACE_ROOT` names another checkout to look at.
+//! `WORKSPACE_ROOT` names another checkout to check.
 
 mod fixtures;
 mod modules;
@@ -13,24 +14,30 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Each crate with the crates of the workspace that it may depend on. Dependencies for tests alone are free.
+///
+/// The driver and `allan-core` know neither each other nor the rest. `measurement` is what `recordings` hands to
+/// `noise-analysis`: so recordings contain no statistics, and the analysis no file, driver, firmware or virtual sensor.
+/// `measurement` needs `allan-core` only for the description of a sensor's filters. The virtual sensor is written from
+/// the data sheet alone, so that it can check the driver. Reports are made of findings: those of `noise-analysis` and
+/// the models of `allan-core` in them. Only the command depends on the benchmarks.
 #[rustfmt::skip]
 const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("adis16405-driver", ""),
     ("allan-core", ""),
     ("link", ""),
     ("firmware", "adis16405-driver allan-core link"),
-    ("recordings", "adis16405-driver link"),
-    ("noise-analysis", "allan-core recordings"),
+    ("measurement", "allan-core"),
+    ("recordings", "adis16405-driver link measurement"),
+    ("noise-analysis", "allan-core measurement"),
     ("virtual-sensor", ""),
     ("simulation", "adis16405-driver firmware link recordings virtual-sensor"),
-    ("reports", "allan-core noise-analysis recordings"),
-    ("benchmarks", "adis16405-driver allan-core noise-analysis recordings reports simulation virtual-sensor"),
-    ("host-sim", "adis16405-driver allan-core benchmarks firmware link noise-analysis recordings reports simulation \
-                  virtual-sensor"),
+    ("reports", "allan-core noise-analysis"),
+    ("benchmarks", "adis16405-driver allan-core measurement noise-analysis recordings reports simulation virtual-sensor"),
+    ("host-sim", "adis16405-driver benchmarks link measurement noise-analysis recordings reports simulation"),
     ("system-tests", ""),
     ("driver-footprint", "adis16405-driver"),
     ("instruction-counts", "allan-core"),
-    ("peers-accuracy", "adis16405-driver allan-core host-sim noise-analysis recordings virtual-sensor"),
+    ("peers-accuracy", "allan-core noise-analysis virtual-sensor"),
 ];
 
 struct Package {
@@ -72,7 +79,7 @@ fn packages() -> Vec<Package> {
     list(&metadata["packages"]).into_iter().map(package).collect()
 }
 
-/// Sets of files each of which uses, in the end, every other one of its set.
+/// Sets of files each of which uses every other one of its set, directly or through further files.
 fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     let reached = |from: &Path| {
         let mut reached = BTreeSet::new();
@@ -92,14 +99,14 @@ fn circles(uses: &Uses) -> Vec<BTreeSet<&Path>> {
     circles.into_iter().collect()
 }
 
-/// The uses between the modules of each folder, every one taken together with the modules below it.
+/// The uses between the modules of each folder, where a module includes those below it.
 fn between_modules(uses: &Uses) -> Uses {
     let mut between = Uses::new();
     for (file, used) in uses {
         for (other, names) in used {
             let same = file.components().zip(other.components()).take_while(|(one, another)| one == another).count();
             let module = |path: &Path| path.components().take(same + 1).collect::<PathBuf>().with_extension("");
-            // A file and those in the folder of its name are one module of the folder around them.
+            // `a.rs` and the files in `a/` are one module of the folder that contains both.
             if module(file) != module(other) {
                 between.entry(module(file)).or_default().entry(module(other)).or_default().extend(names.clone());
             }
@@ -108,14 +115,14 @@ fn between_modules(uses: &Uses) -> Uses {
     between
 }
 
-/// The circles of files, and those of modules that are more than one file each: what uses what, and by which names.
+/// The circles of files, and those of modules of several files each, with the names by which each uses the next.
 fn describe_circles(uses: &Uses, root: &Path) -> String {
     let between = between_modules(uses);
     let of_files = circles(uses);
     let module = |files: &BTreeSet<&Path>| files.iter().map(|file| file.with_extension("")).collect();
-    let told: Vec<BTreeSet<PathBuf>> = of_files.iter().map(module).collect();
+    let described: Vec<BTreeSet<PathBuf>> = of_files.iter().map(module).collect();
     let mut of_modules = circles(&between);
-    of_modules.retain(|circle| !told.contains(&module(circle)));
+    of_modules.retain(|circle| !described.contains(&module(circle)));
     let mut text = String::new();
     for (uses, circle) in
         of_files.iter().map(|circle| (uses, circle)).chain(of_modules.iter().map(|circle| (&between, circle)))
@@ -132,7 +139,7 @@ fn describe_circles(uses: &Uses, root: &Path) -> String {
     text
 }
 
-/// Names of public types that are defined more than once, with the places.
+/// Names of public types that are defined more than once, each with its files.
 fn describe_double_names(types: &[(String, PathBuf)], root: &Path) -> String {
     let mut places: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (name, file) in types {
@@ -166,7 +173,7 @@ fn no_modules_of_a_crate_use_each_other_in_a_circle() {
 }
 
 #[test]
-fn no_two_public_types_of_the_workspace_have_one_name() {
+fn no_two_public_types_of_the_workspace_share_a_name() {
     let roots = packages().into_iter().flat_map(|package| package.roots);
     let types: Vec<(String, PathBuf)> = roots.flat_map(|file| Crate::read(&file).public_types).collect();
     let double = describe_double_names(&types, &workspace());

@@ -1,7 +1,7 @@
-//! The modules of one crate, read from its source files: which file uses what is defined in which other file.
+//! Reads the modules of a crate from its source files, and lists which file uses the items of which other file.
 //!
-//! A name is followed through `use` and `pub use` to the file that defines it. A re-export alone is no use. Items for
-//! tests or documentation alone (`#[cfg(test)]`, `#[cfg(doc)]`) are left out; any other `cfg` counts as fulfilled.
+//! A name is followed through `use` and `pub use` to the file that defines it. A re-export does not count as a use. Items
+//! with `#[cfg(test)]` or `#[cfg(doc)]` are left out; any other `cfg` is taken as true.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use quote::ToTokens;
@@ -31,10 +31,10 @@ struct Module {
     used: Vec<Vec<String>>,
 }
 
-/// What the `use` declarations of a module bring in.
+/// Names that the `use` declarations of a module import.
 #[derive(Default)]
 struct Imports {
-    /// Names, with the path that each stands for.
+    /// By name: the path that it stands for.
     names: HashMap<String, Vec<String>>,
     /// Paths of `use path::*`.
     globs: Vec<Vec<String>>,
@@ -42,7 +42,7 @@ struct Imports {
     private: Vec<Vec<String>>,
 }
 
-/// What a path leads to.
+/// The destination of a path.
 #[derive(Clone, Copy)]
 enum Target {
     Module(usize),
@@ -125,7 +125,7 @@ impl Crate {
                 let definer = &self.modules[definer].file;
                 if *definer != module.file {
                     let names = uses.entry(module.file.clone()).or_default().entry(definer.clone()).or_default();
-                    // Of `Type::function` the type.
+                    // For `Type::function`, the name of the type.
                     let name = path.iter().find(|name| name.starts_with(char::is_uppercase)).or(path.last());
                     names.extend(name.cloned());
                 }
@@ -134,8 +134,8 @@ impl Crate {
         uses
     }
 
-    /// Follows a path that stands in a module; `goes_on` where it is the beginning of a longer one. What other crates
-    /// define leads nowhere.
+    /// Follows a path that is written in a module; `goes_on` is true for the beginning of a longer path. `None` for items
+    /// of other crates.
     fn resolve(&self, index: usize, path: &[String], goes_on: bool, depth: usize) -> Option<Target> {
         let (first, rest) = path.split_first()?;
         let mut target = match first.as_str() {
@@ -160,7 +160,7 @@ impl Crate {
         Some(target)
     }
 
-    /// Looks a name up in a module. A module may have the name of a function: it is meant where the path goes on.
+    /// Looks up a name in a module. If a module and a function share it, the module is returned for a path that goes on.
     fn find(&self, index: usize, name: &str, goes_on: bool, depth: usize) -> Option<Target> {
         const DEEPEST: usize = 8;
         if depth > DEEPEST {
@@ -239,14 +239,14 @@ fn definitions(item: &Item) -> Vec<Definition> {
     vec![Definition { name: ident.to_string(), public_type }]
 }
 
-/// What looks like the definition of a public type in the tokens that a macro is given.
+/// Definitions of public types in the tokens of a macro call.
 fn types_in_macro(tokens: TokenStream) -> Vec<Definition> {
     let tokens: Vec<String> = tokens.into_iter().map(|token| token.to_string()).collect();
     let types = tokens.windows(3).filter(|three| three[0] == "pub" && ["struct", "enum"].contains(&three[1].as_str()));
     types.map(|three| Definition { name: three[2].clone(), public_type: true }).collect()
 }
 
-/// Whether the first attributes of an item leave it to tests or documentation.
+/// Whether one of the first attributes of an item restricts it to tests or documentation.
 fn left_out(tokens: &TokenStream) -> bool {
     let mut tokens = tokens.clone().into_iter();
     while let (Some(TokenTree::Punct(sign)), Some(TokenTree::Group(attribute))) = (tokens.next(), tokens.next())
@@ -264,7 +264,7 @@ fn is_for_tests(attribute: &TokenStream) -> bool {
     text.starts_with("cfg") && !text.contains("not") && (text.contains("(test") || text.contains("(doc)"))
 }
 
-/// Finds paths in code: of two names or more, or a single one that is a type's, or that is called.
+/// Finds paths in code: those of two names or more, and single names that begin with a capital letter or are called.
 fn find_paths(tokens: TokenStream, found: &mut Vec<Vec<String>>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let sign =

@@ -1,25 +1,25 @@
 //! The image on an emulated STM32F427 with a crystal, a sensor and a terminal.
 
-use crate::exti::Exti;
-use crate::memory;
-use crate::sensor::Sensor;
-use crate::terminal::Terminal;
+use crate::images;
+use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise};
+use crate::peripherals::{Sensor, Terminal};
+use link::Health;
 use rigless::cpu::armv7m as cpu;
-use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::device::Level;
 use rigless::emulator::{self, Driver, Host, Start, Stop};
 use rigless::image::Image;
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::session::Session;
 use rigless::snapshot::Store;
+use rigless::soc::Error;
 use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::generated::rcc;
 use rigless::soc::stm32f427::peripherals::{gpio::Pin, spi::Select};
-use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 use std::collections::VecDeque;
 use std::num::{NonZeroU32, NonZeroU64};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 const CRYSTAL_HZ: u64 = 8_000_000;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
@@ -30,55 +30,29 @@ const PORT_B: usize = 1;
 const SPI1: usize = 0;
 const USART2: usize = 1;
 const TIM2: std::ops::Range<u64> = 0x4000_0000..0x4000_0400;
-/// Control register of the stream that receives bursts, and its bit that has the end raise an interrupt (RM0090 section
-/// 10.5.5).
+/// Control register of the DMA stream that receives bursts, and its bit that enables the interrupt at the end of a
+/// transfer (RM0090 section 10.5.5).
 const DMA2_S0CR: u64 = 0x4002_6410;
 const TCIE: u64 = 1 << 4;
-/// Longest stretch that the emulator runs without looking at the sensor's clock and the keys.
+/// Longest time that the emulator runs between two looks at the sensor's clock and the events.
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
 const PULSE_NS: u64 = 100_000;
+/// Upper bound on the stack that interrupts add to the deepest use measured, in bytes: four, nested, each with the 104
+/// bytes that the processor stacks (with floating point) and the frames of its functions. By disassembly these are 1.1
+/// kB for the estimators, which frame a full message of the raw stream, and 160 bytes for the other three together.
+pub(crate) const INTERRUPTS_STACK: u32 = 4 * 104 + 1280 + 256;
 
-/// The part, with the external interrupt controller that the emulator lacks.
-#[derive(Debug)]
-struct Microcontroller {
-    part: Stm32f427,
-    exti: Exti,
-    exti_slot: usize,
-    rcc_slot: usize,
-    /// The next reset is one by the supply, which the emulator does not model.
-    browning_out: bool,
+/// The image for the STM32F405, built at most once a run; `OBSERVATORY_IMAGE` names another.
+pub(crate) fn image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    let build = || images::build("f405", "thumbv7em-none-eabihf");
+    IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
 }
 
-impl Mcu for Microcontroller {
-    fn bus(&self) -> &Bus {
-        self.part.bus()
-    }
-
-    fn bus_mut(&mut self) -> &mut Bus {
-        self.part.bus_mut()
-    }
-
-    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
-        self.part.reset(at, cause);
-        self.exti = Exti::default();
-        if std::mem::take(&mut self.browning_out) {
-            let (registers, _) = self.part.bus_mut().drive(at, self.rcc_slot);
-            let flags = registers.get(rcc::Register::Csr);
-            registers.set(rcc::Register::Csr, rcc::csr::BORRSTF.set(flags, 1));
-        }
-    }
-
-    fn poll(&mut self, now: VirtualNanos) {
-        self.part.poll(now);
-    }
-
-    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
-        if slot == self.exti_slot {
-            return (self.part.bus_mut(), Some(&mut self.exti));
-        }
-        self.part.split(slot)
-    }
+/// Asserts that the part of the stack that was never used has room for interrupts.
+pub(crate) fn assert_stack_suffices(health: &Health) {
+    assert!(health.stack_bytes + INTERRUPTS_STACK <= health.stack_size, "{health:?}");
 }
 
 #[derive(Debug)]
@@ -98,24 +72,11 @@ impl Bench {
             part.spi[SPI1].attach_selected(sensor, select);
         }
         part.usart[USART2].attach(terminal);
-        let exti_slot = part.bus().slot("EXTI")?;
-        let rcc_slot = part.bus().slot("RCC")?;
-        let microcontroller = Microcontroller { part, exti: Exti::default(), exti_slot, rcc_slot, browning_out: false };
-        Ok(Self { microcontroller })
+        Ok(Self { microcontroller: Microcontroller::new(part)? })
     }
 
     fn sensor(&mut self) -> Option<&mut Sensor> {
         self.microcontroller.part.spi[SPI1].chip_mut(0)
-    }
-
-    fn drive_data_ready(&mut self, at: VirtualNanos, high: bool) {
-        let Microcontroller { part, exti, exti_slot, .. } = &mut self.microcontroller;
-        let level = if high { Level::High } else { Level::Low };
-        part.drive_port(at, PORT_B, |port, registers, context| {
-            port.drive(Pin::new(DATA_READY).unwrap(), Some(level), registers, context);
-        });
-        let (registers, mut context) = part.bus_mut().drive(at, *exti_slot);
-        exti.drive(usize::from(DATA_READY), high, registers, &mut context);
     }
 }
 
@@ -149,46 +110,47 @@ impl Board for Bench {
     }
 }
 
-/// What happens to the device during a run.
+/// An event that happens to the device during a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Event {
-    /// The part resets itself, as after a dip of its supply.
-    PartReset,
-    /// The data line to the processor is held at this byte, or let go.
+    /// The sensor resets itself, as after a dip of its supply.
+    SensorReset,
+    /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
     /// So many of the next data-ready edges do not reach the processor.
     LoseEdges(u32),
-    /// The plug is pulled: no edges, and zeros on the data line; or put back.
+    /// The sensor is unplugged (no edges, and zeros on the data line), or plugged in again.
     Unplugged(bool),
     /// The reset pin is pulsed.
     ResetPin,
-    /// The supply dips: memory loses what it held, and the part restarts.
+    /// The supply dips: memory loses its contents, and the microcontroller restarts.
     BrownOut,
     /// The end of the next burst raises no interrupt, as if a bit of the DMA's control register had flipped.
     LoseBurstEnd,
     /// The next access to the timer is answered with a bus error.
     BusError,
-    /// Every word pair of memory that holds this value becomes 0.
-    Lose(u64),
+    /// Every aligned word pair of memory that holds this value becomes 0.
+    ClearInMemory(u64),
 }
 
-/// Runs the emulator in stretches that end where the sensor's data-ready line changes.
+/// Runs the emulator in stretches that end where the sensor's data-ready line changes, and carries out the events.
 struct Plant {
     end: u64,
-    /// When the pulse under way ends.
-    falls: Option<u64>,
-    /// Samples that the data-ready line has announced.
+    /// Time in ns at which the data-ready pulse under way ends.
+    pulse_end: Option<u64>,
+    /// Samples of the sensor at the last stop.
     samples: u64,
-    /// Edges still to be swallowed.
-    swallow: u64,
+    /// Data-ready edges still to be withheld from the processor.
+    edges_to_lose: u64,
     lose_burst_end: bool,
     events: VecDeque<(u64, Event)>,
     work: Vec<Work>,
 }
 
-/// How many instructions were executed by a time in ns.
+/// Instructions executed and samples taken up to a time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Work {
+    /// In ns.
     pub(crate) at: u64,
     pub(crate) instructions: u64,
     pub(crate) samples: u64,
@@ -197,34 +159,34 @@ pub(crate) struct Work {
 impl Plant {
     fn next_stop(&self, bench: &mut Bench, now: u64) -> VirtualNanos {
         let ready = bench.sensor().map_or(u64::MAX, |sensor| sensor.part.next_data_ready());
-        let next = ready.min(self.falls.unwrap_or(u64::MAX)).min(now + STRIDE_NS).min(self.end);
-        // Within a frame the part is a byte behind.
+        let next = ready.min(self.pulse_end.unwrap_or(u64::MAX)).min(now + STRIDE_NS).min(self.end);
+        // Within a frame the sensor is a byte behind, so that its next edge may lie in the past.
         VirtualNanos(next.max(now + 1_000))
     }
 
-    fn happen(&mut self, event: Event, session: &mut Session<Bench>, stop: Stop, host: &mut dyn Host) {
+    fn carry_out(&mut self, event: Event, session: &mut Session<Bench>, stop: Stop, host: &mut dyn Host) {
         let Some(sensor) = session.board_mut().sensor() else { return };
         match event {
-            Event::PartReset => {
+            Event::SensorReset => {
                 sensor.part.select();
                 sensor.part.transfer(0xBE80); // GLOB_CMD bit 7
                 sensor.part.deselect();
             }
-            Event::Stuck(byte) => sensor.stuck = byte,
-            Event::LoseEdges(edges) => self.swallow = u64::from(edges),
+            Event::Stuck(byte) => sensor.stuck_at = byte,
+            Event::LoseEdges(edges) => self.edges_to_lose = u64::from(edges),
             Event::Unplugged(out) => {
-                sensor.stuck = out.then_some(0);
-                self.swallow = if out { u64::MAX } else { 0 };
+                sensor.stuck_at = out.then_some(0);
+                self.edges_to_lose = if out { u64::MAX } else { 0 };
             }
             Event::ResetPin => session.reset_by_pin(stop.at, stop.instruction_count, host),
             Event::BrownOut => {
-                memory::fill_with_noise(host);
-                session.board_mut().microcontroller.browning_out = true;
+                fill_memory_with_noise(host);
+                session.board_mut().microcontroller.brown_out = true;
                 session.reset_by_pin(stop.at, stop.instruction_count, host);
             }
             Event::LoseBurstEnd => self.lose_burst_end = true,
             Event::BusError => session.fail_next(TIM2.start, TIM2.end),
-            Event::Lose(value) => memory::lose(host, value),
+            Event::ClearInMemory(value) => clear_in_memory(host, value),
         }
     }
 }
@@ -239,21 +201,22 @@ impl Driver<Bench> for Plant {
         if now >= self.end {
             return None;
         }
-        // Between frames: what happens to the part must not mix with what it is being sent.
-        let between = |session: &mut Session<Bench>| session.board_mut().sensor().is_none_or(|sensor| !sensor.selected);
-        while between(session)
+        // Events wait for the end of a frame, as some of them send the sensor a frame of their own.
+        let between_frames =
+            |session: &mut Session<Bench>| session.board_mut().sensor().is_none_or(|sensor| !sensor.selected);
+        while between_frames(session)
             && let Some((_, event)) = self.events.pop_front_if(|&mut (at, _)| now >= at)
         {
-            self.happen(event, session, stop, host);
+            self.carry_out(event, session, stop, host);
         }
-        let fallen = self.falls.take_if(|falls| now >= *falls).is_some();
-        if fallen && std::mem::take(&mut self.lose_burst_end) {
-            // The pulse is shorter than a burst.
-            memory::clear_bits(session, host, DMA2_S0CR, TCIE);
+        let pulse_ended = self.pulse_end.take_if(|end| now >= *end).is_some();
+        if pulse_ended && std::mem::take(&mut self.lose_burst_end) {
+            // The burst is still under way: it lasts longer than the pulse.
+            clear_bits(session, host, DMA2_S0CR, TCIE);
         }
         let bench = session.board_mut();
-        if fallen {
-            bench.drive_data_ready(stop.at, false);
+        if pulse_ended {
+            bench.microcontroller.drive_pin(stop.at, PORT_B, DATA_READY, false);
         }
         let samples = bench.sensor().map_or(0, |sensor| {
             sensor.advance_to(now);
@@ -261,35 +224,36 @@ impl Driver<Bench> for Plant {
         });
         if samples > self.samples {
             self.samples = samples;
-            if self.swallow > 0 {
-                self.swallow -= 1;
+            if self.edges_to_lose > 0 {
+                self.edges_to_lose -= 1;
             } else {
-                self.falls = Some(now + PULSE_NS);
-                bench.drive_data_ready(stop.at, true);
+                self.pulse_end = Some(now + PULSE_NS);
+                bench.microcontroller.drive_pin(stop.at, PORT_B, DATA_READY, true);
             }
         }
         Some(self.next_stop(bench, now))
     }
 }
 
-/// What is done with the image.
+/// What a run consists of.
 #[derive(Default)]
 pub(crate) struct Scenario {
     pub(crate) sensor: Option<Sensor>,
-    /// Keys that are pressed, by rising time in s.
+    /// Keys sent over the serial port, by rising time in s.
     pub(crate) keys: Vec<(f64, Vec<u8>)>,
-    /// What happens, by rising time in s.
+    /// By rising time in s.
     pub(crate) events: Vec<(f64, Event)>,
     pub(crate) seconds: f64,
 }
 
-/// What a run leaves to look at.
+/// The results of a run.
 pub(crate) struct Outcome {
     pub(crate) sensor: Option<Sensor>,
+    /// Bytes from the serial port, each with its time in ns.
     pub(crate) received: Vec<(u64, u8)>,
-    /// What the emulator found wrong with the image: accesses to nothing, registers without a model, resets.
-    pub(crate) complaints: Vec<String>,
-    /// Once a virtual second, and at the end.
+    /// Reports of the emulator: accesses to unmapped addresses, registers without a model, resets.
+    pub(crate) diagnostics: Vec<String>,
+    /// One value per virtual second, and one at the end.
     pub(crate) work: Vec<Work>,
 }
 
@@ -301,9 +265,9 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
     let bench = Bench::new(scenario.sensor, terminal).expect("the emulator knows the part");
     let plant = Plant {
         end: ns(scenario.seconds),
-        falls: None,
+        pulse_end: None,
         samples: 0,
-        swallow: 0,
+        edges_to_lose: 0,
         lose_burst_end: false,
         events: scenario.events.into_iter().map(|(at, event)| (ns(at), event)).collect(),
         work: Vec::new(),
@@ -312,21 +276,21 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
     let images = [Image::read(image, None).expect("the image is an ELF")];
     let finished = emulator::run(session, &Start::new(&images), plant).expect("the emulator runs to the end");
     let (mut session, work) = (finished.session, finished.driver.work);
-    let complaints = complaints(&session);
+    let diagnostics = diagnostics(&session);
     let part = &mut session.board_mut().microcontroller.part;
     let received = part.usart[USART2].chip_mut::<Terminal>().map(|terminal| std::mem::take(&mut terminal.received));
     let sensor = part.spi[SPI1].chip_mut::<Sensor>(0).cloned();
-    Outcome { sensor, received: received.unwrap_or_default(), complaints, work }
+    Outcome { sensor, received: received.unwrap_or_default(), diagnostics, work }
 }
 
-fn complaints(session: &Session<Bench>) -> Vec<String> {
+fn diagnostics(session: &Session<Bench>) -> Vec<String> {
     let unmapped = session.unmapped().into_iter().map(|access| access.to_string());
     let refused = session.refused().iter().map(|(address, fault)| format!("refused {address:#x}: {fault:?}"));
     let unrouted = session.unrouted().iter().map(|line| format!("unrouted {line:?}"));
     let resets = session.resets().iter().map(|reset| format!("reset {reset:?}"));
-    let told = session.told().map(|told| format!("{} {}: {}", told.instance, told.register, told.reason));
-    // The pins' way to the interrupt controller is what the bench drives by itself.
+    let reported = session.told().map(|told| format!("{} {}: {}", told.instance, told.register, told.reason));
+    // SYSCFG routes pins to the interrupt controller, which `Microcontroller::drive_pin` does here.
     let unimplemented = session.unimplemented().values().filter(|register| register.instance != "SYSCFG");
     let unimplemented = unimplemented.map(|register| format!("no model for {register:?}"));
-    unmapped.chain(refused).chain(unrouted).chain(resets).chain(told).chain(unimplemented).collect()
+    unmapped.chain(refused).chain(unrouted).chain(resets).chain(reported).chain(unimplemented).collect()
 }

@@ -1,4 +1,4 @@
-//! What the image said, decoded by the host's decoder, and what the host makes of the same bursts.
+//! The output of an image, decoded by the host's decoder, and the report that the host computes from the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
 use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, Statistics, TimedBurst};
@@ -11,7 +11,8 @@ pub(crate) struct Decoded {
 }
 
 impl Decoded {
-    pub(crate) fn of(received: &[(u64, u8)]) -> Self {
+    /// Decodes the bytes of the serial port.
+    pub(crate) fn decode(received: &[(u64, u8)]) -> Self {
         let mut decoder = Decoder::new();
         let (mut messages, mut lines) = (Vec::new(), Vec::new());
         for received in received.iter().filter_map(|&(_, byte)| decoder.push(byte)) {
@@ -45,7 +46,7 @@ impl Decoded {
             .collect()
     }
 
-    /// The bursts of the raw stream with their numbers.
+    /// The bursts of the raw stream, each with its number.
     pub(crate) fn raw(&self) -> Vec<(u64, Burst)> {
         let mut bursts = Vec::new();
         for message in &self.messages {
@@ -62,12 +63,13 @@ impl Decoded {
     }
 }
 
-/// The same estimators on the host, fed with `bursts` until as many samples were taken as `report` says.
+/// The report of a channel that the firmware's estimators make on the host from the first bursts, until they have taken
+/// as many samples as `report`.
 pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], rate_hz: f64, report: &ChannelMessage) -> ChannelMessage {
     in_stretches(&[bursts], rate_hz, report)
 }
 
-/// The same in several stretches: each starts as after a restart of the image.
+/// [`on_host`] with bursts in several stretches; each but the first starts as the image does after a restart.
 pub(crate) fn in_stretches(
     stretches: &[&[(u64, [u8; BURST_BYTES])]],
     rate_hz: f64,

@@ -1,8 +1,8 @@
-//! Full speed: 819.2 samples a second with everything else going on.
+//! Full speed: 819.2 samples a second during the raw stream, reports, fits and key presses.
 
-use crate::bench::{Outcome, Scenario, Work, run};
+use crate::bench::{Outcome, Scenario, Work, assert_stack_suffices, image, run};
 use crate::decoded::{Decoded, on_host};
-use crate::{image, sensor, stack_suffices};
+use crate::peripherals::Sensor;
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
 use link::Message;
 use noise_analysis::analysis::analyze;
@@ -13,43 +13,44 @@ use simulation::replay_log;
 use std::path::Path;
 
 const RATE_HZ: f64 = 819.2;
-/// The raw stream and the reports are off before, so that sampling and estimating can be weighed alone.
+/// Between these times the raw stream and the reports are off, so that the work of sampling and estimating is measured
+/// alone.
 const QUIET_S: (f64, f64) = (3.0, 8.0);
 
 #[test]
-fn no_sample_is_lost_or_doubled_while_everything_is_going_on() {
-    at_full_speed_for(60.0);
+fn no_sample_is_lost_or_doubled_under_full_load() {
+    assert_no_sample_lost_in(60.0);
 }
 
 #[test]
 #[ignore = "long: ten emulated minutes take five; run with --long"]
 fn no_sample_is_lost_or_doubled_in_ten_minutes() {
-    at_full_speed_for(600.0);
+    assert_no_sample_lost_in(600.0);
 }
 
-fn at_full_speed_for(seconds: f64) {
+fn assert_no_sample_lost_in(seconds: f64) {
     let mut keys = vec![(1.0, b"i 0\rf 819.2\r".to_vec()), (QUIET_S.1, b"i 30\rw 1\r".to_vec())];
-    // The first two take a fit of every channel.
+    // The first two print a fit of every channel.
     let typed =
         [&b"r"[..], b"t", b"?", b"s", b"k", b"e 0\r", b"x\r", b"v", b"k", b"s", b"i 30\r", b"k", b"?", b"s", b"k"];
     let times = (0..).map(|k| QUIET_S.1 + 1.3 + 2.7 * f64::from(k)).take_while(|&at| at < seconds - 6.0);
     keys.extend(times.zip(typed.iter().cycle()).map(|(at, keys)| (at, keys.to_vec())));
     keys.push((seconds - 3.5, b"w 0\r".to_vec()));
     keys.push((seconds - 3.0, b"r".to_vec()));
-    let scenario = Scenario { sensor: Some(sensor(2)), keys, seconds, ..Scenario::default() };
-    let Outcome { sensor, received, complaints, work } = run(image(), scenario);
-    let sensor = sensor.expect("the sensor hangs on the bus");
-    assert_eq!(complaints, [""; 0]);
+    let scenario = Scenario { sensor: Some(Sensor::published(2)), keys, seconds, ..Scenario::default() };
+    let Outcome { sensor, received, diagnostics, work } = run(image(), scenario);
+    let sensor = sensor.expect("the sensor on the bus");
+    assert_eq!(diagnostics, [""; 0]);
     assert_eq!(sensor.part.violations(), []);
 
-    // Since the rate was set every sample was read once.
+    // Every sample since the rate was set was read once.
     let set = sensor.bursts.windows(2).rposition(|pair| pair[1].0 != pair[0].0 + 1).expect("the rate was set") + 1;
     let bursts = &sensor.bursts[set..];
     assert!(bursts.len() as f64 > (seconds - 1.1) * RATE_HZ - 100.0, "{} bursts", bursts.len());
     assert!(sensor.part.samples() - bursts[bursts.len() - 1].0 <= 1);
 
     // The raw stream is what the sensor sent, in order and complete.
-    let decoded = Decoded::of(&received);
+    let decoded = Decoded::decode(&received);
     assert_eq!((decoded.counters.missing, decoded.counters.bad_frames), (0, 0), "{:?}", decoded.counters);
     let raw = decoded.raw();
     assert!(raw.len() as f64 > (seconds - QUIET_S.1 - 3.6) * RATE_HZ, "{} bursts in the stream", raw.len());
@@ -73,25 +74,28 @@ fn at_full_speed_for(seconds: f64) {
     assert!((measured / RATE_HZ - 1.0).abs() < 1e-6, "{measured} Hz");
     assert!(decoded.lines.iter().any(|line| line.starts_with("Allan deviation")));
 
-    a_recording_off_the_cable_analyses_to_the_identical_report(&decoded, &bursts[first..]);
+    assert_recorded_stream_gives_the_identical_report(&decoded, &bursts[first..]);
 
-    let quiet = between(&work, QUIET_S);
-    let busy = between(&work, (QUIET_S.1 + 1.0, seconds - 4.0));
+    let quiet = load_between(&work, QUIET_S);
+    let busy = load_between(&work, (QUIET_S.1 + 1.0, seconds - 4.0));
     println!("{seconds} s at {RATE_HZ} SPS, {} bursts read, {} in the raw stream", bursts.len(), raw.len());
-    println!("sampling and estimating: {} instructions a sample, {:.2} % of 168 MHz", quiet.0, quiet.1);
-    println!("with raw stream, reports and keys: {} instructions a sample, {:.2} %", busy.0, busy.1);
+    println!("sampling and estimating: {} instructions per sample, {:.2} % of 168 MHz", quiet.0, quiet.1);
+    println!("with raw stream, reports and keys: {} instructions per sample, {:.2} %", busy.0, busy.1);
     println!(
-        "longest sampling interrupt {} instructions, longest turn of the estimators {}",
+        "longest sampling interrupt {} instructions, longest of the estimators {}",
         health.sampling_cycles, health.estimator_cycles
     );
-    println!("stack {} of {} B, at most {} bursts waited", health.stack_bytes, health.stack_size, health.queue_peak);
-    stack_suffices(&health);
+    println!(
+        "stack {} of {} B, at most {} bursts in the queue",
+        health.stack_bytes, health.stack_size, health.queue_peak
+    );
+    assert_stack_suffices(&health);
     assert!(quiet.1 < 5.0, "more than 5 % of the processor");
     assert!(health.sampling_cycles < 168 * 20, "a sampling interrupt of more than 20 us");
 }
 
-/// Instructions a sample, and the part of 168 million a second in percent, between two times in s.
-fn between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
+/// Instructions per sample, and the percentage of 168 million instructions a second, between two times in s.
+fn load_between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
     let at = |seconds: f64| work.iter().find(|work| work.at as f64 >= seconds * 1e9).expect("a time of the run");
     let (from, to) = (at(from), at(to));
     let instructions = to.instructions - from.instructions;
@@ -99,17 +103,17 @@ fn between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
     (instructions / (to.samples - from.samples), share)
 }
 
-/// What `host-sim record` writes of the cable's bytes, against a log of the frames that the sensor handed out at the times
-/// of its own clock.
-fn a_recording_off_the_cable_analyses_to_the_identical_report(decoded: &Decoded, bursts: &[(u64, [u8; BURST_BYTES])]) {
+/// The file that `host-sim record` writes from the serial bytes and a log of the frames that the sensor sent, with the
+/// times of its own clock, give the same report.
+fn assert_recorded_stream_gives_the_identical_report(decoded: &Decoded, bursts: &[(u64, [u8; BURST_BYTES])]) {
     let folder = tempfile::tempdir().expect("a folder");
     let report = |file: &Path| {
         let recording = replay_log(file, GyroRange::Dps300).expect("a log").recording;
         let measurement = measurement(&recording, Some(RATE_HZ)).expect("a time base");
         serde_json::to_string(&analyze(&measurement)).expect("a report")
     };
-    let cable = folder.path().join("cable.csv");
-    let mut tape = RawStreamRecorder::create(&cable).expect("a log");
+    let recorded_file = folder.path().join("recorded.csv");
+    let mut tape = RawStreamRecorder::create(&recorded_file).expect("a log");
     for message in &decoded.messages {
         if let Message::Raw(raw) = message {
             tape.write(raw).expect("room");
@@ -118,12 +122,12 @@ fn a_recording_off_the_cable_analyses_to_the_identical_report(decoded: &Decoded,
     assert_eq!(tape.missing(), 0);
     let recorded = decoded.raw().len();
     tape.finish().expect("room");
-    let sensor = folder.path().join("sensor.csv");
-    let mut log = FrameLogWriter::create(&sensor).expect("a log");
+    let sensor_log = folder.path().join("sensor.csv");
+    let mut log = FrameLogWriter::create(&sensor_log).expect("a log");
     for (sample, bytes) in &bursts[..recorded] {
         let frame = Frame { time_s: *sample as f64 / RATE_HZ, mosi: BURST_REQUEST.to_vec(), miso: bytes.to_vec() };
         log.write(&frame).expect("room");
     }
     log.finish().expect("room");
-    assert_eq!(report(&cable), report(&sensor));
+    assert_eq!(report(&recorded_file), report(&sensor_log));
 }

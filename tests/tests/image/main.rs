@@ -1,82 +1,53 @@
-//! The image that one flashes, run in an emulator against the virtual sensor.
+//! The image for the STM32F405, as it is built to be flashed, run in an emulator against the virtual sensor.
 
 mod bench;
-mod build;
 mod compensation;
-mod crash;
 mod decoded;
-mod exti;
 mod faults;
 mod full_speed;
-mod memory;
-mod overflow;
-mod restart;
-mod sensor;
-mod size;
-mod terminal;
+mod images;
+mod microcontroller;
+mod peripherals;
 
-use bench::{Outcome, Scenario, run};
+use adis16405_driver::GyroRange;
+use bench::{Outcome, Scenario, image, run};
 use decoded::{Decoded, on_host};
 use firmware::CHANNELS;
-use link::{Boot, BootCause, DecoderCounters, Health, Hello, Message};
-use sensor::Sensor;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use virtual_sensor::{NoiseModel, VirtualAdis16405};
-
-/// The bus clock of the board (84 MHz) over the first power of two that brings it to 1 MHz or less.
-const SCK_HZ: u32 = 84_000_000 / 128;
-
-/// What interrupts may add to the deepest stack that was seen, if none came then: four, one above the other, each with the
-/// 104 bytes that the processor stacks (with floating point) and the frames of its functions, which disassembled are
-/// 1.1 kB of the estimators (a full message of the raw stream is framed there) and 160 bytes of the others together.
-const INTERRUPTS_STACK: u32 = 4 * 104 + 1280 + 256;
-
-/// The stack that was left over takes what interrupts may add.
-fn stack_suffices(health: &Health) {
-    assert!(health.stack_bytes + INTERRUPTS_STACK <= health.stack_size, "{health:?}");
-}
-
-/// The image, built at most once a run; `OBSERVATORY_IMAGE` names another.
-fn image() -> &'static Path {
-    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    let build = || build::image("f405", "thumbv7em-none-eabihf");
-    IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
-}
-
-/// The sensor of the published characterisation.
-fn sensor(seed: u64) -> Sensor {
-    Sensor::new(VirtualAdis16405::new(NoiseModel::paper(), seed), SCK_HZ)
-}
+use link::{Boot, BootCause, DecoderCounters, Hello, Message};
+use peripherals::{SCK_HZ, Sensor};
 
 #[test]
 fn the_image_reports_what_the_host_computes_from_the_same_counts() {
-    const ASKED_AT_S: f64 = 4.5;
-    let keys = vec![(ASKED_AT_S, b"r".to_vec())];
-    let scenario = Scenario { sensor: Some(sensor(1)), keys, seconds: 7.0, ..Scenario::default() };
-    let Outcome { sensor, received, complaints, .. } = run(image(), scenario);
-    let sensor = sensor.expect("the sensor hangs on the bus");
-    assert_eq!(complaints, [""; 0], "the emulator has nothing to complain about");
+    const REQUESTED_AT_S: f64 = 4.5;
+    let keys = vec![(REQUESTED_AT_S, b"r".to_vec())];
+    let scenario = Scenario { sensor: Some(Sensor::published(1)), keys, seconds: 7.0, ..Scenario::default() };
+    let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
+    let sensor = sensor.expect("the sensor on the bus");
+    assert_eq!(diagnostics, [""; 0], "neither resets nor accesses to unmapped addresses");
 
-    // The bus: no stall, frame or clock that the data sheet forbids. Eight periods of SCK take 12 190.5 ns; between
-    // bytes the processor may spend 2 % more.
+    // The bus keeps the timing of the data sheet. Eight periods of SCK take 12 190.5 ns; the processor may add 2 %
+    // between bytes.
     assert_eq!(sensor.part.violations(), []);
     assert_eq!(sensor.odd_words, 0);
-    assert!((12_184..=12_440).contains(&sensor.shortest_byte_ns), "a byte in {} ns", sensor.shortest_byte_ns);
+    assert!(
+        (12_184..=12_440).contains(&sensor.shortest_byte_ns),
+        "the shortest byte took {} ns",
+        sensor.shortest_byte_ns
+    );
 
-    // Every sample since sampling began was read once.
+    // Every sample since the first burst was read once.
     let (first, last) = (sensor.bursts[0].0, sensor.bursts[sensor.bursts.len() - 1].0);
     assert!(sensor.bursts.iter().map(|&(sample, _)| sample).eq(first..=last));
     assert!(sensor.part.samples() - last <= 1);
 
-    let Decoded { messages, counters, .. } = Decoded::of(&received);
+    let Decoded { messages, counters, .. } = Decoded::decode(&received);
     assert_eq!(counters, DecoderCounters { frames: messages.len() as u64, ..DecoderCounters::default() });
     let [Message::Log(log), Message::Hello(hello), channels @ .., Message::Health(health)] = messages.as_slice() else {
-        panic!("a report goes from hello to health: {messages:?}");
+        panic!("a report begins with hello and ends with health: {messages:?}");
     };
     assert!(log.starts_with("sensor: ADIS16405, self-test"), "{log}");
     let uptime_s = hello.uptime_us as f64 * 1e-6;
-    assert!((ASKED_AT_S - 0.05..ASKED_AT_S + 0.01).contains(&uptime_s), "{uptime_s} s");
+    assert!((REQUESTED_AT_S - 0.05..REQUESTED_AT_S + 0.01).contains(&uptime_s), "{uptime_s} s");
     let expected = Hello {
         firmware: (0, 1, 0),
         product_id: 16405,
@@ -93,7 +64,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     };
     assert_eq!(*hello, expected);
 
-    // Microseconds of the crystal's clock over 4 s.
+    // A time stamp of 1 us over 4 s allows 2.5e-7.
     let measured = hello.measured_rate_hz.unwrap();
     assert!((measured / 204.8 - 1.0).abs() < 1e-6, "{measured}");
 
@@ -124,22 +95,31 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
 
 #[test]
 fn the_image_fits_its_flash_and_memory() {
-    let size = size::size(image());
+    let size = images::size(image());
     println!("{size:?}");
-    // 128 kB with what the paths to cargo's registry, which panics name, may be longer elsewhere.
+    // 128 kB, less 1 kB for the paths in panic messages, which may be longer where cargo's registry lies deeper.
     assert!(size.flash <= 127 * 1024, "{size:?}");
-    // All that is ever used: the stack, of which other tests assert that it suffices, and what lies above it.
+    // The stack, which other tests assert to suffice, and the static variables above it.
     assert!(size.ram <= 64 * 1024, "{size:?}");
 }
 
 #[test]
-fn a_missing_sensor_is_said_every_second() {
+fn a_missing_sensor_is_reported_every_second() {
     let Outcome { received, .. } = run(image(), Scenario { seconds: 3.0, ..Scenario::default() });
-    let Decoded { messages, counters, .. } = Decoded::of(&received);
+    let Decoded { messages, counters, .. } = Decoded::decode(&received);
     assert_eq!(counters.bad_frames, 0);
     assert_eq!(messages.len(), 3, "{messages:?}");
     for message in messages {
         let Message::Log(text) = message else { panic!("{message:?}") };
         assert!(text.starts_with("sensor: PROD_ID answered 0"), "{text}");
     }
+}
+
+/// Host and device analyse alike only with the same candidates and the same averaging times.
+#[test]
+fn the_firmware_analyses_with_the_settings_of_the_host() {
+    for range in [GyroRange::Dps300, GyroRange::Dps150, GyroRange::Dps75] {
+        assert_eq!(measurement::adis16405::profile(range.lsb()).filters, firmware::learner::FILTERS);
+    }
+    assert_eq!((firmware::OCTAVES, firmware::OVERLAP), (noise_analysis::OCTAVES, noise_analysis::OVERLAP));
 }

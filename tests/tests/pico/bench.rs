@@ -1,6 +1,6 @@
-//! The image in rp2040js under Node, with the virtual sensor on its bus, in the emulator's time.
+//! The image in rp2040js under Node.js, with the virtual sensor on its bus, in the emulator's time.
 
-use crate::build;
+use crate::images;
 use adis16405_driver::BURST_BYTES;
 use host_sim::uf2;
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use virtual_sensor::VirtualAdis16405;
 
-/// rp2040js and the image, as ELF and as UF2.
+/// Paths of rp2040js and of the image, as ELF and as UF2.
 struct Bench {
     emulator: PathBuf,
     elf: PathBuf,
@@ -21,7 +21,7 @@ struct Bench {
 fn bench() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
-        let elf = build::image("pico", "thumbv6m-none-eabi");
+        let elf = images::build("pico", "thumbv6m-none-eabi");
         let blocks = uf2::from_elf(&std::fs::read(&elf).expect("the image")).expect("an image for the Pico");
         let uf2 = elf.with_extension("uf2");
         std::fs::write(&uf2, blocks).expect("room");
@@ -30,7 +30,7 @@ fn bench() -> &'static Bench {
 }
 
 fn emulator() -> PathBuf {
-    let folder = build::folder().join("rp2040js");
+    let folder = images::folder().join("rp2040js");
     if !folder.join("node_modules/rp2040js").is_dir() {
         std::fs::create_dir_all(&folder).expect("a folder");
         let install = Command::new("npm")
@@ -38,40 +38,46 @@ fn emulator() -> PathBuf {
             .arg(&folder)
             .arg("rp2040js@1.4.1")
             .status();
-        assert!(install.is_ok_and(|status| status.success()), "rp2040js cannot be had: install Node.js 20 with npm");
+        assert!(
+            install.is_ok_and(|status| status.success()),
+            "rp2040js cannot be installed: it needs Node.js 18 or later with npm"
+        );
     }
     folder
 }
 
-/// What happens to the sensor during a run.
+/// An event that happens to the sensor during a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Event {
-    /// It resets itself, as after a dip of its supply.
-    PartReset,
-    /// The data line to the processor is held at this byte, or let go.
+    /// The sensor resets itself, as after a dip of its supply.
+    SensorReset,
+    /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
-    /// Data-ready edges do not reach the processor, or do again.
-    Unheard(bool),
+    /// Data-ready edges do not reach the processor while this is true.
+    EdgesLost(bool),
 }
 
-/// What a run leaves to look at.
+/// The results of a run.
 pub(crate) struct Outcome {
     pub(crate) part: VirtualAdis16405,
-    /// What the processor was sent in each burst, with the number of the sample that the part had then.
+    /// The bytes sent to the processor in each burst, with the number of the part's latest sample at that time.
     pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
+    /// Bytes from the serial port, each with its time in ns.
     pub(crate) received: Vec<(u64, u8)>,
     pub(crate) instructions: u64,
-    pub(crate) complaints: String,
+    /// Warnings and errors of the emulator, one a line.
+    pub(crate) diagnostics: String,
 }
 
-/// Boots the image from its UF2. `keys` are as `TIME=TEXT`, `events` by rising time in s.
+/// Boots the image from its UF2 and runs it. A key is given as `TIME=TEXT`; `events` are in order of time. Times are in
+/// s.
 pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], events: &[(f64, Event)]) -> Outcome {
     let Bench { emulator, elf, uf2 } = bench();
     let mut events: VecDeque<(u64, Event)> = events.iter().map(|&(at, event)| ((at * 1e9) as u64, event)).collect();
-    let (mut stuck, mut unheard) = (None, false);
+    let (mut stuck_at, mut edges_lost) = (None, false);
     let (mut announced, mut selected) = (0, false);
     let mut node = Command::new("node")
-        .arg(build::workspace().join("tests/tests/pico/emulator.mjs"))
+        .arg(images::workspace().join("tests/tests/pico/emulator.mjs"))
         .args([emulator, uf2, elf])
         .arg(seconds.to_string())
         .args(keys)
@@ -79,7 +85,7 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .expect("Node.js starts; install Node.js 20");
+        .expect("Node.js 18 or later starts");
     let (mut answers, mut questions) = (node.stdin.take().expect("a pipe"), node.stdout.take().expect("a pipe"));
     let (mut bursts, mut received, mut frame) = (Vec::new(), Vec::new(), Vec::new());
     let mut instructions = 0;
@@ -96,19 +102,19 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
             continue;
         }
         part.advance_to(value as u64);
-        // Between frames; the sensor is asked for its time once a millisecond at least.
+        // Events wait for the end of a frame; the emulator sends `n` at least once a millisecond.
         if kind == b'n'
             && !selected
             && let Some((_, event)) = events.pop_front_if(|&mut (at, _)| value as u64 >= at)
         {
             match event {
-                Event::PartReset => {
+                Event::SensorReset => {
                     part.select();
                     part.transfer(0xBE80); // GLOB_CMD bit 7
                     part.deselect();
                 }
-                Event::Stuck(byte) => stuck = byte,
-                Event::Unheard(on) => unheard = on,
+                Event::Stuck(byte) => stuck_at = byte,
+                Event::EdgesLost(lost) => edges_lost = lost,
             }
         }
         match kind {
@@ -129,21 +135,21 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
             }
             b'b' => {
                 let answer = part.transfer_byte(byte[0]);
-                let miso = stuck.unwrap_or(answer);
+                let miso = stuck_at.unwrap_or(answer);
                 frame.push((byte[0], miso));
-                answers.write_all(&[miso]).expect("the emulator listens");
+                answers.write_all(&[miso]).expect("the emulator reads");
             }
             b'n' => {
                 let next = part.next_data_ready() as f64;
-                announced = if unheard { announced } else { part.samples() };
+                announced = if edges_lost { announced } else { part.samples() };
                 let answer = [(announced as f64).to_le_bytes(), next.to_le_bytes()];
-                answers.write_all(answer.as_flattened()).expect("the emulator listens");
+                answers.write_all(answer.as_flattened()).expect("the emulator reads");
             }
             _ => received.push((value as u64, byte[0])),
         }
     }
     let output = node.wait_with_output().expect("the emulator ends");
-    let complaints = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{complaints}");
-    Outcome { part, bursts, received, instructions, complaints }
+    let diagnostics = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{diagnostics}");
+    Outcome { part, bursts, received, instructions, diagnostics }
 }

@@ -1,10 +1,11 @@
-// Runs an RP2040 image in rp2040js, with the sensor in the parent process: one question over standard output, one answer
-// over standard input. Arguments: the module's folder, the image as UF2 and as ELF, which must agree, seconds, and keys as
-// TIME=TEXT.
+// Runs an RP2040 image in rp2040js. The sensor is simulated by the parent process, to which questions go over standard
+// output, and from which answers come over standard input. Arguments: the folder of rp2040js, the image as UF2 and as
+// ELF, which must agree, the time to run in s, and keys as TIME=TEXT.
 //
-// A question is one byte and a time in ns (f64, little endian): `n` how far the sensor's time is; `s` and `d` chip select
-// falls and rises; `b` a byte goes out, which follows. `u` and a byte: the image said something; `e` and the number of
-// instructions: the end. The answer to `n` is the number of samples and the time of the next (two f64), to `b` a byte.
+// A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `s` and `d` are
+// the falling and the rising edge of chip select, `b` and a further byte a transfer over SPI, `u` and a further byte an
+// output of the serial port. `e` with the number of instructions instead of the time is the end. The answer to `n` is
+// the number of samples and the time of the next one (two f64), that to `b` a byte; the others have none.
 import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -19,20 +20,20 @@ const keys = keyArguments.map((key) => [parseFloat(key) * 1e9, key.slice(key.ind
 
 const clock = new SimulationClock();
 const mcu = new RP2040(clock);
-const complaints = new Map();
-const complain = (from, text) => complaints.set(`${from}: ${text}`, true);
-mcu.logger = { debug() {}, info() {}, warn: complain, error: complain };
+const diagnostics = new Map();
+const report = (from, text) => diagnostics.set(`${from}: ${text}`, true);
+mcu.logger = { debug() {}, info() {}, warn: report, error: report };
 
 const FLASH = 0x10000000;
 
-// What the boot loader writes: of every block (https://github.com/microsoft/uf2), the payload to its address.
+// As the boot loader does, write the payload of every block (https://github.com/microsoft/uf2) to its address.
 const uf2 = fs.readFileSync(uf2File);
 for (let block = 0; block < uf2.length; block += 512) {
   const [magic0, magic1, , address, size] = [0, 4, 8, 12, 16].map((field) => uf2.readUInt32LE(block + field));
   if (magic0 !== 0x0a324655 || magic1 !== 0x9e5d5157) throw new Error(`no UF2 block at ${block}`);
   mcu.flash.set(uf2.subarray(block + 32, block + 32 + size), address - FLASH);
 }
-// What a debug probe writes: the loadable segments of the ELF (32 bits, little endian).
+// Compare the loadable segments of the ELF (32 bits, little-endian), which a debug probe would write.
 const elf = fs.readFileSync(elfFile);
 for (let i = 0; i < elf.readUInt16LE(44); i++) {
   const header = elf.readUInt32LE(28) + i * 32;
@@ -46,7 +47,7 @@ for (let i = 0; i < elf.readUInt16LE(44); i++) {
 // The boot ROM copies the second stage to the top of memory and calls it; rp2040js has no boot ROM.
 mcu.sram.set(mcu.flash.subarray(0, 252), 0x41f00);
 Object.assign(mcu.core, { SP: 0x20041f00, LR: 0, PC: 0x20041f00 });
-// The block that tells why the chip was reset, which rp2040js lacks: after power-on.
+// The registers with the cause of the reset, which rp2040js lacks: power-on.
 mcu.peripherals[0x40064] = {
   readUint32: (offset) => (offset === 8 ? 1 << 8 : 0),
   writeUint32() {},
@@ -79,7 +80,8 @@ mcu.gpio[PIN_SELECT].addListener((state) => {
 });
 mcu.uart[0].onByte = (byte) => ask('u', clock.nanos, byte, 0);
 
-// Data ready: a pulse at every sample; the next one is asked for again and again, as settings may change it.
+// Data ready: a pulse at every sample. The time of the next one is asked for at least every STRIDE_NS, as settings may
+// change it.
 let samples = 0;
 const edge = clock.createAlarm(() => {
   const answer = ask('n', clock.nanos, undefined, 16);
@@ -107,6 +109,6 @@ while (clock.nanos < end) {
     clock.tick((cycles * 1e9) / mcu.clkSys);
   }
 }
-for (const complaint of complaints.keys()) console.error(complaint);
+for (const diagnostic of diagnostics.keys()) console.error(diagnostic);
 ask('e', instructions, undefined, 0);
 process.exit(0);

@@ -1,12 +1,13 @@
-//! The image that one flashes on a Raspberry Pi Pico, run in the emulator rp2040js (npm) under Node against the virtual
-//! sensor: another core, without a floating-point unit, and the same numbers.
+//! The image for the Raspberry Pi Pico, as it is built to be flashed, run in the emulator rp2040js (npm) under Node.js
+//! against the virtual sensor. Its core has no floating-point unit, and reports the same numbers.
 
 mod bench;
-#[path = "../image/build.rs"]
-mod build;
 #[allow(dead_code, reason = "the test of the other image uses the rest")]
 #[path = "../image/decoded.rs"]
 mod decoded;
+#[allow(dead_code, reason = "the test of the other image uses the rest")]
+#[path = "../image/images.rs"]
+mod images;
 
 use adis16405_driver::Burst;
 use bench::{Event, Outcome, run};
@@ -20,17 +21,18 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
 }
 
 #[test]
+#[ignore = "long: 20 emulated seconds with software floating point take half a minute; run with --long"]
 fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     const SECONDS: f64 = 20.0;
     let outcome = run(sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
-    println!("{} instructions in {SECONDS} s; {}", outcome.instructions, outcome.complaints);
+    println!("{} instructions in {SECONDS} s; {}", outcome.instructions, outcome.diagnostics);
     let (bursts, part) = (&outcome.bursts, &outcome.part);
-    // Between frames 16 us pass; the clock is not judged here but by the firmware itself.
+    // The sensor checks the 16 us between frames. It is not told the clock, which the firmware reports (below).
     assert_eq!(part.violations(), []);
     assert!(bursts.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1), "every sample is read once");
     assert!(bursts.len() as f64 > (SECONDS - 0.2) * RATE_HZ, "{} bursts", bursts.len());
 
-    let decoded = Decoded::of(&outcome.received);
+    let decoded = Decoded::decode(&outcome.received);
     assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
     assert!(decoded.logs()[0].starts_with("sensor: ADIS16405, self-test"), "{:?}", decoded.logs());
     let hello = decoded.hellos()[0];
@@ -46,20 +48,20 @@ fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     println!("{health:?}");
 }
 
-/// The raw stream goes out meanwhile, and each fault is recovered from and counted.
+/// The raw stream is complete, and each fault is recovered from and counted.
 #[test]
-fn the_pico_takes_full_speed_and_faults() {
+fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     const FAST_HZ: f64 = 819.2;
     let keys = ["0.5=i 0\rf 819.2\r", "1.0=w 1\r", "3.0=w 0\r", "8.6=k", "8.9=s"];
     let events = [
         (3.5, Event::Stuck(Some(0))),
         (3.8, Event::Stuck(None)),
-        (5.5, Event::PartReset),
-        (7.5, Event::Unheard(true)),
-        (7.6, Event::Unheard(false)),
+        (5.5, Event::SensorReset),
+        (7.5, Event::EdgesLost(true)),
+        (7.6, Event::EdgesLost(false)),
     ];
     let Outcome { part, bursts, received, .. } = run(sensor(9), 9.2, &keys, &events);
-    let decoded = Decoded::of(&received);
+    let decoded = Decoded::decode(&received);
     println!("{:#?}", decoded.logs());
     assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
 
@@ -68,10 +70,10 @@ fn the_pico_takes_full_speed_and_faults() {
     assert!(raw.len() as f64 > 1.9 * FAST_HZ, "{} bursts in the stream", raw.len());
     let sent: Vec<Burst> = bursts.iter().map(|(_, bytes)| Burst::from_bytes(bytes)).collect();
     let first = sent.windows(raw.len()).position(|window| raw.iter().map(|(_, burst)| burst).eq(window));
-    let first = first.expect("the stream is part of what was sent");
+    let first = first.expect("the stream is part of the bursts that were sent");
     assert!(bursts[first..first + raw.len()].windows(2).all(|pair| pair[1].0 == pair[0].0 + 1), "every sample once");
 
-    // The counters as text: a report takes seconds on this core.
+    // The counters are printed as text, as a report takes seconds on this core.
     println!("{:#?}", decoded.lines);
     let counter = |name: &str| {
         let number = |line: &String| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok();
@@ -79,7 +81,7 @@ fn the_pico_takes_full_speed_and_faults() {
     };
     assert_eq!((counter("stuck_low"), counter("recoveries")), (16, 3));
     assert_eq!((counter("queue_full"), counter("raw_dropped"), counter("serial_overruns")), (0, 0, 0));
-    // The lines are written one after the other, while samples come.
+    // Sampling continues while the lines are printed one after the other.
     assert!((0..9).contains(&(counter("used") + 16 - counter("bursts"))), "{:?}", decoded.lines);
     assert!(f64::from(counter("used")) > 5.0 * FAST_HZ);
     assert!(decoded.lines.iter().any(|line| line.contains("sensor sampled")), "{:?}", decoded.lines);

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::f64::consts::{PI, TAU};
-use virtual_sensor::BartlettFilter;
+use virtual_sensor::CascadedBoxFilter;
 use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
@@ -29,7 +29,7 @@ impl Output<'_> {
         let gyro = model.channel_mut(OutputRegister::GyroX);
         [gyro.angle_random_walk, gyro.bias_instability, gyro.rate_random_walk] = self.noise;
         let mut source = NoiseSource::new(&model, seed, 1.0 / RATE_HZ);
-        let mut filter = BartlettFilter::new(self.taps_log2);
+        let mut filter = CascadedBoxFilter::new(self.taps_log2);
         let value = |at: usize| {
             let added = self.added.get(at).copied().unwrap_or(0.0);
             (filter.filter(source.sample()[OutputRegister::GyroX as usize] + added) / LSB).round() * LSB

@@ -1,9 +1,9 @@
-//! libm and micromath on the target: the table in `allan-core/src/math.rs`.
+//! Errors and instructions of libm and micromath on the target, as the table in `allan-core/src/math.rs` gives them.
 
 use crate::image::{Counts, M0_PLUS, M4F};
 use statrs::function::gamma::ln_gamma;
 
-/// The host's functions, which come from its C library, and statrs's.
+/// The functions of the host's C library, and of statrs.
 fn reference(name: &str, x: f64) -> f64 {
     match name {
         "sqrt" => x.sqrt(),
@@ -18,18 +18,18 @@ fn reference(name: &str, x: f64) -> f64 {
     }
 }
 
-/// Largest error, relative to the answer where that is above 1.
+/// Largest error, relative to the result where that is above 1.
 fn error(counts: &Counts, library: &str, name: &str) -> Option<f64> {
-    let asked = format!("{library} {name}");
-    let answers = counts.answers.iter().filter(|(name, ..)| *name == asked);
-    let errors = answers.map(|&(_, argument, answer)| {
-        let (argument, answer) = match library {
-            // The argument that the function was given had the precision of its answer.
-            "micromath" => (f64::from(f64::from_bits(argument) as f32), f64::from(f32::from_bits(answer as u32))),
-            _ => (f64::from_bits(argument), f64::from_bits(answer)),
+    let function = format!("{library} {name}");
+    let results = counts.results.iter().filter(|(name, ..)| *name == function);
+    let errors = results.map(|&(_, argument, result)| {
+        let (argument, result) = match library {
+            // micromath is given the argument rounded to f32.
+            "micromath" => (f64::from(f64::from_bits(argument) as f32), f64::from(f32::from_bits(result as u32))),
+            _ => (f64::from_bits(argument), f64::from_bits(result)),
         };
         let expected = reference(name, argument);
-        (answer - expected).abs() / expected.abs().max(1.0)
+        (result - expected).abs() / expected.abs().max(1.0)
     });
     errors.reduce(f64::max)
 }
@@ -45,7 +45,7 @@ fn row(name: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn the_table_in_the_documentation_is_what_the_target_does() {
+fn the_documented_errors_and_instructions_are_those_of_the_target() {
     for name in NAMES {
         let row = row(name);
         for (library, cells) in ["libm", "micromath"].into_iter().zip(row.chunks(2)) {
@@ -54,31 +54,37 @@ fn the_table_in_the_documentation_is_what_the_target_does() {
                 continue;
             };
             println!("{library} {name}: error {error:.0e}");
-            let told: f64 = cells[0].parse().expect("an error");
-            // One digit is told; the last bit may move with the compiler.
-            assert!(error <= 1.5 * told && error >= told / 4.0, "{library} {name}: {error:.0e}, not {told:.0e}");
-            for (core, told) in [M4F, M0_PLUS].into_iter().zip(cells[1].split(", ")) {
-                let count = core.counts().of(&format!("{library} {name}"));
-                let told: f64 = told.parse().expect("a number of instructions");
+            let documented: f64 = cells[0].parse().expect("an error");
+            // The table has one digit; the last bit may change with the compiler.
+            assert!(
+                error <= 1.5 * documented && error >= documented / 4.0,
+                "{library} {name}: {error:.0e}, not {documented:.0e}"
+            );
+            for (core, documented) in [M4F, M0_PLUS].into_iter().zip(cells[1].split(", ")) {
+                let count = core.counts().number(&format!("{library} {name}"));
+                let documented: f64 = documented.parse().expect("a number of instructions");
                 println!("{library} {name}: {count} instructions");
-                assert!((count - told).abs() <= 0.1 * told + 4.0, "{library} {name}: {count} instructions, not {told}");
+                assert!(
+                    (count - documented).abs() <= 0.1 * documented + 4.0,
+                    "{library} {name}: {count} instructions, not {documented}"
+                );
             }
         }
     }
 }
 
 #[test]
-fn both_cores_answer_alike() {
-    for ((name, argument, m4f), (.., m0_plus)) in M4F.counts().answers.iter().zip(&M0_PLUS.counts().answers) {
-        // micromath's f32 goes through a unit that fuses nothing: the same bits, too.
+fn both_cores_give_the_same_bits() {
+    for ((name, argument, m4f), (.., m0_plus)) in M4F.counts().results.iter().zip(&M0_PLUS.counts().results) {
+        // Also with micromath, as the compiler emits no fused multiply-add for the floating-point unit.
         assert_eq!(m4f, m0_plus, "{name} of {}", f64::from_bits(*argument));
     }
 }
 
 #[test]
-fn reported_figures_are_good_to_the_last_digits() {
+fn libm_on_the_target_has_an_error_below_1e_14() {
     for name in NAMES {
-        let error = error(M4F.counts(), "libm", name).expect("libm has them all");
+        let error = error(M4F.counts(), "libm", name).expect("a function of libm");
         assert!(error < 1e-14, "{name}: {error}");
     }
 }

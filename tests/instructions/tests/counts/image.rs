@@ -1,4 +1,4 @@
-//! The counting images: built, run in QEMU, and what they said.
+//! Builds the counting images, runs them in QEMU and reads their output.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -20,41 +20,41 @@ pub(crate) static M4F: Core = {
 };
 pub(crate) static M0_PLUS: Core = {
     static COUNTS: OnceLock<Counts> = OnceLock::new();
-    // A fit without a unit for floating point would take minutes to emulate.
+    // Without a floating-point unit the image `fitting` would take minutes to emulate.
     Core { target: "thumbv6m-none-eabi", board: "mps2-an385", images: &["count"], counts: &COUNTS }
 };
 
 impl Core {
-    /// Runs the images at most once.
+    /// The counts of this core's images, which are run at most once.
     pub(crate) fn counts(self) -> &'static Counts {
         self.counts.get_or_init(|| {
-            let said = self.images.iter().map(|image| run(&build(self.target, image), self.board));
-            Counts::parse(&said.collect::<String>())
+            let output = self.images.iter().map(|image| run(&build(self.target, image), self.board));
+            Counts::parse(&output.collect::<String>())
         })
     }
 }
 
-/// What the images said.
+/// The output of the images.
 #[derive(Debug)]
 pub(crate) struct Counts {
     numbers: HashMap<String, f64>,
-    /// Library and function, argument, answer.
-    pub(crate) answers: Vec<(String, u64, u64)>,
+    /// Library and function, bits of the argument, bits of the result.
+    pub(crate) results: Vec<(String, u64, u64)>,
 }
 
 impl Counts {
     fn parse(text: &str) -> Self {
-        let mut counts = Self { numbers: HashMap::new(), answers: Vec::new() };
+        let mut counts = Self { numbers: HashMap::new(), results: Vec::new() };
         let bits = |word: &str| u64::from_str_radix(word, 16).expect("a number in hexadecimal");
         for line in text.lines() {
             match line.split(' ').collect::<Vec<_>>()[..] {
                 ["count" | "bytes", name, number] => counts.insert(name, number),
                 ["early", "count", name, number] => counts.insert(&format!("early_{name}"), number),
                 [library, name, number] => counts.insert(&format!("{library} {name}"), number),
-                [library, name, argument, answer] => {
-                    counts.answers.push((format!("{library} {name}"), bits(argument), bits(answer)));
+                [library, name, argument, result] => {
+                    counts.results.push((format!("{library} {name}"), bits(argument), bits(result)));
                 }
-                _ => panic!("the image said: {line}"),
+                _ => panic!("unknown line of the image: {line}"),
             }
         }
         counts
@@ -64,15 +64,16 @@ impl Counts {
         self.numbers.insert(name.to_owned(), number.parse().expect("a number"));
     }
 
-    pub(crate) fn of(&self, name: &str) -> f64 {
-        *self.numbers.get(name).unwrap_or_else(|| panic!("the image counts {name}"))
+    /// The number that an image printed for this name.
+    pub(crate) fn number(&self, name: &str) -> f64 {
+        *self.numbers.get(name).unwrap_or_else(|| panic!("the image printed no {name}"))
     }
 }
 
 fn build(target: &str, image: &str) -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate is in tests/");
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate lies in tests/");
     let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
-    // A directory of its own: the tests' own cargo may hold the lock of the other one.
+    // Not the target folder of the tests, which the cargo that runs the tests may have locked.
     let directory = workspace.join(directory).join("instructions");
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
@@ -85,15 +86,16 @@ fn build(target: &str, image: &str) -> PathBuf {
     directory.join(target).join("release").join(image)
 }
 
-/// One instruction takes 1 ns, whatever the machine is busy with.
+/// Runs an image and returns its output. With `-icount shift=0` an instruction takes 1 ns of the board's time, whatever
+/// the load of the machine.
 fn run(image: &Path, board: &str) -> String {
     let Output { status, stdout, stderr } = Command::new("qemu-system-arm")
         .args(["-M", board, "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=0"])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(image)
         .output()
-        .expect("qemu-system-arm starts; Debian has it in the package of that name");
-    let said = String::from_utf8_lossy(&stdout).into_owned();
-    assert!(status.success(), "{board}: {status}\n{said}\n{}", String::from_utf8_lossy(&stderr));
-    said
+        .expect("qemu-system-arm starts; it is the Debian package of that name");
+    let output = String::from_utf8_lossy(&stdout).into_owned();
+    assert!(status.success(), "{board}: {status}\n{output}\n{}", String::from_utf8_lossy(&stderr));
+    output
 }

@@ -1,4 +1,4 @@
-//! Builds the counting image for both cores, runs it in QEMU and holds the counts within bands.
+//! Builds the counting images for both cores, runs them in QEMU and compares the counts with bounds.
 //!
 //! The board mps2-an386 has a Cortex-M4F. For the Cortex-M0+, whose board QEMU lacks, the image is compiled for
 //! ARMv6-M and runs on the Cortex-M3 of mps2-an385, which executes the same instructions.
@@ -9,23 +9,23 @@ mod image;
 use image::{Counts, M0_PLUS, M4F};
 use std::ops::RangeInclusive;
 
-/// A tenth either way, for the compiler's moods.
+/// The count may change by a tenth with the compiler.
 fn band(count: f64) -> RangeInclusive<f64> {
     0.9 * count..=1.1 * count
 }
 
 fn assert_counts(counts: &Counts, expected: &[(&str, f64)]) {
     for &(name, expected) in expected {
-        let count = counts.of(name);
+        let count = counts.number(name);
         println!("{name}: {count} instructions");
-        assert!(band(expected).contains(&count), "{name} takes {count} instructions, about {expected} before");
+        assert!(band(expected).contains(&count), "{name} takes {count} instructions, not {expected} ± 10 %");
     }
 }
 
 #[test]
-fn a_cortex_m4f() {
+fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m4f() {
     let counts = M4F.counts();
-    assert!(counts.of("push_p8") <= 200.0, "a sample on average: {}", counts.of("push_p8"));
+    assert!(counts.number("push_p8") <= 200.0, "a sample takes {} instructions on average", counts.number("push_p8"));
     assert_counts(
         counts,
         &[
@@ -38,13 +38,13 @@ fn a_cortex_m4f() {
             ("gap_p8", 1_584.0),
             ("coupling_p8", 1_240.0),
             ("hadamard_p8", 1_146.0),
-            ("between_p8", 1_290.0),
+            ("fractional_p8", 1_290.0),
         ],
     );
 }
 
 #[test]
-fn a_cortex_m0_plus() {
+fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m0_plus() {
     let counts = M0_PLUS.counts();
     assert_counts(
         counts,
@@ -59,8 +59,8 @@ fn a_cortex_m0_plus() {
     );
 }
 
-/// Name, instructions, and a bound on the bytes of stack, an interrupt's included. A tone is found together with the
-/// terms that its distance from a sinusoid asks for: about the longest that a trace takes.
+/// Name, instructions, and a bound on the bytes of stack, an interrupt's included. The tone is a square wave, which
+/// adds two terms: such a trace is about the longest one.
 const FITS: [(&str, f64, f64); 5] = [
     ("fit", 30.1e6, 6_200.0),
     ("goodness", 2.87e6, 4_300.0),
@@ -70,21 +70,21 @@ const FITS: [(&str, f64, f64); 5] = [
 ];
 
 #[test]
-fn a_fit_and_a_trace_on_a_cortex_m4f() {
+fn fit_and_trace_take_instructions_and_stack_as_measured_on_a_cortex_m4f() {
     let counts = M4F.counts();
     for (name, instructions, limit) in FITS {
         assert_counts(counts, &[(name, instructions)]);
-        let stack = counts.of(&format!("{name}_stack"));
+        let stack = counts.number(&format!("{name}_stack"));
         println!("{name}: {stack} bytes of stack");
-        assert!(stack <= limit, "{name} takes {stack} bytes of stack, up to {limit} before");
+        assert!(stack <= limit, "{name} takes {stack} bytes of stack, more than {limit}");
     }
 }
 
 #[test]
-fn memory_on_the_target() {
+fn the_estimator_is_within_its_memory_on_both_cores() {
     for target in [M4F, M0_PLUS] {
         let counts = target.counts();
-        println!("P = 4, 8, 16: {}, {}, {} bytes", counts.of("p4"), counts.of("p8"), counts.of("p16"));
-        assert!(counts.of("p4") <= 2_400.0 && counts.of("p8") <= 4_000.0);
+        println!("P = 4, 8, 16: {}, {}, {} bytes", counts.number("p4"), counts.number("p8"), counts.number("p16"));
+        assert!(counts.number("p4") <= 2_400.0 && counts.number("p8") <= 4_000.0);
     }
 }

@@ -1,19 +1,18 @@
-//! The three cases: series whose noise is known.
+//! The three cases: series with known noise.
 
-use virtual_sensor::NoiseSource;
-use virtual_sensor::{NoiseModel, OutputRegister};
+use virtual_sensor::{NoiseModel, NoiseSource, OutputRegister};
 
 /// Samples of a series.
 pub(crate) const SAMPLES: usize = 1_000_000;
 /// Seconds between them.
 pub(crate) const SAMPLE_PERIOD: f64 = 0.01;
-/// Series that are generated and handed on together, one a channel.
+/// Number of series that are generated together, one per channel.
 pub(crate) const BATCH: usize = 6;
 
-/// N, B, K; a coefficient that a method does not give is absent.
+/// N, B, K; `None` where a method gives no value.
 pub(crate) type Coefficients = [Option<f64>; 3];
 
-/// A mixture of noises, in an arbitrary unit.
+/// A mixture of white noise, flicker noise and random walk, in an arbitrary unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case {
     pub(crate) name: &'static str,

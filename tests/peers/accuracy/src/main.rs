@@ -1,5 +1,5 @@
-//! How well the coefficients of known noise are found: series of a million samples at 100 Hz in three cases, this project
-//! beside its peers, each on the very same series.
+//! The error of the coefficients that this project and its peers estimate from series with known noise: three cases of
+//! a million samples at 100 Hz, the same series for every method.
 //!
 //! ```console
 //! $ cargo run --release -p peers-accuracy
@@ -8,9 +8,7 @@
 //! ```
 
 mod case;
-mod imu_calib_crate;
-mod ours;
-mod python;
+mod methods;
 mod score;
 
 use allan_core::NoiseTerm;
@@ -18,13 +16,13 @@ use anyhow::Result;
 use case::{BATCH, CASES, Case, SAMPLES};
 use clap::Parser;
 use comfy_table::{Table, presets};
-use python::Python;
+use methods::Python;
 use score::Scores;
 
-/// Root mean square error (bias) of the coefficients, in percent of the truth.
+/// Root mean square error (bias) of the coefficients, in percent of the true value.
 #[derive(Parser)]
 struct Cli {
-    /// Series a case; rounded up to batches of six.
+    /// Number of series per case; rounded up to batches of six.
     #[arg(long, default_value_t = 72)]
     series: usize,
     /// First seed.
@@ -45,32 +43,32 @@ fn main() -> Result<()> {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["case", "method", "N", "B", "K"]);
     for case in &CASES {
-        let mut methods: Vec<(String, Scores)> = Vec::new();
+        let mut scored: Vec<(String, Scores)> = Vec::new();
         for seed in cli.seed..cli.seed + batches {
             let batch = case.series(seed);
-            own(case, &batch, &mut methods);
+            score_own_fit(case, &batch, &mut scored);
             if !cli.ours {
                 for series in &batch {
-                    let found = imu_calib_crate::coefficients(series)?;
-                    scores(&mut methods, "imu-calib 0.3.1").add(found, case.truth);
+                    let estimate = methods::imu_calib_coefficients(series)?;
+                    scores(&mut scored, "imu-calib 0.3.1").add(estimate, case.truth);
                 }
             }
             if let Some(python) = &mut python {
                 for answer in python.ask(&batch, &python_terms(case))? {
-                    for found in answer.coefficients {
-                        scores(&mut methods, &answer.method).add(found, case.truth);
+                    for estimate in answer.coefficients {
+                        scores(&mut scored, &answer.method).add(estimate, case.truth);
                     }
                 }
             }
         }
-        let [n, b, k] = ours::limit(case).map(|limit| limit.map_or("–".to_owned(), score::percent));
+        let [n, b, k] = methods::limit(case).map(|limit| limit.map_or("–".to_owned(), score::percent));
         table.add_row([case.name.to_owned(), "information in the series".to_owned(), n, b, k]);
-        for (method, Scores([n, b, k])) in methods {
+        for (method, Scores([n, b, k])) in scored {
             table.add_row([case.name.to_owned(), method, n.cell(), b.cell(), k.cell()]);
         }
     }
     println!(
-        "{} series of {SAMPLES} samples a case; rms error and (bias) in percent of the truth",
+        "{} series of {SAMPLES} samples per case; rms error and (bias) in percent of the true value",
         batches * BATCH as u64
     );
     println!("{table}");
@@ -80,27 +78,27 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn own(case: &Case, batch: &[Vec<f64>], methods: &mut Vec<(String, Scores)>) {
-    let true_kinds = ours::true_kinds(case);
+fn score_own_fit(case: &Case, batch: &[Vec<f64>], scored: &mut Vec<(String, Scores)>) {
+    let true_kinds = methods::true_kinds(case);
     for series in batch {
         for (method, kinds) in [("ours, true terms", &true_kinds[..]), ("ours, N, B and K", &NoiseTerm::BASELINE[..])] {
-            let model = ours::fitted(case, series, kinds);
-            let scores = scores(methods, method);
-            scores.add(ours::coefficients(&model), case.truth);
-            scores.add_bounds(ours::covered(case, &model));
+            let model = methods::fitted(case, series, kinds);
+            let scores = scores(scored, method);
+            scores.add(methods::fitted_coefficients(&model), case.truth);
+            scores.add_bounds(methods::covered(case, &model));
         }
     }
 }
 
-fn scores<'a>(methods: &'a mut Vec<(String, Scores)>, name: &str) -> &'a mut Scores {
-    let at = methods.iter().position(|(method, _)| method == name).unwrap_or_else(|| {
-        methods.push((name.to_owned(), Scores::default()));
-        methods.len() - 1
+fn scores<'a>(scored: &'a mut Vec<(String, Scores)>, name: &str) -> &'a mut Scores {
+    let at = scored.iter().position(|(method, _)| method == name).unwrap_or_else(|| {
+        scored.push((name.to_owned(), Scores::default()));
+        scored.len() - 1
     });
-    &mut methods[at].1
+    &mut scored[at].1
 }
 
-/// The terms of the case by the names of `allan-variance`.
+/// The terms of the case by their names in `allan-variance`.
 fn python_terms(case: &Case) -> Vec<&'static str> {
     ["white", "flicker", "walk"].into_iter().zip(case.truth).filter(|(_, v)| *v > 0.0).map(|(name, _)| name).collect()
 }

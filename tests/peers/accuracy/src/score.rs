@@ -2,10 +2,10 @@
 
 use crate::case::Coefficients;
 
-/// What was found for one coefficient by one method.
+/// The estimates of one coefficient by one method.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Score {
-    /// Relative errors of the series for which the method gave a number.
+    /// Relative errors of the series for which the method gave a value.
     errors: Vec<f64>,
     refused: usize,
     covered: usize,
@@ -13,8 +13,8 @@ pub(crate) struct Score {
 }
 
 impl Score {
-    pub(crate) fn add(&mut self, found: Option<f64>, truth: f64) {
-        match found {
+    pub(crate) fn add(&mut self, estimate: Option<f64>, truth: f64) {
+        match estimate {
             Some(value) => self.errors.push(value / truth - 1.0),
             None => self.refused += 1,
         }
@@ -25,7 +25,7 @@ impl Score {
         self.covered += usize::from(covered);
     }
 
-    /// Mean of the relative error; `None` if the method never gave a number.
+    /// Mean of the relative error; `None` if the method never gave a value.
     pub(crate) fn bias(&self) -> Option<f64> {
         (!self.errors.is_empty()).then(|| self.errors.iter().sum::<f64>() / self.errors.len() as f64)
     }
@@ -36,7 +36,7 @@ impl Score {
         (!self.errors.is_empty()).then(|| square.sqrt())
     }
 
-    /// Share of the series whose 95 % bounds hold the truth.
+    /// Fraction of the series whose 95 % interval contains the true value.
     pub(crate) fn coverage(&self) -> Option<f64> {
         (self.bounded > 0).then(|| self.covered as f64 / self.bounded as f64)
     }
@@ -63,10 +63,10 @@ impl Score {
 pub(crate) struct Scores(pub(crate) [Score; 3]);
 
 impl Scores {
-    pub(crate) fn add(&mut self, found: Coefficients, truth: [f64; 3]) {
-        for ((score, found), truth) in self.0.iter_mut().zip(found).zip(truth) {
+    pub(crate) fn add(&mut self, estimates: Coefficients, truth: [f64; 3]) {
+        for ((score, estimate), truth) in self.0.iter_mut().zip(estimates).zip(truth) {
             if truth > 0.0 {
-                score.add(found, truth);
+                score.add(estimate, truth);
             }
         }
     }
@@ -80,7 +80,7 @@ impl Scores {
     }
 }
 
-/// A share in percent.
+/// A fraction in percent.
 pub(crate) fn percent(value: f64) -> String {
     let value = 100.0 * value;
     if value < 1.0 { format!("{value:.3} %") } else { format!("{value:.1} %") }

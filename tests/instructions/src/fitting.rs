@@ -1,13 +1,9 @@
-//! What it takes to get from a curve to coefficients, to the terms that are missing, and to what a channel follows:
-//! instructions and stack, said over semihosting, a line each.
+//! Counts the instructions and the stack of a fit of N, B and K, of a trace of missing terms and of a covariate
+//! regression, and prints them over semihosting, one per line.
 #![no_std]
 #![no_main]
 
-#[path = "../end.rs"]
-mod end;
-mod stack;
-#[path = "../timer.rs"]
-mod timer;
+mod emulator;
 
 use allan_core::fit::{fit, goodness};
 use allan_core::regression::{Covariate, CovariateRegression};
@@ -15,6 +11,7 @@ use allan_core::term::MovingAverageFilter;
 use allan_core::trace::{LineCandidates, Trace, trace_while};
 use allan_core::{Cascade, Coupling, Curve, Model, NoiseTerm};
 use core::hint::black_box;
+use cortex_m::register::msp;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 
@@ -22,7 +19,7 @@ const OCTAVES: usize = 24;
 /// An hour and a half at 204.8 samples a second: 20 points.
 const SAMPLES: u32 = 1 << 20;
 const SAMPLE_PERIOD: f64 = 1.0 / 204.8;
-/// The filters that the trace tries: as many as the firmware has it try.
+/// The filters that the trace tries, which are those of the firmware.
 const FILTERS: [MovingAverageFilter; 10] = [
     MovingAverageFilter::bartlett(2),
     MovingAverageFilter::bartlett(4),
@@ -35,10 +32,17 @@ const FILTERS: [MovingAverageFilter; 10] = [
     MovingAverageFilter { stages: 2, taps: 8, decimation: 10.1 },
     MovingAverageFilter { stages: 2, taps: 8, decimation: 12.1 },
 ];
-/// Of a channel and two covariates.
+/// The pairs of a channel and two covariates.
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+/// Value of a word of stack that has not been used.
+const PAINT: u32 = 0xCCCC_CCCC;
+/// Bytes of stack that are painted: more than anything here uses, and far from the data at the other end of the board's
+/// 4 MB.
+const PAINTED_BYTES: u32 = 256 * 1024;
+/// Bytes of stack that painting itself may use.
+const MARGIN: u32 = 256;
 
-/// A gyro at rest: white noise and a random walk, and, if asked for, a square wave of half a second.
+/// The curve of a gyro at rest with white noise, a random walk, and a square wave of 0.5 s with the amplitude `tone`.
 fn record(tone: i32) -> Curve<OCTAVES> {
     let mut state = 1_u64;
     let mut uniform = || {
@@ -57,28 +61,31 @@ fn record(tone: i32) -> Curve<OCTAVES> {
 
 #[entry]
 fn main() -> ! {
-    timer::start();
+    emulator::start();
     let quiet = black_box(record(0));
-    let toned = black_box(record(100));
+    let with_tone = black_box(record(100));
     let mut model = Model::new(SAMPLE_PERIOD, []);
     measure("fit", || model = black_box(fit(&quiet, &NoiseTerm::BASELINE)));
     measure("goodness", || _ = black_box(goodness(&quiet, &model)));
-    // Where it stands, as on a device: its result is none of its stack.
+    // The result lies outside the stack that is measured, as in the firmware.
     let mut result = Trace::empty();
     let mut traced = |curve| {
         result.fit_baseline(curve);
-        assert!(trace_while(&mut result, curve, LineCandidates::Curve, &FILTERS, &mut || true), "nobody says no");
+        assert!(
+            trace_while(&mut result, curve, LineCandidates::Curve, &FILTERS, &mut || true),
+            "a trace that is not cancelled"
+        );
         result.added.len()
     };
-    let mut found = [0; 2];
-    measure("trace_nothing", || found[0] = black_box(traced(&quiet)));
-    measure("trace_tone", || found[1] = black_box(traced(&toned)));
-    assert!(found == [0, 2], "{found:?} terms are found");
+    let mut added = [0; 2];
+    measure("trace_nothing", || added[0] = black_box(traced(&quiet)));
+    measure("trace_tone", || added[1] = black_box(traced(&with_tone)));
+    assert!(added == [0, 2], "{added:?} terms added");
     sensitivities();
-    end::success()
+    emulator::success()
 }
 
-/// A channel that follows one of two walks, and what they have in common.
+/// Counts the regression of a channel that follows the first of two random walks on both.
 fn sensitivities() {
     let mut state = 1_u64;
     let mut uniform = || {
@@ -106,15 +113,34 @@ fn sensitivities() {
         let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
         points[pair].iter().find(|point| point.n == n).map(|point| point.covariance)
     };
-    let beside = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
-    let mut followed = Default::default();
-    measure("sensitivities", || followed = black_box(beside.sensitivities()));
-    assert!(followed.iter().map(|of| of.covariate).eq([0]), "{followed:?}");
+    let regression = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
+    let mut estimates = Default::default();
+    measure("sensitivities", || estimates = black_box(regression.sensitivities()));
+    assert!(estimates.iter().map(|estimate| estimate.covariate).eq([0]), "{estimates:?}");
 }
 
 fn measure(name: &str, work: impl FnOnce()) {
     let mut count = 0;
-    let stack = stack::deepest(|| count = timer::instructions(work));
+    let stack = stack_bytes(|| count = emulator::instructions(work));
     hprintln!("count {} {}", name, count);
     hprintln!("bytes {}_stack {}", name, stack);
+}
+
+/// Bytes of stack that `work` uses below its caller's, interrupts included: the stack is painted before and searched
+/// after.
+#[inline(never)]
+fn stack_bytes(work: impl FnOnce()) -> u32 {
+    let top = msp::read();
+    let words = || (top - PAINTED_BYTES..top - MARGIN).step_by(4);
+    // SAFETY: this RAM lies below the stack pointer and above the static variables, so nothing uses it.
+    words().for_each(|address| unsafe { (address as *mut u32).write_volatile(PAINT) });
+    run(work);
+    // SAFETY: as above.
+    let used = words().find(|&address| unsafe { (address as *const u32).read_volatile() } != PAINT);
+    used.map_or(MARGIN, |address| top - address)
+}
+
+#[inline(never)]
+fn run(work: impl FnOnce()) {
+    work();
 }

@@ -1,4 +1,5 @@
-//! Instructions by the clock of the emulated board.
+//! The emulated board: its clock, which counts instructions, and the end of a run, which QEMU returns as its exit
+//! status.
 //!
 //! With QEMU's `-icount shift=0` an instruction takes 1 ns, and SysTick counts at 25 MHz: a tick is 40 instructions.
 
@@ -6,11 +7,13 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{Peripherals, SYST};
 use cortex_m_rt::exception;
+use cortex_m_semihosting::debug::{self, ExitStatus};
+use cortex_m_semihosting::hprintln;
 
 const INSTRUCTIONS_PER_TICK: u64 = 40;
 const WRAP: u32 = 1 << 24;
 
-/// How often the timer has wrapped.
+/// Number of times that the timer has wrapped.
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
 #[exception]
@@ -18,6 +21,7 @@ fn SysTick() {
     WRAPS.store(WRAPS.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
 }
 
+/// Starts the clock; to be called once.
 pub(crate) fn start() {
     let mut timer = Peripherals::take().expect("taken once").SYST;
     timer.set_clock_source(SystClkSource::Core);
@@ -27,6 +31,7 @@ pub(crate) fn start() {
     timer.enable_interrupt();
 }
 
+/// Ticks since [`start`].
 fn ticks() -> u64 {
     loop {
         let wraps = WRAPS.load(Ordering::Relaxed);
@@ -37,9 +42,27 @@ fn ticks() -> u64 {
     }
 }
 
-/// Instructions that `work` takes.
+/// Number of instructions that `work` takes.
 pub(crate) fn instructions(work: impl FnOnce()) -> u64 {
     let start = ticks();
     work();
     (ticks() - start) * INSTRUCTIONS_PER_TICK
+}
+
+/// Ends the run with success.
+pub(crate) fn success() -> ! {
+    exit(debug::EXIT_SUCCESS)
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    hprintln!("{}", info);
+    exit(debug::EXIT_FAILURE)
+}
+
+fn exit(status: ExitStatus) -> ! {
+    debug::exit(status);
+    loop {
+        cortex_m::asm::wfi();
+    }
 }

@@ -1,0 +1,119 @@
+//! The methods that are compared: this project's fit, the crate imu-calib, and the Python packages that `peers.py` runs
+//! in a process of its own.
+
+use crate::case::{Case, Coefficients, SAMPLE_PERIOD, SAMPLES};
+use allan_core::model::FittedTerm;
+use allan_core::{Cascade, Model, NoiseTerm, fit::fit};
+use anyhow::{Context, Result, ensure};
+use imu_calib::allan::{AllanConfig, AllanEstimator, Sensor};
+use noise_analysis::record_length::relative_error;
+use serde::Deserialize;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+/// Standard deviation of the white noise in counts. Rounding adds 1/12 count² to its variance, a part in 10⁷.
+const COUNTS: f64 = 1000.0;
+
+/// This project's fit of `kinds` to the curve of a series; coefficients and bounds are in the unit of the series.
+pub(crate) fn fitted(case: &Case, series: &[f64], kinds: &[NoiseTerm]) -> Model {
+    let lsb = case.truth[0] / SAMPLE_PERIOD.sqrt() / COUNTS;
+    let mut cascade = Cascade::<24, 8>::new();
+    for value in series {
+        cascade.push((value / lsb).round() as i32);
+    }
+    fit(&cascade.curve(SAMPLE_PERIOD), kinds).scaled(lsb)
+}
+
+/// The terms of which the case consists.
+pub(crate) fn true_kinds(case: &Case) -> Vec<NoiseTerm> {
+    NoiseTerm::BASELINE.into_iter().zip(case.truth).filter(|(_, value)| *value > 0.0).map(|(kind, _)| kind).collect()
+}
+
+/// Lower bound on the relative standard error of N, B, K for an unbiased method.
+pub(crate) fn limit(case: &Case) -> [Option<f64>; 3] {
+    let truth = Model::new(
+        SAMPLE_PERIOD,
+        NoiseTerm::BASELINE.into_iter().zip(case.truth).map(|(kind, value)| FittedTerm::exact(kind, value)),
+    );
+    std::array::from_fn(|term| {
+        (case.truth[term] > 0.0).then(|| relative_error(&truth, term, SAMPLES as f64 * SAMPLE_PERIOD))?
+    })
+}
+
+/// N, B, K of a model.
+pub(crate) fn fitted_coefficients(model: &Model) -> Coefficients {
+    NoiseTerm::BASELINE.map(|kind| model.terms().iter().find(|term| term.kind == kind).map(|term| term.value))
+}
+
+/// Whether the 95 % intervals of N, B, K contain the true value.
+pub(crate) fn covered(case: &Case, model: &Model) -> [Option<bool>; 3] {
+    let mut truth = case.truth.into_iter();
+    NoiseTerm::BASELINE.map(|kind| {
+        let truth = truth.next()?;
+        let term = model.terms().iter().find(|term| term.kind == kind)?;
+        Some((term.low..=term.high).contains(&truth))
+    })
+}
+
+/// N and K by imu-calib, from slopes of the non-overlapping curve; absent where the crate returns an error.
+pub(crate) fn imu_calib_coefficients(series: &[f64]) -> Result<Coefficients> {
+    let mut estimator = AllanEstimator::with_rate(AllanConfig::default(), 1.0 / SAMPLE_PERIOD)?;
+    for (at, &value) in series.iter().enumerate() {
+        estimator.push(at as f64 * SAMPLE_PERIOD, [0.0; 3], [value; 3]);
+    }
+    let result = estimator.finish()?;
+    let first = |axes: Result<[f64; 3]>| axes.ok().map(|[x, ..]| x);
+    Ok([first(result.noise_density_per_axis(Sensor::Gyro)), None, first(result.random_walk_per_axis(Sensor::Gyro))])
+}
+
+/// A running `peers.py`.
+pub(crate) struct Python {
+    child: Child,
+    series: ChildStdin,
+    answers: BufReader<ChildStdout>,
+}
+
+/// The coefficients that one method gives for each series of a batch.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Answer {
+    pub(crate) method: String,
+    /// N, B, K for each series.
+    pub(crate) coefficients: Vec<Coefficients>,
+}
+
+impl Python {
+    /// Starts `peers.py` with `interpreter`, in whose environment the peers are installed.
+    pub(crate) fn start(interpreter: &str) -> Result<Self> {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/peers.py");
+        let mut child = Command::new(interpreter)
+            .arg(script)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .with_context(|| interpreter.to_owned())?;
+        let series = child.stdin.take().context("no standard input")?;
+        let answers = BufReader::new(child.stdout.take().context("no standard output")?);
+        Ok(Self { child, series, answers })
+    }
+
+    /// Sends a batch and waits for the answers of every method.
+    pub(crate) fn ask(&mut self, batch: &[Vec<f64>], kinds: &[&str]) -> Result<Vec<Answer>> {
+        writeln!(self.series, "{} {} {}", batch.len(), batch[0].len(), kinds.join(","))?;
+        for series in batch {
+            let bytes: Vec<u8> = series.iter().flat_map(|value| value.to_le_bytes()).collect();
+            self.series.write_all(&bytes)?;
+        }
+        self.series.flush()?;
+        let mut line = String::new();
+        ensure!(self.answers.read_line(&mut line)? > 0, "peers.py ended: see its message above");
+        Ok(serde_json::from_str(&line)?)
+    }
+}
+
+impl Drop for Python {
+    fn drop(&mut self) {
+        // It waits for the next batch. An error means that it has ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,92 @@
+//! The images: built as they are built to be flashed, their size, and a copy with a smaller stack.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+pub(crate) fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
+}
+
+/// The target folder of the images. It is not that of the tests, which the cargo that runs the tests may have locked.
+pub(crate) fn folder() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
+    workspace().join(target).join("image")
+}
+
+/// Builds the image `observatory-{board}` for a target and returns the path of its ELF.
+pub(crate) fn build(board: &str, target: &str) -> PathBuf {
+    let (bin, feature) = (format!("observatory-{board}"), format!("board-{board}"));
+    let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(workspace())
+        .args(["build", "--package", "firmware", "--bin", &bin, "--features", &feature, "--target", target])
+        .args(["--profile", "image", "--locked", "--target-dir"])
+        .arg(folder())
+        .status()
+        .expect("cargo starts");
+    assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
+    folder().join(target).join("image").join(bin)
+}
+
+const FLASH_START: u32 = 0x0800_0000;
+const RAM: std::ops::Range<u32> = 0x2000_0000..0x3000_0000;
+
+/// An ELF of 32 bits, little-endian.
+struct Elf(Vec<u8>);
+
+impl Elf {
+    fn read(file: &Path) -> Self {
+        Self(std::fs::read(file).expect("the image"))
+    }
+
+    fn word(&self, at: usize) -> u32 {
+        u32::from_le_bytes(self.0[at..at + 4].try_into().expect("4 bytes"))
+    }
+
+    fn half(&self, at: usize) -> usize {
+        usize::from(u16::from_le_bytes(self.0[at..at + 2].try_into().expect("2 bytes")))
+    }
+}
+
+/// What an image takes of flash and memory, in bytes.
+#[derive(Debug)]
+pub(crate) struct Size {
+    pub(crate) flash: u32,
+    /// Static variables, that is without the stack.
+    pub(crate) statics: u32,
+    /// From the start of memory, where the stack is, to the end of the last static variable.
+    pub(crate) ram: u32,
+}
+
+/// The size of an image by the section headers of its ELF.
+pub(crate) fn size(image: &Path) -> Size {
+    let elf = Elf::read(image);
+    let mut size = Size { flash: 0, statics: 0, ram: 0 };
+    for section in 0..elf.half(48) {
+        let header = elf.word(32) as usize + section * elf.half(46);
+        let [kind, flags, address, bytes] = [4, 8, 12, 20].map(|field| elf.word(header + field));
+        let (allocated, without_bits) = (flags & 2 != 0, kind == 8);
+        if allocated && RAM.contains(&address) {
+            size.statics += bytes;
+            size.ram = size.ram.max(address + bytes - RAM.start);
+        }
+        if allocated && !without_bits {
+            size.flash += bytes;
+        }
+    }
+    size
+}
+
+/// Writes a copy of an image with a stack of so many bytes: the first word of the vector table, from which the
+/// processor loads its stack pointer, is changed.
+pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
+    let mut elf = Elf::read(image);
+    // The program headers: at 4 the offset in the file, at 12 the physical address, at 16 the size.
+    let mut headers = (0..elf.half(44)).map(|segment| elf.word(28) as usize + 32 * segment);
+    let vectors = headers.find(|&header| elf.word(header + 12) == FLASH_START && elf.word(header + 16) > 0);
+    let at = elf.word(vectors.expect("a vector table") + 4) as usize;
+    elf.0[at..at + 4].copy_from_slice(&(RAM.start + bytes).to_le_bytes());
+    std::fs::create_dir_all(folder()).expect("a folder");
+    let copy = folder().join(format!("observatory-f405-stack-{bytes}"));
+    std::fs::write(&copy, elf.0).expect("room");
+    copy
+}

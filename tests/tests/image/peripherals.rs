@@ -1,0 +1,119 @@
+//! The devices that are connected to the microcontroller: the virtual sensor at its chip select, and a terminal at the
+//! serial port, both in the emulator's time.
+
+use adis16405_driver::BURST_BYTES;
+use rigless::chip::{Timeline, spi, uart};
+use rigless::snapshot::Store;
+use rigless::time::VirtualNanos;
+use std::collections::VecDeque;
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
+
+/// The bus clock of the board (84 MHz) divided by the first power of two that brings it to 1 MHz or less.
+pub(crate) const SCK_HZ: u32 = 84_000_000 / 128;
+
+#[derive(Debug, Clone)]
+pub(crate) struct Sensor {
+    pub(crate) part: VirtualAdis16405,
+    /// The answer of the part to each burst, in order, with the number of its latest sample at that time.
+    pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
+    /// Shortest time from one byte to the next within a frame, in ns.
+    pub(crate) shortest_byte_ns: u64,
+    /// Byte at which the data line to the processor is held.
+    pub(crate) stuck_at: Option<u8>,
+    /// Words of another width than eight bits.
+    pub(crate) odd_words: u64,
+    byte_ns: u64,
+    frame: Vec<(u8, u8)>,
+    last_byte: Option<u64>,
+    /// Whether a frame is under way.
+    pub(crate) selected: bool,
+}
+
+impl Sensor {
+    /// The emulator reports a byte at its end, while the part is told when it began: it is taken to have lasted eight
+    /// periods of [`SCK_HZ`]. [`shortest_byte_ns`](Self::shortest_byte_ns) shows how long it really lasted.
+    pub(crate) fn new(mut part: VirtualAdis16405) -> Self {
+        part.set_sck_hz(Some(SCK_HZ));
+        Self {
+            part,
+            byte_ns: 8_000_000_000 / u64::from(SCK_HZ),
+            bursts: Vec::new(),
+            shortest_byte_ns: u64::MAX,
+            stuck_at: None,
+            odd_words: 0,
+            frame: Vec::new(),
+            last_byte: None,
+            selected: false,
+        }
+    }
+
+    /// A sensor with the noise of the published characterisation.
+    pub(crate) fn published(seed: u64) -> Self {
+        Self::new(VirtualAdis16405::new(NoiseModel::paper(), seed))
+    }
+
+    /// Advances the part to a time in ns. Within a frame it stays one byte behind, as a byte is reported at its end.
+    pub(crate) fn advance_to(&mut self, now: u64) {
+        self.part.advance_to(if self.selected { now.saturating_sub(self.byte_ns) } else { now });
+    }
+}
+
+impl Store for Sensor {}
+
+impl spi::Peer for Sensor {
+    fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        let now = context.now().0;
+        if let Some(last) = self.last_byte.replace(now) {
+            self.shortest_byte_ns = self.shortest_byte_ns.min(now - last);
+        }
+        self.odd_words += u64::from(bits != 8);
+        self.part.advance_to(now.saturating_sub(self.byte_ns));
+        let answer = self.part.transfer_byte(mosi as u8);
+        let miso = self.stuck_at.unwrap_or(answer);
+        self.frame.push((mosi as u8, miso));
+        u32::from(miso)
+    }
+
+    fn select(&mut self, context: &mut Timeline<'_, '_>) {
+        self.part.advance_to(context.now().0);
+        self.part.select();
+        self.selected = true;
+        self.frame.clear();
+        self.last_byte = None;
+    }
+
+    fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
+        self.part.advance_to(context.now().0);
+        self.part.deselect();
+        self.selected = false;
+        let burst_requested = self.frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
+        let answers: Vec<u8> = self.frame.iter().map(|&(_, miso)| miso).collect();
+        if burst_requested && let Ok(burst) = answers.try_into() {
+            self.bursts.push((self.part.samples(), burst));
+        }
+    }
+}
+
+/// Records the bytes of the image, and sends keys.
+#[derive(Debug, Default)]
+pub(crate) struct Terminal {
+    /// Every byte received, with the time in ns at which its stop bit ended.
+    pub(crate) received: Vec<(u64, u8)>,
+    /// Keys still to be sent, by rising time in ns.
+    pub(crate) keys: VecDeque<(u64, u8)>,
+}
+
+impl Store for Terminal {}
+
+impl uart::Peer for Terminal {
+    fn receive(&mut self, word: u16, context: &mut Timeline<'_, '_>) {
+        self.received.push((context.now().0, word as u8));
+    }
+
+    fn transmit(&mut self, now: VirtualNanos) -> Option<u16> {
+        if self.keys.front()?.0 > now.0 {
+            return None;
+        }
+        self.keys.pop_front().map(|(_, key)| u16::from(key))
+    }
+}
