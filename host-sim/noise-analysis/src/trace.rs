@@ -6,12 +6,10 @@
 mod bias_step;
 pub mod block;
 pub mod coarse_counts;
-pub mod deliveries;
 pub mod evidence;
 pub mod level;
 pub mod noises;
 mod rate_ramp;
-pub mod sample_clock;
 pub mod spikes;
 pub mod two_levels;
 

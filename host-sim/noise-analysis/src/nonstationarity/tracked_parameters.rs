@@ -1,0 +1,302 @@
+//! A model whose white noise and one of whose lines may change from epoch to epoch.
+
+use super::epochs::SIGNIFICANCE;
+use allan_core::confidence::octave_correlation;
+use allan_core::model::Term;
+use allan_core::term::{Resonance, Sinusoid};
+use allan_core::{Curve, Kind, Model, Point};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Number of parameters that can be tracked.
+pub(crate) const PARAMETERS: usize = 2;
+/// Largest change of a line's frequency from its mean, in ln f.
+const MAX_LINE: f64 = 0.3;
+/// Largest change of the level, in ln of the variance: a factor of about 20.
+pub(crate) const MAX_LEVEL: f64 = 3.0;
+/// Largest bandwidth of a line that is tracked, as a part of its frequency.
+const MAX_BANDWIDTH: f64 = 0.25;
+/// Largest standard deviation of ln f, in the median of the epochs, of a line that is tracked.
+const MAX_LINE_ERROR: f64 = 0.02;
+/// Distance in ln f of the frequencies from which the search starts.
+const GUESS_STEP: f64 = 0.02;
+
+/// The differences of an epoch from the model, or their standard deviations: ln of the variance of the white noise, and ln
+/// of the line's frequency.
+pub type ParameterVector = [f64; PARAMETERS];
+
+/// A model, and which of its lines is tracked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedModel {
+    model: Model,
+    line: Option<usize>,
+}
+
+/// The tracked parameters of an epoch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EpochEstimate {
+    /// At the minimum of the deviance.
+    pub parameters: ParameterVector,
+    /// Standard deviations.
+    pub error: ParameterVector,
+    /// `Σ edf·(ln(m/v) + v/m − 1)` there.
+    pub deviance: f64,
+    /// Mean decrease of the deviance by chance with the last parameter that was set free.
+    scatter: f64,
+}
+
+/// The parameters that are tracked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TrackedSet {
+    /// Nothing.
+    Nothing,
+    /// The level of the white noise.
+    Level,
+    /// The level and the frequency of the line.
+    LevelAndLine,
+}
+
+/// Test of whether a parameter moves among the epochs of the first half.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MovementTest {
+    /// Mean decrease of the deviance of an epoch, over that by chance.
+    pub gain: f64,
+    /// Probability of as much if the parameter does not move.
+    pub p_value: f64,
+}
+
+impl TrackedModel {
+    /// A model none of whose lines is tracked.
+    #[must_use]
+    pub fn without_line(model: Model) -> Self {
+        Self { model, line: None }
+    }
+
+    /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
+    #[must_use]
+    pub fn select_line<const POINTS: usize>(model: Model, epochs: &[Curve<POINTS>]) -> (Self, Option<MovementTest>) {
+        let is_line = |term: &Term| match term.kind {
+            Kind::Sinusoid(_) => term.value > 0.0,
+            Kind::Resonance(line) => term.value > 0.0 && line.bandwidth < MAX_BANDWIDTH * line.frequency,
+            _ => false,
+        };
+        let lines: Vec<usize> = (0..model.terms().len()).filter(|&at| is_line(&model.terms()[at])).collect();
+        let is_trackable = |line: &usize| {
+            let tracked = Self { model: model.clone(), line: Some(*line) };
+            let mut errors: Vec<f64> =
+                epochs.iter().map(|epoch| tracked.estimate(epoch, TrackedSet::LevelAndLine).error[1]).collect();
+            errors.sort_by(f64::total_cmp);
+            errors.get(errors.len() / 2).is_some_and(|&median| median < MAX_LINE_ERROR)
+        };
+        let tried = lines.iter().copied().filter(is_trackable).map(|line| {
+            let tracked = Self { model: model.clone(), line: Some(line) };
+            let test = tracked.test_movement(epochs, TrackedSet::Level, TrackedSet::LevelAndLine);
+            (tracked, MovementTest { p_value: (test.p_value * lines.len() as f64).min(1.0), ..test })
+        });
+        let clearest = tried.min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value).then(b.1.gain.total_cmp(&a.1.gain)));
+        match clearest {
+            Some((tracked, test)) if test.p_value < SIGNIFICANCE => (tracked, Some(test)),
+            clearest => (Self::without_line(model), clearest.map(|(_, test)| test)),
+        }
+    }
+
+    /// The model with all parameters at their means.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Mean frequency of the line that is tracked, Hz.
+    #[must_use]
+    pub fn line_frequency(&self) -> Option<f64> {
+        self.line.map(|line| self.model.terms()[line].kind.shape()[0].1)
+    }
+
+    /// All parameters that can be tracked.
+    #[must_use]
+    pub fn largest_set(&self) -> TrackedSet {
+        if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
+    }
+
+    /// The model with the parameters of an epoch.
+    #[must_use]
+    pub fn at(&self, [level, line]: ParameterVector) -> Model {
+        let moved = |(at, term): (usize, &Term)| {
+            let mut term = *term;
+            if matches!(term.kind, Kind::AngleRandomWalk | Kind::Filtered(_)) {
+                term.value *= (level / 2.0).exp();
+            }
+            if self.line == Some(at) {
+                term.kind = shifted(term.kind, line.exp());
+            }
+            term
+        };
+        Model::new(self.model.sample_period(), self.model.terms().iter().enumerate().map(moved))
+    }
+
+    /// The model with the parameters of an epoch, and with the logarithms of the line's width and amplitude changed by
+    /// `width` and `amplitude`.
+    pub fn with_line_shape(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
+        let moved = self.at([level, line]);
+        let changed = |(at, term): (usize, &Term)| {
+            let mut term = *term;
+            if self.line == Some(at) {
+                term.value *= amplitude.exp();
+                if let Kind::Resonance(line) = term.kind {
+                    term.kind = Kind::Resonance(Resonance { bandwidth: line.bandwidth * width.exp(), ..line });
+                }
+            }
+            term
+        };
+        Model::new(moved.sample_period(), moved.terms().iter().enumerate().map(changed))
+    }
+
+    /// Tests whether the epochs need the parameters `more`, which are one more than `fewer`.
+    ///
+    /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
+    #[must_use]
+    pub fn test_movement<const POINTS: usize>(
+        &self,
+        epochs: &[Curve<POINTS>],
+        fewer: TrackedSet,
+        more: TrackedSet,
+    ) -> MovementTest {
+        let decrease = |epoch: &Curve<POINTS>| {
+            let estimate = self.estimate(epoch, more);
+            (self.estimate(epoch, fewer).deviance - estimate.deviance) / estimate.scatter
+        };
+        let sum: f64 = epochs.iter().map(decrease).sum();
+        let count = epochs.len() as f64;
+        // `count` is above 0 for an `EpochCurves`.
+        let p_value = ChiSquared::new(count).map_or(1.0, |chi_squared| chi_squared.sf(sum.max(0.0)));
+        MovementTest { gain: sum / count, p_value }
+    }
+
+    /// The parameters of an epoch; those that are not in `tracked` are 0.
+    #[must_use]
+    pub fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
+        let points: Vec<(&Point, f64)> = epoch
+            .points()
+            .iter()
+            .filter(|point| point.n <= epoch.samples() / 8 && point.avar > 0.0)
+            .map(|point| (point, self.model.edf(point)))
+            .collect();
+        let avars = |parameters: ParameterVector| -> Vec<f64> {
+            let model = self.at(parameters);
+            points.iter().map(|(point, _)| model.avar(point.n)).collect()
+        };
+        // The part of the white noise, which the level multiplies: by a factor of 2 it adds as much again.
+        let white: Vec<f64> =
+            avars([2f64.ln(), 0.0]).iter().zip(avars([0.0; 2])).map(|(twice, once)| twice - once).collect();
+        let deviance = |level: f64, avars: &[f64]| {
+            let added = level.exp() - 1.0;
+            let modelled = avars.iter().zip(&white).map(|(all, white)| all + added * white);
+            let of = |((point, edf), modelled): (&(&Point, f64), f64)| {
+                let ratio = point.avar / modelled;
+                edf * (ratio - 1.0 - ratio.ln())
+            };
+            points.iter().zip(modelled).map(of).sum::<f64>()
+        };
+        let best_level = |avars: &[f64]| minimum(|level| deviance(level, avars), 0.0, 0.05, MAX_LEVEL);
+        let at_line = |line: f64| {
+            let avars = avars([0.0, line]);
+            let level = best_level(&avars);
+            (level, deviance(level, &avars))
+        };
+        let parameters = match tracked {
+            TrackedSet::Nothing => [0.0, 0.0],
+            TrackedSet::Level => [at_line(0.0).0, 0.0],
+            TrackedSet::LevelAndLine => {
+                let most = (MAX_LINE / GUESS_STEP) as i32;
+                let guesses = (-most..=most).map(|k| f64::from(k) * GUESS_STEP).map(|line| (line, at_line(line).1));
+                let guess = guesses.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(line, _)| line);
+                let line = minimum(|line| at_line(line).1, guess, GUESS_STEP / 2.0, MAX_LINE);
+                [at_line(line).0, line]
+            }
+        };
+        let (error, scatter) = self.uncertainty(&points, parameters, tracked);
+        let deviance = deviance(parameters[0], &avars([0.0, parameters[1]]));
+        EpochEstimate { parameters, error, deviance, scatter }
+    }
+
+    /// Standard deviations by the sandwich estimator `H⁻¹·S·H⁻¹`, and the factor by which the correlation of the points
+    /// increases the variance along the last parameter.
+    fn uncertainty(
+        &self,
+        points: &[(&Point, f64)],
+        parameters: ParameterVector,
+        tracked: TrackedSet,
+    ) -> (ParameterVector, f64) {
+        const STEP: f64 = 1e-3;
+        let slope = |index: usize, point: &Point| {
+            let at = |step: f64| {
+                let mut moved = parameters;
+                moved[index] += step;
+                self.at(moved).avar(point.n).ln()
+            };
+            (at(STEP) - at(-STEP)) / (2.0 * STEP)
+        };
+        // The slope of each point in its standard deviations.
+        let tangent = |index: usize| -> Vec<f64> {
+            points.iter().map(|(point, edf)| (edf / 2.0).sqrt() * slope(index, point)).collect()
+        };
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let spread = |along: &[f64]| -> f64 {
+            let mut sum = 0.0;
+            for (i, (a, _)) in points.iter().enumerate() {
+                for (j, (b, _)) in points.iter().enumerate() {
+                    let (a, b) = (self.model.shares(a.n), self.model.shares(b.n));
+                    sum += along[i] * along[j] * octave_correlation(i.abs_diff(j), a, b);
+                }
+            }
+            sum
+        };
+        let without = |vector: Vec<f64>, other: &[f64]| -> Vec<f64> {
+            let along = dot(&vector, other) / dot(other, other);
+            vector.iter().zip(other).map(|(entry, other)| entry - along * other).collect()
+        };
+        let error = |rest: &[f64]| spread(rest).sqrt() / dot(rest, rest);
+        match tracked {
+            TrackedSet::Nothing => ([0.0, 0.0], 1.0),
+            TrackedSet::Level => {
+                let level = tangent(0);
+                ([error(&level), 0.0], (spread(&level) / dot(&level, &level)).max(1.0))
+            }
+            TrackedSet::LevelAndLine => {
+                let (level, line) = (tangent(0), tangent(1));
+                let (level_rest, line_rest) = (without(level.clone(), &line), without(line, &level));
+                let scatter = spread(&line_rest) / dot(&line_rest, &line_rest);
+                ([error(&level_rest), error(&line_rest)], scatter.max(1.0))
+            }
+        }
+    }
+}
+
+fn shifted(kind: Kind, factor: f64) -> Kind {
+    match kind {
+        Kind::Sinusoid(line) => Kind::Sinusoid(Sinusoid { frequency: line.frequency * factor }),
+        Kind::Resonance(line) => Kind::Resonance(Resonance { frequency: line.frequency * factor, ..line }),
+        other => other,
+    }
+}
+
+/// The position of the minimum of `of` near `start`, at most `farthest` from 0: downhill in growing steps, then by golden
+/// section search.
+pub(crate) fn minimum(of: impl Fn(f64) -> f64, start: f64, step: f64, farthest: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let mut step = if of(start + step) < of(start - step) { step } else { -step };
+    let (mut behind, mut here, mut value) = (start - step, start, of(start));
+    for _ in 0..40 {
+        let next = of(here + step);
+        if next >= value || (here + step).abs() > farthest {
+            break;
+        }
+        (behind, here, value) = (here, here + step, next);
+        step *= 1.5;
+    }
+    let (mut low, mut high) = if step > 0.0 { (behind, here + step) } else { (here + step, behind) };
+    while high - low > 1e-5 {
+        let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        if of(a) < of(b) { high = b } else { low = a }
+    }
+    (low + high) / 2.0
+}
