@@ -3,7 +3,7 @@
 use crate::cli::{ExplainArguments, OutputArguments};
 use crate::output::print;
 use anyhow::{Context, Result, bail};
-use noise_analysis::explain::{Explanation, explain};
+use noise_analysis::nonstationarity::{Explanation, explain};
 use recordings::count_table;
 use recordings::time_base::measurement;
 use std::fs;

@@ -12,6 +12,10 @@ const SLOW_TIME_BASE: u32 = 31;
 /// Initial bias error (1 σ): deg/s, g.
 const GYRO_BIAS: f64 = 3.0;
 const ACCELEROMETER_BIAS: f64 = 0.05;
+/// Relative standard deviation of the clock of an ordinary host: a crystal that is not trimmed, 20 ppm.
+pub const HOST_CLOCK_ERROR: f64 = 20e-6;
+/// Relative standard deviation of the sample rate: by the clock of a host whose crystal is good to ±100 ppm (2 σ).
+const SAMPLE_RATE_ERROR: f64 = 5e-5;
 
 /// The profile of the part; `gyro_lsb` is the size of a gyroscope's count in deg/s in the range that was set: 0.05, 0.025
 /// or 0.0125.
@@ -50,6 +54,8 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         native_rates_hz: native_rates_hz(),
         filters: filters(),
         dithered_avar_counts2: 0.2,
+        host_clock_error: HOST_CLOCK_ERROR,
+        sample_rate_error: SAMPLE_RATE_ERROR,
     }
 }
 
@@ -75,7 +81,7 @@ mod tests {
     use adis16405_driver::{Channel, GyroRange, SamplePeriod};
 
     #[test]
-    fn names_units_and_scales_are_the_drivers() {
+    fn names_units_and_scales_are_those_of_the_driver() {
         for range in [GyroRange::Dps300, GyroRange::Dps150, GyroRange::Dps75] {
             let profile = profile(range.lsb());
             assert_eq!(profile.channels.len(), Channel::ALL.len());

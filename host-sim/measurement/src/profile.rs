@@ -67,6 +67,10 @@ pub struct SensorProfile {
     /// Allan variance of a channel at the shortest octaves, in counts², above which rounding to counts adds white noise and
     /// nothing else.
     pub dithered_avar_counts2: f64,
+    /// Relative standard deviation of the clock of the host that stamps the samples.
+    pub host_clock_error: f64,
+    /// Relative standard deviation of the sample rate as the analysis is given it: the error of a line's frequency.
+    pub sample_rate_error: f64,
 }
 
 impl SensorProfile {

@@ -1,16 +1,16 @@
-//! What an analysis found, as data: the JSON schema, and the source of the terminal table and of the page.
+//! The report of an analysis as plain data: the JSON schema, and the source of the terminal table and of the page.
 //!
-//! A report says nothing of where its samples came from, so that a recording read from a file and the same
-//! recording replayed over the bus give the same bytes.
+//! A report does not name the source of its samples: a recording that is read from a file and the same recording replayed
+//! over the bus give the same bytes.
 
+use crate::assessment::Assessment;
 pub use crate::findings::{Effect, Parameter};
-use crate::practice::Practice;
-use allan_core::AllanPoint;
-use allan_core::slope_method::percentage_accuracy;
+use crate::units::coefficient_unit;
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Version of the JSON schema; field names are a promise within one version.
+/// Version of the JSON schema; the field names are fixed within a version.
 pub const SCHEMA: u32 = 1;
 
 /// A whole analysis.
@@ -18,13 +18,13 @@ pub const SCHEMA: u32 = 1;
 pub struct Report {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// Given by the user, or measured from the time stamps, in Hz.
+    /// As the user states it or as the time stamps show it, Hz.
     pub sample_rate_hz: f64,
     /// Samples that the estimator used.
     pub samples: u64,
     /// Samples that are missing or were refused, by cause; `gap` counts those that never arrived.
     pub dropped: BTreeMap<String, u64>,
-    /// Samples that were used although something about them was noticed, by cause.
+    /// Samples that are used although a warning was raised, by cause.
     pub flagged: BTreeMap<String, u64>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
@@ -39,18 +39,19 @@ pub struct ChannelReport {
     pub unit: String,
     /// Samples used.
     pub samples: u64,
-    /// Measured over the whole record, octave by octave.
+    /// Allan deviation over the whole record, octave by octave.
     pub curve: Vec<CurvePoint>,
-    /// The coefficients as the classical slopes give them, beside the fit.
-    pub read_off: ReadOff,
-    /// The declared model: angle random walk, bias instability, rate random walk.
+    /// The coefficients by the slope method.
+    pub read_off: SlopeMethodReport,
+    /// The baseline model: angle random walk, bias instability, rate random walk.
     pub before: ModelReport,
-    /// Effects that the declared model lacks.
+    /// Effects that the baseline model lacks.
     pub effects: Vec<Effect>,
-    /// The declared model with the effects.
+    /// The baseline model with the terms that were added.
     pub after: ModelReport,
-    /// What that model is good for.
-    pub practice: Practice,
+    /// Assessment of the model for use in navigation.
+    #[serde(rename = "practice")]
+    pub assessment: Assessment,
 }
 
 /// One octave of the measured Allan deviation.
@@ -68,14 +69,14 @@ pub struct CurvePoint {
     pub high: f64,
     /// Equivalent degrees of freedom.
     pub edf: f64,
-    /// `100/sqrt(2(N/n−1))`, the percentage accuracy by which the classical method judges a point.
+    /// `100/sqrt(2(N/n−1))`: the percentage accuracy of a point in the slope method, for `N` samples.
     pub accuracy_percent: f64,
 }
 
 impl CurvePoint {
     /// A point of a curve of `samples` samples, in the curve's unit.
     #[must_use]
-    pub fn of(point: &AllanPoint, samples: u64) -> Self {
+    pub fn new(point: &AllanPoint, samples: u64) -> Self {
         Self {
             n: point.n,
             tau_s: point.tau,
@@ -83,25 +84,25 @@ impl CurvePoint {
             low: point.low.sqrt(),
             high: point.high.sqrt(),
             edf: point.edf,
-            accuracy_percent: percentage_accuracy(samples, point.n),
+            accuracy_percent: slope_method::percentage_accuracy(samples, point.n),
         }
     }
 }
 
-/// Coefficients read off the slopes of the curve; absent where the slope does not occur.
+/// Coefficients by the slope method; absent where the curve has no such slope.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReadOff {
-    /// The −½ line at 1 s.
-    pub angle_random_walk: Option<ReadOffValue>,
+pub struct SlopeMethodReport {
+    /// The line of slope −½ at 1 s.
+    pub angle_random_walk: Option<SlopeMethodValue>,
     /// The flat minimum times `sqrt(π/(2 ln 2))`.
-    pub bias_instability: Option<ReadOffValue>,
-    /// The +½ line at 3 s.
-    pub rate_random_walk: Option<ReadOffValue>,
+    pub bias_instability: Option<SlopeMethodValue>,
+    /// The line of slope +½ at 3 s.
+    pub rate_random_walk: Option<SlopeMethodValue>,
 }
 
-/// One coefficient and where on the curve it was found.
+/// One coefficient by the slope method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReadOffValue {
+pub struct SlopeMethodValue {
     /// In `unit`.
     pub value: f64,
     /// Such as `deg/sqrt(s)`.
@@ -112,33 +113,90 @@ pub struct ReadOffValue {
     pub to_s: f64,
 }
 
-/// A fitted model and how wrong it is.
+/// A fitted model and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelReport {
     /// The terms, with their parameters.
-    pub terms: Vec<Term>,
+    pub terms: Vec<TermReport>,
     /// The model's Allan deviation at each point of the curve, in the channel's unit.
     pub adev: Vec<f64>,
     /// Against the first half of the record, which the model was fitted to.
-    pub fitted: ModelError,
-    /// Against the second half, which the fit has not seen.
-    pub unseen: ModelError,
+    pub fitted: ModelErrorReport,
+    /// Against the second half of the record, which was not used in the fit.
+    pub unseen: ModelErrorReport,
 }
 
 /// One term of a noise model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Term {
+pub struct TermReport {
     /// Such as `angle_random_walk`.
     pub kind: String,
     /// By name; a term with a single parameter calls it `value`.
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// How wrong a model is, over the octaves with `n ≤ M/8` of a part of `M` samples; absent when there are none.
+/// Error of a model over the octaves with `n ≤ M/8` of a part of `M` samples; absent when there are none.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ModelError {
+pub struct ModelErrorReport {
     /// `mean edf·(ln(m/v) + v/m − 1)`; 1 is what a true model scores on the data that it was fitted to.
     pub deviance_per_point: Option<f64>,
     /// `100·sqrt(mean (½ ln(v/m))²)`.
     pub rms_percent: Option<f64>,
+}
+
+impl SlopeMethodReport {
+    /// By the slopes of `curve`, whose channel is in `unit`.
+    #[must_use]
+    pub fn from_curve<const POINTS: usize>(curve: &Curve<POINTS>, unit: &str) -> Self {
+        let value = |coefficient: Option<slope_method::SlopeEstimate>, kind: NoiseTerm| {
+            coefficient.map(|coefficient| SlopeMethodValue {
+                value: coefficient.value,
+                unit: coefficient_unit(&kind, unit),
+                from_s: *coefficient.interval.start(),
+                to_s: *coefficient.interval.end(),
+            })
+        };
+        Self {
+            angle_random_walk: value(slope_method::angle_random_walk(curve), NoiseTerm::AngleRandomWalk),
+            bias_instability: value(slope_method::bias_instability(curve), NoiseTerm::BiasInstability),
+            rate_random_walk: value(slope_method::rate_random_walk(curve), NoiseTerm::RateRandomWalk),
+        }
+    }
+}
+
+impl TermReport {
+    /// A term of a model of a channel in `unit`.
+    #[must_use]
+    pub fn new(term: &allan_core::model::FittedTerm, unit: &str) -> Self {
+        Self { kind: term.kind.name().to_owned(), parameters: term_parameters(term, unit) }
+    }
+}
+
+/// The parameters of a term by name, of a channel in `unit`: those of its shape, and its coefficient.
+#[must_use]
+pub fn term_parameters(term: &allan_core::model::FittedTerm, unit: &str) -> BTreeMap<String, Parameter> {
+    let coefficient = Parameter::new(term.value, term.low, term.high, coefficient_unit(&term.kind, unit));
+    let shapes = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
+    let shape = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
+        let unit = match name {
+            "frequency" | "bandwidth" => "Hz",
+            "time_constant" => "s",
+            _ => "",
+        };
+        (name.to_owned(), Parameter::new(value, low, high, unit))
+    };
+    shapes.map(shape).chain([(term.kind.coefficient().to_owned(), coefficient)]).collect()
+}
+
+impl ModelErrorReport {
+    /// The error of `model` against `curve`.
+    #[must_use]
+    pub fn new<const POINTS: usize>(model: &Model, curve: &Curve<POINTS>) -> Self {
+        let error = allan_core::model::Discrepancy::between(model, curve);
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Self {
+            deviance_per_point: error.and_then(|error| finite(error.deviance_per_point)),
+            rms_percent: error.and_then(|error| finite(error.rms_percent)),
+        }
+    }
 }

@@ -1,27 +1,27 @@
-//! One channel along its timeline.
+//! The samples of one channel on the recording's time base.
 
 use crate::findings::Correction;
 use measurement::{ChannelProfile, Measurement};
 
-/// The samples of one channel in its unit, each with the period in which it was taken.
+/// The samples of one channel, each with the sample period in which it was taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Periods from the first sample; a step of more than 1 is a gap.
+    /// Sample period of each sample, counted from the first; strictly increasing. A step of more than 1 is a gap.
     pub slots: Vec<u64>,
-    /// One a slot, in the channel's unit.
+    /// One value for each slot, in [`unit`](Self::unit).
     pub values: Vec<f64>,
-    /// s.
+    /// Sample period, s.
     pub period_s: f64,
-    /// One step of the values, in the channel's unit: a count, if nothing else is known.
+    /// Smallest distance of two values, in [`unit`](Self::unit): one count, unless the values are known to be coarser.
     pub resolution: f64,
-    /// Of the values.
+    /// Unit of the values.
     pub unit: &'static str,
 }
 
 impl Series {
-    /// The samples of `channel`; none where it was not recorded.
+    /// The samples of `channel`; an empty series if it was not recorded.
     #[must_use]
-    pub fn of(measurement: &Measurement, channel: &ChannelProfile) -> Self {
+    pub fn from_measurement(measurement: &Measurement, channel: &ChannelProfile) -> Self {
         let counts = measurement.channel(channel).map(|channel| channel.counts.as_slice()).unwrap_or_default();
         Self {
             slots: measurement.slots[..counts.len()].to_vec(),
@@ -32,9 +32,9 @@ impl Series {
         }
     }
 
-    /// The same values, known to be steps of so many counts.
+    /// The same values, known to be multiples of `counts` counts.
     #[must_use]
-    pub fn with_steps(self, counts: u32) -> Self {
+    pub fn with_counts_per_step(self, counts: u32) -> Self {
         Self { resolution: self.resolution * f64::from(counts), ..self }
     }
 
@@ -51,7 +51,7 @@ impl Series {
         Self { slots: self.slots[..half].to_vec(), values: self.values[..half].to_vec(), ..*self }
     }
 
-    /// The series without the effect.
+    /// The series without the effect that `correction` removes.
     #[must_use]
     pub fn corrected(mut self, correction: &Correction) -> Self {
         match correction {

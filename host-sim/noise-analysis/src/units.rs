@@ -1,20 +1,22 @@
-//! Coefficients in the units that people ask for, each named as of the continuous process or of its samples.
+//! Units of coefficients: the unit that a coefficient has by the channel's unit, and its conversion to other usual units.
 //!
-//! A continuous coefficient belongs to the process, whatever the rate; a discrete one is a standard deviation of samples
-//! at the rate of the record, and is another number at another rate. To take one for the other is the commonest mistake
-//! with noise coefficients.
+//! A continuous coefficient belongs to the process at any sample rate. A discrete one is a standard deviation of samples at
+//! the rate of the record, and changes with the rate. Each conversion says which of the two it gives.
+
+use allan_core::NoiseTerm;
+use allan_core::term::CoefficientUnit;
 
 /// Standard gravity, m/s².
-pub const GRAVITY: f64 = 9.806_65;
+pub(crate) const GRAVITY: f64 = 9.806_65;
 
-/// A unit and what a coefficient in the channel's own unit is multiplied with.
+/// A unit and the factor to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conversion {
+pub(crate) struct Conversion {
     /// Such as `deg/sqrt(h)`.
     pub unit: &'static str,
-    /// From the coefficient of a channel in deg/s, g or gauss, with seconds.
+    /// What the coefficient of a channel in deg/s, g or gauss, with times in s, is multiplied by.
     pub factor: f64,
-    /// Whether the number is one of samples at a rate.
+    /// Whether the coefficient is a standard deviation of samples at the record's rate.
     pub discrete: bool,
 }
 
@@ -26,12 +28,27 @@ const fn discrete(unit: &'static str, factor: f64) -> Conversion {
     Conversion { unit, factor, discrete: true }
 }
 
-/// The units of the coefficient `kind` (a name of the JSON schema) of a channel in `unit`, sampled at `rate_hz`.
-///
-/// None for a kind or a channel of which nobody asks. The discrete form of a random walk is its step from one sample to
-/// the next.
+/// The unit of the coefficient of a term of `kind` in a channel in `unit`, such as `deg/sqrt(s)` of a channel in `deg/s`.
 #[must_use]
-pub fn conversions(kind: &str, unit: &str, rate_hz: f64) -> Vec<Conversion> {
+pub(crate) fn coefficient_unit(kind: &NoiseTerm, unit: &str) -> String {
+    match (kind.unit(), unit.strip_suffix("/s")) {
+        (CoefficientUnit::TimesSecond, Some(angle)) => angle.to_owned(),
+        (CoefficientUnit::TimesSecond, None) => format!("{unit}*s"),
+        (CoefficientUnit::TimesRootSecond, Some(angle)) => format!("{angle}/sqrt(s)"),
+        (CoefficientUnit::TimesRootSecond, None) => format!("{unit}/sqrt(Hz)"),
+        (CoefficientUnit::Itself, _) => unit.to_owned(),
+        (CoefficientUnit::PerRootSecond, _) => format!("{unit}/sqrt(s)"),
+        (CoefficientUnit::PerSecond, Some(angle)) => format!("{angle}/s^2"),
+        (CoefficientUnit::PerSecond, None) => format!("{unit}/s"),
+    }
+}
+
+/// The usual units of the coefficient `kind` (a name of the JSON schema) of a channel in `unit`, sampled at `rate_hz`.
+///
+/// Empty for other kinds and channels than N, B and K of a gyroscope, an accelerometer or a magnetometer. The discrete form
+/// of a random walk is its step from one sample to the next.
+#[must_use]
+pub(crate) fn conversions(kind: &str, unit: &str, rate_hz: f64) -> Vec<Conversion> {
     const RAD: f64 = std::f64::consts::PI / 180.0;
     let root_rate = rate_hz.sqrt();
     match (unit, kind) {
@@ -76,7 +93,7 @@ mod tests {
     use super::conversions;
 
     #[test]
-    fn published_pairs_agree() {
+    fn conversions_agree_with_published_pairs() {
         let convert = |kind, channel, to: &str, value: f64| {
             let conversions = conversions(kind, channel, 100.0);
             conversions.iter().find(|conversion| conversion.unit == to).map(|conversion| value * conversion.factor)
@@ -90,7 +107,7 @@ mod tests {
             // 1 deg/h/√h is 1/3600/60 deg/s/√s.
             ("rate_random_walk", "deg/s", "deg/h/sqrt(h)", 1.0 / 216_000.0, 1.0),
             ("angle_random_walk", "g", "m/s/sqrt(h)", 340e-6, 0.2),
-            // A tenth of a second between samples would give the number itself; at 100 Hz white noise is ten times its N.
+            // At 100 Hz the standard deviation of a sample of white noise is √100 times its N.
             ("angle_random_walk", "deg/s", "deg/s", 0.0368, 0.368),
         ] {
             let found = convert(kind, channel, to, value).expect(to);

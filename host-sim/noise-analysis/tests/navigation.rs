@@ -1,17 +1,17 @@
-//! What a model says of the future, beside simulated data that it has not seen.
+//! The assessment of a model against simulated data: predicted errors of integration, and innovations.
 
 use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
-use noise_analysis::innovation::{Innovations, innovations};
-use noise_analysis::navigation::drifts;
+use noise_analysis::assessment::innovations::{Innovations, filter_innovations};
+use noise_analysis::assessment::navigation::integrated_errors;
 use noise_analysis::uniform_series::UniformSeries;
 use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
 const PERIOD: f64 = 0.02;
 const SAMPLES: usize = 150_000;
-/// N, B, K: of the paper.
+/// N, B and K of the paper's gyroscope.
 const NOISE: [f64; 3] = [0.0368, 0.0093, 0.0013];
 
 fn simulated(noise: [f64; 3], seed: u64) -> Vec<f64> {
@@ -29,13 +29,13 @@ fn model(extra: Option<FittedTerm>) -> Model {
 }
 
 #[test]
-fn the_predicted_drift_is_what_simulated_vehicles_show() {
+fn the_predicted_error_is_that_of_simulated_data() {
     // Twelve records of 50 min: the mean square against the prediction, as χ² with all their degrees of freedom.
     let mut sums = [(0.0, 0.0); 3];
     let mut inside = 0;
     for seed in 0..12 {
         for (sum, drift) in
-            sums.iter_mut().zip(drifts(&model(None), &UniformSeries::new(PERIOD, simulated(NOISE, seed))))
+            sums.iter_mut().zip(integrated_errors(&model(None), &UniformSeries::new(PERIOD, simulated(NOISE, seed))))
         {
             let observed = drift.observed.expect("a long record");
             sum.0 += observed.edf * (observed.value / drift.predicted).powi(2);
@@ -51,38 +51,40 @@ fn the_predicted_drift_is_what_simulated_vehicles_show() {
 }
 
 #[test]
-fn a_gap_costs_windows_and_nothing_else() {
+fn missing_samples_widen_the_bounds_without_shifting_the_error() {
     let mut values = simulated(NOISE, 3);
-    let whole = drifts(&model(None), &UniformSeries::new(PERIOD, values.clone()));
+    let whole = integrated_errors(&model(None), &UniformSeries::new(PERIOD, values.clone()));
     values.iter_mut().step_by(50).for_each(|value| *value = f64::NAN);
     values[60_000..70_000].fill(f64::NAN);
-    for (whole, holed) in whole.iter().zip(drifts(&model(None), &UniformSeries::new(PERIOD, values))) {
+    for (whole, holed) in whole.iter().zip(integrated_errors(&model(None), &UniformSeries::new(PERIOD, values))) {
         let (whole, holed) = (whole.observed.expect("long"), holed.observed.expect("long"));
         assert!(holed.edf < whole.edf && (holed.low..holed.high).contains(&whole.value), "{whole:?} {holed:?}");
     }
     assert!(
-        drifts(&model(None), &UniformSeries::new(PERIOD, vec![1.0; 3000])).iter().all(|drift| drift.observed.is_none())
+        integrated_errors(&model(None), &UniformSeries::new(PERIOD, vec![1.0; 3000]))
+            .iter()
+            .all(|drift| drift.observed.is_none())
     );
 }
 
 fn of(values: Vec<f64>, model: &Model) -> Innovations {
-    innovations(model, &UniformSeries::new(PERIOD, values)).expect("a long record")
+    filter_innovations(model, &UniformSeries::new(PERIOD, values)).expect("a long record")
 }
 
 #[test]
-fn the_innovations_of_a_true_model_are_white_and_as_large_as_it_says() {
+fn the_innovations_of_a_true_model_are_white_and_of_the_expected_variance() {
     let (mut consistent, mut white) = (0, 0);
     for seed in 0..12 {
         let found = of(simulated(NOISE, 100 + seed), &model(None));
-        consistent += usize::from((found.consistent.0..found.consistent.1).contains(&found.normalised));
-        white += usize::from(found.whiteness > 0.05);
+        consistent += usize::from((found.low..found.high).contains(&found.normalised));
+        white += usize::from(found.whiteness_p > 0.05);
     }
     // Of 12 events of 95 %, fewer than 9 once in five thousand.
     assert!(consistent >= 9 && white >= 9, "{consistent} consistent, {white} white");
 }
 
 #[test]
-fn the_innovations_of_a_wrong_model_are_not() {
+fn the_innovations_of_a_wrong_model_are_not_white_or_not_of_the_expected_variance() {
     // A Markov process that the model lacks: of 0.03 deg/s, over 2 s.
     let time_constant = 2.0;
     let mut source = NoiseModel::noiseless();
@@ -96,15 +98,15 @@ fn the_innovations_of_a_wrong_model_are_not() {
         *value += state;
     }
     let lacking = of(values.clone(), &model(None));
-    assert!(lacking.whiteness < 1e-6 && lacking.normalised > lacking.consistent.1, "{lacking:?}");
+    assert!(lacking.whiteness_p < 1e-6 && lacking.normalised > lacking.high, "{lacking:?}");
     let knowing = of(values, &model(Some(FittedTerm::exact(NoiseTerm::Markov(Markov { time_constant }), 0.03))));
-    assert!(knowing.whiteness > 1e-3, "{knowing:?}");
+    assert!(knowing.whiteness_p > 1e-3, "{knowing:?}");
     assert!((knowing.normalised - 1.0).abs() < 4.0 * (2.0 / knowing.count as f64).sqrt(), "{knowing:?}");
     // Too much N is seen as well.
     let [n, b, k] = NOISE;
     let terms =
         NoiseTerm::BASELINE.into_iter().zip([1.1 * n, b, k]).map(|(kind, value)| FittedTerm::exact(kind, value));
     let loud = of(simulated(NOISE, 8), &Model::new(PERIOD, terms));
-    assert!(loud.normalised < loud.consistent.0, "{loud:?}");
-    assert_eq!(innovations(&model(None), &UniformSeries::new(PERIOD, vec![0.0; 100])), None);
+    assert!(loud.normalised < loud.low, "{loud:?}");
+    assert_eq!(filter_innovations(&model(None), &UniformSeries::new(PERIOD, vec![0.0; 100])), None);
 }

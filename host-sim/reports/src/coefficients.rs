@@ -1,6 +1,6 @@
 //! The rows of the coefficient tables on the terminal and on the page: by the slope method, beside the fit.
 
-use noise_analysis::report::{ChannelReport, Parameter, ReadOffValue};
+use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue};
 
 /// Kind, letter and slope of the coefficients that the slope method gives (IEEE Std 952, annex C).
 pub const SLOPES: [(&str, &str, &str); 3] = [
@@ -21,7 +21,7 @@ pub struct CoefficientRow<'a> {
     /// Unit of both values; empty where there is neither.
     pub unit: &'a str,
     /// By the slope method; absent where the slope does not occur.
-    pub slope_value: Option<&'a ReadOffValue>,
+    pub slope_value: Option<&'a SlopeMethodValue>,
     /// By the fit of the baseline model to the first half; absent where the model lacks the term.
     pub fit: Option<&'a Parameter>,
 }

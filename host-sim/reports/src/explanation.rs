@@ -3,11 +3,9 @@
 use crate::formatting::{NONE, TextTable, count, duration, interval, number, words};
 use allan_core::NoiseTerm;
 use allan_core::model::FittedTerm;
-use noise_analysis::explain::slow_part::SlowPart;
-use noise_analysis::explain::{ChannelExplanation, Explanation};
-use noise_analysis::time_course::companion::Companion;
-use noise_analysis::time_course::moving::Free;
-use noise_analysis::time_course::stationarity::Part;
+use noise_analysis::nonstationarity::{
+    ChannelExplanation, CommonModeRegression, Explanation, FittedPart, RelatedLine, TrackedSet,
+};
 use std::io::{self, Write};
 
 /// Writes the explanation. Lines are as long as the tables need.
@@ -15,10 +13,10 @@ use std::io::{self, Write};
 /// # Errors
 /// `out` cannot be written.
 pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> {
-    let Explanation { sample_rate_hz, samples, deliveries, channels, slow_part, .. } = explanation;
+    let Explanation { sample_rate_hz, samples, time_base, channels, common_mode, .. } = explanation;
     let length = duration(*samples as f64 / sample_rate_hz);
     writeln!(out, "{} samples at {} Hz, {length}", count(*samples), number(*sample_rate_hz))?;
-    for sentence in deliveries {
+    for sentence in time_base {
         writeln!(out, "• {sentence}")?;
     }
     if channels.is_empty() {
@@ -59,7 +57,7 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
     )?;
     writeln!(out, "every epoch's own deviance, with tracked parameters and with the predictive model as it stands.")?;
     for of in channels {
-        if let Some(companion) = &of.companion {
+        if let Some(companion) = &of.related_line {
             writeln!(out, "{}", related_line(explanation, of, companion))?;
         }
     }
@@ -69,12 +67,12 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
         out,
         "By the curves alone: how a line moves, they show well; where it is, octaves tell to some ten percent."
     )?;
-    if let Some(slow_part) = slow_part {
+    if let Some(common_mode) = common_mode {
         writeln!(out, "\nFraction of each channel's variance that the others predict, %, first half")?;
-        writeln!(out, "{}", variance_fraction_table(slow_part))?;
-        let learned = number(slow_part.learnt_at as f64 / sample_rate_hz);
+        writeln!(out, "{}", variance_fraction_table(common_mode))?;
+        let learned = number(common_mode.weights_at as f64 / sample_rate_hz);
         writeln!(out, "\nBias drift after over before, second half; weights learned in the first at τ = {learned} s")?;
-        writeln!(out, "{}", gain_table(slow_part))?;
+        writeln!(out, "{}", gain_table(common_mode))?;
         writeln!(out, "Trusted: weights of the first quarter made the second quarter better.")?;
     }
     Ok(())
@@ -124,15 +122,15 @@ fn stationarity_table(channels: &[ChannelExplanation]) -> TextTable {
         let mut row = vec![channel.channel.name.to_owned()];
         match channel.stationarity {
             Some(found) => row.extend([
-                number(found.n as f64 * channel.parts.fitted.sample_period()),
+                number(found.n as f64 * channel.curves.fitted.sample_period()),
                 format!("{:+.2} %", 100.0 * (found.ratio - 1.0)),
                 format!("{:.1e}", found.p_value),
             ]),
             None => row.extend([NONE, NONE, NONE].map(str::to_owned)),
         }
         row.push(match channel.part {
-            Part::FittedHalf => "the first half".to_owned(),
-            Part::LatestQuarter => "its later quarter".to_owned(),
+            FittedPart::FirstHalf => "the first half".to_owned(),
+            FittedPart::LatestQuarter => "its later quarter".to_owned(),
         });
         row
     };
@@ -145,9 +143,9 @@ fn error_table(channels: &[ChannelExplanation]) -> TextTable {
     let row = |channel: &ChannelExplanation| {
         let errors = &channel.errors;
         let [declared, traced, predictive] =
-            [errors.declared, errors.traced, errors.predictive].map(|both| both.map(deviance));
+            [errors.baseline, errors.traced, errors.predictive].map(|both| both.map(deviance));
         let values = [declared, traced, predictive].concat();
-        let last = [errors.beyond_drift, errors.standing_still].map(deviance).to_vec();
+        let last = [errors.beyond_drift, errors.first_half_curve].map(deviance).to_vec();
         [vec![channel.channel.name.to_owned()], values, last].concat()
     };
     let header = [
@@ -172,17 +170,17 @@ fn deviance(value: f64) -> String {
 /// Deviance per point of predictions that follow the tracked parameters, beside two baselines.
 fn tracking_table(channels: &[ChannelExplanation]) -> TextTable {
     let row = |channel: &ChannelExplanation| {
-        let (tracked, controls) = (&channel.tracked, &channel.controls);
-        let what = match channel.free {
-            Free::Nothing => "nothing",
-            Free::Level => "level",
-            Free::LevelAndLine => "level, line",
+        let (tracked, controls) = (&channel.tracking, &channel.baselines);
+        let what = match channel.tracked_set {
+            TrackedSet::Nothing => "nothing",
+            TrackedSet::Level => "level",
+            TrackedSet::LevelAndLine => "level, line",
         };
         let values = [
             tracked.pooled,
             tracked.one_step,
             tracked.one_step_static,
-            controls.declared_followed,
+            controls.baseline_tracked,
             controls.persistence,
         ];
         [vec![channel.channel.name.to_owned(), what.to_owned()], values.map(deviance).to_vec()].concat()
@@ -200,10 +198,10 @@ fn tracking_table(channels: &[ChannelExplanation]) -> TextTable {
 }
 
 /// A line of another channel whose frequency is in a fixed ratio to that of the channel's line.
-fn related_line(explanation: &Explanation, of: &ChannelExplanation, companion: &Companion) -> String {
+fn related_line(explanation: &Explanation, of: &ChannelExplanation, companion: &RelatedLine) -> String {
     let (name, other) = (of.channel.name, explanation.searched[companion.channel].name);
     let (mean, deviation) = companion.measured_ratio;
-    let ((above, below), path) = (companion.ratio, [&companion.line, &companion.companion[0], &companion.companion[1]]);
+    let ((above, below), path) = (companion.ratio, [&companion.line, &companion.related[0], &companion.related[1]]);
     let [line, seen, unseen] = path.map(|path| path.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" "));
     format!(
         "\nThe line of {name} shows in {other} at {above}/{below} of its frequency: ratio {mean:.4} ± {deviation:.4} epoch by\n\
@@ -219,22 +217,22 @@ fn profile_table(rate: f64, channels: &[ChannelExplanation]) -> TextTable {
     let mut header = vec!["half".to_owned(), "from, min".to_owned()];
     for channel in channels {
         header.push(channel.channel.name.to_owned());
-        if channel.moving.line_frequency().is_some() {
+        if channel.tracked_model.line_frequency().is_some() {
             header.push("Hz".to_owned());
         }
     }
     let Some(first) = channels.first() else { return TextTable::new(header, 0, Vec::new()) };
-    let half = first.parts.fitted.samples() as usize;
-    let starts = [half % first.parts.epoch, half];
+    let half = first.curves.fitted.samples() as usize;
+    let starts = [half % first.curves.epoch, half];
     let rows = ["first", "second"].iter().enumerate().flat_map(|(at, name)| {
-        (0..first.course[at].len()).map(move |epoch| {
-            let from = (starts[at] + epoch * first.parts.epoch) as f64 / rate / 60.0;
+        (0..first.profile[at].len()).map(move |epoch| {
+            let from = (starts[at] + epoch * first.curves.epoch) as f64 / rate / 60.0;
             let mut row = vec![(*name).to_owned(), format!("{from:.1}")];
             for channel in channels {
-                let estimate = channel.course[at][epoch];
-                let [level, line] = estimate.state;
+                let estimate = channel.profile[at][epoch];
+                let [level, line] = estimate.parameters;
                 row.push(format!("{:+.1} ± {:.1}", 100.0 * level.exp_m1(), 100.0 * estimate.error[0]));
-                if let Some(frequency) = channel.moving.line_frequency() {
+                if let Some(frequency) = channel.tracked_model.line_frequency() {
                     let f = frequency * line.exp();
                     row.push(format!("{f:.2} ± {:.2}", f * estimate.error[1]));
                 }
@@ -246,27 +244,27 @@ fn profile_table(rate: f64, channels: &[ChannelExplanation]) -> TextTable {
 }
 
 /// Header of a table with a column for each channel.
-fn by_channel(slow_part: &SlowPart) -> Vec<String> {
-    let names = slow_part.channels.iter().map(|channel| channel.name.to_owned());
+fn by_channel(common_mode: &CommonModeRegression) -> Vec<String> {
+    let names = common_mode.channels.iter().map(|channel| channel.name.to_owned());
     ["τ, s".to_owned()].into_iter().chain(names).collect()
 }
 
 /// Fraction of each channel's variance that the others predict, at each octave.
-fn variance_fraction_table(slow_part: &SlowPart) -> TextTable {
-    let rows = slow_part.shared.iter().map(|octave| {
+fn variance_fraction_table(common_mode: &CommonModeRegression) -> TextTable {
+    let rows = common_mode.shares.iter().map(|octave| {
         let shares = octave.share.iter().map(|share| format!("{:.0}", 100.0 * share));
         [number(octave.tau)].into_iter().chain(shares).collect::<Vec<_>>()
     });
-    TextTable::new(by_channel(slow_part), 0, rows)
+    TextTable::new(by_channel(common_mode), 0, rows)
 }
 
 /// Bias drift after the common-mode correction over that before, at each octave.
-fn gain_table(slow_part: &SlowPart) -> TextTable {
-    let rows = slow_part.bought.iter().map(|octave| {
+fn gain_table(common_mode: &CommonModeRegression) -> TextTable {
+    let rows = common_mode.gains.iter().map(|octave| {
         let ratios = octave.ratio.iter().map(|ratio| format!("{ratio:.2}"));
         [number(octave.tau)].into_iter().chain(ratios).collect::<Vec<_>>()
     });
-    let trusted = slow_part.trusted.iter().map(|&trusted| if trusted { "yes" } else { "no" }.to_owned());
+    let trusted = common_mode.trusted.iter().map(|&trusted| if trusted { "yes" } else { "no" }.to_owned());
     let last: Vec<_> = ["trusted".to_owned()].into_iter().chain(trusted).collect();
-    TextTable::new(by_channel(slow_part), 0, rows.chain([last]))
+    TextTable::new(by_channel(common_mode), 0, rows.chain([last]))
 }

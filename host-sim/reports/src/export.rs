@@ -50,7 +50,7 @@ pub fn kalibr(report: &Report) -> String {
 
 /// The coefficient of the continuous process in `unit`, unless its upper bound is zero.
 fn coefficient<'a>(channel: &'a ChannelReport, kind: &str, unit: &str) -> Option<&'a Parameter> {
-    let mut coefficients = channel.practice.coefficients.iter();
+    let mut coefficients = channel.assessment.coefficients.iter();
     let continuous = coefficients.find(|of| of.kind == kind && !of.discrete && of.value.unit == unit)?;
     Some(&continuous.value).filter(|value| value.high > 0.0)
 }

@@ -7,8 +7,8 @@ pub use panel::DARK_COLOURS;
 
 use crate::formatting;
 use allan_core::Model;
-use noise_analysis::explain::ChannelExplanation;
-use noise_analysis::report::{ChannelReport, CurvePoint, ModelError, ModelReport, ReadOff};
+use noise_analysis::nonstationarity::ChannelExplanation;
+use noise_analysis::report::{ChannelReport, CurvePoint, ModelErrorReport, ModelReport, SlopeMethodReport};
 use panel::{
     AFTER, BEFORE, Canvas, DrawResult, FAINT_TEXT, Frame, MEASURED, MIDDLE_LEFT, Panel, SLOPES, TEXT, has_logarithm,
     span, text_style,
@@ -155,7 +155,7 @@ fn legend(canvas: &Canvas<'_>, channel: &ChannelReport) -> DrawResult {
     if effects_added(channel) {
         entry("with traced effects", AFTER, Shape::Line)?;
     }
-    let ReadOff { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
+    let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
     if [angle_random_walk, bias_instability, rate_random_walk].iter().any(|slope| slope.is_some()) {
         entry("slope method", SLOPES, Shape::Dashes)?;
     }
@@ -243,22 +243,22 @@ fn label_distance(limit: f64) -> f64 {
 /// # Errors
 /// The drawing library fails.
 pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError> {
-    let unseen = &of.parts.unseen;
+    let unseen = &of.curves.unseen;
     let model = |model: &Model, [fitted, error]: [f64; 2]| ModelReport {
         terms: Vec::new(),
         adev: unseen.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
-        fitted: ModelError { deviance_per_point: Some(fitted), rms_percent: None },
-        unseen: ModelError { deviance_per_point: Some(error), rms_percent: None },
+        fitted: ModelErrorReport { deviance_per_point: Some(fitted), rms_percent: None },
+        unseen: ModelErrorReport { deviance_per_point: Some(error), rms_percent: None },
     };
     allan_deviation(&ChannelReport {
         name: format!("{}, second half; models of the first", of.channel.name),
         unit: of.channel.unit.to_owned(),
         samples: unseen.samples(),
         // With the degrees of freedom of the tables.
-        curve: unseen.points().iter().map(|point| CurvePoint::of(point, unseen.samples())).collect(),
-        read_off: ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
-        before: model(&of.trace.before, of.errors.declared),
-        practice: Default::default(),
+        curve: unseen.points().iter().map(|point| CurvePoint::new(point, unseen.samples())).collect(),
+        read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
+        before: model(&of.trace.before, of.errors.baseline),
+        assessment: Default::default(),
         effects: Vec::new(),
         after: model(&of.predictive, of.errors.predictive),
     })

@@ -1,7 +1,7 @@
 //! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
-use noise_analysis::practice::{Innovations, Record};
+use noise_analysis::assessment::{Innovations, RecordLength};
 use std::fmt;
 
 /// Shown in the place of a number that is absent or not finite.
@@ -131,7 +131,7 @@ pub fn filter_consistency(innovations: &Innovations) -> &'static str {
 }
 
 /// How much longer to record for a coefficient with an interval of ±20 %.
-pub fn recording_advice(record: &Record) -> String {
+pub fn recording_advice(record: &RecordLength) -> String {
     let kind = words(&record.kind);
     match record.more_hours {
         Some(0.0) => format!("{kind}: known to ±20 % and better"),

@@ -7,7 +7,7 @@ use crate::formatting::{
     count, duration, filter_consistency, interval, number, parameter_name, recording_advice, unit, words,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use noise_analysis::practice::Practice;
+use noise_analysis::assessment::Assessment;
 use noise_analysis::report::{ChannelReport, Report};
 use std::path::{Path, PathBuf};
 
@@ -165,7 +165,7 @@ fn channel_section(channel: &ChannelReport, figure: &str) -> Markup {
             }
             details {
                 summary { "What the model is good for: other units, drift, a filter's innovations, longer records" }
-                (assessment(&channel.practice))
+                (assessment(&channel.assessment))
             }
             details {
                 summary { "The curve in numbers (" (count(channel.curve.len() as u64)) " points)" }
@@ -176,7 +176,7 @@ fn channel_section(channel: &ChannelReport, figure: &str) -> Markup {
 }
 
 /// What the model of a channel is good for.
-fn assessment(assessment: &Practice) -> Markup {
+fn assessment(assessment: &Assessment) -> Markup {
     html! {
         @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
         @if !assessment.drift.is_empty() { (tables::drift(&assessment.drift)) }

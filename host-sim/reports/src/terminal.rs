@@ -5,9 +5,9 @@ use crate::formatting::{
     NONE, TextTable, count, duration, filter_consistency, interval, number, optional, parameter_name, percent,
     recording_advice, unit, words, wrap,
 };
-use noise_analysis::navigation::CALIBRATION_S;
-use noise_analysis::practice::{Coefficient, Drift, Practice};
-use noise_analysis::report::{ChannelReport, Parameter, Report, Term};
+use noise_analysis::assessment::navigation::CALIBRATION_S;
+use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
+use noise_analysis::report::{ChannelReport, Parameter, Report, TermReport};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
@@ -68,7 +68,7 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     if same && channel.effects.is_empty() {
         writeln!(out, "No effect was added to the baseline model: after equals before.")?;
     }
-    write_assessment(&channel.practice, out)?;
+    write_assessment(&channel.assessment, out)?;
     if channel.curve.is_empty() {
         return writeln!(out, "The record is too short for a point of the curve.");
     }
@@ -102,7 +102,7 @@ fn fitted(parameter: Option<&Parameter>) -> [String; 2] {
     }
 }
 
-fn term_table(terms: &[Term]) -> TextTable {
+fn term_table(terms: &[TermReport]) -> TextTable {
     let rows = terms.iter().flat_map(|term| {
         term.parameters.iter().map(|(name, parameter)| {
             let [fit, bounds] = fitted(Some(parameter));
@@ -151,7 +151,7 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
 }
 
 /// What the model is good for: other units, drift, a filter's innovations, longer records.
-fn write_assessment(assessment: &Practice, out: &mut impl Write) -> io::Result<()> {
+fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
         writeln!(out, "{}", unit_table(&assessment.coefficients))?;
     }
@@ -192,8 +192,8 @@ fn unit_table(coefficients: &[Coefficient]) -> TextTable {
     table(&header, 3, coefficients.iter().map(row))
 }
 
-fn drift_table(drifts: &[Drift]) -> TextTable {
-    let row = |drift: &Drift| {
+fn drift_table(drifts: &[NavigationDrift]) -> TextTable {
+    let row = |drift: &NavigationDrift| {
         let observed = drift.observed.as_ref();
         vec![
             duration(drift.seconds),

@@ -8,9 +8,7 @@ use crate::program::{self, host_sim};
 use adis16405_driver::GyroRange;
 use allan_core::{NoiseTerm, term::MovingAverageFilter};
 use noise_analysis::analysis::analyze;
-use noise_analysis::explain::{ChannelExplanation, Explanation, explain};
-use noise_analysis::time_course::moving::Free;
-use noise_analysis::time_course::stationarity::Part;
+use noise_analysis::nonstationarity::{ChannelExplanation, Explanation, FittedPart, TrackedSet, explain};
 use recordings::count_table;
 use recordings::time_base::measurement;
 
@@ -77,12 +75,12 @@ struct Run {
 
 fn check(test: &str, run: &Run) {
     let Some(explanation) = explained(test, run.file, Some(100.0)) else { return };
-    assert!(explanation.deliveries.is_empty(), "{:?}", explanation.deliveries);
+    assert!(explanation.time_base.is_empty(), "{:?}", explanation.time_base);
     let inertial = INERTIAL.map(|channel| of(&explanation, channel));
     for (channel, baseline) in inertial.iter().zip(run.baseline) {
         // Of the same samples: the two differ by the overlap of the windows beyond n = 8 and by the weights of the fit.
-        let ratio = channel.errors.declared[1] / baseline;
-        assert!((ratio - 1.0).abs() < 0.05, "{}: {} for {baseline}", channel.channel.name, channel.errors.declared[1]);
+        let ratio = channel.errors.baseline[1] / baseline;
+        assert!((ratio - 1.0).abs() < 0.05, "{}: {} for {baseline}", channel.channel.name, channel.errors.baseline[1]);
     }
     // The filter before the sampling, of the two gyros without a line.
     for channel in &inertial[..2] {
@@ -95,29 +93,29 @@ fn check(test: &str, run: &Run) {
     for (at, channel) in inertial.into_iter().enumerate() {
         let name = channel.channel.name;
         let unseen = channel.errors.predictive[1];
-        let predicted = channel.companion.as_ref().map_or(unseen, |companion| companion.unseen);
+        let predicted = channel.related_line.as_ref().map_or(unseen, |companion| companion.unseen);
         assert!(predicted <= target(name) || run.may_miss.contains(&name), "{name}: {predicted} misses the target");
-        assert!(unseen < 0.05 * channel.errors.declared[1], "{name}: {unseen}");
+        assert!(unseen < 0.05 * channel.errors.baseline[1], "{name}: {unseen}");
         let beyond_drift = channel.errors.beyond_drift;
         assert!(beyond_drift < target(name), "{name}: {beyond_drift}");
-        let deviances = [unseen, beyond_drift, channel.tracked.pooled];
+        let deviances = [unseen, beyond_drift, channel.tracking.pooled];
         for (deviance, quoted) in deviances.into_iter().zip(run.quoted.map(|column| column[at])) {
             assert!(deviance < largest(quoted), "{name}: {deviance}, more than the scatter above the quoted {quoted}");
         }
-        assert!(channel.tracked.pooled < target(name), "{name}: {:?}", channel.tracked);
-        assert!(channel.controls.declared_followed > 500.0, "{name}: {:?}", channel.controls);
-        let moves = channel.stationarity.expect("octaves").moves();
-        assert_eq!(channel.part == Part::LatestQuarter, moves, "{name}");
+        assert!(channel.tracking.pooled < target(name), "{name}: {:?}", channel.tracking);
+        assert!(channel.baselines.baseline_tracked > 500.0, "{name}: {:?}", channel.baselines);
+        let moves = channel.stationarity.expect("octaves").is_nonstationary();
+        assert_eq!(channel.part == FittedPart::LatestQuarter, moves, "{name}");
     }
     tone(&explanation, run);
-    slow_part(&explanation, run);
+    common_mode(&explanation, run);
 }
 
 /// The frequency of gyro Z's tone changes, and accelerometer X shows it at half the frequency.
 fn tone(explanation: &Explanation, run: &Run) {
     let gyro_z = of(explanation, "gyro_z");
-    assert_eq!(gyro_z.free, Free::LevelAndLine);
-    let companion = gyro_z.companion.as_ref().expect("a companion");
+    assert_eq!(gyro_z.tracked_set, TrackedSet::LevelAndLine);
+    let companion = gyro_z.related_line.as_ref().expect("a companion");
     assert_eq!(explanation.searched[companion.channel].name, "accl_x");
     assert_eq!(companion.ratio, (1, 2));
     // In Python, mean and standard deviation over the 30 epochs of each record: 1.994 ± 0.006, 1.995 ± 0.005, 1.995 ± 0.004.
@@ -133,10 +131,10 @@ fn tone(explanation: &Explanation, run: &Run) {
     assert!(companion.unseen < largest(run.related_quoted), "{}", companion.unseen);
 }
 
-fn slow_part(explanation: &Explanation, run: &Run) {
-    let slow_part = explanation.slow_part.as_ref().expect("common-mode drift");
-    assert_eq!(slow_part.channels.iter().map(|channel| channel.name).collect::<Vec<_>>(), INERTIAL);
-    let at_41_s = slow_part.bought.iter().find(|octave| octave.n == 4096).expect("4096 samples");
+fn common_mode(explanation: &Explanation, run: &Run) {
+    let common_mode = explanation.common_mode.as_ref().expect("common-mode drift");
+    assert_eq!(common_mode.channels.iter().map(|channel| channel.name).collect::<Vec<_>>(), INERTIAL);
+    let at_41_s = common_mode.gains.iter().find(|octave| octave.n == 4096).expect("4096 samples");
     for (ratio, expected) in at_41_s.ratio[3..].iter().zip(run.compensated) {
         // The regression in Python has other differences: fully overlapping ones over the whole of the first half. At 41 s
         // the half has 122 windows, of which a deviation has a relative standard deviation of about 1/√(2·122) = 0.06.
@@ -144,9 +142,9 @@ fn slow_part(explanation: &Explanation, run: &Run) {
     }
     // The other channels predict more than a third of the variance of accelerometers X and Y at 41 s, and nothing of the
     // gyros' at 10 ms.
-    let shared = slow_part.shared.iter().find(|octave| octave.n == 4096).expect("4096 samples");
+    let shared = common_mode.shares.iter().find(|octave| octave.n == 4096).expect("4096 samples");
     assert!(shared.share[3] > 1.0 / 3.0 && shared.share[4] > 1.0 / 3.0, "{:?}", shared.share);
-    assert!(slow_part.shared[0].share[..3].iter().all(|&share| share < 0.005), "{:?}", slow_part.shared[0]);
+    assert!(common_mode.shares[0].share[..3].iter().all(|&share| share < 0.005), "{:?}", common_mode.shares[0]);
 }
 
 #[test]
@@ -224,7 +222,7 @@ fn the_parts_filter_is_found_at_the_full_rate() {
     }
     assert_eq!(explanation.channels.len(), 6);
     // One interval of 16 periods after which no samples follow faster; equal neighbours are as frequent as by chance.
-    let [gap, clock] = &explanation.deliveries[..] else { panic!("{:?}", explanation.deliveries) };
+    let [gap, clock] = &explanation.time_base[..] else { panic!("{:?}", explanation.time_base) };
     assert!(gap.starts_with("15 of 49440 samples never arrived, in 1 gaps"), "{gap}");
     assert!(clock.contains("816.4") && clock.contains("819.2"), "{clock}");
 }

@@ -8,7 +8,7 @@ use super::published_gyro::{
 use allan_core::fit::{fit, fit_shapes};
 use allan_core::term::Markov;
 use allan_core::{Curve, Model, NoiseTerm};
-use noise_analysis::innovation::innovations;
+use noise_analysis::assessment::innovations::filter_innovations;
 use noise_analysis::spectra::{Welch, correlation_time};
 use noise_analysis::uniform_series::UniformSeries;
 use serde::Serialize;
@@ -254,13 +254,13 @@ fn innovation_tests(fitted: &Model, unseen: &UniformSeries) -> Vec<InnovationTes
         fitted.terms().iter().filter(|term| matches!(term.kind, NoiseTerm::Filtered(_) | NoiseTerm::AngleRandomWalk));
     let only_n = Model::new(1.0 / RATE_HZ, white.copied());
     let test = |(name, model): (&'static str, &Model)| {
-        let found = innovations(model, unseen)?;
+        let found = filter_innovations(model, unseen)?;
         Some(InnovationTest {
             model: name,
             normalised: found.normalised,
-            consistent: found.consistent,
+            consistent: (found.low, found.high),
             correlation: found.correlation,
-            whiteness_p: found.whiteness,
+            whiteness_p: found.whiteness_p,
         })
     };
     [("N, B, K", fitted), ("N only", &only_n)].into_iter().filter_map(test).collect()

@@ -23,11 +23,11 @@ use super::channel_under_test::{
     resonance_density,
 };
 use super::effect::GYROS;
+use measurement::adis16405::HOST_CLOCK_ERROR;
 use nalgebra::DVector;
 use noise_analysis::detectors::block_means::BLOCKS;
 use noise_analysis::detectors::block_means::{NoiseCovariance, flicker_covariance, markov_covariance};
 use noise_analysis::distributions::quantile;
-use noise_analysis::trace::sample_clock::HOST_CLOCK;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -133,7 +133,7 @@ pub(super) fn smallest_size(
             smallest_count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
         }
         InjectedEffect::SampleClock { .. } => {
-            solve_size(required_ratio(1.0), |off| ratio_of_clock(off * HOST_CLOCK)) * HOST_CLOCK
+            solve_size(required_ratio(1.0), |off| ratio_of_clock(off * HOST_CLOCK_ERROR)) * HOST_CLOCK_ERROR
         }
     }
 }
@@ -267,7 +267,7 @@ pub(super) fn smallest_count(by_chance: f64) -> f64 {
 /// Expected log likelihood ratio of a sample clock whose rate differs by the fraction `off` from the nominal one, measured
 /// with a host's clock.
 fn ratio_of_clock(off: f64) -> f64 {
-    0.5 * (off / HOST_CLOCK).powi(2)
+    0.5 * (off / HOST_CLOCK_ERROR).powi(2)
 }
 
 /// Size at the limit of a waveform that has the block means `unit` for a size of 1 and could be at `places` places.

@@ -6,7 +6,7 @@
 use super::channel_under_test::{RecordLength, RecordingConditions};
 use super::detection_limit::smallest_size;
 use super::effect::{EffectKind, draw_unit, log_uniform, scaled, size};
-use noise_analysis::trace::sample_clock::HOST_CLOCK;
+use measurement::adis16405::HOST_CLOCK_ERROR;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -78,8 +78,10 @@ impl DrawnRecording {
         random.set_stream(u64::MAX);
         let noise = noise(&mut random);
         let surroundings = surroundings(&mut random, kinds.contains(&EffectKind::Acceleration));
-        let host =
-            HostClock { latency_s: LATENCY_S, clock_ratio: 1.0 + HOST_CLOCK * random.sample::<f64, _>(StandardNormal) };
+        let host = HostClock {
+            latency_s: LATENCY_S,
+            clock_ratio: 1.0 + HOST_CLOCK_ERROR * random.sample::<f64, _>(StandardNormal),
+        };
         let record = RecordLength { seconds, period_s: 1.0 / SAMPLE_RATE_HZ };
         let conditions = RecordingConditions { noise: &noise, environment: surroundings, record, seed };
         // In a moving accelerometer the motion hides any other effect.

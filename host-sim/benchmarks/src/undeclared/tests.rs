@@ -16,7 +16,7 @@ use adis16405_driver::Channel;
 use allan_core::NoiseTerm as Term;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance};
 use noise_analysis::report::{
-    ChannelReport, Effect as Reported, ModelError, ModelReport, Parameter, ReadOff, Report, SCHEMA,
+    ChannelReport, Effect as Reported, ModelErrorReport, ModelReport, Parameter, Report, SCHEMA, SlopeMethodReport,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -223,8 +223,8 @@ fn report(found: &[Found<'_>]) -> Report {
     let model = || ModelReport {
         terms: Vec::new(),
         adev: Vec::new(),
-        fitted: ModelError { deviance_per_point: None, rms_percent: None },
-        unseen: ModelError { deviance_per_point: None, rms_percent: None },
+        fitted: ModelErrorReport { deviance_per_point: None, rms_percent: None },
+        unseen: ModelErrorReport { deviance_per_point: None, rms_percent: None },
     };
     let effect = |&(_, kind, parameters): &Found<'_>| Reported {
         kind: kind.to_owned(),
@@ -242,9 +242,9 @@ fn report(found: &[Found<'_>]) -> Report {
         unit: channel.unit().to_owned(),
         samples: 0,
         curve: Vec::new(),
-        read_off: ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
+        read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(),
-        practice: Default::default(),
+        assessment: Default::default(),
         effects: found.iter().filter(|(of, ..)| *of == channel).map(effect).collect(),
         after: model(),
     };

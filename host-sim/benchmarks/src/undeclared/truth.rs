@@ -131,7 +131,8 @@ fn curve(samples: &[RecordedSample], channel: Channel, range: GyroRange) -> alla
 /// The slowest noise has few periods in a recording, from which the test estimates both its size and the effect: Student's
 /// distribution with few degrees of freedom. This is an upper limit for methods that have to find channel and waveform too.
 pub(super) fn detects_known_waveform(effect: &InjectedEffect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
-    let series = |channel: Channel| Series::of(measurement, &measurement.profile.channels[channel as usize]);
+    let series =
+        |channel: Channel| Series::from_measurement(measurement, &measurement.profile.channels[channel as usize]);
     let own = series(simulation::channel(*effect.channels().first()?));
     let blocks = BlockMeans::from_series(&own)?;
     let waveform = match effect {

@@ -2,7 +2,7 @@
 
 use super::panel::{DrawError, DrawResult, Panel, SLOPES, has_logarithm};
 use crate::formatting::{number, unit};
-use noise_analysis::report::{ReadOff, ReadOffValue};
+use noise_analysis::report::{SlopeMethodReport, SlopeMethodValue};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::f64::consts::{LN_2, PI};
@@ -37,7 +37,7 @@ impl Slope {
 }
 
 /// The deviation that the axis must reach down to for the flat line and its label; absent without a flat line.
-pub(super) fn floor(read_off: &ReadOff) -> Option<f64> {
+pub(super) fn floor(read_off: &SlopeMethodReport) -> Option<f64> {
     let value = read_off.bias_instability.as_ref()?.value * flat_factor();
     has_logarithm(value).then_some(value * 0.9)
 }
@@ -49,7 +49,7 @@ fn flat_factor() -> f64 {
 
 /// Draws the lines with the values of their coefficients: −½ through N at 1 s, flat at `B·sqrt(2 ln 2/π)`, +½ through K
 /// at 3 s (IEEE Std 952, annex C).
-pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> DrawResult {
+pub(super) fn draw(area: &Panel<'_>, read_off: &SlopeMethodReport) -> DrawResult {
     let lines = [
         ("N", read_off.angle_random_walk.as_ref(), -0.5, 1.0, 1.0),
         ("B", read_off.bias_instability.as_ref(), 0.0, 1.0, flat_factor()),
@@ -71,7 +71,7 @@ pub(super) fn draw(area: &Panel<'_>, read_off: &ReadOff) -> DrawResult {
 }
 
 /// Draws one line. Returns the middle of the visible part of where it was found.
-fn draw_line(area: &Panel<'_>, line: &Slope, value: &ReadOffValue) -> Result<Option<f64>, DrawError> {
+fn draw_line(area: &Panel<'_>, line: &Slope, value: &SlopeMethodValue) -> Result<Option<f64>, DrawError> {
     let (from, to) = (value.from_s.log10(), value.to_s.log10());
     let (mut start, mut end) = (from - 0.3, to + 0.3);
     if line.slope != 0.0 {
@@ -111,7 +111,7 @@ struct Label {
 impl Label {
     /// A label below `line` and inside the panel: left of `middle` for a falling line, right of it for a rising one, so
     /// that the line does not cross it.
-    fn under(area: &Panel<'_>, line: &Slope, middle: f64, symbol: &str, value: &ReadOffValue) -> Self {
+    fn under(area: &Panel<'_>, line: &Slope, middle: f64, symbol: &str, value: &SlopeMethodValue) -> Self {
         let text = format!("{symbol} = {} {}", number(value.value), unit(&value.unit));
         let (width, pixels) = area.text_width(&text);
         let (first, last) = (area.across.start + width, area.across.end - width);

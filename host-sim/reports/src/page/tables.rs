@@ -3,8 +3,8 @@
 use crate::coefficients::{self, CoefficientRow};
 use crate::formatting::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
 use maud::{Markup, html};
-use noise_analysis::practice::{Coefficient, Drift};
-use noise_analysis::report::{ChannelReport, ModelError, ModelReport, Parameter, Report};
+use noise_analysis::assessment::{Coefficient, NavigationDrift};
+use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Parameter, Report};
 
 /// Content of a column's heading, and whether the column holds numbers.
 type Heading = (Markup, bool);
@@ -131,7 +131,7 @@ pub(super) fn terms(model: &ModelReport) -> Markup {
 /// Errors of both models on the fitted and on the unseen half.
 pub(super) fn errors(channel: &ChannelReport) -> Markup {
     let same = channel.after == channel.before;
-    let cell = |error: &ModelError| {
+    let cell = |error: &ModelErrorReport| {
         html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) } } }
     };
     let rows = html! {
@@ -164,7 +164,7 @@ pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
 }
 
 /// Predicted and observed error of the integrated channel.
-pub(super) fn drift(drifts: &[Drift]) -> Markup {
+pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
     let rows = html! {
         @for drift in drifts {
             tr {

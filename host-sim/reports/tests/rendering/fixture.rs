@@ -1,6 +1,6 @@
 //! A report made by hand: the curve of known N, B and K, without an estimator or a fit.
 
-use noise_analysis::practice::{Coefficient, Drift, Innovations, Practice, Record};
+use noise_analysis::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
 use noise_analysis::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -52,11 +52,11 @@ pub(crate) fn empty() -> Report {
     let channel = &mut report.channels[0];
     channel.samples = 1;
     channel.curve.clear();
-    channel.read_off = ReadOff { angle_random_walk: None, bias_instability: None, rate_random_walk: None };
-    let error = ModelError { deviance_per_point: None, rms_percent: None };
+    channel.read_off = SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None };
+    let error = ModelErrorReport { deviance_per_point: None, rms_percent: None };
     channel.before = ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error };
     channel.after = channel.before.clone();
-    channel.practice = Practice::default();
+    channel.assessment = Assessment::default();
     report
 }
 
@@ -72,18 +72,18 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         .map(|(kind, value, per)| term(kind, "value", value * scale, &rate_unit(unit, per)))
         .into(),
         adev: curve.iter().map(|point| scale * model(point.tau_s)).collect(),
-        fitted: ModelError { deviance_per_point: Some(1.042), rms_percent: Some(2.317) },
-        unseen: ModelError { deviance_per_point: Some(1.385), rms_percent: Some(3.946) },
+        fitted: ModelErrorReport { deviance_per_point: Some(1.042), rms_percent: Some(2.317) },
+        unseen: ModelErrorReport { deviance_per_point: Some(1.385), rms_percent: Some(3.946) },
     };
     let value = |value: f64, per: &str, from_s: f64, to_s: f64| {
-        Some(ReadOffValue { value: value * scale, unit: rate_unit(unit, per), from_s, to_s })
+        Some(SlopeMethodValue { value: value * scale, unit: rate_unit(unit, per), from_s, to_s })
     };
     ChannelReport {
         name: name.to_owned(),
         unit: unit.to_owned(),
         samples: SAMPLES,
         curve,
-        read_off: ReadOff {
+        read_off: SlopeMethodReport {
             angle_random_walk: value(0.037_14, "/sqrt(s)", 0.01, 2.56),
             bias_instability: value(0.014_30, "", 40.96, 81.92),
             rate_random_walk: value(0.001_217, "/s/sqrt(s)", 327.68, 1310.72),
@@ -91,12 +91,12 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         before: declared.clone(),
         effects: vec![],
         after: declared,
-        practice: assessment(scale),
+        assessment: assessment(scale),
     }
 }
 
 /// An assessment whose numbers occur nowhere else in the report.
-fn assessment(scale: f64) -> Practice {
+fn assessment(scale: f64) -> Assessment {
     let parameter = |value: f64, unit: &str| Parameter {
         value: scale * value,
         low: scale * value * 0.9,
@@ -104,13 +104,13 @@ fn assessment(scale: f64) -> Practice {
         unit: unit.to_owned(),
     };
     let coefficient = |discrete, value| Coefficient { kind: "angle_random_walk".to_owned(), discrete, value };
-    Practice {
+    Assessment {
         coefficients: vec![
             coefficient(false, parameter(2.208, "deg/sqrt(h)")),
             coefficient(true, parameter(0.3681, "deg/s")),
         ],
         drift: [10.0, 600.0]
-            .map(|seconds| Drift {
+            .map(|seconds| NavigationDrift {
                 seconds,
                 calibration_s: 60.0,
                 predicted: scale * 0.017 * seconds,
@@ -129,7 +129,7 @@ fn assessment(scale: f64) -> Practice {
         angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
         markov_time_by_autocorrelation: Some(parameter(2.1, "s")),
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
-            .map(|(kind, more_hours)| Record { kind: kind.to_owned(), half_s: None, more_hours })
+            .map(|(kind, more_hours)| RecordLength { kind: kind.to_owned(), half_s: None, more_hours })
             .into(),
     }
 }
@@ -144,9 +144,9 @@ fn rate_unit(unit: &str, per: &str) -> String {
     }
 }
 
-pub(crate) fn term(kind: &str, name: &str, value: f64, unit: &str) -> Term {
+pub(crate) fn term(kind: &str, name: &str, value: f64, unit: &str) -> TermReport {
     let parameter = Parameter { value, low: value * 0.94, high: value * 1.07, unit: unit.to_owned() };
-    Term { kind: kind.to_owned(), parameters: BTreeMap::from([(name.to_owned(), parameter)]) }
+    TermReport { kind: kind.to_owned(), parameters: BTreeMap::from([(name.to_owned(), parameter)]) }
 }
 
 /// The point of one octave: about `1.5·N/n` degrees of freedom, and a bounded wobble inside the interval.

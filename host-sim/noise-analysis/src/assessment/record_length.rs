@@ -1,28 +1,28 @@
-//! How long to record: the information that a longer record would hold.
+//! How long to record: the standard error of a coefficient by the length of the record.
 
 use allan_core::Model;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use nalgebra::{DMatrix, DVector};
 
-/// Relative half-width of the 95 % bounds that is asked for.
-pub const WANTED: f64 = 0.2;
-/// Longest record that is advised, s.
+/// Relative half-width of the 95 % bounds that is required.
+pub const REQUIRED_HALF_WIDTH: f64 = 0.2;
+/// Longest record that is recommended, s: 30 days.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
 
-/// Record length in s at which the 95 % bounds of a coefficient are [`WANTED`] wide, for a model that is true.
+/// Record length in s, at least `duration`, at which the 95 % bounds of the coefficient at position `term` of `model` are
+/// within ±[`REQUIRED_HALF_WIDTH`].
 ///
-/// By Whittle's information: each frequency tells each term's share of the density. The fit reaches it within a tenth; by
-/// how much its own bounds of today's `duration` are wider, those of the longer record are taken to be. `None` for a term
-/// that the data does not show, or where a month would not do.
+/// By [`relative_error`], times the factor by which the bounds that the fit gave for `duration` s are wider, if they are.
+/// `None` for a term that the data does not show, or where more than 30 days are required.
 #[must_use]
-pub fn wanted(model: &Model, term: usize, duration: f64) -> Option<f64> {
+pub fn required_length(model: &Model, term: usize, duration: f64) -> Option<f64> {
     let present = model.terms().get(term).filter(|term| term.value > 0.0 && term.low > 0.0)?;
     let today = (present.high - present.low) / 2.0 / present.value;
     let inefficiency = (today / (NORMAL_975 * relative_error(model, term, duration)?)).max(1.0);
     let width = |length: f64| relative_error(model, term, length).map(|error| NORMAL_975 * inefficiency * error);
     let mut length = duration;
-    while width(length)? > WANTED {
+    while width(length)? > REQUIRED_HALF_WIDTH {
         length *= 1.05;
         if length > LONGEST_S {
             return None;
@@ -31,15 +31,15 @@ pub fn wanted(model: &Model, term: usize, duration: f64) -> Option<f64> {
     Some(length)
 }
 
-/// Relative standard deviation of a coefficient among the others that `duration` s of samples allow, by Whittle's
-/// information; `None` for a term of 0.
+/// Smallest relative standard deviation of the coefficient at position `term` of `model` that is estimated together with the
+/// others from `duration` s of samples, by Whittle's information; `None` for a term of 0.
 #[must_use]
 pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> {
     let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
     let position = present.iter().position(|of| std::ptr::eq(*of, &model.terms()[term]))?;
     let period = model.sample_period();
     let mut information = DMatrix::zeros(present.len(), present.len());
-    // One ordinate in every half resolution, each with a single degree of freedom; in ever wider bands.
+    // One ordinate of a single degree of freedom in every half resolution, summed over bands of growing width.
     let ordinates = (duration / period) as usize;
     let mut first = 1;
     while first < ordinates {
@@ -54,7 +54,7 @@ pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> 
         }
         first += count;
     }
-    // Of the square of the coefficient, hence the half.
+    // The information is that of the squared coefficient, whose relative error is twice that of the coefficient.
     Some(information.cholesky()?.inverse()[(position, position)].sqrt() / 2.0)
 }
 
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_and_a_walk_have_their_known_information() {
+    fn errors_of_white_noise_and_of_a_random_walk_are_the_known_ones() {
         // N alone: 1/√(2M) of M samples.
         let error = relative_error(&model(2e-3, 0.0), 0, 1e4).expect("an error");
         assert!((error / (1.0 / 2e6f64.sqrt()) - 1.0).abs() < 1e-3, "{error}");
@@ -80,14 +80,14 @@ mod tests {
     }
 
     #[test]
-    fn four_times_as_long_halves_the_error_of_a_walk() {
+    fn the_required_length_follows_from_the_error_of_today() {
         let model = model(2e-3, 3.464e-5);
-        // 1.96·10.8 % at 1e4 s is 21.2 %: 12.5 % longer will do.
-        let length = wanted(&model, 1, 1e4).expect("a length");
+        // 1.96·10.8 % at 1e4 s is 21.2 %: 12.5 % longer is enough.
+        let length = required_length(&model, 1, 1e4).expect("a length");
         assert!((1.0e4..1.25e4).contains(&length), "{length}");
-        // The white noise is known at once; what is not there can never be.
-        assert_eq!(wanted(&model, 0, 1e4), Some(1e4));
-        assert_eq!(wanted(&self::model(2e-3, 0.0), 1, 1e4), None);
-        assert_eq!(wanted(&self::model(2e-3, 1e-9), 1, 1e4), None);
+        // The white noise is known well enough; a walk of 0, or of far less than the white noise, cannot be.
+        assert_eq!(required_length(&model, 0, 1e4), Some(1e4));
+        assert_eq!(required_length(&self::model(2e-3, 0.0), 1, 1e4), None);
+        assert_eq!(required_length(&self::model(2e-3, 1e-9), 1, 1e4), None);
     }
 }

@@ -1,51 +1,52 @@
-//! A model whose white level and one of whose lines may differ from epoch to epoch.
+//! A model whose white noise and one of whose lines may change from epoch to epoch.
 
-use super::{SIGNIFICANCE, chi_square_tail};
+use super::epochs::SIGNIFICANCE;
 use allan_core::confidence::octave_correlation;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// What can move.
-pub const STATES: usize = 2;
-/// Farthest that a line is looked for from where it is on average, in ln f.
-const FARTHEST: f64 = 0.3;
-/// Farthest that a level is looked for, in ln s²: a factor of about 20.
-pub const FARTHEST_LEVEL: f64 = 3.0;
-/// Widest line, as a part of its frequency; what is wider is a colour of the noise.
-const WIDEST: f64 = 0.25;
-/// Largest standard deviation of ln f in an epoch of a line that can be followed.
-const LEAST_CERTAIN: f64 = 0.02;
-/// Distance of the first guesses.
-const GUESSES: f64 = 0.02;
+/// Number of parameters that can be tracked.
+pub(crate) const PARAMETERS: usize = 2;
+/// Largest change of a line's frequency from its mean, in ln f.
+const MAX_LINE: f64 = 0.3;
+/// Largest change of the level, in ln of the variance: a factor of about 20.
+pub(crate) const MAX_LEVEL: f64 = 3.0;
+/// Largest bandwidth of a line that is tracked, as a part of its frequency.
+const MAX_BANDWIDTH: f64 = 0.25;
+/// Largest standard deviation of ln f, in the median of the epochs, of a line that is tracked.
+const MAX_LINE_ERROR: f64 = 0.02;
+/// Distance in ln f of the frequencies from which the search starts.
+const GUESS_STEP: f64 = 0.02;
 
-/// What an epoch differs by from the model, or by how much that is uncertain: ln of the variance of the white level, and
-/// ln of the line's frequency.
-pub type State = [f64; STATES];
+/// The differences of an epoch from the model, or their standard deviations: ln of the variance of the white noise, and ln
+/// of the line's frequency.
+pub type ParameterVector = [f64; PARAMETERS];
 
-/// A model with what may move in it.
+/// A model, and which of its lines is tracked.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Moving {
+pub struct TrackedModel {
     model: Model,
     line: Option<usize>,
 }
 
-/// An epoch's state.
+/// The tracked parameters of an epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// Where the epoch's curve is likeliest.
-    pub state: State,
+pub struct EpochEstimate {
+    /// At the minimum of the deviance.
+    pub parameters: ParameterVector,
     /// Standard deviations.
-    pub error: State,
+    pub error: ParameterVector,
     /// `Σ edf·(ln(m/v) + v/m − 1)` there.
     pub deviance: f64,
-    /// What chance lowers the deviance by on average with the last thing that was set free.
+    /// Mean decrease of the deviance by chance with the last parameter that was set free.
     scatter: f64,
 }
 
-/// What is set free.
+/// The parameters that are tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Free {
+pub enum TrackedSet {
     /// Nothing.
     Nothing,
     /// The level of the white noise.
@@ -54,71 +55,71 @@ pub enum Free {
     LevelAndLine,
 }
 
-/// Whether something moves among the epochs of the fitted half.
+/// Test of whether a parameter moves among the epochs of the first half.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Evidence {
-    /// How much the deviance falls for each epoch, in units of what chance would do.
+pub struct MovementTest {
+    /// Mean decrease of the deviance of an epoch, over that by chance.
     pub gain: f64,
-    /// Chance of as much if nothing moves.
+    /// Probability of as much if the parameter does not move.
     pub p_value: f64,
 }
 
-impl Moving {
-    /// A model none of whose lines moves.
+impl TrackedModel {
+    /// A model none of whose lines is tracked.
     #[must_use]
-    pub fn still(model: Model) -> Self {
+    pub fn without_line(model: Model) -> Self {
         Self { model, line: None }
     }
 
-    /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the evidence.
+    /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
     #[must_use]
-    pub fn of<const POINTS: usize>(model: Model, epochs: &[Curve<POINTS>]) -> (Self, Option<Evidence>) {
+    pub fn select_line<const POINTS: usize>(model: Model, epochs: &[Curve<POINTS>]) -> (Self, Option<MovementTest>) {
         let is_line = |term: &FittedTerm| match term.kind {
             NoiseTerm::Sinusoid(_) => term.value > 0.0,
-            NoiseTerm::Resonance(line) => term.value > 0.0 && line.bandwidth < WIDEST * line.frequency,
+            NoiseTerm::Resonance(line) => term.value > 0.0 && line.bandwidth < MAX_BANDWIDTH * line.frequency,
             _ => false,
         };
         let lines: Vec<usize> = (0..model.terms().len()).filter(|&at| is_line(&model.terms()[at])).collect();
-        let followable = |line: &usize| {
-            let moving = Self { model: model.clone(), line: Some(*line) };
+        let is_trackable = |line: &usize| {
+            let tracked = Self { model: model.clone(), line: Some(*line) };
             let mut errors: Vec<f64> =
-                epochs.iter().map(|epoch| moving.estimate(epoch, Free::LevelAndLine).error[1]).collect();
+                epochs.iter().map(|epoch| tracked.estimate(epoch, TrackedSet::LevelAndLine).error[1]).collect();
             errors.sort_by(f64::total_cmp);
-            errors.get(errors.len() / 2).is_some_and(|&median| median < LEAST_CERTAIN)
+            errors.get(errors.len() / 2).is_some_and(|&median| median < MAX_LINE_ERROR)
         };
-        let tried = lines.iter().copied().filter(followable).map(|line| {
-            let moving = Self { model: model.clone(), line: Some(line) };
-            let evidence = moving.evidence(epochs, Free::Level, Free::LevelAndLine);
-            (moving, Evidence { p_value: (evidence.p_value * lines.len() as f64).min(1.0), ..evidence })
+        let tried = lines.iter().copied().filter(is_trackable).map(|line| {
+            let tracked = Self { model: model.clone(), line: Some(line) };
+            let test = tracked.test_movement(epochs, TrackedSet::Level, TrackedSet::LevelAndLine);
+            (tracked, MovementTest { p_value: (test.p_value * lines.len() as f64).min(1.0), ..test })
         });
         let clearest = tried.min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value).then(b.1.gain.total_cmp(&a.1.gain)));
         match clearest {
-            Some((moving, evidence)) if evidence.p_value < SIGNIFICANCE => (moving, Some(evidence)),
-            clearest => (Self::still(model), clearest.map(|(_, evidence)| evidence)),
+            Some((tracked, test)) if test.p_value < SIGNIFICANCE => (tracked, Some(test)),
+            clearest => (Self::without_line(model), clearest.map(|(_, test)| test)),
         }
     }
 
-    /// The model that does not move.
+    /// The model with all parameters at their means.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Frequency of the line that moves, Hz.
+    /// Mean frequency of the line that is tracked, Hz.
     #[must_use]
     pub fn line_frequency(&self) -> Option<f64> {
         self.line.map(|line| self.model.terms()[line].kind.shape()[0].1)
     }
 
-    /// What moves at most.
+    /// All parameters that can be tracked.
     #[must_use]
-    pub fn free(&self) -> Free {
-        if self.line.is_some() { Free::LevelAndLine } else { Free::Level }
+    pub fn largest_set(&self) -> TrackedSet {
+        if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }
 
-    /// The model in a state.
+    /// The model with the parameters of an epoch.
     #[must_use]
-    pub fn at(&self, [level, line]: State) -> Model {
+    pub fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
             if matches!(term.kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_)) {
@@ -132,8 +133,9 @@ impl Moving {
         Model::new(self.model.sample_period(), self.model.terms().iter().enumerate().map(moved))
     }
 
-    /// The model in a state, with a line of another width and amplitude, whose logarithms change by so much.
-    pub fn along(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
+    /// The model with the parameters of an epoch, and with the logarithms of the line's width and amplitude changed by
+    /// `width` and `amplitude`.
+    pub fn with_line_shape(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
         let moved = self.at([level, line]);
         let changed = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
@@ -148,79 +150,92 @@ impl Moving {
         Model::new(moved.sample_period(), moved.terms().iter().enumerate().map(changed))
     }
 
-    /// Whether `more` describes the epochs better than `fewer` by more than chance.
+    /// Tests whether the epochs need the parameters `more`, which are one more than `fewer`.
     ///
-    /// Without a movement each epoch's deviance falls by χ² of one degree of freedom times its scatter.
+    /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
     #[must_use]
-    pub fn evidence<const POINTS: usize>(&self, epochs: &[Curve<POINTS>], fewer: Free, more: Free) -> Evidence {
-        let fall = |epoch: &Curve<POINTS>| {
-            let free = self.estimate(epoch, more);
-            (self.estimate(epoch, fewer).deviance - free.deviance) / free.scatter
+    pub fn test_movement<const POINTS: usize>(
+        &self,
+        epochs: &[Curve<POINTS>],
+        fewer: TrackedSet,
+        more: TrackedSet,
+    ) -> MovementTest {
+        let decrease = |epoch: &Curve<POINTS>| {
+            let estimate = self.estimate(epoch, more);
+            (self.estimate(epoch, fewer).deviance - estimate.deviance) / estimate.scatter
         };
-        let sum: f64 = epochs.iter().map(fall).sum();
+        let sum: f64 = epochs.iter().map(decrease).sum();
         let count = epochs.len() as f64;
-        Evidence { gain: sum / count, p_value: chi_square_tail(sum, count) }
+        // `count` is above 0 for an `EpochCurves`.
+        let p_value = ChiSquared::new(count).map_or(1.0, |chi_squared| chi_squared.sf(sum.max(0.0)));
+        MovementTest { gain: sum / count, p_value }
     }
 
-    /// The state of an epoch.
+    /// The parameters of an epoch; those that are not in `tracked` are 0.
     #[must_use]
-    pub fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, free: Free) -> Estimate {
+    pub fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
         let points: Vec<(&AllanPoint, f64)> = epoch
             .points()
             .iter()
             .filter(|point| point.n <= epoch.samples() / 8 && point.avar > 0.0)
             .map(|point| (point, self.model.edf(point)))
             .collect();
-        // The level scales what the white noise adds to the rest.
-        let avars = |state: State| -> Vec<f64> {
-            let model = self.at(state);
+        let avars = |parameters: ParameterVector| -> Vec<f64> {
+            let model = self.at(parameters);
             points.iter().map(|(point, _)| model.avar(point.n)).collect()
         };
+        // The part of the white noise, which the level multiplies: by a factor of 2 it adds as much again.
         let white: Vec<f64> =
             avars([2f64.ln(), 0.0]).iter().zip(avars([0.0; 2])).map(|(twice, once)| twice - once).collect();
         let deviance = |level: f64, avars: &[f64]| {
-            let more = level.exp() - 1.0;
-            let modelled = avars.iter().zip(&white).map(|(all, white)| all + more * white);
+            let added = level.exp() - 1.0;
+            let modelled = avars.iter().zip(&white).map(|(all, white)| all + added * white);
             let of = |((point, edf), modelled): (&(&AllanPoint, f64), f64)| {
                 let ratio = point.avar / modelled;
                 edf * (ratio - 1.0 - ratio.ln())
             };
             points.iter().zip(modelled).map(of).sum::<f64>()
         };
-        let best_level = |avars: &[f64]| least(|level| deviance(level, avars), 0.0, 0.05, FARTHEST_LEVEL);
+        let best_level = |avars: &[f64]| minimum(|level| deviance(level, avars), 0.0, 0.05, MAX_LEVEL);
         let at_line = |line: f64| {
             let avars = avars([0.0, line]);
             let level = best_level(&avars);
             (level, deviance(level, &avars))
         };
-        let state = match free {
-            Free::Nothing => [0.0, 0.0],
-            Free::Level => [at_line(0.0).0, 0.0],
-            Free::LevelAndLine => {
-                let most = (FARTHEST / GUESSES) as i32;
-                let guesses = (-most..=most).map(|k| f64::from(k) * GUESSES).map(|line| (line, at_line(line).1));
+        let parameters = match tracked {
+            TrackedSet::Nothing => [0.0, 0.0],
+            TrackedSet::Level => [at_line(0.0).0, 0.0],
+            TrackedSet::LevelAndLine => {
+                let most = (MAX_LINE / GUESS_STEP) as i32;
+                let guesses = (-most..=most).map(|k| f64::from(k) * GUESS_STEP).map(|line| (line, at_line(line).1));
                 let guess = guesses.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(line, _)| line);
-                let line = least(|line| at_line(line).1, guess, GUESSES / 2.0, FARTHEST);
+                let line = minimum(|line| at_line(line).1, guess, GUESS_STEP / 2.0, MAX_LINE);
                 [at_line(line).0, line]
             }
         };
-        let (error, scatter) = self.uncertainty(&points, state, free);
-        Estimate { state, error, deviance: deviance(state[0], &avars([0.0, state[1]])), scatter }
+        let (error, scatter) = self.uncertainty(&points, parameters, tracked);
+        let deviance = deviance(parameters[0], &avars([0.0, parameters[1]]));
+        EpochEstimate { parameters, error, deviance, scatter }
     }
 
-    /// Standard deviations by the sandwich `H⁻¹·S·H⁻¹`, and how much likelier chance moves the points along the last
-    /// state than if they were independent.
-    fn uncertainty(&self, points: &[(&AllanPoint, f64)], state: State, free: Free) -> (State, f64) {
+    /// Standard deviations by the sandwich estimator `H⁻¹·S·H⁻¹`, and the factor by which the correlation of the points
+    /// increases the variance along the last parameter.
+    fn uncertainty(
+        &self,
+        points: &[(&AllanPoint, f64)],
+        parameters: ParameterVector,
+        tracked: TrackedSet,
+    ) -> (ParameterVector, f64) {
         const STEP: f64 = 1e-3;
         let slope = |index: usize, point: &AllanPoint| {
             let at = |step: f64| {
-                let mut moved = state;
+                let mut moved = parameters;
                 moved[index] += step;
                 self.at(moved).avar(point.n).ln()
             };
             (at(STEP) - at(-STEP)) / (2.0 * STEP)
         };
-        // In standard deviations of each point.
+        // The slope of each point in its standard deviations.
         let tangent = |index: usize| -> Vec<f64> {
             points.iter().map(|(point, edf)| (edf / 2.0).sqrt() * slope(index, point)).collect()
         };
@@ -240,13 +255,13 @@ impl Moving {
             vector.iter().zip(other).map(|(entry, other)| entry - along * other).collect()
         };
         let error = |rest: &[f64]| spread(rest).sqrt() / dot(rest, rest);
-        match free {
-            Free::Nothing => ([0.0, 0.0], 1.0),
-            Free::Level => {
+        match tracked {
+            TrackedSet::Nothing => ([0.0, 0.0], 1.0),
+            TrackedSet::Level => {
                 let level = tangent(0);
                 ([error(&level), 0.0], (spread(&level) / dot(&level, &level)).max(1.0))
             }
-            Free::LevelAndLine => {
+            TrackedSet::LevelAndLine => {
                 let (level, line) = (tangent(0), tangent(1));
                 let (level_rest, line_rest) = (without(level.clone(), &line), without(line, &level));
                 let scatter = spread(&line_rest) / dot(&line_rest, &line_rest);
@@ -264,8 +279,9 @@ fn shifted(kind: NoiseTerm, factor: f64) -> NoiseTerm {
     }
 }
 
-/// Where `of` is least near `start`, at most `farthest` from 0: downhill in growing steps, then by the golden section.
-pub fn least(of: impl Fn(f64) -> f64, start: f64, step: f64, farthest: f64) -> f64 {
+/// The position of the minimum of `of` near `start`, at most `farthest` from 0: downhill in growing steps, then by golden
+/// section search.
+pub(crate) fn minimum(of: impl Fn(f64) -> f64, start: f64, step: f64, farthest: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut step = if of(start + step) < of(start - step) { step } else { -step };
     let (mut behind, mut here, mut value) = (start - step, start, of(start));

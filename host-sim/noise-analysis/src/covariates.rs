@@ -1,0 +1,147 @@
+//! Regression of a channel on its covariates: temperature, supply, and for a gyroscope the specific force.
+
+use crate::OCTAVES;
+use crate::detectors::bias::BiasSensitivity;
+use crate::detectors::block_means::BLOCKS;
+use crate::estimators::RecordPart;
+use crate::series::Series;
+use allan_core::Curve;
+use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
+use measurement::{ChannelProfile, Quantity};
+
+/// Degrees of freedom of a sensitivity that was estimated from block means: about the number of blocks of a record.
+const BLOCK_DEGREES_OF_FREEDOM: f64 = BLOCKS as f64;
+
+/// The curves of a channel and of its covariates in one part of a recording, and their covariances.
+struct RegressionData {
+    channel: Curve<OCTAVES>,
+    /// Positions of the covariates in the part.
+    positions: Vec<usize>,
+    covariates: Vec<Covariate<OCTAVES>>,
+    with_channel: Vec<CovarianceCurve<OCTAVES>>,
+    /// Of covariate `i` with covariate `j < i`, at index `i·(i−1)/2 + j`.
+    mutual: Vec<CovarianceCurve<OCTAVES>>,
+}
+
+/// The sensitivities of a channel to its covariates, estimated in one part of a recording.
+pub(crate) struct CovariateFit {
+    data: RegressionData,
+    /// `covariate` of each counts as in [`RegressionData`].
+    sensitivities: Vec<Sensitivity>,
+    /// The channel's curve less the share of the covariates.
+    pub curve: Curve<OCTAVES>,
+}
+
+impl RegressionData {
+    /// With `known`, the covariates go on with the noise that was estimated there.
+    fn new(part: &RecordPart, channel: usize, known: Option<&Self>) -> Self {
+        let positions: Vec<usize> = regressors(part.channels[channel], part).collect();
+        let covariate = |(index, &position): (usize, &usize)| match known {
+            Some(known) => known.covariates[index].continued(&part.curve(position), 1),
+            None => Covariate::new(&part.curve(position), part.resolution(position), 1),
+        };
+        let pairs = positions.iter().enumerate().flat_map(|(i, &a)| positions[..i].iter().map(move |&b| (a, b)));
+        Self {
+            channel: part.curve(channel),
+            covariates: positions.iter().enumerate().map(covariate).collect(),
+            with_channel: positions.iter().map(|&position| part.covariance(channel, position)).collect(),
+            mutual: pairs.map(|(a, b)| part.covariance(a, b)).collect(),
+            positions,
+        }
+    }
+
+    /// Calls `work` with the regression of the channel on its covariates.
+    fn regress<T>(&self, work: impl FnOnce(&CovariateRegression<OCTAVES>) -> T) -> T {
+        let covariance = |with: Option<usize>, covariate: usize, n: u64| {
+            let curve = match with {
+                None => &self.with_channel[covariate],
+                Some(other) => {
+                    let (high, low) = (covariate.max(other), covariate.min(other));
+                    &self.mutual[high * (high - 1) / 2 + low]
+                }
+            };
+            curve.iter().find(|point| point.n == n).map(|point| point.covariance)
+        };
+        work(&CovariateRegression { channel: &self.channel, covariates: &self.covariates, covariance: &covariance })
+    }
+}
+
+impl CovariateFit {
+    /// Estimates the sensitivities of the channel at position `channel` from the second differences in `part`, and takes
+    /// those to temperature and supply from `by_block_means` where these have the smaller error.
+    ///
+    /// With a ramp (`has_ramp`) the sensitivities to temperature and supply come from the block means alone: the second
+    /// differences of a ramp correlate with those of anything else that drifts.
+    pub(crate) fn estimate(
+        part: &RecordPart,
+        channel: usize,
+        has_ramp: bool,
+        by_block_means: impl Fn(ChannelProfile) -> Option<BiasSensitivity>,
+    ) -> Self {
+        let data = RegressionData::new(part, channel, None);
+        let mut sensitivities: Vec<Sensitivity> = data.regress(|beside| beside.sensitivities()).into_iter().collect();
+        for (covariate, &position) in data.positions.iter().enumerate() {
+            let regressor = part.channels[position];
+            let Some(BiasSensitivity { sensitivity: value, error }) = by_block_means(regressor) else {
+                let is_dropped = has_ramp && regressor.quantity.is_environment();
+                sensitivities.retain(|known| known.covariate != covariate || !is_dropped);
+                continue;
+            };
+            let sensitivity = Sensitivity { covariate, value, error, degrees_of_freedom: BLOCK_DEGREES_OF_FREEDOM };
+            match sensitivities.iter_mut().find(|known| known.covariate == covariate) {
+                Some(known) if known.error <= error => {}
+                Some(known) => *known = sensitivity,
+                None => sensitivities.push(sensitivity),
+            }
+        }
+        let curve = data.regress(|beside| beside.compensated(&sensitivities));
+        Self { data, sensitivities, curve }
+    }
+
+    /// Whether the channel depends on no covariate.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.sensitivities.is_empty()
+    }
+
+    /// The curve of the same channel in another part, compensated with the sensitivities of this one.
+    pub(crate) fn compensated(&self, part: &RecordPart, channel: usize) -> Curve<OCTAVES> {
+        RegressionData::new(part, channel, Some(&self.data)).regress(|beside| beside.compensated(&self.sensitivities))
+    }
+
+    /// Each covariate's position in the part, with the sensitivity to it.
+    pub(crate) fn sensitivities(&self) -> impl Iterator<Item = (usize, &Sensitivity)> {
+        self.sensitivities.iter().map(|sensitivity| (self.data.positions[sensitivity.covariate], sensitivity))
+    }
+
+    /// `series` less the covariates times their sensitivities; `of_part` are the series of the part's channels.
+    ///
+    /// The covariates' own noise is added by this. `None` where the channel depends on no covariate, or a covariate has
+    /// other samples.
+    pub(crate) fn compensated_series(&self, series: &Series, of_part: &[Series]) -> Option<Series> {
+        let mut rest = series.clone();
+        for (position, sensitivity) in self.sensitivities() {
+            let covariate = &of_part[position];
+            if covariate.slots != series.slots {
+                return None;
+            }
+            let mean = covariate.values.iter().sum::<f64>() / covariate.values.len() as f64;
+            for (value, covariate) in rest.values.iter_mut().zip(&covariate.values) {
+                *value -= sensitivity.value * (covariate - mean);
+            }
+        }
+        (!self.is_empty()).then_some(rest)
+    }
+}
+
+/// Positions of the channels of `part` that `channel` may depend on.
+fn regressors(channel: ChannelProfile, part: &RecordPart) -> impl Iterator<Item = usize> {
+    let quantities: &[Quantity] = match channel.quantity {
+        Quantity::AngularRate => &[Quantity::Temperature, Quantity::SupplyVoltage, Quantity::SpecificForce],
+        Quantity::SpecificForce => &[Quantity::Temperature, Quantity::SupplyVoltage],
+        _ => &[],
+    };
+    let of = move |&quantity: &Quantity| {
+        (0..part.channels.len()).filter(move |&position| part.channels[position].quantity == quantity)
+    };
+    quantities.iter().flat_map(of)
+}

@@ -1,0 +1,308 @@
+//! Names the effects that the whole record shows in a channel: which of them are reported, with parameters, units and
+//! bounds, and with evidence that a person can check.
+
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::findings::BoundedEstimate;
+use crate::findings::MeasuredValue;
+use crate::findings::{Detection, Effect, Parameter};
+use crate::report::term_parameters;
+use crate::slow_drift::{BoundedDrift, ChannelsInCommon, bounded_drift};
+use crate::spectral_lines::MergedLine;
+use crate::units::coefficient_unit;
+use allan_core::Model;
+use allan_core::confidence::NORMAL_975;
+use allan_core::model::FittedTerm;
+use allan_core::regression::Sensitivity;
+use allan_core::telegraph::{self, KurtosisRatio};
+use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm};
+use allan_core::trace::AddedTerm;
+use measurement::{ChannelProfile, Quantity, SensorProfile};
+use std::f64::consts::PI;
+
+/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts.
+const NEIGHBOURING_COUNTS: f64 = 1.5;
+/// In a channel that is not dithered, the rounding error is correlated over about this many lengths of the filter.
+const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
+/// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
+const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
+/// Variance of the rounding error, in squares of the resolution.
+const ROUNDING: f64 = 1.0 / 12.0;
+
+/// What was found in a channel over the whole record.
+pub(crate) struct ChannelFindings<'a> {
+    pub channel: ChannelProfile,
+    /// Smallest distance of two values, in the channel's unit.
+    pub resolution: f64,
+    pub fit: &'a ChannelFit,
+    /// The covariates and the channel's sensitivities to them.
+    pub sensitivities: Vec<(ChannelProfile, Sensitivity)>,
+    /// Lines of the spectrum.
+    pub lines: &'a [MergedLine],
+    /// Random telegraph noise in the samples.
+    pub two_levels: Option<&'a Detection>,
+    /// Drift that the channel has in common with others.
+    pub common: Option<&'a ChannelsInCommon>,
+}
+
+/// The effects of a channel beyond the baseline model, without those that preprocessing found.
+pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) -> Vec<Effect> {
+    let &ChannelFindings { channel, resolution, fit, lines, common, .. } = findings;
+    let (model, unit, period_s) = (&fit.trace.after, channel.unit, fit.trace.after.sample_period());
+    let mut effects = sensitivity_effects(&findings.sensitivities, unit);
+    // Without dither the rounding error is no white noise, and the curve shows the steps of the rounding.
+    let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
+    let is_dithered_at_once = fit.is_dithered(profile, resolution, 1);
+    let is_rounding = |found: &&Detection| {
+        !is_dithered_at_once && found.effect.parameters["amplitude"].value < NEIGHBOURING_COUNTS * resolution
+    };
+    let two_levels = findings.two_levels.filter(|found| !is_rounding(found));
+    let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
+    for found in &fit.trace.added {
+        let term = &model.terms()[found.term];
+        match term.kind {
+            NoiseTerm::Filtered(filter) => {
+                effects.push(filter_effect((term, &filter), found, unit, period_s, profile.internal_rate_hz));
+            }
+            _ if !is_dithered => {}
+            NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s => {}
+            NoiseTerm::Quantization if rounding_s > 0.0 => {}
+            // Reported from the spectrum, which resolves them better than the curve.
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) => {}
+            // In the curve, random telegraph noise and a common-mode drift look like these.
+            NoiseTerm::Markov(_) | NoiseTerm::RateRamp if two_levels.is_some() || common.is_some() => {}
+            NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
+                effects.push(low_pass_effect(term, markov, found, period_s));
+            }
+            NoiseTerm::Markov(markov) => match telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov) {
+                Some(verdict) if verdict.is_telegraph() => {
+                    effects.push(telegraph_effect(term, found, &verdict, unit, period_s));
+                }
+                _ => effects.push(term_effect(term, found, unit, period_s)),
+            },
+            _ => effects.push(term_effect(term, found, unit, period_s)),
+        }
+    }
+    let is_slow = |effect: &Effect| ["markov", "telegraph", "rate_ramp"].contains(&effect.kind.as_str());
+    if common.is_none() && two_levels.is_none() && !effects.iter().any(is_slow) {
+        let bounded = bounded_drift(&fit.covariates.curve, &fit.trace, channel);
+        effects.extend(bounded.map(|found| bounded_drift_effect(&found, unit)));
+    }
+    effects.extend(two_levels.map(|found| found.effect.clone()));
+    effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
+    effects.extend(lines.iter().map(|line| line_effect(line, unit)));
+    effects
+}
+
+/// Length of the impulse response of the longest filter in a model, s.
+fn filter_length_s(model: &Model) -> f64 {
+    let length = |kind: &NoiseTerm| match kind {
+        NoiseTerm::Filtered(filter) => {
+            f64::from(filter.stages) * f64::from(filter.taps) * model.sample_period() / filter.decimation
+        }
+        _ => 0.0,
+    };
+    model.terms().iter().map(|term| length(&term.kind)).fold(0.0, f64::max)
+}
+
+/// Whether a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
+/// noise, filtered or not, is no larger than the rounding error.
+fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
+    let period_s = model.sample_period();
+    let rounding = ROUNDING * resolution * resolution * period_s;
+    let is_white = |kind: &NoiseTerm| matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_));
+    let white = model.terms().iter().filter(|term| is_white(&term.kind));
+    let left: f64 = white.map(|term| term.low * term.low).sum();
+    markov.time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding
+}
+
+/// A term that was added to the baseline model.
+fn term_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64) -> Effect {
+    added_effect(term, found, unit, period_s, &meaning(&term.kind))
+}
+
+/// A filter that was added to the baseline model, in a sensor whose internal sample rate is `internal_rate_hz`.
+fn filter_effect(
+    (term, filter): (&FittedTerm, &MovingAverageFilter),
+    found: &AddedTerm,
+    unit: &str,
+    period_s: f64,
+    internal_rate_hz: f64,
+) -> Effect {
+    added_effect(term, found, unit, period_s, &filter_meaning(filter, internal_rate_hz))
+}
+
+fn added_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64, meaning: &str) -> Effect {
+    let residual = found.residual;
+    let evidence = format!(
+        "{:+.1} % at tau = {} s ({:.0} sigma) before it was added, which takes {:.0} sigma off the fit; {meaning}",
+        100.0 * residual.excess,
+        seconds(residual.n as f64 * period_s),
+        residual.sigmas.abs(),
+        found.score.sqrt(),
+    );
+    Effect { kind: term.kind.name().to_owned(), parameters: term_parameters(term, unit), evidence }
+}
+
+/// An estimate with the 95 % bounds of a normal distribution, of a quantity that is not negative.
+fn normal_bounds(estimate: MeasuredValue, unit: &str) -> Parameter {
+    let half_width = NORMAL_975 * estimate.error;
+    let (low, high) = ((estimate.value - half_width).max(0.0), estimate.value + half_width);
+    Parameter::new(estimate.value, low, high, unit)
+}
+
+/// A Markov term whose kurtosis is that of random telegraph noise.
+fn telegraph_effect(
+    term: &FittedTerm,
+    found: &AddedTerm,
+    verdict: &KurtosisRatio,
+    unit: &str,
+    period_s: f64,
+) -> Effect {
+    let markov = term_effect(term, found, unit, period_s);
+    let mut parameters = markov.parameters;
+    parameters.remove("deviation");
+    // Two levels that are equally frequent are two standard deviations apart.
+    let amplitude = Parameter::new(2.0 * term.value, 2.0 * term.low, 2.0 * term.high, unit);
+    parameters.insert("amplitude".to_owned(), amplitude);
+    let evidence = format!(
+        "two levels: excess kurtosis {:.2} ± {:.2} of that of a telegraph signal, a Gaussian process has 0; {}",
+        verdict.ratio, verdict.error, markov.evidence,
+    );
+    Effect { kind: "telegraph".to_owned(), parameters, evidence }
+}
+
+/// A Markov process in the place of a random walk that goes too far.
+fn bounded_drift_effect(found: &BoundedDrift, unit: &str) -> Effect {
+    let evidence = format!(
+        "a random walk of {:.1e} {} would take the bias {:.0} times as far in an hour as the biases of parts differ; {}",
+        found.walk.value,
+        coefficient_unit(&found.walk.kind, unit),
+        found.bias_errors_per_hour,
+        meaning(&found.process.kind),
+    );
+    Effect { kind: found.process.kind.name().to_owned(), parameters: term_parameters(&found.process, unit), evidence }
+}
+
+/// A Markov term in the place of the white noise.
+fn low_pass_effect(term: &FittedTerm, markov: Markov, found: &AddedTerm, period_s: f64) -> Effect {
+    let corner = |time_constant: f64| 0.5 / (PI * time_constant);
+    let (shortest, longest) = term.shape[0];
+    let bandwidth = Parameter::new(corner(markov.time_constant), corner(longest), corner(shortest), "Hz");
+    let evidence = format!(
+        "{:+.1} % at tau = {} s ({:.0} sigma); all the white noise is correlated over {} s and none is left: \
+         a low-pass filter of the first order",
+        100.0 * found.residual.excess,
+        seconds(found.residual.n as f64 * period_s),
+        found.residual.sigmas.abs(),
+        seconds(markov.time_constant),
+    );
+    Effect::new("filter_bandwidth", [("bandwidth", bandwidth)], evidence)
+}
+
+/// Sensitivities to temperature, to supply, and to the specific force on all axes as one effect.
+fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &str) -> Vec<Effect> {
+    let parameter = |sensitivity: &Sensitivity, per: &str| {
+        let (low, high) = sensitivity.bounds();
+        Parameter::new(sensitivity.value, low, high, format!("{unit}/{per}"))
+    };
+    let single = |regressor: Quantity, kind: &str, per: &str, meaning: &str| {
+        let (_, sensitivity) = sensitivities.iter().find(|(channel, _)| channel.quantity == regressor)?;
+        let evidence = format!("follows the measured {kind}, {:.0} sigma; {meaning}", sensitivity.sigmas());
+        Some(Effect::new(kind, [("sensitivity", parameter(sensitivity, per))], evidence))
+    };
+    let axes: Vec<_> =
+        sensitivities.iter().filter(|(channel, _)| channel.quantity == Quantity::SpecificForce).collect();
+    let acceleration = (!axes.is_empty()).then(|| {
+        let clearest = axes.iter().map(|(_, sensitivity)| sensitivity.sigmas()).fold(0.0, f64::max);
+        let named = axes.iter().map(|(channel, of)| (format!("sensitivity_{}", channel.axis), parameter(of, "g")));
+        Effect {
+            kind: "acceleration".to_owned(),
+            parameters: named.collect(),
+            evidence: format!("follows the measured specific force, {clearest:.0} sigma; g-sensitivity of the gyro"),
+        }
+    });
+    let temperature = single(Quantity::Temperature, "temperature", "degC", "a bias that drifts with temperature");
+    let supply = single(Quantity::SupplyVoltage, "supply", "V", "a bias that is not regulated");
+    temperature.into_iter().chain(supply).chain(acceleration).collect()
+}
+
+/// A line of the spectrum.
+fn line_effect(line: &MergedLine, unit: &str) -> Effect {
+    let (kind, root) = (line.kind(), 2f64.sqrt());
+    let parameters = match kind {
+        NoiseTerm::Resonance(_) => {
+            vec![("deviation", normal_bounds(line.deviation, unit)), ("bandwidth", normal_bounds(line.width, "Hz"))]
+        }
+        _ => {
+            let MeasuredValue { value, error } = line.deviation;
+            vec![("amplitude", normal_bounds(MeasuredValue { value: root * value, error: root * error }, unit))]
+        }
+    };
+    let frequency = ("frequency", normal_bounds(line.frequency, "Hz"));
+    let width = match line.width.value {
+        width if width > 0.0 => format!("{width:.4} Hz wide"),
+        _ => "no wider than the record resolves".to_owned(),
+    };
+    let evidence = format!(
+        "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {:.0e}; {}",
+        line.frequency.value,
+        line.statistic.sqrt(),
+        line.p_value,
+        meaning(&kind),
+    );
+    Effect::new(kind.name(), parameters.into_iter().chain([frequency]), evidence)
+}
+
+/// Drift that `channel` has in common with others.
+fn common_mode_effect(common: &ChannelsInCommon, channel: ChannelProfile, unit: &str) -> Effect {
+    let parameter = |of: BoundedEstimate, unit: &str| Parameter::new(of.value, of.low, of.high, unit);
+    let others: Vec<&str> = common.channels.iter().filter(|other| **other != channel).map(|other| other.name).collect();
+    let evidence = format!(
+        "moves with {}: their spectra are e^{:.0} times as likely as those of channels with nothing in common, and no \
+         measured cause explains it; a shared reference, supply or temperature gradient",
+        others.join(" and "),
+        common.gain,
+    );
+    Effect::new(
+        "common_mode",
+        [
+            ("deviation", parameter(common.drift.deviation, unit)),
+            ("time_constant", parameter(common.drift.time_constant, "s")),
+        ],
+        evidence,
+    )
+}
+
+/// A time in s with three decimals, below 0.1 s with four.
+fn seconds(tau: f64) -> String {
+    if tau < 0.1 { format!("{tau:.4}") } else { format!("{tau:.3}") }
+}
+
+/// Usual causes of a term, for the evidence.
+fn meaning(kind: &NoiseTerm) -> String {
+    match kind {
+        NoiseTerm::Quantization => "steps of the angle: a counter or an integrator before the output".to_owned(),
+        NoiseTerm::RateRamp => "a steady drift: warming up, or ageing".to_owned(),
+        NoiseTerm::Filtered(_) => "a low-pass filter before the sampling".to_owned(),
+        NoiseTerm::Markov(_) => "a correlated fluctuation: thermal or electronic".to_owned(),
+        NoiseTerm::Resonance(_) => "a narrow band: a mechanical resonance or an unsteady vibration".to_owned(),
+        NoiseTerm::Sinusoid(_) => "a steady line: a vibration, or an interference folded into the band".to_owned(),
+        NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk => {
+            "part of the declared model".to_owned()
+        }
+    }
+}
+
+fn filter_meaning(filter: &MovingAverageFilter, internal_rate_hz: f64) -> String {
+    let window = if filter.stages == 2 { "Bartlett window" } else { "moving average" };
+    if filter.decimation == 1.0 {
+        return format!("neighbours correlate as behind a {window} of {} taps a stage", filter.taps);
+    }
+    format!(
+        "neighbours correlate as behind a {window} of {} taps a stage that is read every {:.2} values; \
+         at the part's own {internal_rate_hz} Hz that is a sample rate of {:.1} Hz",
+        filter.taps,
+        filter.decimation,
+        internal_rate_hz / filter.decimation,
+    )
+}

@@ -1,0 +1,214 @@
+//! Common-mode drift: how much of each channel the other channels explain, and the hold-out gain of subtracting it.
+//!
+//! Each channel is regressed on all others by the covariances of their second differences at one octave. The weights are
+//! estimated in the first half at one octave and applied to the second half at all octaves.
+
+use crate::estimators::CoupledEstimators;
+use crate::{OCTAVES, OVERLAP};
+use allan_core::PowerLaw;
+use measurement::{ChannelProfile, Measurement};
+use nalgebra::{DMatrix, DVector};
+
+/// Degrees of freedom that an octave needs for each weight that is estimated from it.
+const DEGREES_OF_FREEDOM_PER_WEIGHT: f64 = 10.0;
+
+/// The share of the common mode at one averaging time of the first half.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OctaveShares {
+    /// Averaging factor, samples.
+    pub n: u64,
+    /// Averaging time, s.
+    pub tau: f64,
+    /// Degrees of freedom of the variance of flicker noise.
+    pub edf: f64,
+    /// By channel: the part of its variance that the others explain, adjusted for the number of weights (adjusted R²).
+    pub share: Vec<f64>,
+}
+
+/// The gain of subtracting the common mode at one averaging time of the second half.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HoldOutGain {
+    /// Averaging factor, samples.
+    pub n: u64,
+    /// Averaging time, s.
+    pub tau: f64,
+    /// By channel: Allan deviation after over before; above 1 the channel is worse after it.
+    pub ratio: Vec<f64>,
+}
+
+/// The regression of each channel on the others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonModeRegression {
+    /// In the order of all lists by channel.
+    pub channels: Vec<ChannelProfile>,
+    /// Averaging factor at which the weights were estimated, samples: the longest one with enough degrees of freedom.
+    pub weights_at: u64,
+    /// By channel: whether the weights of the first quarter reduce the variance of the second quarter at `weights_at`. This
+    /// decides from the first half alone whether to use the weights.
+    pub trusted: Vec<bool>,
+    /// Octave by octave, in the first half.
+    pub shares: Vec<OctaveShares>,
+    /// Octave by octave up to an eighth of the half, in the second half.
+    pub gains: Vec<HoldOutGain>,
+}
+
+impl CommonModeRegression {
+    /// The regression of `channels` of a recording; `None` if there are fewer than two, or too few samples for it.
+    #[must_use]
+    pub fn estimate(measurement: &Measurement, channels: &[ChannelProfile]) -> Option<Self> {
+        let others = channels.len().checked_sub(1).filter(|&others| others > 0)?;
+        let period = measurement.period_s();
+        let [first, second, unseen] = quarters_and_second_half(measurement, channels);
+        let fitted = first.clone().followed_by(&second);
+        let longest = fitted.cascade(0).len() / 8;
+        let covariances = |part: &CoupledEstimators, n: u64| part.covariances(n.ilog2() as usize);
+        let edf = |n: u64| {
+            let (_, count) = fitted.cascade(0).sum_of_squares(n.ilog2() as usize).unwrap_or_default();
+            allan_core::confidence::edf(
+                n,
+                count,
+                (OVERLAP as u64).min(n) as u32,
+                PowerLaw::Flicker.variance_fractions(),
+            )
+        };
+        let octaves = || (0..OCTAVES).map(|octave| 1_u64 << octave).take_while(|&n| n <= longest);
+        let weights_at = octaves().filter(|&n| edf(n) >= DEGREES_OF_FREEDOM_PER_WEIGHT * others as f64).last()?;
+        let at_weights = covariances(&fitted, weights_at)?;
+        let early = covariances(&first, weights_at)?;
+        let late = covariances(&second, weights_at)?;
+        let by_channel = || 0..channels.len();
+        let shares = octaves().filter_map(|n| {
+            let covariances = covariances(&fitted, n)?;
+            let edf = edf(n);
+            let adjustment = (edf - 1.0) / (edf - 1.0 - others as f64);
+            let share = by_channel().map(|of| {
+                let left = remaining_variance(&covariances, of, &weights(&covariances, of)?)?;
+                Some((1.0 - left * adjustment).max(0.0))
+            });
+            (edf > 2.0 + others as f64).then_some(())?;
+            Some(OctaveShares { n, tau: n as f64 * period, edf, share: share.collect::<Option<_>>()? })
+        });
+        let gains = octaves().filter_map(|n| {
+            let covariances = covariances(&unseen, n)?;
+            let ratio =
+                by_channel().map(|of| Some(remaining_variance(&covariances, of, &weights(&at_weights, of)?)?.sqrt()));
+            Some(HoldOutGain { n, tau: n as f64 * period, ratio: ratio.collect::<Option<_>>()? })
+        });
+        let trusted = by_channel().map(|of| Some(remaining_variance(&late, of, &weights(&early, of)?)? < 1.0));
+        Some(Self {
+            channels: channels.to_vec(),
+            weights_at,
+            trusted: trusted.collect::<Option<_>>()?,
+            shares: shares.collect(),
+            gains: gains.collect(),
+        })
+    }
+}
+
+/// Estimators of the first quarter, the second quarter, and the second half.
+fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelProfile]) -> [CoupledEstimators; 3] {
+    let counts: Vec<&[i32]> =
+        channels.iter().filter_map(|channel| Some(measurement.channel(channel)?.counts.as_slice())).collect();
+    let mut parts = [(); 3].map(|()| CoupledEstimators::new(channels.len(), channels.len()));
+    for position in 0..measurement.len() {
+        let part = &mut parts[(4 * position / measurement.len()).min(2)];
+        let missing = measurement.missing_before(position);
+        if missing > 0 {
+            part.gap(missing);
+        }
+        part.push(counts.iter().map(|counts| counts[position]));
+    }
+    parts
+}
+
+/// The weight of every channel in the prediction of channel `of`, 0 of itself; `None` where the covariances of the others
+/// are singular.
+fn weights(covariances: &DMatrix<f64>, of: usize) -> Option<DVector<f64>> {
+    let others = covariances.clone().remove_row(of).remove_column(of);
+    let with_others = covariances.column(of).into_owned().remove_row(of);
+    Some(others.cholesky()?.solve(&with_others).insert_row(of, 0.0))
+}
+
+/// The part of the variance of channel `of` that is left when its prediction by the others is subtracted; `None` if the
+/// channel has no variance.
+fn remaining_variance(covariances: &DMatrix<f64>, of: usize, weights: &DVector<f64>) -> Option<f64> {
+    let mut combination = -weights;
+    combination[of] = 1.0;
+    let left = (combination.transpose() * covariances * &combination)[0] / covariances[(of, of)];
+    left.is_finite().then_some(left.max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::CommonModeRegression;
+    use measurement::{ChannelProfile, MeasuredChannel, Measurement, adis16405};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+    use std::collections::BTreeMap;
+
+    /// `columns` of counts at 100 Hz without a gap.
+    fn measurement(columns: Vec<(&str, Vec<i32>)>) -> Measurement {
+        let profile = adis16405::profile(0.05);
+        let samples = columns[0].1.len() as u64;
+        let channel = |(name, counts)| MeasuredChannel { profile: profile.channel(name).expect("a channel"), counts };
+        Measurement {
+            sample_rate_hz: 100.0,
+            stated_rate_hz: Some(100.0),
+            slots: (0..samples).collect(),
+            times_s: None,
+            channels: columns.into_iter().map(channel).collect(),
+            dropped: BTreeMap::new(),
+            flagged: BTreeMap::new(),
+            profile,
+        }
+    }
+
+    fn profiles(measurement: &Measurement) -> Vec<ChannelProfile> {
+        measurement.profiles().collect()
+    }
+
+    #[test]
+    fn a_common_walk_is_explained_by_its_share_of_the_variance_and_removed() {
+        /// White noise of every channel and step of the walk, counts.
+        const WHITE: f64 = 20.0;
+        const STEP: f64 = 1.0;
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut walk = 0.0;
+        let mut columns = [("gyro_x", vec![]), ("accl_x", vec![]), ("accl_y", vec![])];
+        for _ in 0..1 << 16 {
+            let [step, a, b, c]: [f64; 4] = [(); 4].map(|()| StandardNormal.sample(&mut random));
+            walk += STEP * step;
+            let values = [WHITE * a, WHITE * b + walk, WHITE * c + walk];
+            columns.iter_mut().zip(values).for_each(|((_, counts), value)| counts.push(value.round() as i32));
+        }
+        let measurement = measurement(columns.to_vec());
+        let found = CommonModeRegression::estimate(&measurement, &profiles(&measurement)).expect("three channels");
+        // Allan variances of a sampled random walk and of white noise.
+        let (walk, white) = (|n: f64| STEP * STEP * (2.0 * n * n + 1.0) / (6.0 * n), |n: f64| WHITE * WHITE / n);
+        for octave in found.shares.iter().filter(|octave| octave.edf > 100.0) {
+            let n = octave.n as f64;
+            let part = walk(n) / (walk(n) + white(n));
+            // R² of two channels that share this part of their variance is its square; its deviation is below 2/√edf.
+            for share in &octave.share[1..] {
+                assert!((share - part * part).abs() < 6.0 / octave.edf.sqrt(), "n {n}: {share} for {}", part * part);
+            }
+            assert!(octave.share[0] < 6.0 / octave.edf.sqrt(), "n {n}: {}", octave.share[0]);
+        }
+        assert_eq!(found.trusted[1..], [true, true]);
+        let at_weights = found
+            .gains
+            .iter()
+            .find(|octave| octave.n == found.weights_at)
+            .expect("the octave at which the weights were estimated");
+        assert!(at_weights.ratio[1] < 0.5 && at_weights.ratio[2] < 0.5, "{at_weights:?}");
+        // At short averaging times the white noise of the other channel is added to the channel's own.
+        assert!((found.gains[0].ratio[1] - 2f64.sqrt()).abs() < 0.1, "{:?}", found.gains[0]);
+    }
+
+    #[test]
+    fn a_single_channel_has_no_common_mode() {
+        let measurement = measurement(vec![("gyro_x", (0..100).map(|at| at % 7).collect())]);
+        assert_eq!(CommonModeRegression::estimate(&measurement, &profiles(&measurement)), None);
+    }
+}

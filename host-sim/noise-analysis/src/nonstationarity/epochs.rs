@@ -1,0 +1,178 @@
+//! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
+
+use crate::series::Series;
+use crate::{OCTAVES, OVERLAP};
+use allan_core::{AllanPoint, Cascade, Curve, Model};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use std::ops::Range;
+
+/// Highest probability, over all that is compared in a channel, at which stationary noise is taken to be non-stationary.
+pub(crate) const SIGNIFICANCE: f64 = 0.01;
+
+/// Longest epoch, samples: five minutes at 100 Hz.
+const LONGEST_EPOCH: usize = 1 << 15;
+/// Shortest epoch, samples, whose curve separates the white noise from a line.
+const SHORTEST_EPOCH: usize = 1 << 10;
+/// Fewest epochs of a half.
+const MIN_EPOCHS: usize = 12;
+
+/// An epoch's Allan variance is used up to averaging factors of a `MIN_AVERAGES`th of its samples.
+pub(crate) const MIN_AVERAGES: u64 = 64;
+
+/// Curves of the halves, of the quarters of the first half, and of epochs, in the channel's unit.
+///
+/// The first half is what models are fitted to; the second half is unseen.
+#[derive(Debug, Clone)]
+pub struct EpochCurves {
+    /// First half of the record.
+    pub fitted: Curve<OCTAVES>,
+    /// The two quarters of the first half, the earlier first.
+    pub quarters: [Curve<OCTAVES>; 2],
+    /// Second half of the record.
+    pub unseen: Curve<OCTAVES>,
+    /// Samples in an epoch: a power of 2.
+    pub epoch: usize,
+    /// Epochs up to the middle of the record; the samples that are left over lie before the first.
+    pub fitted_epochs: Vec<Curve<OCTAVES>>,
+    /// Epochs from the middle on; the samples that are left over lie behind the last.
+    pub unseen_epochs: Vec<Curve<OCTAVES>>,
+}
+
+impl EpochCurves {
+    /// Curves of a series of at least 24,576 samples (two halves of twelve shortest epochs); `None` of a shorter one.
+    #[must_use]
+    pub fn from_series(series: &Series) -> Option<Self> {
+        let (all, half) = (series.values.len(), series.values.len() / 2);
+        let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;
+        if epoch < SHORTEST_EPOCH {
+            return None;
+        }
+        let epochs = |from: usize| (0..half / epoch).map(move |k| from + k * epoch..from + (k + 1) * epoch);
+        let curves =
+            |ranges: &mut dyn Iterator<Item = Range<usize>>| ranges.map(|range| curve(series, range)).collect();
+        Some(Self {
+            fitted: curve(series, 0..half),
+            quarters: [curve(series, 0..half / 2), curve(series, half / 2..half)],
+            unseen: curve(series, half..all),
+            epoch,
+            fitted_epochs: curves(&mut epochs(half % epoch)),
+            unseen_epochs: curves(&mut epochs(half)),
+        })
+    }
+
+    /// Epochs of the later quarter of the first half.
+    #[must_use]
+    pub fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
+        &self.fitted_epochs[self.fitted_epochs.len() / 2..]
+    }
+
+    /// The curve of the later quarter with the median of its epochs at the octaves with at least 64 averages in an epoch.
+    ///
+    /// Some minutes of vibration raise the mean of the quarter and hardly the median of its epochs. The median of variances
+    /// with `ν` degrees of freedom is low by the factor `(1 − 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided
+    /// out. The median scatters by a fourth more than the mean; the confidence bounds do not include that.
+    #[must_use]
+    pub fn median_curve(&self) -> Curve<OCTAVES> {
+        let mut curve = self.quarters[1].clone();
+        curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));
+        curve
+    }
+}
+
+fn curve(series: &Series, range: Range<usize>) -> Curve<OCTAVES> {
+    let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
+    let mut next = series.slots.get(range.start).copied().unwrap_or(0);
+    for (&slot, value) in series.slots[range.clone()].iter().zip(&series.values[range]) {
+        if slot > next {
+            estimator.gap(u32::try_from(slot - next).unwrap_or(u32::MAX));
+        }
+        estimator.push((value / series.resolution).round() as i32);
+        next = slot + 1;
+    }
+    estimator.curve(series.period_s).scaled(series.resolution)
+}
+
+fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {
+    let used = |epoch: &Curve<POINTS>| {
+        let point = epoch.points().iter().find(|point| point.n == n)?;
+        (n * MIN_AVERAGES <= epoch.samples()).then_some(*point)
+    };
+    let points: Vec<AllanPoint> = epochs.iter().filter_map(used).collect();
+    let mut avars: Vec<f64> = points.iter().map(|point| point.avar).collect();
+    avars.sort_by(f64::total_cmp);
+    let (lower, upper) = (avars.get(avars.len().checked_sub(1)? / 2)?, avars.get(avars.len() / 2)?);
+    let edf = points.iter().map(|point| point.edf).sum::<f64>() / points.len() as f64;
+    Some((lower + upper) / 2.0 / (1.0 - 2.0 / (9.0 * edf)).powi(3))
+}
+
+/// `mean edf·(ln(m/v) + v/m − 1)` over the octaves with `n ≤ M/8`, of a model with the Allan variance `modelled`.
+///
+/// It differs from the figure of the report in the degrees of freedom: here they are those of the kind of noise that the
+/// curve itself shows, and the same for all models, so that a model with uncertain points gains nothing by them.
+pub(crate) fn deviance_per_point<const POINTS: usize>(curve: &Curve<POINTS>, modelled: impl Fn(u64) -> f64) -> f64 {
+    let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8);
+    let of = |point: &AllanPoint| {
+        let ratio = point.avar / modelled(point.n);
+        point.edf * (ratio - 1.0 - ratio.ln())
+    };
+    points().map(of).sum::<f64>() / points().count() as f64
+}
+
+/// Comparison of two stretches of a channel, at the octave at which they differ most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stationarity {
+    /// Averaging factor, samples.
+    pub n: u64,
+    /// Allan variance of the later stretch over that of the earlier one.
+    pub ratio: f64,
+    /// Probability that stretches of the same noise differ as clearly at any octave.
+    pub p_value: f64,
+}
+
+/// The part of the first half that a model for the second half is fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FittedPart {
+    /// All of it.
+    FirstHalf,
+    /// Its later half, which is nearer in time to the second half: the noise is non-stationary.
+    LatestQuarter,
+}
+
+impl Stationarity {
+    /// Compares two stretches octave by octave, up to an eighth of the shorter one. `None` where no octave can be compared.
+    ///
+    /// The ratio of two variances of the same noise has Fisher's distribution with their degrees of freedom, by `model`,
+    /// which describes both stretches together. The probability is that of the clearest octave times the number of octaves
+    /// (Bonferroni), which holds for correlated octaves too.
+    #[must_use]
+    pub fn compare<const POINTS: usize>(earlier: &Curve<POINTS>, later: &Curve<POINTS>, model: &Model) -> Option<Self> {
+        let longest = earlier.samples().min(later.samples()) / 8;
+        let compare = |(before, after): (&AllanPoint, &AllanPoint)| {
+            let ratio = after.avar / before.avar;
+            let fisher = FisherSnedecor::new(model.edf(after), model.edf(before)).ok()?;
+            let p_value = (2.0 * fisher.cdf(ratio).min(fisher.sf(ratio))).min(1.0);
+            ratio.is_finite().then_some(Self { n: before.n, ratio, p_value })
+        };
+        let pairs = earlier.points().iter().zip(later.points()).filter(|(point, _)| point.n <= longest);
+        let octaves: Vec<Self> = pairs.filter_map(compare).collect();
+        let clearest = octaves.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
+        Some(Self { p_value: (clearest.p_value * octaves.len() as f64).min(1.0), ..*clearest })
+    }
+
+    /// Whether the stretches have different noise.
+    #[must_use]
+    pub fn is_nonstationary(&self) -> bool {
+        self.p_value < SIGNIFICANCE
+    }
+}
+
+impl FittedPart {
+    /// The part to use by the comparison of the two quarters of the first half.
+    #[must_use]
+    pub fn select(quarters: Option<Stationarity>) -> Self {
+        match quarters {
+            Some(comparison) if comparison.is_nonstationary() => Self::LatestQuarter,
+            _ => Self::FirstHalf,
+        }
+    }
+}

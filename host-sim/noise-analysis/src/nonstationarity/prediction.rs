@@ -1,0 +1,172 @@
+//! Prediction of the second half with tracked parameters, epoch by epoch, and the baselines that it is compared with.
+//!
+//! The terms of the model and their shapes are those of the first half; only the parameters that moved there are tracked.
+//! The parameters of each epoch are predicted from the epochs before it, and updated with the epoch afterwards. Over many
+//! epochs the mean of the predictions, which lag by one epoch, is nearly the mean of the parameters: the error of the pooled
+//! curve is therefore too small. The error of the single epochs, one step ahead, is not.
+
+use super::epochs::{EpochCurves, MIN_AVERAGES, SIGNIFICANCE, deviance_per_point};
+use super::tracked_parameters::{MAX_LEVEL, PARAMETERS, ParameterVector, TrackedModel, TrackedSet, minimum};
+use allan_core::{Curve, Model};
+
+/// Rounds of the search in [`beyond_drift`], one parameter after the other, and its first step.
+const ROUNDS: usize = 8;
+const FIRST_STEP: f64 = 0.01;
+
+/// Deviances per point on the second half of a model with tracked parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackingErrors {
+    /// What was tracked.
+    pub tracked: TrackedSet,
+    /// Of the mean of all predicted curves against the curve of the second half.
+    pub pooled: f64,
+    /// Mean over the epochs of each one's own, against its prediction.
+    pub one_step: f64,
+    /// The same of the model that is not tracked.
+    pub one_step_static: f64,
+}
+
+/// The parameters to track, by the epochs of the first half alone. The line is tracked only together with the level.
+#[must_use]
+pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: &[Curve<POINTS>]) -> TrackedSet {
+    let level = model.test_movement(fitted, TrackedSet::Nothing, TrackedSet::Level);
+    match model.largest_set() {
+        TrackedSet::LevelAndLine => TrackedSet::LevelAndLine,
+        _ if level.p_value < SIGNIFICANCE => TrackedSet::Level,
+        _ => TrackedSet::Nothing,
+    }
+}
+
+/// Tracks the parameters `tracked` through the epochs of both halves; the errors are those on the second half `half`.
+#[must_use]
+pub(crate) fn track<const POINTS: usize>(
+    model: &TrackedModel,
+    tracked: TrackedSet,
+    [fitted, unseen]: [&[Curve<POINTS>]; 2],
+    half: &Curve<POINTS>,
+) -> TrackingErrors {
+    let estimates: Vec<_> = fitted.iter().chain(unseen).map(|epoch| model.estimate(epoch, tracked)).collect();
+    let mut predicted = [[0.0; PARAMETERS]].repeat(unseen.len());
+    for index in 0..PARAMETERS {
+        let measured: Vec<(f64, f64)> = estimates.iter().map(|e| (e.parameters[index], e.error[index])).collect();
+        let ahead = predict_one_step(&measured, fitted.len());
+        for (parameters, value) in predicted.iter_mut().zip(&ahead[fitted.len()..]) {
+            parameters[index] = *value;
+        }
+    }
+    let models: Vec<Model> = predicted.iter().map(|parameters: &ParameterVector| model.at(*parameters)).collect();
+    let mean = |n: u64| models.iter().map(|model| model.avar(n)).sum::<f64>() / models.len() as f64;
+    let of_epoch = |(epoch, model): (&Curve<POINTS>, &Model)| deviance_per_point(epoch, |n| model.avar(n));
+    let count = unseen.len() as f64;
+    TrackingErrors {
+        tracked,
+        pooled: deviance_per_point(half, mean),
+        one_step: unseen.iter().zip(&models).map(of_epoch).sum::<f64>() / count,
+        one_step_static: unseen.iter().map(|epoch| of_epoch((epoch, model.model()))).sum::<f64>() / count,
+    }
+}
+
+/// Variance of the step from each `(value, error)` to the next, less the variances of the errors.
+fn step_variance(measured: &[(f64, f64)]) -> f64 {
+    let squares =
+        measured.windows(2).map(|pair| (pair[1].0 - pair[0].0).powi(2) - pair[0].1.powi(2) - pair[1].1.powi(2));
+    (squares.sum::<f64>() / (measured.len().max(2) - 1) as f64).max(0.0)
+}
+
+/// Predicts each `(value, error)` from those before it.
+///
+/// By a Kalman filter of a random walk that is measured with these errors (the local level model of structural time
+/// series); the variance of its step is that of the first `fitted` values.
+fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
+    let step = step_variance(&measured[..fitted]);
+    let (mut level, mut variance) = measured.first().map_or((0.0, 0.0), |&(value, error)| (value, error * error));
+    let mut predicted = Vec::with_capacity(measured.len());
+    for (at, &(value, error)) in measured.iter().enumerate() {
+        predicted.push(level);
+        if at > 0 && variance + error * error > 0.0 {
+            let gain = variance / (variance + error * error);
+            level += gain * (value - level);
+            variance *= 1.0 - gain;
+        }
+        variance += step;
+    }
+    predicted
+}
+
+/// Standard deviation of the difference between each parameter's mean over `unseen` epochs and its mean over the last
+/// `used` epochs of the first half, if the parameter goes on as a random walk with the steps of the first half.
+///
+/// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about
+/// `q·(L + H)/3`.
+#[must_use]
+pub(crate) fn expected_drift<const POINTS: usize>(
+    model: &TrackedModel,
+    tracked: TrackedSet,
+    fitted: &[Curve<POINTS>],
+    used: usize,
+    unseen: usize,
+) -> ParameterVector {
+    let estimates: Vec<_> = fitted.iter().map(|epoch| model.estimate(epoch, tracked)).collect();
+    std::array::from_fn(|index| {
+        let measured: Vec<(f64, f64)> = estimates.iter().map(|e| (e.parameters[index], e.error[index])).collect();
+        (step_variance(&measured) * (used + unseen) as f64 / 3.0).sqrt()
+    })
+}
+
+/// Deviance per point of a model on `half`, with parameters that may differ by `drift` (standard deviations): the minimum
+/// over the parameters `x` of the model's deviance and their cost `(x/σ)²`. Without drift the plain deviance per point.
+#[must_use]
+pub(crate) fn beyond_drift<const POINTS: usize>(
+    model: &TrackedModel,
+    drift: ParameterVector,
+    half: &Curve<POINTS>,
+) -> f64 {
+    let points = half.points().iter().filter(|point| point.n <= half.samples() / 8).count() as f64;
+    let cost = |parameters: ParameterVector| {
+        let moved = parameters.iter().zip(drift).filter(|(_, sigma)| *sigma > 0.0);
+        let prior: f64 = moved.map(|(x, sigma)| (x / sigma).powi(2)).sum();
+        let model = model.at(parameters);
+        deviance_per_point(half, |n| model.avar(n)) + prior / points
+    };
+    let mut parameters = [0.0; PARAMETERS];
+    for _ in 0..ROUNDS {
+        for index in (0..PARAMETERS).filter(|&index| drift[index] > 0.0) {
+            let trial = |value: f64| {
+                let mut trial = parameters;
+                trial[index] = value;
+                cost(trial)
+            };
+            parameters[index] = minimum(trial, parameters[index], FIRST_STEP, MAX_LEVEL);
+        }
+    }
+    cost(parameters)
+}
+
+/// Deviances per point on the second half of two predictions without added terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Baselines {
+    /// Of the baseline model with its white noise tracked: what tracking alone explains.
+    pub baseline_tracked: f64,
+    /// Of the curve of the epoch before, with the baseline model at the averaging times that an epoch is too short for.
+    pub persistence: f64,
+}
+
+impl Baselines {
+    /// `baseline` is the baseline model, fitted to the first half.
+    #[must_use]
+    pub fn new(curves: &EpochCurves, baseline: &Model) -> Self {
+        let model = TrackedModel::without_line(baseline.clone());
+        let epochs = [&curves.fitted_epochs[..], &curves.unseen_epochs[..]];
+        let tracked = track(&model, TrackedSet::Level, epochs, &curves.unseen);
+        let count = curves.unseen_epochs.len();
+        let persistent = |n: u64| {
+            if n * MIN_AVERAGES > curves.epoch as u64 {
+                return baseline.avar(n);
+            }
+            let before = curves.fitted_epochs.last().into_iter().chain(&curves.unseen_epochs).take(count);
+            let points = before.flat_map(|epoch| epoch.points().iter().filter(|point| point.n == n));
+            points.map(|point| point.avar).sum::<f64>() / count as f64
+        };
+        Self { baseline_tracked: tracked.pooled, persistence: deviance_per_point(&curves.unseen, persistent) }
+    }
+}

@@ -1,0 +1,174 @@
+//! A line whose frequency moves, and a line of another channel that moves with it at a ratio of small whole numbers.
+//!
+//! A mechanical or electrical source shows in several channels and at multiples of its frequency. If the first half has
+//! such a related line, its frequency in the second half predicts the frequency of the channel's own line there.
+
+use super::epochs::{EpochCurves, SIGNIFICANCE, deviance_per_point};
+use super::tracked_parameters::{TrackedModel, minimum};
+use crate::OCTAVES;
+use crate::series::Series;
+use crate::spectra::Welch;
+use crate::uniform_series::UniformSeries;
+use allan_core::Curve;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::ops::Range;
+
+/// Frequencies of the related line over the line's that are tried.
+const RATIOS: [(u8, u8); 5] = [(1, 3), (1, 2), (1, 1), (2, 1), (3, 1)];
+/// Half-width of the band around its mean frequency in which a line is searched, as a part of the frequency.
+const BAND: f64 = 0.18;
+/// Half-width of the band whose power is that of the line, as a part of the frequency.
+const LINE: f64 = 0.05;
+/// Resolution of the spectra, as a part of the frequency.
+const RESOLUTION: f64 = 0.005;
+/// Highest frequency that is searched, as a part of the sample rate: the band around a higher one would reach the Nyquist
+/// frequency.
+const MAX_FREQUENCY: f64 = 0.4;
+/// Rounds of the fit along the related line's frequencies, one parameter after the other, and its first step.
+const ROUNDS: usize = 12;
+const FIRST_STEP: f64 = 0.02;
+
+/// A line of another channel that moves with the line of a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RelatedLine {
+    /// Position of the channel among those that were searched.
+    pub channel: usize,
+    /// Its frequency over the line's, as a fraction.
+    pub ratio: (u8, u8),
+    /// Correlation of the two frequencies' changes from epoch to epoch, in the first half.
+    pub correlation: f64,
+    /// Probability of as much between unrelated lines, in any channel at any ratio.
+    pub p_value: f64,
+    /// Mean and standard deviation of the line's frequency over the related line's, epoch by epoch, in the first half.
+    pub measured_ratio: (f64, f64),
+    /// Frequency of the line, Hz, in the epochs of the first half.
+    pub line: Vec<f64>,
+    /// Frequency of the related line, Hz, in the epochs of the first and of the second half.
+    pub related: [Vec<f64>; 2],
+    /// Deviance per point on the second half of the model whose line moves with the related line.
+    pub unseen: f64,
+}
+
+impl RelatedLine {
+    /// Searches all other channels for a line that moves with the tracked line of channel `of`; `None` if no line is
+    /// tracked or none moves with it.
+    #[must_use]
+    pub fn find(channels: &[Series], of: usize, model: &TrackedModel, curves: &EpochCurves) -> Option<Self> {
+        let near = model.line_frequency()?;
+        let (half, epoch) = (channels[of].values.len() / 2, curves.epoch);
+        let fitted = |channel: usize, near: f64| {
+            line_frequencies(&channels[channel], half % epoch, curves.fitted_epochs.len(), epoch, near)
+        };
+        let unseen = |channel: usize, near: f64| {
+            line_frequencies(&channels[channel], half, curves.unseen_epochs.len(), epoch, near)
+        };
+        // The second half of the channel itself is not used.
+        let mean = centroid(&channels[of], 0..half, near)?;
+        let line = fitted(of, mean)?;
+        let others = (0..channels.len()).filter(|&other| other != of);
+        let candidates: Vec<(usize, (u8, u8))> = others.flat_map(|other| RATIOS.map(|ratio| (other, ratio))).collect();
+        let tried = candidates.iter().filter_map(|&(channel, ratio)| {
+            let near = mean * f64::from(ratio.0) / f64::from(ratio.1);
+            let related = fitted(channel, near)?;
+            let (correlation, chance) = correlation(&changes(&line), &changes(&related))?;
+            let p_value = (chance * candidates.len() as f64).min(1.0);
+            Some((channel, ratio, correlation, p_value, related, near))
+        });
+        let (channel, ratio, correlation, p_value, first_half, near) = tried.min_by(|a, b| a.3.total_cmp(&b.3))?;
+        if p_value > SIGNIFICANCE || correlation < 0.0 {
+            return None;
+        }
+        let related = [first_half, unseen(channel, near)?];
+        let ratios: Vec<f64> = line.iter().zip(&related[0]).map(|(line, related)| line / related).collect();
+        let unseen = predict(model, curves, &related);
+        Some(Self { channel, ratio, correlation, p_value, measured_ratio: moments(&ratios), line, related, unseen })
+    }
+}
+
+/// Frequencies, Hz, of the line near `near` Hz in `epochs` epochs of `epoch` samples from sample `start` on; `None` if an
+/// epoch has no line there.
+fn line_frequencies(series: &Series, start: usize, epochs: usize, epoch: usize, near: f64) -> Option<Vec<f64>> {
+    (0..epochs).map(|k| start + k * epoch).map(|at| centroid(series, at..at + epoch, near)).collect()
+}
+
+/// Centroid of the strongest line of the spectrum around `near` Hz, above the median of that band, Hz.
+fn centroid(series: &Series, range: Range<usize>, near: f64) -> Option<f64> {
+    let rate = 1.0 / series.period_s;
+    if near > MAX_FREQUENCY * rate {
+        return None;
+    }
+    let length = ((rate / (RESOLUTION * near)) as usize).next_power_of_two();
+    let stretch = Series {
+        slots: series.slots.get(range.clone())?.to_vec(),
+        values: series.values.get(range)?.to_vec(),
+        period_s: series.period_s,
+        resolution: series.resolution,
+        unit: series.unit,
+    };
+    let welch = Welch::estimate(&UniformSeries::from_series(&stretch), length)?;
+    let band: Vec<(f64, f64)> = welch.points().filter(|(f, _)| (f / near - 1.0).abs() < BAND).collect();
+    let mut sorted: Vec<f64> = band.iter().map(|point| point.1).collect();
+    sorted.sort_by(f64::total_cmp);
+    let floor = *sorted.get(sorted.len() / 2)?;
+    let above = |centre: f64| band.iter().filter(move |(f, _)| (f / centre - 1.0).abs() < LINE);
+    let power = |centre: f64| above(centre).map(|(_, density)| density - floor).sum::<f64>();
+    let peak = band.iter().map(|&(f, _)| (f, power(f))).max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+    let weight = |density: f64| (density - floor).max(0.0);
+    let (moment, sum) =
+        above(peak).fold((0.0, 0.0), |(moment, sum), &(f, d)| (moment + f * weight(d), sum + weight(d)));
+    (sum > 0.0).then(|| moment / sum)
+}
+
+/// Changes of the logarithm from epoch to epoch: unrelated drifts correlate, their changes do not.
+fn changes(frequencies: &[f64]) -> Vec<f64> {
+    frequencies.windows(2).map(|pair| (pair[1] / pair[0]).ln()).collect()
+}
+
+/// Mean and standard deviation.
+fn moments(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt())
+}
+
+/// Pearson's correlation, and the probability of as much with either sign between independent normal numbers.
+fn correlation(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
+    let ((mean_a, deviation_a), (mean_b, deviation_b)) = (moments(a), moments(b));
+    let degrees_of_freedom = a.len() as f64 - 2.0;
+    let products: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();
+    let correlation = products / (deviation_a * deviation_b * (degrees_of_freedom + 1.0));
+    let t = correlation * (degrees_of_freedom / (1.0 - correlation * correlation)).sqrt();
+    let students_t = StudentsT::new(0.0, 1.0, degrees_of_freedom).ok()?;
+    t.is_finite().then(|| (correlation, 2.0 * students_t.sf(t.abs())))
+}
+
+/// Deviance per point on the second half of the model whose line moves with the related line.
+///
+/// The ratio of the frequencies, the width of the line without its movement, its amplitude, and the level of the white
+/// noise are fitted to the later quarter of the first half, with the related line's frequencies there.
+fn predict(tracked: &TrackedModel, curves: &EpochCurves, [fitted, unseen]: &[Vec<f64>; 2]) -> f64 {
+    let Some(near) = tracked.line_frequency() else { return f64::NAN };
+    let quarter = &curves.quarters[1];
+    let recent = &fitted[fitted.len() / 2..];
+    let start = (recent.len() as f64 * near / recent.iter().sum::<f64>()).ln();
+    // Logarithms: of level, frequency over the related line's, width and amplitude.
+    let mut shape = [0.0, start, -0.5, 0.0];
+    let model = |shape: [f64; 4], frequencies: &[f64], n: u64| {
+        let at = |&f: &f64| tracked.with_line_shape(shape[0], shape[1] + (f / near).ln(), shape[2], shape[3]).avar(n);
+        frequencies.iter().map(at).sum::<f64>() / frequencies.len() as f64
+    };
+    let deviance = |shape: [f64; 4], frequencies: &[f64], curve: &Curve<OCTAVES>| {
+        deviance_per_point(curve, |n| model(shape, frequencies, n))
+    };
+    for _ in 0..ROUNDS {
+        for index in 0..shape.len() {
+            let trial = |value: f64| {
+                let mut shape = shape;
+                shape[index] = value;
+                deviance(shape, recent, quarter)
+            };
+            shape[index] = minimum(trial, shape[index], FIRST_STEP, f64::INFINITY);
+        }
+    }
+    deviance(shape, unseen, &curves.unseen)
+}

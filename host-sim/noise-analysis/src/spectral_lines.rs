@@ -1,0 +1,191 @@
+//! The lines in the spectrum of a channel as terms of its noise model.
+//!
+//! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
+
+use crate::channel_fit::ChannelFit;
+use crate::covariates::CovariateFit;
+use crate::findings::MeasuredValue;
+use crate::series::Series;
+use crate::spectra;
+use crate::uniform_series::UniformSeries;
+use allan_core::Model;
+use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
+use measurement::SensorProfile;
+
+/// Peaks closer than this part of their frequency are one line if either has a width.
+const MERGE_DISTANCE: f64 = 0.03;
+/// Peaks closer than so many of their widths are one line.
+const MERGE_WIDTHS: f64 = 3.0;
+/// Peaks closer than so many resolutions are one line: a sinusoid and the side lobes of its taper.
+const MERGE_RESOLUTIONS: f64 = 8.0;
+/// A peak at a lower frequency than so many of its widths is no line but a Markov process.
+const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
+/// Lower bound of the model's other noise, as a part of its Markov processes: where a filter leaves no noise, rounding does.
+const MIN_NOISE: f64 = 1e-6;
+/// A line wider than this part of its frequency may be an error of the form of the background.
+const BROAD: f64 = 0.1;
+/// A line whose bandwidth times the length of the record is below this is treated as a sinusoid.
+const MIN_PHASE_CHANGES: f64 = 30.0;
+/// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
+const MIN_OWN_DEVIATION: f64 = 0.5;
+/// Power gain of a filter below which the spectrum holds leakage from other frequencies.
+const LEAKAGE_GAIN: f64 = 0.1;
+
+/// One line of a spectrum, merged from one or several peaks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MergedLine {
+    /// Mean weighted by power, Hz.
+    pub frequency: MeasuredValue,
+    /// Standard deviation of the line's signal, in the channel's unit.
+    pub deviation: MeasuredValue,
+    /// Full width at half maximum, Hz; 0 where it is no wider than the record resolves.
+    pub width: MeasuredValue,
+    /// −2 log-likelihood ratio of the strongest peak.
+    pub statistic: f64,
+    /// Probability that a record without lines shows the strongest peak at any frequency.
+    pub p_value: f64,
+    duration_s: f64,
+}
+
+/// Finds the lines of `series` and traces what the baseline model lacks with them.
+///
+/// `rest` is the series less its covariates, if the channel depends on any; lines that come from a covariate are left out.
+pub(crate) fn fit_with_lines(
+    covariates: CovariateFit,
+    series: &Series,
+    rest: Option<&Series>,
+    profile: &SensorProfile,
+) -> (ChannelFit, Vec<MergedLine>) {
+    let rate_error = profile.sample_rate_error;
+    let mut lines = find(series, None, rate_error);
+    if let Some(rest) = rest {
+        let left = find(rest, None, rate_error);
+        let is_own = |line: &MergedLine, left: &MergedLine| {
+            line.is_same(left) && left.deviation.value > MIN_OWN_DEVIATION * line.deviation.value
+        };
+        lines.retain(|line| left.iter().any(|left| is_own(line, left)));
+    }
+    let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
+    let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &profile.filters);
+    if fit.correlation_times().next().is_some() && lines.iter().any(MergedLine::is_broad) {
+        // A broad line may be a part of a Markov process, which the background of the first search has no form for.
+        lines.retain(|line| !line.is_broad());
+        lines.extend(find(series, Some(&fit.trace.after), rate_error).into_iter().filter(MergedLine::is_broad));
+        fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &profile.filters);
+    }
+    lines.retain(|line| line.is_sinusoid() || !is_leakage(&fit.trace.after, line.frequency.value));
+    (fit, lines)
+}
+
+/// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
+/// of white, flicker and random-walk noise.
+fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLine> {
+    let duration_s = series.duration_s();
+    let grid = UniformSeries::from_series(series);
+    let peaks = match known {
+        Some(model) => spectra::find_lines_over(&grid, |frequency| markov_background(model, frequency)),
+        None => spectra::find_lines(&grid),
+    };
+    let is_line = |peak: &spectra::SpectralLine| {
+        let is_finite = peak.frequency.error.is_finite() && peak.deviation.error.is_finite();
+        is_finite && peak.frequency.value > MIN_WIDTHS_FROM_ZERO * width(peak)
+    };
+    let mut rest: Vec<spectra::SpectralLine> = peaks.into_iter().filter(is_line).collect();
+    let mut lines = Vec::new();
+    while let Some(strongest) = rest.first().copied() {
+        let reach = (MERGE_WIDTHS * width(&strongest)).max(MERGE_RESOLUTIONS / duration_s);
+        let is_same = |peak: &spectra::SpectralLine| {
+            let distance = (peak.frequency.value - strongest.frequency.value).abs();
+            let wanders = peak.width.is_some() || strongest.width.is_some();
+            distance < reach || (wanders && distance < MERGE_DISTANCE * strongest.frequency.value)
+        };
+        let (same, others): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_same);
+        lines.push(MergedLine::merge(&same, duration_s, rate_error));
+        rest = others;
+    }
+    lines
+}
+
+/// Full width at half maximum of a peak, Hz; 0 of a sinusoid.
+fn width(peak: &spectra::SpectralLine) -> f64 {
+    peak.width.map_or(0.0, |width| width.value)
+}
+
+/// Density of a model's noise without its lines, over that without its Markov processes either.
+fn markov_background(model: &Model, frequency: f64) -> f64 {
+    let density_of = |is_included: &dyn Fn(&NoiseTerm) -> bool| {
+        let terms = model.terms().iter().copied().filter(|term| is_included(&term.kind));
+        Model::new(model.sample_period(), terms).density(frequency)
+    };
+    let markov = density_of(&|kind| matches!(kind, NoiseTerm::Markov(_)));
+    let noise =
+        density_of(&|kind| !matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)));
+    1.0 + markov / noise.max(MIN_NOISE * markov)
+}
+
+/// Whether a broad line at `frequency` Hz may be leakage into a null of a filter of the model.
+fn is_leakage(model: &Model, frequency: f64) -> bool {
+    let gain = |kind: &NoiseTerm| match kind {
+        // The density of the filtered unit white noise is 1 at low frequencies.
+        NoiseTerm::Filtered(filter) if filter.decimation == 1.0 => {
+            kind.process().density(frequency, model.sample_period())
+        }
+        _ => 1.0,
+    };
+    model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min) < LEAKAGE_GAIN
+}
+
+impl MergedLine {
+    /// One line with the power of all `peaks`, at their mean frequency, as wide as they and their spread.
+    fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
+        let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
+        let total: f64 = peaks.iter().map(power).sum();
+        let mean = |of: &dyn Fn(&spectra::SpectralLine) -> f64| {
+            peaks.iter().map(|peak| power(peak) * of(peak)).sum::<f64>() / total
+        };
+        let frequency = mean(&|peak| peak.frequency.value);
+        let spread = mean(&|peak| (peak.frequency.value - frequency).powi(2)).sqrt();
+        let own_width = mean(&|peak| width(peak));
+        let width_error = mean(&|peak| peak.width.map_or(0.0, |width| width.error));
+        let strongest = peaks[0];
+        Self {
+            frequency: MeasuredValue {
+                value: frequency,
+                error: strongest.frequency.error.max(spread).hypot(rate_error * frequency),
+            },
+            deviation: MeasuredValue {
+                value: total.sqrt(),
+                error: strongest.deviation.error * total.sqrt() / strongest.deviation.value,
+            },
+            // A normal curve is 2.35 standard deviations wide at half its height.
+            width: MeasuredValue { value: own_width.hypot(2.35 * spread), error: width_error.hypot(spread) },
+            statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
+            p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
+            duration_s,
+        }
+    }
+
+    /// Whether both have the same frequency, within the wider of them and the resolution.
+    fn is_same(&self, other: &Self) -> bool {
+        let reach = self.width.value.max(other.width.value).max(MERGE_RESOLUTIONS / self.duration_s);
+        (self.frequency.value - other.frequency.value).abs() < reach
+    }
+
+    fn is_sinusoid(&self) -> bool {
+        matches!(self.kind(), NoiseTerm::Sinusoid(_))
+    }
+
+    fn is_broad(&self) -> bool {
+        self.width.value > BROAD * self.frequency.value
+    }
+
+    /// The model's term for the line: a sinusoid, or a resonance if it is wider than the record resolves.
+    pub(crate) fn kind(&self) -> NoiseTerm {
+        let (frequency, bandwidth) = (self.frequency.value, self.width.value);
+        if bandwidth * self.duration_s < MIN_PHASE_CHANGES {
+            NoiseTerm::Sinusoid(Sinusoid { frequency })
+        } else {
+            NoiseTerm::Resonance(Resonance { frequency, bandwidth })
+        }
+    }
+}
