@@ -6,16 +6,16 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::sync::LazyLock;
 
-fn assert_coverage(study: &Study) {
-    let judged: Vec<usize> = (0..OCTAVES).filter(|&octave| study.dof[octave] >= 3.0).collect();
+fn assert_coverage(records: &SimulatedRecords) {
+    let judged: Vec<usize> = (0..OCTAVES).filter(|&octave| records.dof[octave] >= 3.0).collect();
     assert!(judged.len() >= 10, "all but the last octave, at least");
     for octave in judged {
         let share = |covered: u32| f64::from(covered) / RECORDS as f64;
-        let (known, identified) = (share(study.covered[octave]), share(study.covered_as_identified[octave]));
-        println!("n = 2^{octave}: edf {:.1}, coverage {known}, {identified}", study.dof[octave]);
-        assert!((0.94..=0.96).contains(&known), "n = 2^{octave}, edf {}: {known}", study.dof[octave]);
+        let (known, identified) = (share(records.covered[octave]), share(records.covered_as_identified[octave]));
+        println!("n = 2^{octave}: edf {:.1}, coverage {known}, {identified}", records.dof[octave]);
+        assert!((0.94..=0.96).contains(&known), "n = 2^{octave}, edf {}: {known}", records.dof[octave]);
         // Here the noise type is classified from the same record.
-        assert!(identified >= 0.93, "n = 2^{octave}, edf {}: {identified}", study.dof[octave]);
+        assert!(identified >= 0.93, "n = 2^{octave}, edf {}: {identified}", records.dof[octave]);
     }
 }
 
@@ -41,8 +41,9 @@ fn bounds_cover_a_mixture_in_94_to_96_percent() {
 
 #[test]
 fn a_pure_noise_is_classified_correctly_in_95_percent() {
-    for (study, noise) in [(&*WHITE, PowerLaw::White), (&*FLICKER, PowerLaw::Flicker), (&*WALK, PowerLaw::RandomWalk)] {
-        for (octave, named) in study.named.iter().enumerate() {
+    for (records, noise) in [(&*WHITE, PowerLaw::White), (&*FLICKER, PowerLaw::Flicker), (&*WALK, PowerLaw::RandomWalk)]
+    {
+        for (octave, named) in records.named.iter().enumerate() {
             let right = f64::from(named[noise as usize]) / RECORDS as f64;
             println!("n = 2^{octave}: {noise:?} in {right}");
             assert!(right >= 0.95, "n = 2^{octave}: {noise:?} in {right}");
@@ -52,9 +53,9 @@ fn a_pure_noise_is_classified_correctly_in_95_percent() {
 
 /// Degrees of freedom at each overlap over those of full overlap, for 2¹⁷ samples and `n` = 2¹⁰ to 2¹⁴,
 /// which is the same as 2¹² samples and `n` = 2⁵ to 2⁹. Computed independently from Greenhall's sums.
-fn assert_loss(study: &Study, table: &[[f64; OVERLAPS]; 5]) {
+fn assert_loss(records: &SimulatedRecords, table: &[[f64; OVERLAPS]; 5]) {
     for (octave, row) in (5..).zip(table) {
-        let found = study.equivalent_dof(octave);
+        let found = records.equivalent_dof(octave);
         for (overlap, ratio) in row.iter().enumerate() {
             let (found, expected) = (found[overlap] / found[OVERLAPS - 1], ratio / row[OVERLAPS - 1]);
             // Three standard deviations of 4,000 runs, by their bootstrap: 0.02 for P = 1 and 2, 0.01 beyond.
@@ -182,13 +183,13 @@ const OCTAVES: usize = 11;
 /// P = 1, 2, 4, 8, 16.
 const OVERLAPS: usize = 5;
 
-static WHITE: LazyLock<Study> = LazyLock::new(|| Study::run(WHITE_NOISE, 0));
-static FLICKER: LazyLock<Study> = LazyLock::new(|| Study::run(FLICKER_NOISE, 10_000));
-static WALK: LazyLock<Study> = LazyLock::new(|| Study::run(RANDOM_WALK, 20_000));
-static MIXTURE: LazyLock<Study> = LazyLock::new(|| Study::run(MIXED_NOISE, 30_000));
+static WHITE: LazyLock<SimulatedRecords> = LazyLock::new(|| SimulatedRecords::run(WHITE_NOISE, 0));
+static FLICKER: LazyLock<SimulatedRecords> = LazyLock::new(|| SimulatedRecords::run(FLICKER_NOISE, 10_000));
+static WALK: LazyLock<SimulatedRecords> = LazyLock::new(|| SimulatedRecords::run(RANDOM_WALK, 20_000));
+static MIXTURE: LazyLock<SimulatedRecords> = LazyLock::new(|| SimulatedRecords::run(MIXED_NOISE, 30_000));
 
 /// The results of all records of one noise, by octave.
-struct Study {
+struct SimulatedRecords {
     /// Calculated degrees of freedom, P = 8.
     dof: [f64; OCTAVES],
     /// Number of bounds that cover the truth, with the true noise and with the classified noise.
@@ -200,12 +201,12 @@ struct Study {
     measured: [[(f64, f64); OVERLAPS]; OCTAVES],
 }
 
-impl Study {
+impl SimulatedRecords {
     fn run(noise: Noise, seed: u64) -> Self {
         let truth: Vec<_> =
             (0..OCTAVES).map(|octave| (noise.avar(1 << octave), noise.variance_fractions(1 << octave))).collect();
         let octave = |n: u64| n.trailing_zeros() as usize;
-        let mut study = Self {
+        let mut records = Self {
             dof: [0.0; OCTAVES],
             covered: [0; OCTAVES],
             covered_as_identified: [0; OCTAVES],
@@ -224,23 +225,23 @@ impl Study {
             for (overlap, curve) in curves.iter().enumerate() {
                 for point in curve.points() {
                     let ratio = point.avar / truth[octave(point.n)].0;
-                    let (sum, squares) = &mut study.measured[octave(point.n)][overlap];
+                    let (sum, squares) = &mut records.measured[octave(point.n)][overlap];
                     (*sum, *squares) = (*sum + ratio, *squares + ratio * ratio);
                 }
             }
             let [.., identified, _] = curves;
             for point in identified.points() {
                 let octave = octave(point.n);
-                study.named[octave][point.power_law as usize] += 1;
-                study.covered_as_identified[octave] += u32::from((point.low..=point.high).contains(&truth[octave].0));
+                records.named[octave][point.power_law as usize] += 1;
+                records.covered_as_identified[octave] += u32::from((point.low..=point.high).contains(&truth[octave].0));
             }
             for point in identified.with_confidence(|point| truth[octave(point.n)].1).points() {
                 let octave = octave(point.n);
-                study.dof[octave] = point.edf;
-                study.covered[octave] += u32::from((point.low..=point.high).contains(&truth[octave].0));
+                records.dof[octave] = point.edf;
+                records.covered[octave] += u32::from((point.low..=point.high).contains(&truth[octave].0));
             }
         }
-        study
+        records
     }
 
     /// Degrees of freedom by the scatter of the records, by overlap.

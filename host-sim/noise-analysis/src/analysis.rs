@@ -124,7 +124,7 @@ struct ChannelAnalysis {
     /// Lines in the spectrum of the whole record.
     lines: Vec<MergedLine>,
     /// Random telegraph noise in the whole record.
-    two_levels: Option<Detection>,
+    telegraph: Option<Detection>,
     /// The samples less the share of the covariates; of a traced channel only.
     rest: Option<UniformSeries>,
 }
@@ -136,7 +136,7 @@ impl ChannelAnalysis {
         let position = estimators.both.position(channel).unwrap_or_default();
         let [first, both] = [&estimators.first, &estimators.both]
             .map(|part| ChannelFit::fit_baseline(CovariateFit::estimate(part, position, false, |_| None)));
-        Self { first, both, lines: Vec::new(), two_levels: None, rest: None }
+        Self { first, both, lines: Vec::new(), telegraph: None, rest: None }
     }
 
     /// The baseline model and what it lacks; `own` are the samples of the channel.
@@ -169,8 +169,8 @@ impl ChannelAnalysis {
         let (both, lines) = fit_with_lines(both, own, whole.as_ref(), profile);
         let correlation_times: Vec<f64> = both.correlation_times().collect();
         let rest = UniformSeries::from_series(whole.as_ref().unwrap_or(own));
-        let two_levels = random_telegraph::find(&rest, channel.unit, &correlation_times);
-        Self { first, both, lines, two_levels, rest: Some(rest) }
+        let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times);
+        Self { first, both, lines, telegraph, rest: Some(rest) }
     }
 
     /// What was found in the channel over the whole record.
@@ -187,7 +187,7 @@ impl ChannelAnalysis {
             fit: &self.both,
             sensitivities: sensitivities.map(|(position, of)| (both.channels[position], *of)).collect(),
             lines: &self.lines,
-            two_levels: self.two_levels.as_ref(),
+            telegraph: self.telegraph.as_ref(),
             common,
         }
     }

@@ -79,7 +79,8 @@ impl CovariateFit {
         by_block_means: impl Fn(ChannelProfile) -> Option<BiasSensitivity>,
     ) -> Self {
         let data = RegressionData::new(part, channel, None);
-        let mut sensitivities: Vec<Sensitivity> = data.regress(|beside| beside.sensitivities()).into_iter().collect();
+        let mut sensitivities: Vec<Sensitivity> =
+            data.regress(|regression| regression.sensitivities()).into_iter().collect();
         for (covariate, &position) in data.positions.iter().enumerate() {
             let regressor = part.channels[position];
             let Some(BiasSensitivity { sensitivity: value, error }) = by_block_means(regressor) else {
@@ -94,7 +95,7 @@ impl CovariateFit {
                 None => sensitivities.push(sensitivity),
             }
         }
-        let curve = data.regress(|beside| beside.compensated(&sensitivities));
+        let curve = data.regress(|regression| regression.compensated(&sensitivities));
         Self { data, sensitivities, curve }
     }
 
@@ -105,7 +106,8 @@ impl CovariateFit {
 
     /// The curve of the same channel in another part, compensated with the sensitivities of this one.
     pub(crate) fn compensated(&self, part: &RecordPart, channel: usize) -> Curve<OCTAVES> {
-        RegressionData::new(part, channel, Some(&self.data)).regress(|beside| beside.compensated(&self.sensitivities))
+        RegressionData::new(part, channel, Some(&self.data))
+            .regress(|regression| regression.compensated(&self.sensitivities))
     }
 
     /// Each covariate's position in the part, with the sensitivity to it.

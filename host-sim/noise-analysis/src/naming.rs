@@ -39,7 +39,7 @@ pub(crate) struct ChannelFindings<'a> {
     /// Lines of the spectrum.
     pub lines: &'a [MergedLine],
     /// Random telegraph noise in the samples.
-    pub two_levels: Option<&'a Detection>,
+    pub telegraph: Option<&'a Detection>,
     /// Drift that the channel has in common with others.
     pub common: Option<&'a ChannelsInCommon>,
 }
@@ -55,7 +55,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     let is_rounding = |found: &&Detection| {
         !is_dithered_at_once && found.effect.parameters["amplitude"].value < NEIGHBOURING_COUNTS * resolution
     };
-    let two_levels = findings.two_levels.filter(|found| !is_rounding(found));
+    let telegraph = findings.telegraph.filter(|found| !is_rounding(found));
     let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
     for found in &fit.trace.added {
         let term = &model.terms()[found.term];
@@ -69,13 +69,13 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             // Reported from the spectrum, which resolves them better than the curve.
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) => {}
             // In the curve, random telegraph noise and a common-mode drift look like these.
-            NoiseTerm::Markov(_) | NoiseTerm::RateRamp if two_levels.is_some() || common.is_some() => {}
+            NoiseTerm::Markov(_) | NoiseTerm::RateRamp if telegraph.is_some() || common.is_some() => {}
             NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
                 effects.push(low_pass_effect(term, markov, found, period_s));
             }
             NoiseTerm::Markov(markov) => match telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov) {
-                Some(verdict) if verdict.is_telegraph() => {
-                    effects.push(telegraph_effect(term, found, &verdict, unit, period_s));
+                Some(kurtosis) if kurtosis.is_telegraph() => {
+                    effects.push(telegraph_effect(term, found, &kurtosis, unit, period_s));
                 }
                 _ => effects.push(term_effect(term, found, unit, period_s)),
             },
@@ -83,11 +83,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
         }
     }
     let is_slow = |effect: &Effect| ["markov", "telegraph", "rate_ramp"].contains(&effect.kind.as_str());
-    if common.is_none() && two_levels.is_none() && !effects.iter().any(is_slow) {
+    if common.is_none() && telegraph.is_none() && !effects.iter().any(is_slow) {
         let bounded = bounded_drift(&fit.covariates.curve, &fit.trace, channel);
         effects.extend(bounded.map(|found| bounded_drift_effect(&found, unit)));
     }
-    effects.extend(two_levels.map(|found| found.effect.clone()));
+    effects.extend(telegraph.map(|found| found.effect.clone()));
     effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
     effects.extend(lines.iter().map(|line| line_effect(line, unit)));
     effects
@@ -154,7 +154,7 @@ fn normal_bounds(estimate: MeasuredValue, unit: &str) -> Parameter {
 fn telegraph_effect(
     term: &FittedTerm,
     found: &AddedTerm,
-    verdict: &KurtosisRatio,
+    kurtosis: &KurtosisRatio,
     unit: &str,
     period_s: f64,
 ) -> Effect {
@@ -166,7 +166,7 @@ fn telegraph_effect(
     parameters.insert("amplitude".to_owned(), amplitude);
     let evidence = format!(
         "two levels: excess kurtosis {:.2} ± {:.2} of that of a telegraph signal, a Gaussian process has 0; {}",
-        verdict.ratio, verdict.error, markov.evidence,
+        kurtosis.ratio, kurtosis.error, markov.evidence,
     );
     Effect { kind: "telegraph".to_owned(), parameters, evidence }
 }

@@ -49,7 +49,7 @@ impl Preprocessing {
             recorded.iter().map(|&channel| (channel, series_of(channel))).collect();
         let found = in_parallel(traced, |&channel| {
             let series = series_of(channel);
-            let coarse = effective_lsb::find(&measured(channel));
+            let lsb = effective_lsb::find(&measured(channel));
             let spikes = spikes::find(&series);
             let left_out = spikes.as_ref().map(|finding| excluded(&finding.correction)).unwrap_or_default();
             let cleaned = series.corrected(&Correction::Exclude(left_out.clone()));
@@ -62,9 +62,9 @@ impl Preprocessing {
                 })
                 .unzip();
             let level = bias::find(&cleaned, &others.iter().collect::<Vec<_>>(), noises);
-            (coarse, spikes, level, profiles, left_out)
+            (lsb, spikes, level, profiles, left_out)
         });
-        for (&channel, (coarse, spikes, BiasChanges { step, ramp, sensitivities: followed }, regressors, left_out)) in
+        for (&channel, (lsb, spikes, BiasChanges { step, ramp, sensitivities }, regressors, left_out)) in
             traced.iter().zip(found)
         {
             if let Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) = &step {
@@ -72,10 +72,10 @@ impl Preprocessing {
             }
             // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its
             // own drift.
-            let slow = followed.into_iter().map(|(regressor, followed)| (channel, regressors[regressor], followed));
+            let slow = sensitivities.into_iter().map(|(place, sensitivity)| (channel, regressors[place], sensitivity));
             preprocessing.sensitivities.extend(slow.filter(|(_, regressor, _)| regressor.quantity.is_environment()));
             preprocessing.excluded.extend(left_out);
-            let findings = coarse.into_iter().chain(spikes).chain(step).chain(ramp);
+            let findings = lsb.into_iter().chain(spikes).chain(step).chain(ramp);
             preprocessing.channel_effects.extend(findings.map(|finding| (channel, finding.effect)));
         }
         preprocessing

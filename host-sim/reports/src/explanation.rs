@@ -57,8 +57,8 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
     )?;
     writeln!(out, "every epoch's own deviance, with tracked parameters and with the predictive model as it stands.")?;
     for of in channels {
-        if let Some(companion) = &of.related_line {
-            writeln!(out, "{}", related_line(explanation, of, companion))?;
+        if let Some(related) = &of.related_line {
+            writeln!(out, "{}", related_line(explanation, of, related))?;
         }
     }
     writeln!(out, "\nWhite noise (change of its variance, %) and moving line (Hz), epoch by epoch")?;
@@ -142,9 +142,9 @@ fn stationarity_table(channels: &[ChannelExplanation]) -> TextTable {
 fn error_table(channels: &[ChannelExplanation]) -> TextTable {
     let row = |channel: &ChannelExplanation| {
         let errors = &channel.errors;
-        let [declared, traced, predictive] =
+        let [baseline, traced, predictive] =
             [errors.baseline, errors.traced, errors.predictive].map(|both| both.map(deviance));
-        let values = [declared, traced, predictive].concat();
+        let values = [baseline, traced, predictive].concat();
         let last = [errors.beyond_drift, errors.first_half_curve].map(deviance).to_vec();
         [vec![channel.channel.name.to_owned()], values, last].concat()
     };
@@ -198,17 +198,17 @@ fn tracking_table(channels: &[ChannelExplanation]) -> TextTable {
 }
 
 /// A line of another channel whose frequency is in a fixed ratio to that of the channel's line.
-fn related_line(explanation: &Explanation, of: &ChannelExplanation, companion: &RelatedLine) -> String {
-    let (name, other) = (of.channel.name, explanation.searched[companion.channel].name);
-    let (mean, deviation) = companion.measured_ratio;
-    let ((above, below), path) = (companion.ratio, [&companion.line, &companion.related[0], &companion.related[1]]);
+fn related_line(explanation: &Explanation, of: &ChannelExplanation, related: &RelatedLine) -> String {
+    let (name, other) = (of.channel.name, explanation.searched[related.channel].name);
+    let (mean, deviation) = related.measured_ratio;
+    let ((above, below), path) = (related.ratio, [&related.line, &related.related[0], &related.related[1]]);
     let [line, seen, unseen] = path.map(|path| path.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" "));
     format!(
         "\nThe line of {name} shows in {other} at {above}/{below} of its frequency: ratio {mean:.4} ± {deviation:.4} epoch by\n\
          epoch, correlation of the steps {:.3}, chance {:.0e} (first half). Where {other} has it in the second half\n\
          predicts {name} with a deviance per point of {:.2}; {name} itself is not looked at there. Hz, by the spectra:\n\
          {name}, first half: {line}\n{other}, first half: {seen}\n{other}, second half: {unseen}",
-        companion.correlation, companion.p_value, companion.unseen,
+        related.correlation, related.p_value, related.unseen,
     )
 }
 

@@ -77,15 +77,15 @@ impl DrawnRecording {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX);
         let noise = noise(&mut random);
-        let surroundings = surroundings(&mut random, kinds.contains(&EffectKind::Acceleration));
+        let environment = environment(&mut random, kinds.contains(&EffectKind::Acceleration));
         let host = HostClock {
             latency_s: LATENCY_S,
             clock_ratio: 1.0 + HOST_CLOCK_ERROR * random.sample::<f64, _>(StandardNormal),
         };
         let record = RecordLength { seconds, period_s: 1.0 / SAMPLE_RATE_HZ };
-        let conditions = RecordingConditions { noise: &noise, environment: surroundings, record, seed };
+        let conditions = RecordingConditions { noise: &noise, environment, record, seed };
         // In a moving accelerometer the motion hides any other effect.
-        let channels = if surroundings.motion.deviation_g > 0.0 {
+        let channels = if environment.motion.deviation_g > 0.0 {
             &OutputRegister::INERTIAL[..3]
         } else {
             &OutputRegister::INERTIAL
@@ -96,13 +96,8 @@ impl DrawnRecording {
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
         let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
         let (effects, strengths) = draw_effects(kinds, range, at_least, &conditions, channel, &mut random);
-        let hidden = SensorScenario { environment: surroundings, effects };
-        Self {
-            seed,
-            kinds: kinds.to_vec(),
-            strengths,
-            simulation: Simulation { seconds, seed, noise, scenario: hidden, host },
-        }
+        let scenario = SensorScenario { environment, effects };
+        Self { seed, kinds: kinds.to_vec(), strengths, simulation: Simulation { seconds, seed, noise, scenario, host } }
     }
 
     /// The two different kinds of the pair of a seed.
@@ -187,7 +182,7 @@ fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
 }
 
 /// A random environment. `moved` says whether an effect needs a motion.
-fn surroundings(random: &mut ChaCha8Rng, moved: bool) -> Environment {
+fn environment(random: &mut ChaCha8Rng, moved: bool) -> Environment {
     let temperature = TemperatureProfile {
         rise_c: log_uniform(random, 2.0, 12.0),
         time_constant_s: log_uniform(random, 200.0, 1200.0),

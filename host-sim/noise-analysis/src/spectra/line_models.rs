@@ -156,11 +156,11 @@ impl Lorentz {
             sum / weight
         };
         let everything = mean(&mut groups.iter());
-        let surroundings = mean(&mut groups.iter().filter(|group| (group.position - centre).abs() > 0.6 * reach));
+        let floor = mean(&mut groups.iter().filter(|group| (group.position - centre).abs() > 0.6 * reach));
         let summit = mean(&mut around(&groups, centre, width).iter().copied());
         // The mean of a Lorentz curve over its full width is π/4 of its height.
-        let height = ((summit / surroundings - 1.0) * 4.0 / PI).max(0.1);
-        let mut parameters = Vector4::new(surroundings.ln(), height.ln(), centre, width.ln());
+        let height = ((summit / floor - 1.0) * 4.0 / PI).max(0.1);
+        let mut parameters = Vector4::new(floor.ln(), height.ln(), centre, width.ln());
         let mut likelihood = log_likelihood(&groups, &parameters);
         let mut damping = 1e-2;
         for _ in 0..ROUNDS {

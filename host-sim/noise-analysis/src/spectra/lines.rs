@@ -25,7 +25,7 @@ const MOST: usize = 6;
 const NARROWEST: f64 = 1.5;
 /// Least −2 log-likelihood ratio of a sinusoid against a resonance for the latter to be taken.
 const PREFERENCE: f64 = 10.0;
-/// Least relative excess of a broad peak over its surroundings; a smaller one may be an error of the background's shape.
+/// Least relative excess of a broad peak over the density around it; a smaller one may be an error of the background's shape.
 const LEAST_EXCESS: f64 = 0.1;
 /// Averages on either side that a broad peak is compared with.
 const NEIGHBOURS: usize = 16;

@@ -63,7 +63,7 @@ pub(crate) fn empty() -> Report {
 pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
     let scale = if unit == "g" { 1e-3 } else { 1.0 };
     let curve: Vec<CurvePoint> = (0..18).map(|octave| point(octave, scale)).collect();
-    let declared = ModelReport {
+    let baseline = ModelReport {
         terms: [
             ("angle_random_walk", N, "/sqrt(s)"),
             ("bias_instability", B, ""),
@@ -88,9 +88,9 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
             bias_instability: value(0.014_30, "", 40.96, 81.92),
             rate_random_walk: value(0.001_217, "/s/sqrt(s)", 327.68, 1310.72),
         },
-        before: declared.clone(),
+        before: baseline.clone(),
         effects: vec![],
-        after: declared,
+        after: baseline,
         assessment: assessment(scale),
     }
 }
