@@ -39,10 +39,11 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Async> {
             0 => {
                 self.spi
                     .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)])
-                    .await?
+                    .await
             }
-            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns)).await?,
+            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns)).await,
         }
+        .map_err(Error::Spi)?;
         Ok(Burst::from_bytes(&answer))
     }
 
@@ -95,7 +96,7 @@ async fn run<SPI: SpiDevice<u8>, T>(
     loop {
         match slot.resume(procedure.as_mut()) {
             Ok(result) => return result.map_err(Error::with_bus_error),
-            Err(request) => slot.respond(perform(spi, delay, request).await?),
+            Err(request) => slot.respond(perform(spi, delay, request).await.map_err(Error::Spi)?),
         }
     }
 }

@@ -38,9 +38,10 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
         match self.state.timing.word_gap_ns {
             0 => self
                 .spi
-                .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)])?,
-            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns))?,
+                .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)]),
+            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns)),
         }
+        .map_err(Error::Spi)?;
         Ok(Burst::from_bytes(&answer))
     }
 
@@ -93,7 +94,7 @@ fn run<SPI: SpiDevice<u8>, T>(
     loop {
         match slot.resume(procedure.as_mut()) {
             Ok(result) => return result.map_err(Error::with_bus_error),
-            Err(request) => slot.respond(perform(spi, delay, request)?),
+            Err(request) => slot.respond(perform(spi, delay, request).map_err(Error::Spi)?),
         }
     }
 }

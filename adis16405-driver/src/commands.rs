@@ -109,18 +109,18 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn set_sample_rate(&mut self, hz: f64) -> Result<f64, ProtocolError> {
-        let period = SamplePeriod::nearest(hz).map_err(Error::Config)?;
+        let period = SamplePeriod::nearest(hz)?;
         self.configure(self.state.config.with_sample_period(period)).await?;
         Ok(period.hz())
     }
 
     pub(crate) async fn set_range(&mut self, range: GyroRange) -> Result<(), ProtocolError> {
-        let config = self.state.config.with_range(range).map_err(Error::Config)?;
+        let config = self.state.config.with_range(range)?;
         self.configure(config).await
     }
 
     pub(crate) async fn set_filter_taps_log2(&mut self, filter_taps_log2: u8) -> Result<(), ProtocolError> {
-        let config = self.state.config.with_filter_taps_log2(filter_taps_log2).map_err(Error::Config)?;
+        let config = self.state.config.with_filter_taps_log2(filter_taps_log2)?;
         self.configure(config).await
     }
 

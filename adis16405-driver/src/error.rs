@@ -146,9 +146,9 @@ impl Error<Infallible> {
     }
 }
 
-impl<E> From<E> for Error<E> {
-    fn from(error: E) -> Self {
-        Error::Spi(error)
+impl<E> From<ConfigError> for Error<E> {
+    fn from(error: ConfigError) -> Self {
+        Error::Config(error)
     }
 }
 

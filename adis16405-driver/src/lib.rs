@@ -11,8 +11,8 @@
 //! use embedded_hal::{delay::DelayNs, spi::SpiDevice};
 //!
 //! fn read<SPI: SpiDevice<u8>>(spi: SPI, delay: &mut impl DelayNs) -> Result<(), Error<SPI::Error>> {
-//!     let period = SamplePeriod::nearest(204.8).map_err(Error::Config)?;
-//!     let config = Config::new(GyroRange::Dps300, 2, period).map_err(Error::Config)?;
+//!     let period = SamplePeriod::nearest(204.8)?;
+//!     let config = Config::new(GyroRange::Dps300, 2, period)?;
 //!     let mut imu = Adis16405::new(spi, config);
 //!     imu.start_up(delay)?;
 //!     let healthy = imu.self_test(delay)?.passed();
