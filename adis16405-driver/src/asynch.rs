@@ -82,6 +82,19 @@ macro_rules! methods {
             run(&mut self.spi, delay, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*)).await
         }
     };
+    (@stimulating [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
+        $($doc)*
+        pub async fn $name(&mut self, $($declared)* delay: &mut impl DelayNs) -> Result<$output, Error<SPI::Error>> {
+            let slot = RequestSlot::new();
+            let mut protocol = Protocol::new(&slot, &mut self.state);
+            let result = run(&mut self.spi, delay, &slot, protocol.$name($($passed)*)).await;
+            if self.state.stimulated {
+                // The first error is the one to report; the state tells whether this attempt has succeeded.
+                let _ = self.stop_stimulus().await;
+            }
+            result
+        }
+    };
 }
 procedures!(methods);
 

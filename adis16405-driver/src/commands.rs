@@ -77,6 +77,9 @@ impl Protocol<'_> {
 
     pub(crate) async fn init(&mut self) -> Result<Product, ProtocolError> {
         let product = self.identity().await?;
+        if self.state.stimulated {
+            self.stop_stimulus().await?;
+        }
         self.configure(self.state.config).await?;
         self.gyro_offsets().await?;
         Ok(product)

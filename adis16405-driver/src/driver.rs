@@ -87,7 +87,8 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
 
 /// The methods of the driver that run a procedure of [`Protocol`](crate::protocol::Protocol), each with the name of its
 /// procedure. The macro `$make_methods` makes a blocking or an asynchronous method of each row. Procedures marked
-/// `framed` consist of frames only; those marked `paced` contain pauses, and their methods take a delay.
+/// `framed` consist of frames only; those marked `paced` contain pauses, and their methods take a delay. A method marked
+/// `stimulating` is paced, and switches the stimulus of the manual self-test off if its procedure ends with an error.
 macro_rules! procedures {
     ($make_methods:ident) => {
         $make_methods! {
@@ -100,7 +101,8 @@ macro_rules! procedures {
             /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and reads the gyro offsets
             /// ([`x_sign_at_risk`](Self::x_sign_at_risk)).
             ///
-            /// Only bytes that differ are written, the lower byte first (in SENS_AVG the upper byte first where the
+            /// If a manual self-test has left its stimulus on, it is switched off first. Only bytes that differ are
+            /// written, the lower byte first (in SENS_AVG the upper byte first where the
             /// filter would be too short for the old range). A register that was written is read back.
             ///
             /// # Errors
@@ -187,14 +189,14 @@ macro_rules! procedures {
             framed fn diagnosis() -> Diagnosis;
 
             /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end. The other bits of MSC_CTRL keep
-            /// their values; a manual self-test that was on is interrupted and switched on again afterwards.
+            /// their values, except that a manual self-test that was on is switched off.
             ///
             /// # Errors
             /// [`Error::Deadline`] if it does not end within twice its usual time, [`Error::Product`] if the part does
             /// not answer, [`Error::Verify`].
             paced fn self_test() -> SelfTest;
 
-            /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end.
+            /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end. It too switches a manual self-test off.
             ///
             /// # Errors
             /// Those of [`self_test`](Self::self_test).
@@ -205,8 +207,18 @@ macro_rules! procedures {
             /// must be still. The limits of a valid response are in the data sheet of the part.
             ///
             /// # Errors
-            /// [`Error::Verify`] if MSC_CTRL did not take the stimulus bits.
-            paced fn stimulus_response(stimulus: Stimulus) -> [i16; 6];
+            /// [`Error::Verify`] if MSC_CTRL did not take the stimulus bits. After any error the method tries once more
+            /// to switch the stimulus off. If that fails too, or if the future is dropped, the sensors stay deflected
+            /// until [`stop_stimulus`](Self::stop_stimulus), [`init`](Self::init) or [`self_test`](Self::self_test)
+            /// succeeds.
+            stimulating fn stimulus_response(stimulus: Stimulus) -> [i16; 6];
+
+            /// Switches the stimulus of a manual self-test off (MSC_CTRL bits 9 and 8). The outputs are then settled
+            /// after the length of the filter.
+            ///
+            /// # Errors
+            /// [`Error::Verify`] if MSC_CTRL did not take the bits.
+            framed fn stop_stimulus() -> ();
 
             /// The bias correction of the gyros, as applied by the part and by the driver.
             ///
