@@ -86,6 +86,8 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn start_up(&mut self) -> Result<Product, ProtocolError> {
+        // SMPL_PRD is loaded from flash, so the power mode is not known before it was read.
+        self.state.mode = ClockMode::LowPower;
         self.pause(self.state.timing.start_up_us).await;
         self.init().await
     }
@@ -134,7 +136,10 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
-        self.command(SOFTWARE_RESET, self.state.timing.reset_us).await;
+        self.write_low(Register::GlobCmd, SOFTWARE_RESET).await;
+        // As after power-on: SMPL_PRD is loaded from flash.
+        self.state.mode = ClockMode::LowPower;
+        self.pause(self.state.timing.reset_us).await;
         self.init().await
     }
 

@@ -121,7 +121,8 @@ macro_rules! procedures {
             /// part as [`init`](Self::init) does.
             ///
             /// A reset loads the registers from flash, and sets the volatile ones (GPIO, sleep, auxiliary DAC) to their
-            /// reset values.
+            /// reset values. If SMPL_PRD in flash selects low-power mode, SCK must not exceed 300 kHz until `init` has
+            /// set another one; the driver keeps the stall of that mode as long.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).

@@ -74,7 +74,7 @@ pub(crate) struct DriverState {
     pub(crate) timing: Timing,
     /// Whether changed registers are read back and compared.
     pub(crate) verify: bool,
-    /// The power mode of the part. While it changes, low-power mode, which has the longer stall.
+    /// The power mode of the part. While it is unknown or changes, low-power mode, which has the longer stall.
     pub(crate) mode: ClockMode,
     /// Bias correction of gyro x that the driver adds instead of XGYRO_OFF, in counts of 0.0125 °/s.
     pub(crate) host_bias_x: i16,

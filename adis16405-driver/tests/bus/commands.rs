@@ -131,12 +131,29 @@ fn settings_that_the_part_does_not_accept_are_not_sent() {
     assert_eq!(rate, Err(Error::Config(ConfigError::Rate)));
 }
 
-/// 290 ms from power-on and 170 ms from a reset are the times of low-power mode, the longer ones.
+/// The frames of an `init` on a part that is already configured, whose power mode is not known before SMPL_PRD was read:
+/// until then the driver keeps the stall of low-power mode.
+fn init_in_unknown_power_mode() -> Frames {
+    let slow = |sent: [u8; 2], answer: u16| frame_with(75_000, &sent, &answer.to_be_bytes());
+    [
+        slow([0x56, 0], 0),
+        slow([0, 0], 16405),
+        slow([0x36, 0], 0),
+        slow([0, 0], 0x0001),
+        read(0x38, 0x0402),
+        gyro_offsets(0, 0, 0),
+    ]
+    .concat()
+}
+
+/// 290 ms from power-on and 170 ms from a reset are the times of low-power mode, the longer ones. Both load SMPL_PRD,
+/// and with it the power mode, from flash.
 #[test]
-fn the_bus_is_silent_during_start_up_and_reset() {
-    let started = both!(Config::default(); [init(0x0001, 0x0402)]; [290_000]; |imu, delay| imu.start_up(&mut delay));
+fn after_start_up_and_reset_the_bus_is_silent_and_then_slow() {
+    let bus = [init_in_unknown_power_mode()];
+    let started = both!(Config::default(); bus; [290_000]; |imu, delay| imu.start_up(&mut delay));
     assert_eq!(started, Ok(Product::Adis16405));
-    let bus = [write(0x3E, 0x80), init(0x0001, 0x0402)];
+    let bus = [write(0x3E, 0x80), init_in_unknown_power_mode()];
     let reset = both!(Config::default(); bus; [170_000]; |imu, delay| imu.software_reset(&mut delay));
     assert_eq!(reset, Ok(Product::Adis16405));
 }
