@@ -14,7 +14,7 @@ use crate::clock::Timing;
 use crate::commands::{Product, Sleep};
 use crate::config::Config;
 use crate::driver::{Adis16405, Blocking, procedures};
-use crate::error::{Diagnosis, Error};
+use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::pins::{DacLevel, DioSignal, Gpio};
 use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot};
 use crate::register::Register;

@@ -7,7 +7,7 @@ use crate::calibration::{FactoryRestore, GyroBias};
 use crate::channel::GyroRange;
 use crate::clock::{ClockMode, SamplePeriod};
 use crate::config::Config;
-use crate::error::{Diagnosis, Error};
+use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::protocol::{Protocol, ProtocolError, WriteOrder};
 use crate::register::Register;
 
@@ -177,15 +177,18 @@ impl Protocol<'_> {
         Ok(self.read(Register::FlashCnt).await)
     }
 
-    pub(crate) async fn flash_update(&mut self) -> Result<u16, ProtocolError> {
-        let before = self.flash_writes().await?;
+    pub(crate) async fn flash_update(&mut self) -> Result<FlashUpdate, ProtocolError> {
+        // A failure of an earlier update may still be flagged.
+        let before = self.diagnosis().await?;
+        let writes_before = self.flash_writes().await?;
         self.command(FLASH_UPDATE, self.state.timing.flash_update_us).await;
         let diagnosis = self.diagnosis().await?;
-        let after = self.flash_writes().await?;
-        if diagnosis.contains(Diagnosis::FLASH_UPDATE) || after == before {
-            return Err(Error::FlashUpdate { before, after, diagnosis });
+        let writes = self.flash_writes().await?;
+        let outcome = FlashUpdate { before, writes_before, writes, diagnosis };
+        if diagnosis.contains(Diagnosis::FLASH_UPDATE) || writes == writes_before {
+            return Err(Error::FlashUpdate(outcome));
         }
-        Ok(after)
+        Ok(outcome)
     }
 
     pub(crate) async fn sleep(&self, sleep: Sleep) -> Result<(), ProtocolError> {

@@ -306,12 +306,12 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             framed fn flash_writes() -> u16;
 
-            /// Writes the present settings to flash (GLOB_CMD bit 3), leaves the bus silent meanwhile, and returns the
-            /// number of flash writes.
+            /// Reads DIAG_STAT and FLASH_CNT, writes the present settings to flash (GLOB_CMD bit 3), leaves the bus
+            /// silent meanwhile, and reads both again.
             ///
             /// # Errors
-            /// [`Error::FlashUpdate`] if DIAG_STAT reports a failure, or if FLASH_CNT did not change.
-            paced fn flash_update() -> u16;
+            /// [`Error::FlashUpdate`] if DIAG_STAT reports a failure of this update, or if FLASH_CNT did not change.
+            paced fn flash_update() -> FlashUpdate;
 
             /// The pin and polarity of the data-ready signal; `None` if it is off.
             ///

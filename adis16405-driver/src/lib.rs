@@ -132,7 +132,7 @@ pub use config::{BartlettFilter, Config};
 #[cfg(feature = "async")]
 pub use driver::Async;
 pub use driver::{Adis16405, Blocking};
-pub use error::{Diagnosis, Error};
+pub use error::{Diagnosis, Error, FlashUpdate};
 pub use pins::{DacLevel, Dio, DioLine, DioSignal, Gpio, Polarity};
 pub use register::{Access, Register};
 pub use sample::ImuSample;

@@ -273,6 +273,11 @@ impl VirtualAdis16405 {
         self.flash_damaged = true;
     }
 
+    /// Undoes [`damage_flash`](Self::damage_flash).
+    pub fn repair_flash(&mut self) {
+        self.flash_damaged = false;
+    }
+
     /// Sets the answer of PROD_ID, also after a reset: another part of the family.
     pub fn set_prod_id(&mut self, prod_id: u16) {
         self.registers.store(registers::PROD_ID, prod_id);

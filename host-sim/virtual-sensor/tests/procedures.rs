@@ -7,8 +7,8 @@ use std::task::{Context, Poll, Waker};
 
 use adis16405_driver::{
     Adis16405, Alarm, AlarmNumber, AlarmThreshold, AlarmWatch, BurstValidator, Channel, Config, DacLevel, Diagnosis,
-    Dio, DioLine, DioSignal, Error, FactoryRestore, Faults, Gpio, GyroBias, OnChipCompensation, Polarity, Product,
-    Register, Sleep, Stimulus,
+    Dio, DioLine, DioSignal, Error, FactoryRestore, Faults, FlashUpdate, Gpio, GyroBias, OnChipCompensation, Polarity,
+    Product, Register, Sleep, Stimulus,
 };
 
 use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
@@ -175,7 +175,15 @@ fn a_flash_update_outlives_a_reset() {
     both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.flash_writes() => Ok(0);
         expect imu.set_accl_offsets([1, 2, 3]) => Ok(());
-        expect imu.flash_update(&mut delay) => Ok(1);
+        // A failed update before left its flag in DIAG_STAT.
+        then bus.part_mut().damage_flash();
+        expect imu.write_register(Register::GlobCmd, 1 << 3) => Ok(());
+        then { let now = bus.part().now(); bus.advance_to(now + 100_000_000) };
+        then bus.part_mut().repair_flash();
+        given none = Diagnosis::empty();
+        given failed = Diagnosis::FLASH_UPDATE;
+        expect imu.flash_update(&mut delay)
+            => Ok(FlashUpdate { before: failed, writes_before: 0, writes: 1, diagnosis: none });
         expect imu.set_accl_offsets([0, 0, 0]) => Ok(());
         expect imu.set_filter_taps_log2(5) => Ok(());
         expect imu.set_sample_rate(200.0) => Ok(204.8);
@@ -185,7 +193,7 @@ fn a_flash_update_outlives_a_reset() {
 
         then bus.part_mut().damage_flash();
         expect imu.flash_update(&mut delay)
-            => Err(Error::FlashUpdate { before: 1, after: 1, diagnosis: Diagnosis::FLASH_UPDATE });
+            => Err(Error::FlashUpdate(FlashUpdate { before: none, writes_before: 1, writes: 1, diagnosis: failed }));
     );
 }
 
