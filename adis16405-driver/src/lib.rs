@@ -69,7 +69,7 @@
 //! |---|---|---|---|
 //! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0, or all bits 1 | no | check wiring and power; then [`start_up`](Adis16405::start_up) |
 //! | [`SHIFTED`](Faults::SHIFTED) | a valid burst, shifted by 1 to 15 bits | no | check SCK; the next transaction is aligned again |
-//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | a new-data flag is clear | no | wait for data ready |
+//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | the new-data flag of an inertial word is clear | no | wait for data ready |
 //! | [`FROZEN`](Faults::FROZEN) | twelve words equal for 512 bursts | no | [`software_reset`](Adis16405::software_reset) |
 //! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | no | a damaged word, or the sign erratum |
 //! | [`X_SIGN`](Faults::X_SIGN) | an x rate that may lack its sign bit | no | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |

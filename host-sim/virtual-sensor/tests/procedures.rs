@@ -223,6 +223,8 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
     let change =
         Alarm { source: Channel::GyroY, watch: AlarmWatch::RateOfChange(4), threshold: AlarmThreshold::Above(99) };
     both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+        // A period of 4.9 ms, so that no sample is taken before the alarms are set.
+        expect imu.set_sample_rate(204.8) => Ok(204.8);
         expect imu.set_alarm_output(Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
         expect imu.set_alarm(AlarmNumber::One, Some(above)) => Ok(());
         expect imu.set_alarm(AlarmNumber::Two, Some(cold)) => Ok(());
