@@ -31,7 +31,8 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Async> {
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
     ///
     /// # Errors
-    /// [`Error::Spi`]. [`BurstValidator`](crate::BurstValidator) decides whether the data are usable.
+    /// [`Error::Spi`]. Whether the data are usable is for [`read`](Self::read) or a
+    /// [`BurstValidator`](crate::BurstValidator) to decide.
     pub async fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
         let stall_ns = self.state.stall_ns();
@@ -47,13 +48,20 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Async> {
         Ok(Burst::from_bytes(&answer))
     }
 
-    /// Reads a burst and returns it as a sample, as [`sample_from`](Self::sample_from) does.
+    /// Reads a burst, validates it together with the bursts that this method has read before
+    /// ([`BurstValidator`](crate::BurstValidator)), and returns it as a sample. Call it at every data-ready edge.
+    ///
+    /// [`burst`](Self::burst) and [`sample_from`](Self::sample_from) give the sample without a check.
     ///
     /// # Errors
-    /// [`Error::Spi`]. The sample is not validated: see [`burst`](Self::burst).
-    pub async fn sample(&mut self) -> Result<ImuSample, Error<SPI::Error>> {
+    /// [`Error::Unusable`] with the faults of the burst, [`Error::NotReady`] if the driver [is not](Self::is_ready),
+    /// [`Error::Spi`].
+    pub async fn read(&mut self) -> Result<ImuSample, Error<SPI::Error>> {
+        if !self.is_ready() {
+            return Err(Error::NotReady);
+        }
         let burst = self.burst().await?;
-        Ok(self.sample_from(burst))
+        self.checked_sample(burst).map_err(Error::Unusable)
     }
 }
 

@@ -86,13 +86,19 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn start_up(&mut self) -> Result<Product, ProtocolError> {
-        // SMPL_PRD is loaded from flash, so the power mode is not known before it was read.
-        self.state.mode = ClockMode::LowPower;
+        self.forget_registers();
         self.pause(self.state.timing.start_up_us).await;
         self.init().await
     }
 
+    /// The registers were loaded from flash: until they are read, neither configuration nor power mode is known.
+    fn forget_registers(&mut self) {
+        self.state.configured = false;
+        self.state.mode = ClockMode::LowPower;
+    }
+
     pub(crate) async fn configure(&mut self, config: Config) -> Result<(), ProtocolError> {
+        self.state.configured = false;
         let mode = self.state.timing.clock_mode(config.smpl_prd());
         // The longer stall of low-power mode is kept until the new sample period is known to be set.
         if mode == ClockMode::LowPower {
@@ -108,8 +114,10 @@ impl Protocol<'_> {
         let needed = GyroRange::from_sens_avg(before).map_or(0, GyroRange::min_filter_taps_log2);
         let order =
             if needed > config.filter_taps_log2() { WriteOrder::HighByteFirst } else { WriteOrder::LowByteFirst };
-        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), order).await?;
+        // Stored before the write: if it is interrupted, the part more likely has the new range than the old one.
         self.state.config = config;
+        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), order).await?;
+        self.state.configured = true;
         Ok(())
     }
 
@@ -137,8 +145,7 @@ impl Protocol<'_> {
 
     pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
         self.write_low(Register::GlobCmd, SOFTWARE_RESET).await;
-        // As after power-on: SMPL_PRD is loaded from flash.
-        self.state.mode = ClockMode::LowPower;
+        self.forget_registers();
         self.pause(self.state.timing.reset_us).await;
         self.init().await
     }

@@ -8,6 +8,7 @@ use crate::clock::{PerClockMode, Timing};
 use crate::config::Config;
 use crate::protocol::DriverState;
 use crate::sample::ImuSample;
+use crate::validity::{BurstValidator, FaultCounters, Faults};
 
 /// Type parameter of a driver over a blocking [`SpiDevice`](embedded_hal::spi::SpiDevice).
 #[derive(Clone, Copy, Debug)]
@@ -27,12 +28,13 @@ pub enum Async {}
 pub struct Adis16405<SPI, MODE = Blocking> {
     pub(crate) spi: SPI,
     pub(crate) state: DriverState,
+    validator: BurstValidator,
     mode: PhantomData<MODE>,
 }
 
 impl<SPI, MODE> Adis16405<SPI, MODE> {
     pub(crate) fn with_state(spi: SPI, config: Config) -> Self {
-        Self { spi, state: DriverState::new(config), mode: PhantomData }
+        Self { spi, state: DriverState::new(config), validator: BurstValidator::default(), mode: PhantomData }
     }
 
     /// Sets the stall after each frame in ns, for both power modes.
@@ -62,6 +64,19 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
         self.state.config
     }
 
+    /// True if the part is known to have the [configuration](Self::config), and no stimulus of a manual self-test is on:
+    /// [`init`](Self::init) or a later [`configure`](Self::configure) has succeeded, and no configuration, reset or
+    /// stimulus since then was left unfinished by an error or a dropped future. If false, [`init`](Self::init) makes it
+    /// true.
+    pub fn is_ready(&self) -> bool {
+        self.state.configured && !self.state.stimulated
+    }
+
+    /// The number of bursts that [`read`](Self::read) has validated, and of their faults.
+    pub fn fault_counters(&self) -> &FaultCounters {
+        self.validator.counters()
+    }
+
     /// The times that the driver keeps.
     pub fn timing(&self) -> Timing {
         self.state.timing
@@ -74,9 +89,17 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
         self.state.x_sign_at_risk
     }
 
-    /// A burst of this part as a sample, with the present gyro range and host-side bias.
+    /// A burst of this part as a sample, with the present gyro range and host-side bias. Neither the burst is validated
+    /// nor is it checked that the driver [is ready](Self::is_ready): [`read`](Self::read) does both.
     pub fn sample_from(&self, burst: Burst) -> ImuSample {
         ImuSample::new(burst.counts(), self.state.config.range()).with_host_bias_x(self.state.host_bias_x)
+    }
+
+    /// The next burst of this part as a sample if it is usable, else its faults.
+    pub(crate) fn checked_sample(&mut self, burst: Burst) -> Result<ImuSample, Faults> {
+        self.validator = self.validator.with_x_sign_at_risk(self.state.x_sign_at_risk);
+        let validity = self.validator.validate(&burst);
+        if validity.usable { Ok(self.sample_from(burst)) } else { Err(validity.faults) }
     }
 
     /// Returns the SPI device.

@@ -6,6 +6,7 @@ use core::fmt;
 use crate::channel::Channel;
 use crate::clock::ConfigError;
 use crate::register::Register;
+use crate::validity::Faults;
 
 bitflags::bitflags! {
     /// The status and error flags of DIAG_STAT. A read clears the register, so a procedure that reads it returns the
@@ -122,6 +123,11 @@ pub enum Error<E> {
     },
     /// The flash update failed, or FLASH_CNT did not change.
     FlashUpdate(FlashUpdate),
+    /// The burst that was read is not usable.
+    Unusable(Faults),
+    /// It is not known which configuration the part has, or a stimulus of the manual self-test may be on:
+    /// [`init`](crate::Adis16405::init) has to succeed first. Nothing was sent.
+    NotReady,
     /// The part does not accept the configuration. Nothing was written.
     Config(ConfigError),
     /// The value does not fit the register. Nothing was written.
@@ -146,6 +152,8 @@ impl Error<Infallible> {
             Error::Verify { register, expected, answer } => Error::Verify { register, expected, answer },
             Error::Deadline { register, mask, waited_us } => Error::Deadline { register, mask, waited_us },
             Error::FlashUpdate(outcome) => Error::FlashUpdate(outcome),
+            Error::Unusable(faults) => Error::Unusable(faults),
+            Error::NotReady => Error::NotReady,
             Error::Config(error) => Error::Config(error),
             Error::Value { register, value } => Error::Value { register, value },
             Error::ReadOnly(register) => Error::ReadOnly(register),
@@ -182,6 +190,8 @@ impl<E: fmt::Debug> fmt::Display for Error<E> {
                     "flash update failed: FLASH_CNT was {writes_before} and is {writes}, DIAG_STAT {diagnosis:#06x}"
                 )
             }
+            Error::Unusable(faults) => write!(f, "the burst is not usable: {}", faults.cause().unwrap_or_default()),
+            Error::NotReady => write!(f, "init() has to succeed first"),
             Error::Config(error) => write!(f, "{error}"),
             Error::Value { register, value } => write!(f, "{value} does not fit {}", register.name()),
             Error::ReadOnly(register) => write!(f, "{} cannot be written", register.name()),

@@ -116,13 +116,24 @@ pub(crate) struct DriverState {
     pub(crate) x_sign_at_risk: bool,
     /// True from the moment before a stimulus of the manual self-test is switched on until it is known to be off.
     pub(crate) stimulated: bool,
+    /// True if the part is known to have `config`.
+    pub(crate) configured: bool,
 }
 
 impl DriverState {
     pub(crate) const fn new(config: Config) -> Self {
         let timing = Timing::DEFAULT;
         let mode = timing.clock_mode(config.smpl_prd());
-        Self { config, timing, verify: true, mode, host_bias_x: 0, x_sign_at_risk: false, stimulated: false }
+        Self {
+            config,
+            timing,
+            verify: true,
+            mode,
+            host_bias_x: 0,
+            x_sign_at_risk: false,
+            configured: false,
+            stimulated: false,
+        }
     }
 
     /// Stall after a frame in the present power mode, ns.

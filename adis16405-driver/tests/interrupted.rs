@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use adis16405_driver::{Adis16405, Config, Error, Stimulus};
+use adis16405_driver::{Adis16405, Config, Error, Faults, GyroRange, Stimulus};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
@@ -17,6 +17,8 @@ const STIMULI: u16 = 0x0300;
 struct Part {
     registers: [u16; 0x40],
     answer: u16,
+    /// The supply word of a burst, and all others of it.
+    burst: [u16; 2],
     /// Transactions so far.
     transactions: usize,
     /// Transactions of these numbers fail, and the part does not receive them.
@@ -43,7 +45,13 @@ impl Bus {
         for (address, value) in [(0x56, 16405), (0x36, 0x0001), (SENS_AVG, 0x0402), (MSC_CTRL, 0x0006)] {
             registers[usize::from(address / 2)] = value;
         }
-        Self(Rc::new(RefCell::new(Part { registers, answer: 0, transactions: 0, failing })))
+        Self(Rc::new(RefCell::new(Part {
+            registers,
+            answer: 0,
+            burst: [0x8000 | 2068, 0x8000],
+            transactions: 0,
+            failing,
+        })))
     }
 
     fn register(&self, address: u8) -> u16 {
@@ -85,10 +93,9 @@ impl SpiDevice for Bus {
                         *register = u16::from_be_bytes(bytes);
                     }
                 }
-                // A burst: new data in every word, and a supply of 5 V.
                 Operation::Transfer(answer, _) => {
-                    answer.as_chunks_mut().0.fill(0x8000u16.to_be_bytes());
-                    answer[2..4].copy_from_slice(&(0x8000 | 2068u16).to_be_bytes());
+                    answer.as_chunks_mut().0.fill(part.burst[1].to_be_bytes());
+                    answer[2..4].copy_from_slice(&part.burst[0].to_be_bytes());
                 }
                 _ => (),
             }
@@ -133,10 +140,54 @@ fn init_switches_off_a_stimulus_that_a_failed_bus_has_left_on() {
         assert_eq!(imu.stimulus_response(Stimulus::Positive, &mut NoDelay), Err(Error::Spi(BusFault)));
         left_on += u32::from(bus.register(MSC_CTRL) & STIMULI != 0);
         bus.repair();
+        assert_eq!(imu.read(), Err(Error::NotReady));
         imu.init().unwrap();
+        assert!(imu.read().is_ok());
         assert_eq!(bus.register(MSC_CTRL), 0x0006, "error at transaction {at} of {whole}");
     }
     assert!(left_on > 50, "the failures must cover the time of the stimulus: {left_on}");
+}
+
+/// The range byte of SENS_AVG is written by the fifth transaction, after two reads.
+#[test]
+fn after_an_error_the_range_is_that_of_the_part() {
+    let whole = transactions_of(|imu| imu.set_range(GyroRange::Dps150).unwrap());
+    assert_eq!(whole, 7);
+    for at in 0..whole {
+        let bus = Bus::new(at..at + 1);
+        let mut imu = Adis16405::new(bus.clone(), Config::default());
+        assert_eq!(imu.set_range(GyroRange::Dps150), Err(Error::Spi(BusFault)));
+        assert!(!imu.is_ready());
+        assert_eq!(imu.read(), Err(Error::NotReady));
+        // Whether the part has received a write that failed cannot be known.
+        if at != 4 {
+            let range = GyroRange::from_sens_avg(bus.register(SENS_AVG));
+            assert_eq!(Some(imu.config().range()), range, "error at transaction {at} of {whole}");
+        }
+        imu.init().unwrap();
+        assert_eq!(Some(imu.read().unwrap().range()), GyroRange::from_sens_avg(bus.register(SENS_AVG)));
+    }
+}
+
+#[test]
+fn read_gives_a_sample_or_says_why_not() {
+    let bus = Bus::new(0..0);
+    let mut imu = Adis16405::new(bus.clone(), Config::default());
+    assert_eq!(imu.read(), Err(Error::NotReady), "before init");
+    imu.init().unwrap();
+    assert_eq!(imu.read().unwrap().supply_uv(), 2068 * 2418);
+
+    // A bus on which nothing answers reads zeros, which would be a rate of 0 °/s.
+    bus.0.borrow_mut().burst = [0; 2];
+    let error = imu.read().unwrap_err();
+    assert!(matches!(error, Error::Unusable(faults) if faults.contains(Faults::STUCK_LOW)), "{error:?}");
+    assert_eq!(error.to_string(), "the burst is not usable: stuck_low");
+    assert_eq!((imu.fault_counters().bursts, imu.fault_counters().unusable), (2, 1));
+
+    bus.0.borrow_mut().failing = 0..usize::MAX;
+    assert_eq!(imu.read(), Err(Error::Spi(BusFault)));
+    assert_eq!(imu.stimulus_response(Stimulus::Positive, &mut NoDelay), Err(Error::Spi(BusFault)));
+    assert!(imu.is_ready(), "no stimulus was switched on");
 }
 
 /// Futures that are dropped while a transaction is under way.

@@ -34,6 +34,7 @@ fn assert_send<T: Send>(_: T) {}
 fn the_futures_of_the_driver_are_send() {
     let mut imu: Adis16405<ZeroBus, Async> = Adis16405::new_async(ZeroBus, Config::default());
     assert_send(imu.burst());
+    assert_send(imu.read());
     assert_send(imu.init());
     assert_send(imu.start_up(&mut NoDelay));
     assert_send(imu.software_reset(&mut NoDelay));

@@ -127,7 +127,7 @@ fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
         expect imu.auto_null(&mut delay) => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
         then assert!(!imu.x_sign_at_risk());
         then bus.wait_for_data();
-        take sample = imu.sample();
+        take sample = imu.read();
         then assert_eq!(sample.counts().gyro(), [10, 0, 0]);
         then assert_eq!(sample.gyro_udps(), [0, 0, 0]);
         then assert_eq!(sample.accl_ug(), [0, 0, -999_000]);
@@ -334,7 +334,7 @@ fn the_x_gyro_erratum_occurs_and_is_avoided() {
         expect imu.keep_negative_x_bias_on_host() => Ok(GyroBias { part: [0; 3], host_x: -16 });
         then assert!(!imu.x_sign_at_risk());
         then for _ in 0..8 { bus.wait_for_data(); };
-        take sample = imu.sample();
+        take sample = imu.read();
         then assert_eq!(sample.counts().gyro(), [-4, -4, -4]);
         then assert_eq!(sample.gyro_udps(), [-400_000, -200_000, -200_000]);
     );
