@@ -9,6 +9,7 @@ use crate::alarms::{Alarm, AlarmNumber};
 use crate::burst::{BURST_BYTES, BURST_REQUEST, Burst, burst_with_gaps};
 use crate::calibration::{FactoryRestore, GyroBias, OnChipCompensation};
 use crate::channel::GyroRange;
+use crate::clock::SamplePeriod;
 #[cfg(doc)]
 use crate::clock::Timing;
 use crate::commands::{Product, Sleep};

@@ -17,6 +17,7 @@ use crate::register::Register;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Product {
     /// ADIS16400, PROD_ID 0x4010.
     Adis16400,
@@ -121,9 +122,13 @@ impl Protocol<'_> {
         Ok(())
     }
 
+    pub(crate) async fn set_sample_period(&mut self, period: SamplePeriod) -> Result<(), ProtocolError> {
+        self.configure(self.state.config.with_sample_period(period)).await
+    }
+
     pub(crate) async fn set_sample_rate(&mut self, hz: f64) -> Result<f64, ProtocolError> {
         let period = SamplePeriod::nearest(hz)?;
-        self.configure(self.state.config.with_sample_period(period)).await?;
+        self.set_sample_period(period).await?;
         Ok(period.hz())
     }
 
@@ -161,9 +166,12 @@ impl Protocol<'_> {
     /// Has the part set its gyro offsets from its outputs, which replaces a host-side bias; a negative offset of x then
     /// becomes the host-side bias.
     async fn run_auto_null(&mut self, command: u16, silence_us: u32) -> Result<GyroBias, ProtocolError> {
-        self.command(command, silence_us).await;
-        self.identity().await?;
+        self.write_low(Register::GlobCmd, command).await;
+        // Known from here on, should the procedure be interrupted: XGYRO_OFF may become negative.
         self.state.host_bias_x = 0;
+        self.state.x_sign_at_risk = true;
+        self.pause(silence_us).await;
+        self.identity().await?;
         self.keep_negative_x_bias_on_host().await
     }
 

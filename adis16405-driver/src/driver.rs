@@ -159,7 +159,15 @@ macro_rules! procedures {
             /// [`Error::Verify`] if a register did not take its value.
             framed fn configure(config: Config) -> ();
 
-            /// Sets the sample rate nearest to `hz` and returns the rate that was set, both in samples per second.
+            /// Sets the period of the internal sample clock. [`SamplePeriod`] is made from a rate in `f64`, `f32` or
+            /// 10⁻³ samples per second.
+            ///
+            /// # Errors
+            /// [`Error::Verify`].
+            framed fn set_sample_period(period: SamplePeriod) -> ();
+
+            /// Sets the sample rate nearest to `hz` and returns the rate that was set, both in samples per second. For
+            /// targets without a double-precision FPU, [`set_sample_period`](Self::set_sample_period) is cheaper.
             ///
             /// # Errors
             /// [`Error::Config`] if `hz` is not finite and positive, [`Error::Verify`].

@@ -95,6 +95,7 @@ pub struct FlashUpdate {
 /// An error of the SPI bus, an unexpected answer of the part, or a request that the part would not accept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Error<E> {
     /// The SPI bus failed.
     Spi(E),

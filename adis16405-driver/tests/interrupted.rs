@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use adis16405_driver::{Adis16405, Config, Error, Faults, GyroRange, Stimulus};
+use adis16405_driver::{Adis16405, Burst, Config, Error, Faults, GyroRange, SharedDelay, Stimulus};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
@@ -188,6 +188,53 @@ fn read_gives_a_sample_or_says_why_not() {
     assert_eq!(imu.read(), Err(Error::Spi(BusFault)));
     assert_eq!(imu.stimulus_response(Stimulus::Positive, &mut NoDelay), Err(Error::Spi(BusFault)));
     assert!(imu.is_ready(), "no stimulus was switched on");
+}
+
+/// Before, an error after the command left the bias of the host in place beside that of the part.
+#[test]
+fn an_interrupted_auto_null_leaves_no_stale_bias_on_the_host() {
+    let bus = Bus::new(0..0);
+    let mut imu = Adis16405::new(bus.clone(), Config::default());
+    imu.init().unwrap();
+    imu.set_gyro_offsets([-40, 0, 0]).unwrap();
+    let command = bus.transactions();
+    bus.0.borrow_mut().failing = command + 1..usize::MAX;
+    assert_eq!(imu.auto_null(&mut NoDelay), Err(Error::Spi(BusFault)));
+    assert_eq!(imu.sample_from(Burst::default()).host_bias_x(), 0);
+    assert!(imu.x_sign_at_risk(), "XGYRO_OFF may have become negative");
+}
+
+/// One delay serves the stalls of the SPI device and the pauses of the driver.
+#[test]
+fn a_shared_delay_serves_both_the_spi_device_and_the_driver() {
+    struct Total(u64);
+    impl DelayNs for Total {
+        fn delay_ns(&mut self, ns: u32) {
+            self.0 += u64::from(ns);
+        }
+    }
+    /// An SPI device that passes the stalls on to its delay, as those of embedded-hal-bus do.
+    struct Device<D>(Bus, D);
+    impl<D> ErrorType for Device<D> {
+        type Error = BusFault;
+    }
+    impl<D: DelayNs> SpiDevice for Device<D> {
+        fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), BusFault> {
+            for operation in operations.iter() {
+                if let Operation::DelayNs(ns) = operation {
+                    self.1.delay_ns(*ns);
+                }
+            }
+            SpiDevice::transaction(&mut self.0, operations)
+        }
+    }
+    let bus = Bus::new(0..0);
+    let delay = SharedDelay::new(Total(0));
+    let mut imu = Adis16405::new(Device(bus.clone(), &delay), Config::default());
+    imu.start_up(&mut &delay).unwrap();
+    let frames = bus.transactions() as u64;
+    // 290 ms of start-up; a stall of 75 µs after the first four frames, 16 µs after the others.
+    assert_eq!(delay.release().0, 290_000_000 + 4 * 75_000 + (frames - 4) * 16_000);
 }
 
 /// Futures that are dropped while a transaction is under way.
