@@ -1,6 +1,7 @@
 //! The methods of the driver over a blocking [`SpiDevice`].
 
 use core::pin::pin;
+use core::task::Poll;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Operation, SpiDevice};
@@ -17,7 +18,7 @@ use crate::config::Config;
 use crate::driver::{Adis16405, Blocking, procedures};
 use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::pins::{DacLevel, DioSignal, Gpio};
-use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot};
+use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot, resume};
 use crate::register::Register;
 use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
@@ -114,29 +115,26 @@ fn run<SPI: SpiDevice<u8>, T>(
 ) -> Result<T, Error<SPI::Error>> {
     let mut procedure = pin!(procedure);
     loop {
-        match slot.resume(procedure.as_mut()) {
-            Ok(result) => return result.map_err(Error::with_bus_error),
-            Err(request) => slot.respond(perform(spi, delay, request).map_err(Error::Spi)?),
+        match resume(procedure.as_mut()) {
+            Poll::Ready(result) => return result.map_err(Error::with_bus_error),
+            Poll::Pending => perform(spi, delay, slot).map_err(Error::Spi)?,
         }
     }
 }
 
-/// Carries out one request. Not inlined, so that all methods share one copy in flash.
+/// Carries out the request in the slot and responds to it. Not inlined, so that all methods share one copy in flash.
 #[inline(never)]
-fn perform<SPI: SpiDevice<u8>>(
-    spi: &mut SPI,
-    delay: &mut impl DelayNs,
-    request: BusRequest,
-) -> Result<[u8; 2], SPI::Error> {
+fn perform<SPI: SpiDevice<u8>>(spi: &mut SPI, delay: &mut impl DelayNs, slot: &RequestSlot) -> Result<(), SPI::Error> {
     let mut answer = [0; 2];
-    match request {
+    match slot.placed() {
         BusRequest::Frame { bytes, stall_ns } => {
             spi.transaction(&mut [Operation::Transfer(&mut answer, &bytes), Operation::DelayNs(stall_ns)])?;
         }
         BusRequest::ChipSelectPulse { ns } => spi.transaction(&mut [Operation::DelayNs(ns)])?,
         BusRequest::Pause { us } => delay.delay_us(us),
     }
-    Ok(answer)
+    slot.respond(answer);
+    Ok(())
 }
 
 /// The delay of methods whose procedure requests no pause.

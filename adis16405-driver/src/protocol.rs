@@ -73,8 +73,8 @@ impl RequestSlot {
         .await
     }
 
-    /// The request that was placed last.
-    fn placed(&self) -> BusRequest {
+    /// Called by the driver: the request that the procedure has placed.
+    pub(crate) fn placed(&self) -> BusRequest {
         let time = self.time.load(Relaxed);
         match self.request.load(Relaxed) {
             Self::PAUSE => BusRequest::Pause { us: time },
@@ -83,19 +83,16 @@ impl RequestSlot {
         }
     }
 
-    /// Called by the driver: runs the procedure up to its next request (`Err`) or to its end (`Ok`).
-    pub(crate) fn resume<T>(&self, procedure: Pin<&mut impl Future<Output = T>>) -> Result<T, BusRequest> {
-        // The waker is never used: a procedure can go on only after respond().
-        match procedure.poll(&mut Context::from_waker(Waker::noop())) {
-            Poll::Ready(output) => Ok(output),
-            Poll::Pending => Err(self.placed()),
-        }
-    }
-
     /// Called by the driver: the two bytes that the part sent during a frame, or zeros for other requests.
     pub(crate) fn respond(&self, response: [u8; 2]) {
         self.response.store(u32::from(u16::from_be_bytes(response)), Relaxed);
     }
+}
+
+/// Runs a procedure to its end (`Ready`) or up to its next request, which is then in its slot (`Pending`).
+pub(crate) fn resume<T>(procedure: Pin<&mut impl Future<Output = T>>) -> Poll<T> {
+    // The waker is never used: a procedure can go on only after respond().
+    procedure.poll(&mut Context::from_waker(Waker::noop()))
 }
 
 /// The error of a procedure, which has no bus that could fail.
