@@ -6,7 +6,7 @@
 
 use std::convert::Infallible;
 
-use adis16405_driver::{Adis16405, Burst, BurstValidator, Config, Counts, Product, Register};
+use adis16405_driver::{Adis16405, Burst, Config, Counts, Product, Register};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
@@ -60,12 +60,8 @@ impl DelayNs for NoDelay {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut imu = Adis16405::new(MockPart::default(), Config::default());
     let product = imu.start_up(&mut NoDelay)?;
-    let mut validator = BurstValidator::default().with_x_sign_at_risk(imu.x_sign_at_risk());
-
-    let burst = imu.burst()?;
-    let validity = validator.validate(&burst);
-    let sample = imu.sample_from(burst);
-    println!("{product:?}, usable: {}", validity.usable);
+    let sample = imu.read()?;
+    println!("{product:?}");
     println!("{:8.3?} °/s, {:8.5?} g, {:7.4?} gauss", sample.gyro_dps(), sample.accl_g(), sample.magn_gauss());
     println!("{:.1} °C, supply {:.3} V", sample.temp_degc(), sample.supply_v());
     Ok(())

@@ -14,7 +14,7 @@
 
 #[cfg(target_os = "linux")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    use adis16405_driver::{Adis16405, BurstValidator, Config, GyroRange, SamplePeriod};
+    use adis16405_driver::{Adis16405, Config, Error, Faults, GyroRange, SamplePeriod};
     use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
     use linux_embedded_hal::{Delay, SpidevDevice};
     use std::time::Duration;
@@ -30,20 +30,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let test = imu.self_test(&mut Delay)?;
     println!("{product:?}, self-test {}: {:?}", if test.passed() { "passed" } else { "failed" }, test.diagnosis);
 
-    let mut validator = BurstValidator::default().with_x_sign_at_risk(imu.x_sign_at_risk());
     for _ in 0..100 {
         // The data-ready line is not used here: reads are slower than the sensor's sampling, so each sample is new.
         std::thread::sleep(Duration::from_millis(10));
-        let burst = imu.burst()?;
-        let validity = validator.validate(&burst);
-        if validity.usable {
-            let sample = imu.sample_from(burst);
-            println!("{:8.3?} °/s {:7.4?} g {:.1} °C", sample.gyro_dps(), sample.accl_g(), sample.temp_degc());
-        } else {
-            println!("not usable: {}", validity.faults.causes().collect::<Vec<_>>().join(", "));
+        match imu.read() {
+            Ok(sample) => {
+                println!("{:8.3?} °/s {:7.4?} g {:.1} °C", sample.gyro_dps(), sample.accl_g(), sample.temp_degc());
+            }
+            Err(Error::Unusable(faults)) => {
+                println!("not usable: {}", faults.causes().collect::<Vec<_>>().join(", "));
+                if faults.contains(Faults::ERROR_ALARM) {
+                    println!("{:?}", imu.diagnosis()?);
+                }
+            }
+            Err(error) => return Err(error.into()),
         }
     }
-    for (cause, count) in validator.counters().by_cause().filter(|(_, count)| *count > 0) {
+    for (cause, count) in imu.fault_counters().by_cause().filter(|(_, count)| *count > 0) {
         println!("{count} × {cause}");
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The methods of the driver over a blocking [`SpiDevice`].
 
 use core::pin::pin;
+use core::task::Poll;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Operation, SpiDevice};
@@ -9,14 +10,15 @@ use crate::alarms::{Alarm, AlarmNumber};
 use crate::burst::{BURST_BYTES, BURST_REQUEST, Burst, burst_with_gaps};
 use crate::calibration::{FactoryRestore, GyroBias, OnChipCompensation};
 use crate::channel::GyroRange;
+use crate::clock::SamplePeriod;
 #[cfg(doc)]
 use crate::clock::Timing;
 use crate::commands::{Product, Sleep};
 use crate::config::Config;
 use crate::driver::{Adis16405, Blocking, procedures};
-use crate::error::{Diagnosis, Error};
+use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::pins::{DacLevel, DioSignal, Gpio};
-use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot};
+use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot, resume};
 use crate::register::Register;
 use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
@@ -31,26 +33,35 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
     ///
     /// # Errors
-    /// [`Error::Spi`]. [`BurstValidator`](crate::BurstValidator) decides whether the data are usable.
+    /// [`Error::Spi`]. Whether the data are usable is for [`read`](Self::read) or a
+    /// [`BurstValidator`](crate::BurstValidator) to decide.
     pub fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
         let stall_ns = self.state.stall_ns();
         match self.state.timing.word_gap_ns {
             0 => self
                 .spi
-                .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)])?,
-            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns))?,
+                .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)]),
+            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns)),
         }
+        .map_err(Error::Spi)?;
         Ok(Burst::from_bytes(&answer))
     }
 
-    /// Reads a burst and returns it as a sample, as [`sample_from`](Self::sample_from) does.
+    /// Reads a burst, validates it together with the bursts that this method has read before
+    /// ([`BurstValidator`](crate::BurstValidator)), and returns it as a sample. Call it at every data-ready edge.
+    ///
+    /// [`burst`](Self::burst) and [`sample_from`](Self::sample_from) give the sample without a check.
     ///
     /// # Errors
-    /// [`Error::Spi`]. The sample is not validated: see [`burst`](Self::burst).
-    pub fn sample(&mut self) -> Result<ImuSample, Error<SPI::Error>> {
+    /// [`Error::Unusable`] with the faults of the burst, [`Error::NotReady`] if the driver [is not](Self::is_ready),
+    /// [`Error::Spi`].
+    pub fn read(&mut self) -> Result<ImuSample, Error<SPI::Error>> {
+        if !self.is_ready() {
+            return Err(Error::NotReady);
+        }
         let burst = self.burst()?;
-        Ok(self.sample_from(burst))
+        self.checked_sample(burst).map_err(Error::Unusable)
     }
 }
 
@@ -79,6 +90,19 @@ macro_rules! methods {
             run(&mut self.spi, delay, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*))
         }
     };
+    (@stimulating [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
+        $($doc)*
+        pub fn $name(&mut self, $($declared)* delay: &mut impl DelayNs) -> Result<$output, Error<SPI::Error>> {
+            let slot = RequestSlot::new();
+            let mut protocol = Protocol::new(&slot, &mut self.state);
+            let result = run(&mut self.spi, delay, &slot, protocol.$name($($passed)*));
+            if self.state.stimulated {
+                // The first error is the one to report; the state tells whether this attempt has succeeded.
+                let _ = self.stop_stimulus();
+            }
+            result
+        }
+    };
 }
 procedures!(methods);
 
@@ -91,29 +115,26 @@ fn run<SPI: SpiDevice<u8>, T>(
 ) -> Result<T, Error<SPI::Error>> {
     let mut procedure = pin!(procedure);
     loop {
-        match slot.resume(procedure.as_mut()) {
-            Ok(result) => return result.map_err(Error::with_bus_error),
-            Err(request) => slot.respond(perform(spi, delay, request)?),
+        match resume(procedure.as_mut()) {
+            Poll::Ready(result) => return result.map_err(Error::with_bus_error),
+            Poll::Pending => perform(spi, delay, slot).map_err(Error::Spi)?,
         }
     }
 }
 
-/// Carries out one request. Not inlined, so that all methods share one copy in flash.
+/// Carries out the request in the slot and responds to it. Not inlined, so that all methods share one copy in flash.
 #[inline(never)]
-fn perform<SPI: SpiDevice<u8>>(
-    spi: &mut SPI,
-    delay: &mut impl DelayNs,
-    request: BusRequest,
-) -> Result<[u8; 2], SPI::Error> {
+fn perform<SPI: SpiDevice<u8>>(spi: &mut SPI, delay: &mut impl DelayNs, slot: &RequestSlot) -> Result<(), SPI::Error> {
     let mut answer = [0; 2];
-    match request {
+    match slot.placed() {
         BusRequest::Frame { bytes, stall_ns } => {
             spi.transaction(&mut [Operation::Transfer(&mut answer, &bytes), Operation::DelayNs(stall_ns)])?;
         }
         BusRequest::ChipSelectPulse { ns } => spi.transaction(&mut [Operation::DelayNs(ns)])?,
         BusRequest::Pause { us } => delay.delay_us(us),
     }
-    Ok(answer)
+    slot.respond(answer);
+    Ok(())
 }
 
 /// The delay of methods whose procedure requests no pause.

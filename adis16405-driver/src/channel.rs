@@ -25,7 +25,7 @@ impl GyroRange {
     }
 
     /// Size of one count in 10⁻⁶ °/s.
-    pub(crate) const fn lsb_udps(self) -> i32 {
+    pub const fn lsb_udps(self) -> i32 {
         match self {
             GyroRange::Dps300 => 50_000,
             GyroRange::Dps150 => 25_000,

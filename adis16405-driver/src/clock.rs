@@ -47,6 +47,9 @@ impl ClockMode {
     }
 }
 
+/// Units of 1/1638.4 s in 1000 s.
+const TICKS_PER_1000_S: u32 = 1_638_400;
+
 /// Period of the internal sample clock: time base · divisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -95,6 +98,53 @@ impl SamplePeriod {
         Ok(best)
     }
 
+    /// As [`nearest`](Self::nearest), in `f32`, for targets with a single-precision FPU.
+    ///
+    /// # Errors
+    /// [`ConfigError::Rate`] if `hz` is not finite and positive.
+    pub fn nearest_f32(hz: f32) -> Result<Self, ConfigError> {
+        if !(hz.is_finite() && hz > 0.0) {
+            return Err(ConfigError::Rate);
+        }
+        let mut best = Self::RESET;
+        for smpl_prd in 0x01..=0xFF {
+            let candidate = Self { smpl_prd };
+            if (candidate.hz_f32() - hz).abs() < (best.hz_f32() - hz).abs() {
+                best = candidate;
+            }
+        }
+        Ok(best)
+    }
+
+    /// As [`nearest`](Self::nearest), for a rate in 10⁻³ samples per second and in exact integers, for targets without
+    /// an FPU and for constants.
+    ///
+    /// # Errors
+    /// [`ConfigError::Rate`] if `millihz` is 0.
+    pub const fn nearest_millihz(millihz: u32) -> Result<Self, ConfigError> {
+        if millihz == 0 {
+            return Err(ConfigError::Rate);
+        }
+        // Above the fastest rate the fastest is the nearest. With this limit rate · ticks is below 2³².
+        let millihz = if millihz > 819_200 { 819_200 } else { millihz };
+        let mut best = Self::RESET;
+        let mut smpl_prd = 0x01;
+        loop {
+            let candidate = Self { smpl_prd };
+            // |rate of the candidate − millihz| · ticks of both
+            let (of_candidate, of_best) = (candidate.ticks(), best.ticks());
+            let candidate_off = TICKS_PER_1000_S.abs_diff(millihz * of_candidate) as u64 * of_best as u64;
+            let best_off = TICKS_PER_1000_S.abs_diff(millihz * of_best) as u64 * of_candidate as u64;
+            if candidate_off < best_off {
+                best = candidate;
+            }
+            if smpl_prd == 0xFF {
+                return Ok(best);
+            }
+            smpl_prd += 1;
+        }
+    }
+
     /// From the value of SMPL_PRD; `None` for 0x00, which selects the external clock.
     pub const fn from_register(smpl_prd: u8) -> Option<Self> {
         if smpl_prd == 0 { None } else { Some(Self { smpl_prd }) }
@@ -114,6 +164,16 @@ impl SamplePeriod {
     /// Sample rate in samples per second.
     pub const fn hz(self) -> f64 {
         1638.4 / self.ticks() as f64
+    }
+
+    /// Sample rate in samples per second.
+    pub const fn hz_f32(self) -> f32 {
+        1638.4 / self.ticks() as f32
+    }
+
+    /// Sample rate in 10⁻³ samples per second, rounded to the nearest integer.
+    pub const fn millihz(self) -> u32 {
+        (TICKS_PER_1000_S + self.ticks() / 2) / self.ticks()
     }
 
     /// The power mode that this period selects by the data sheet.
@@ -160,6 +220,7 @@ pub enum SampleClock {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum ConfigError {
     /// The sample rate is not finite and positive.
     Rate,

@@ -7,7 +7,7 @@ use crate::calibration::{FactoryRestore, GyroBias};
 use crate::channel::GyroRange;
 use crate::clock::{ClockMode, SamplePeriod};
 use crate::config::Config;
-use crate::error::{Diagnosis, Error};
+use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::protocol::{Protocol, ProtocolError, WriteOrder};
 use crate::register::Register;
 
@@ -17,6 +17,7 @@ use crate::register::Register;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Product {
     /// ADIS16400, PROD_ID 0x4010.
     Adis16400,
@@ -77,17 +78,28 @@ impl Protocol<'_> {
 
     pub(crate) async fn init(&mut self) -> Result<Product, ProtocolError> {
         let product = self.identity().await?;
+        if self.state.stimulated {
+            self.stop_stimulus().await?;
+        }
         self.configure(self.state.config).await?;
         self.gyro_offsets().await?;
         Ok(product)
     }
 
     pub(crate) async fn start_up(&mut self) -> Result<Product, ProtocolError> {
+        self.forget_registers();
         self.pause(self.state.timing.start_up_us).await;
         self.init().await
     }
 
+    /// The registers were loaded from flash: until they are read, neither configuration nor power mode is known.
+    fn forget_registers(&mut self) {
+        self.state.configured = false;
+        self.state.mode = ClockMode::LowPower;
+    }
+
     pub(crate) async fn configure(&mut self, config: Config) -> Result<(), ProtocolError> {
+        self.state.configured = false;
         let mode = self.state.timing.clock_mode(config.smpl_prd());
         // The longer stall of low-power mode is kept until the new sample period is known to be set.
         if mode == ClockMode::LowPower {
@@ -103,24 +115,30 @@ impl Protocol<'_> {
         let needed = GyroRange::from_sens_avg(before).map_or(0, GyroRange::min_filter_taps_log2);
         let order =
             if needed > config.filter_taps_log2() { WriteOrder::HighByteFirst } else { WriteOrder::LowByteFirst };
-        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), order).await?;
+        // Stored before the write: if it is interrupted, the part more likely has the new range than the old one.
         self.state.config = config;
+        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), order).await?;
+        self.state.configured = true;
         Ok(())
     }
 
+    pub(crate) async fn set_sample_period(&mut self, period: SamplePeriod) -> Result<(), ProtocolError> {
+        self.configure(self.state.config.with_sample_period(period)).await
+    }
+
     pub(crate) async fn set_sample_rate(&mut self, hz: f64) -> Result<f64, ProtocolError> {
-        let period = SamplePeriod::nearest(hz).map_err(Error::Config)?;
-        self.configure(self.state.config.with_sample_period(period)).await?;
+        let period = SamplePeriod::nearest(hz)?;
+        self.set_sample_period(period).await?;
         Ok(period.hz())
     }
 
     pub(crate) async fn set_range(&mut self, range: GyroRange) -> Result<(), ProtocolError> {
-        let config = self.state.config.with_range(range).map_err(Error::Config)?;
+        let config = self.state.config.with_range(range)?;
         self.configure(config).await
     }
 
     pub(crate) async fn set_filter_taps_log2(&mut self, filter_taps_log2: u8) -> Result<(), ProtocolError> {
-        let config = self.state.config.with_filter_taps_log2(filter_taps_log2).map_err(Error::Config)?;
+        let config = self.state.config.with_filter_taps_log2(filter_taps_log2)?;
         self.configure(config).await
     }
 
@@ -131,7 +149,9 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
-        self.command(SOFTWARE_RESET, self.state.timing.reset_us).await;
+        self.write_low(Register::GlobCmd, SOFTWARE_RESET).await;
+        self.forget_registers();
+        self.pause(self.state.timing.reset_us).await;
         self.init().await
     }
 
@@ -146,9 +166,12 @@ impl Protocol<'_> {
     /// Has the part set its gyro offsets from its outputs, which replaces a host-side bias; a negative offset of x then
     /// becomes the host-side bias.
     async fn run_auto_null(&mut self, command: u16, silence_us: u32) -> Result<GyroBias, ProtocolError> {
-        self.command(command, silence_us).await;
-        self.identity().await?;
+        self.write_low(Register::GlobCmd, command).await;
+        // Known from here on, should the procedure be interrupted: XGYRO_OFF may become negative.
         self.state.host_bias_x = 0;
+        self.state.x_sign_at_risk = true;
+        self.pause(silence_us).await;
+        self.identity().await?;
         self.keep_negative_x_bias_on_host().await
     }
 
@@ -169,15 +192,18 @@ impl Protocol<'_> {
         Ok(self.read(Register::FlashCnt).await)
     }
 
-    pub(crate) async fn flash_update(&mut self) -> Result<u16, ProtocolError> {
-        let before = self.flash_writes().await?;
+    pub(crate) async fn flash_update(&mut self) -> Result<FlashUpdate, ProtocolError> {
+        // A failure of an earlier update may still be flagged.
+        let before = self.diagnosis().await?;
+        let writes_before = self.flash_writes().await?;
         self.command(FLASH_UPDATE, self.state.timing.flash_update_us).await;
         let diagnosis = self.diagnosis().await?;
-        let after = self.flash_writes().await?;
-        if diagnosis.contains(Diagnosis::FLASH_UPDATE) || after == before {
-            return Err(Error::FlashUpdate { before, after, diagnosis });
+        let writes = self.flash_writes().await?;
+        let outcome = FlashUpdate { before, writes_before, writes, diagnosis };
+        if diagnosis.contains(Diagnosis::FLASH_UPDATE) || writes == writes_before {
+            return Err(Error::FlashUpdate(outcome));
         }
-        Ok(after)
+        Ok(outcome)
     }
 
     pub(crate) async fn sleep(&self, sleep: Sleep) -> Result<(), ProtocolError> {

@@ -8,6 +8,7 @@ use crate::clock::{PerClockMode, Timing};
 use crate::config::Config;
 use crate::protocol::DriverState;
 use crate::sample::ImuSample;
+use crate::validity::{BurstValidator, FaultCounters, Faults};
 
 /// Type parameter of a driver over a blocking [`SpiDevice`](embedded_hal::spi::SpiDevice).
 #[derive(Clone, Copy, Debug)]
@@ -27,12 +28,13 @@ pub enum Async {}
 pub struct Adis16405<SPI, MODE = Blocking> {
     pub(crate) spi: SPI,
     pub(crate) state: DriverState,
+    validator: BurstValidator,
     mode: PhantomData<MODE>,
 }
 
 impl<SPI, MODE> Adis16405<SPI, MODE> {
     pub(crate) fn with_state(spi: SPI, config: Config) -> Self {
-        Self { spi, state: DriverState::new(config), mode: PhantomData }
+        Self { spi, state: DriverState::new(config), validator: BurstValidator::default(), mode: PhantomData }
     }
 
     /// Sets the stall after each frame in ns, for both power modes.
@@ -62,6 +64,19 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
         self.state.config
     }
 
+    /// True if the part is known to have the [configuration](Self::config), and no stimulus of a manual self-test is on:
+    /// [`init`](Self::init) or a later [`configure`](Self::configure) has succeeded, and no configuration, reset or
+    /// stimulus since then was left unfinished by an error or a dropped future. If false, [`init`](Self::init) makes it
+    /// true.
+    pub fn is_ready(&self) -> bool {
+        self.state.configured && !self.state.stimulated
+    }
+
+    /// The number of bursts that [`read`](Self::read) has validated, and of their faults.
+    pub fn fault_counters(&self) -> &FaultCounters {
+        self.validator.counters()
+    }
+
     /// The times that the driver keeps.
     pub fn timing(&self) -> Timing {
         self.state.timing
@@ -74,9 +89,17 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
         self.state.x_sign_at_risk
     }
 
-    /// A burst of this part as a sample, with the present gyro range and host-side bias.
+    /// A burst of this part as a sample, with the present gyro range and host-side bias. Neither the burst is validated
+    /// nor is it checked that the driver [is ready](Self::is_ready): [`read`](Self::read) does both.
     pub fn sample_from(&self, burst: Burst) -> ImuSample {
         ImuSample::new(burst.counts(), self.state.config.range()).with_host_bias_x(self.state.host_bias_x)
+    }
+
+    /// The next burst of this part as a sample if it is usable, else its faults.
+    pub(crate) fn checked_sample(&mut self, burst: Burst) -> Result<ImuSample, Faults> {
+        self.validator = self.validator.with_x_sign_at_risk(self.state.x_sign_at_risk);
+        let validity = self.validator.validate(&burst);
+        if validity.usable { Ok(self.sample_from(burst)) } else { Err(validity.faults) }
     }
 
     /// Returns the SPI device.
@@ -87,7 +110,8 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
 
 /// The methods of the driver that run a procedure of [`Protocol`](crate::protocol::Protocol), each with the name of its
 /// procedure. The macro `$make_methods` makes a blocking or an asynchronous method of each row. Procedures marked
-/// `framed` consist of frames only; those marked `paced` contain pauses, and their methods take a delay.
+/// `framed` consist of frames only; those marked `paced` contain pauses, and their methods take a delay. A method marked
+/// `stimulating` is paced, and switches the stimulus of the manual self-test off if its procedure ends with an error.
 macro_rules! procedures {
     ($make_methods:ident) => {
         $make_methods! {
@@ -100,7 +124,8 @@ macro_rules! procedures {
             /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and reads the gyro offsets
             /// ([`x_sign_at_risk`](Self::x_sign_at_risk)).
             ///
-            /// Only bytes that differ are written, the lower byte first (in SENS_AVG the upper byte first where the
+            /// If a manual self-test has left its stimulus on, it is switched off first. Only bytes that differ are
+            /// written, the lower byte first (in SENS_AVG the upper byte first where the
             /// filter would be too short for the old range). A register that was written is read back.
             ///
             /// # Errors
@@ -119,7 +144,8 @@ macro_rules! procedures {
             /// part as [`init`](Self::init) does.
             ///
             /// A reset loads the registers from flash, and sets the volatile ones (GPIO, sleep, auxiliary DAC) to their
-            /// reset values.
+            /// reset values. If SMPL_PRD in flash selects low-power mode, SCK must not exceed 300 kHz until `init` has
+            /// set another one; the driver keeps the stall of that mode as long.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
@@ -133,7 +159,15 @@ macro_rules! procedures {
             /// [`Error::Verify`] if a register did not take its value.
             framed fn configure(config: Config) -> ();
 
-            /// Sets the sample rate nearest to `hz` and returns the rate that was set, both in samples per second.
+            /// Sets the period of the internal sample clock. [`SamplePeriod`] is made from a rate in `f64`, `f32` or
+            /// 10⁻³ samples per second.
+            ///
+            /// # Errors
+            /// [`Error::Verify`].
+            framed fn set_sample_period(period: SamplePeriod) -> ();
+
+            /// Sets the sample rate nearest to `hz` and returns the rate that was set, both in samples per second. For
+            /// targets without a double-precision FPU, [`set_sample_period`](Self::set_sample_period) is cheaper.
             ///
             /// # Errors
             /// [`Error::Config`] if `hz` is not finite and positive, [`Error::Verify`].
@@ -187,14 +221,14 @@ macro_rules! procedures {
             framed fn diagnosis() -> Diagnosis;
 
             /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end. The other bits of MSC_CTRL keep
-            /// their values; a manual self-test that was on is interrupted and switched on again afterwards.
+            /// their values, except that a manual self-test that was on is switched off.
             ///
             /// # Errors
             /// [`Error::Deadline`] if it does not end within twice its usual time, [`Error::Product`] if the part does
             /// not answer, [`Error::Verify`].
             paced fn self_test() -> SelfTest;
 
-            /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end.
+            /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end. It too switches a manual self-test off.
             ///
             /// # Errors
             /// Those of [`self_test`](Self::self_test).
@@ -205,8 +239,18 @@ macro_rules! procedures {
             /// must be still. The limits of a valid response are in the data sheet of the part.
             ///
             /// # Errors
-            /// [`Error::Verify`] if MSC_CTRL did not take the stimulus bits.
-            paced fn stimulus_response(stimulus: Stimulus) -> [i16; 6];
+            /// [`Error::Verify`] if MSC_CTRL did not take the stimulus bits. After any error the method tries once more
+            /// to switch the stimulus off. If that fails too, or if the future is dropped, the sensors stay deflected
+            /// until [`stop_stimulus`](Self::stop_stimulus), [`init`](Self::init) or [`self_test`](Self::self_test)
+            /// succeeds.
+            stimulating fn stimulus_response(stimulus: Stimulus) -> [i16; 6];
+
+            /// Switches the stimulus of a manual self-test off (MSC_CTRL bits 9 and 8). The outputs are then settled
+            /// after the length of the filter.
+            ///
+            /// # Errors
+            /// [`Error::Verify`] if MSC_CTRL did not take the bits.
+            framed fn stop_stimulus() -> ();
 
             /// The bias correction of the gyros, as applied by the part and by the driver.
             ///
@@ -293,12 +337,12 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             framed fn flash_writes() -> u16;
 
-            /// Writes the present settings to flash (GLOB_CMD bit 3), leaves the bus silent meanwhile, and returns the
-            /// number of flash writes.
+            /// Reads DIAG_STAT and FLASH_CNT, writes the present settings to flash (GLOB_CMD bit 3), leaves the bus
+            /// silent meanwhile, and reads both again.
             ///
             /// # Errors
-            /// [`Error::FlashUpdate`] if DIAG_STAT reports a failure, or if FLASH_CNT did not change.
-            paced fn flash_update() -> u16;
+            /// [`Error::FlashUpdate`] if DIAG_STAT reports a failure of this update, or if FLASH_CNT did not change.
+            paced fn flash_update() -> FlashUpdate;
 
             /// The pin and polarity of the data-ready signal; `None` if it is off.
             ///

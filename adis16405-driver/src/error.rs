@@ -6,6 +6,7 @@ use core::fmt;
 use crate::channel::Channel;
 use crate::clock::ConfigError;
 use crate::register::Register;
+use crate::validity::Faults;
 
 bitflags::bitflags! {
     /// The status and error flags of DIAG_STAT. A read clears the register, so a procedure that reads it returns the
@@ -76,9 +77,25 @@ impl defmt::Format for Diagnosis {
     }
 }
 
+/// Outcome of a flash update, successful or not. Both reads of DIAG_STAT cleared the register.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FlashUpdate {
+    /// DIAG_STAT before the command: [`Diagnosis::FLASH_UPDATE`] here belongs to an earlier update.
+    pub before: Diagnosis,
+    /// FLASH_CNT before the command.
+    pub writes_before: u16,
+    /// FLASH_CNT after it.
+    pub writes: u16,
+    /// DIAG_STAT after the command.
+    pub diagnosis: Diagnosis,
+}
+
 /// An error of the SPI bus, an unexpected answer of the part, or a request that the part would not accept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Error<E> {
     /// The SPI bus failed.
     Spi(E),
@@ -106,14 +123,12 @@ pub enum Error<E> {
         waited_us: u32,
     },
     /// The flash update failed, or FLASH_CNT did not change.
-    FlashUpdate {
-        /// FLASH_CNT before the command.
-        before: u16,
-        /// FLASH_CNT after it.
-        after: u16,
-        /// DIAG_STAT after it; the read cleared the register.
-        diagnosis: Diagnosis,
-    },
+    FlashUpdate(FlashUpdate),
+    /// The burst that was read is not usable.
+    Unusable(Faults),
+    /// It is not known which configuration the part has, or a stimulus of the manual self-test may be on:
+    /// [`init`](crate::Adis16405::init) has to succeed first. Nothing was sent.
+    NotReady,
     /// The part does not accept the configuration. Nothing was written.
     Config(ConfigError),
     /// The value does not fit the register. Nothing was written.
@@ -137,7 +152,9 @@ impl Error<Infallible> {
             Error::Product { answer } => Error::Product { answer },
             Error::Verify { register, expected, answer } => Error::Verify { register, expected, answer },
             Error::Deadline { register, mask, waited_us } => Error::Deadline { register, mask, waited_us },
-            Error::FlashUpdate { before, after, diagnosis } => Error::FlashUpdate { before, after, diagnosis },
+            Error::FlashUpdate(outcome) => Error::FlashUpdate(outcome),
+            Error::Unusable(faults) => Error::Unusable(faults),
+            Error::NotReady => Error::NotReady,
             Error::Config(error) => Error::Config(error),
             Error::Value { register, value } => Error::Value { register, value },
             Error::ReadOnly(register) => Error::ReadOnly(register),
@@ -146,9 +163,9 @@ impl Error<Infallible> {
     }
 }
 
-impl<E> From<E> for Error<E> {
-    fn from(error: E) -> Self {
-        Error::Spi(error)
+impl<E> From<ConfigError> for Error<E> {
+    fn from(error: ConfigError) -> Self {
+        Error::Config(error)
     }
 }
 
@@ -167,10 +184,15 @@ impl<E: fmt::Debug> fmt::Display for Error<E> {
                 let name = register.name();
                 write!(f, "{name} still has bits of {mask:#06x} set after {waited_us} µs")
             }
-            Error::FlashUpdate { before, after, diagnosis } => {
+            Error::FlashUpdate(FlashUpdate { writes_before, writes, diagnosis, .. }) => {
                 let diagnosis = diagnosis.bits();
-                write!(f, "flash update failed: FLASH_CNT was {before} and is {after}, DIAG_STAT {diagnosis:#06x}")
+                write!(
+                    f,
+                    "flash update failed: FLASH_CNT was {writes_before} and is {writes}, DIAG_STAT {diagnosis:#06x}"
+                )
             }
+            Error::Unusable(faults) => write!(f, "the burst is not usable: {}", faults.cause().unwrap_or_default()),
+            Error::NotReady => write!(f, "init() has to succeed first"),
             Error::Config(error) => write!(f, "{error}"),
             Error::Value { register, value } => write!(f, "{value} does not fit {}", register.name()),
             Error::ReadOnly(register) => write!(f, "{} cannot be written", register.name()),

@@ -7,21 +7,27 @@
 //! ```
 //!
 //! ```
-//! use adis16405_driver::{Adis16405, BurstValidator, Config, Error, GyroRange, SamplePeriod};
+//! use adis16405_driver::{Adis16405, Config, Error, GyroRange, SamplePeriod};
 //! use embedded_hal::{delay::DelayNs, spi::SpiDevice};
 //!
 //! fn read<SPI: SpiDevice<u8>>(spi: SPI, delay: &mut impl DelayNs) -> Result<(), Error<SPI::Error>> {
-//!     let period = SamplePeriod::nearest(204.8).map_err(Error::Config)?;
-//!     let config = Config::new(GyroRange::Dps300, 2, period).map_err(Error::Config)?;
+//!     let period = SamplePeriod::nearest(204.8)?;
+//!     let config = Config::new(GyroRange::Dps300, 2, period)?;
 //!     let mut imu = Adis16405::new(spi, config);
 //!     imu.start_up(delay)?;
 //!     let healthy = imu.self_test(delay)?.passed();
-//!     let mut validator = BurstValidator::default().with_x_sign_at_risk(imu.x_sign_at_risk());
 //!     // … at every data-ready edge:
-//!     let burst = imu.burst()?;
-//!     if validator.validate(&burst).usable {
-//!         let [x, y, z] = imu.sample_from(burst).gyro_dps();
-//!         # let _ = (healthy, x, y, z);
+//!     match imu.read() {
+//!         Ok(sample) => {
+//!             let [x, y, z] = sample.gyro_dps();
+//!             # let _ = (healthy, x, y, z);
+//!         }
+//!         Err(Error::Unusable(faults)) if faults.contains(adis16405_driver::Faults::ERROR_ALARM) => {
+//!             let reason = imu.diagnosis()?; // Clears DIAG_STAT, which else keeps the flag set.
+//!             # let _ = reason;
+//!         }
+//!         Err(Error::Unusable(_)) => (), // Left out.
+//!         Err(error) => return Err(error),
 //!     }
 //!     Ok(())
 //! }
@@ -58,6 +64,8 @@
 //! # Ok(()) }
 //! ```
 //!
+//! The methods that wait take a delay as well. If your HAL has only one, [`SharedDelay`] serves both.
+//!
 //! `examples/mock.rs` runs without hardware; `examples/spidev.rs` reads a part on a Linux host.
 //!
 //! # Validity of a burst
@@ -69,7 +77,7 @@
 //! |---|---|---|---|
 //! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0, or all bits 1 | no | check wiring and power; then [`start_up`](Adis16405::start_up) |
 //! | [`SHIFTED`](Faults::SHIFTED) | a valid burst, shifted by 1 to 15 bits | no | check SCK; the next transaction is aligned again |
-//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | a new-data flag is clear | no | wait for data ready |
+//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | the new-data flag of an inertial word is clear | no | wait for data ready |
 //! | [`FROZEN`](Faults::FROZEN) | twelve words equal for 512 bursts | no | [`software_reset`](Adis16405::software_reset) |
 //! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | no | a damaged word, or the sign erratum |
 //! | [`X_SIGN`](Faults::X_SIGN) | an x rate that may lack its sign bit | no | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
@@ -80,6 +88,30 @@
 //! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor. All were a full sample
 //! period apart, and 37 of them differed in another word. A sample that was read twice is distinguished from one that
 //! is equal by chance by its new-data flags, or, in a recording without them, by its time.
+//!
+//! # Errors and cancellation
+//!
+//! A method whose bus fails, or whose future is dropped, stops where it is. A transaction that was under way may or may
+//! not have reached the part. The driver itself stays consistent, and the next call works: each read begins with its own
+//! request, and each transaction with a falling edge of chip select, provided that the SPI device releases it when its
+//! future is dropped. What the part may be left with, and the remedy:
+//!
+//! | interrupted | state of the part | remedy |
+//! |---|---|---|
+//! | [`burst`](Adis16405::burst), [`read`](Adis16405::read), register reads | new-data flags are cleared | none; the next sample is new |
+//! | [`init`](Adis16405::init), [`configure`](Adis16405::configure) and the methods that set rate, range or filter | old or new period, range and filter | [`init`](Adis16405::init); until then [`read`](Adis16405::read) refuses |
+//! | [`start_up`](Adis16405::start_up), [`software_reset`](Adis16405::software_reset) | settings of the flash memory, perhaps still busy | [`start_up`](Adis16405::start_up); until then [`read`](Adis16405::read) refuses |
+//! | [`stimulus_response`](Adis16405::stimulus_response) | sensors deflected, unless the driver could switch that off | [`stop_stimulus`](Adis16405::stop_stimulus) or [`init`](Adis16405::init); until then [`read`](Adis16405::read) refuses |
+//! | [`self_test`](Adis16405::self_test), [`flash_test`](Adis16405::flash_test) | the test goes on and ends by itself | wait; flags of DIAG_STAT that were read are lost |
+//! | [`auto_null`](Adis16405::auto_null), [`precision_auto_null`](Adis16405::precision_auto_null) | busy up to 30 s; a negative XGYRO_OFF | wait, then [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
+//! | setters of offsets, factors, alarms and pins | some registers old, some new, one perhaps with one new byte | call the setter again |
+//! | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) | XGYRO_OFF may be 0 and its value lost | read [`gyro_offsets`](Adis16405::gyro_offsets) before, and set them again |
+//! | [`factory_restore`](Adis16405::factory_restore) | old or factory corrections | call it again; corrections that it has read are lost |
+//! | [`flash_update`](Adis16405::flash_update) | flash old, new or being written | wait, compare [`flash_writes`](Adis16405::flash_writes), call it again; flags of DIAG_STAT that were read are lost |
+//! | [`sleep`](Adis16405::sleep), [`wake`](Adis16405::wake) | asleep or awake | [`wake`](Adis16405::wake) |
+//!
+//! A timeout around any method is therefore possible; `burst` and `read` may be dropped at any time without a loss other
+//! than that sample.
 //!
 //! # Unconfirmed facts
 //!
@@ -113,6 +145,7 @@ mod channel;
 mod clock;
 mod commands;
 mod config;
+mod delay;
 mod driver;
 mod error;
 mod pins;
@@ -129,15 +162,29 @@ pub use channel::{Channel, GyroRange};
 pub use clock::{ClockMode, ConfigError, PerClockMode, SampleClock, SamplePeriod, TimeBase, Timing};
 pub use commands::{Product, Sleep};
 pub use config::{BartlettFilter, Config};
+pub use delay::SharedDelay;
 #[cfg(feature = "async")]
 pub use driver::Async;
 pub use driver::{Adis16405, Blocking};
-pub use error::{Diagnosis, Error};
+pub use error::{Diagnosis, Error, FlashUpdate};
 pub use pins::{DacLevel, Dio, DioLine, DioSignal, Gpio, Polarity};
 pub use register::{Access, Register};
 pub use sample::ImuSample;
 pub use self_test::{FlashTest, SelfTest, Stimulus};
 pub use validity::{BurstValidator, FaultCounters, Faults, Validity};
+
+/// Types that grow with the family need a wildcard arm.
+///
+/// ```compile_fail,E0004
+/// fn name(product: adis16405_driver::Product) -> &'static str {
+///     match product {
+///         adis16405_driver::Product::Adis16400 => "ADIS16400",
+///         adis16405_driver::Product::Adis16405 => "ADIS16405",
+///     }
+/// }
+/// ```
+#[cfg(doctest)]
+struct NonExhaustive;
 
 /// Compiles the example of the README as a documentation test.
 #[cfg(doctest)]

@@ -5,10 +5,10 @@
 //! The blocking or the asynchronous driver polls the procedure, carries out each request on its bus, and resumes the
 //! procedure with the response. Every sequence of frames therefore exists once.
 
-use core::cell::Cell;
 use core::convert::Infallible;
 use core::future::poll_fn;
 use core::pin::Pin;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use core::task::{Context, Poll, Waker};
 
 use crate::clock::{ClockMode, Timing};
@@ -28,40 +28,71 @@ pub(crate) enum BusRequest {
 }
 
 /// Passes requests from a procedure to the driver, and responses back.
+///
+/// The fields are atomic so that the futures of the driver are `Send`. Both sides run in the same future, one after the
+/// other, so loads and stores need no order among threads.
 #[derive(Debug)]
 pub(crate) struct RequestSlot {
-    request: Cell<BusRequest>,
-    response: Cell<Option<[u8; 2]>>,
+    /// The two bytes of a frame, or [`PAUSE`](Self::PAUSE), or [`CHIP_SELECT_PULSE`](Self::CHIP_SELECT_PULSE).
+    request: AtomicU32,
+    /// Stall or pulse in ns, or pause in µs.
+    time: AtomicU32,
+    /// The two bytes received, or [`NO_RESPONSE`](Self::NO_RESPONSE).
+    response: AtomicU32,
 }
 
 impl RequestSlot {
+    const PAUSE: u32 = 1 << 16;
+    const CHIP_SELECT_PULSE: u32 = 2 << 16;
+    const NO_RESPONSE: u32 = 1 << 16;
+
     pub(crate) const fn new() -> Self {
-        Self { request: Cell::new(BusRequest::Pause { us: 0 }), response: Cell::new(None) }
+        Self {
+            request: AtomicU32::new(Self::PAUSE),
+            time: AtomicU32::new(0),
+            response: AtomicU32::new(Self::NO_RESPONSE),
+        }
     }
 
     /// Called by a procedure: places a request and waits for its response.
     async fn request(&self, request: BusRequest) -> [u8; 2] {
-        self.request.set(request);
-        poll_fn(|_| match self.response.take() {
-            Some(response) => Poll::Ready(response),
-            None => Poll::Pending,
+        let (request, time) = match request {
+            BusRequest::Frame { bytes, stall_ns } => (u32::from(u16::from_be_bytes(bytes)), stall_ns),
+            BusRequest::ChipSelectPulse { ns } => (Self::CHIP_SELECT_PULSE, ns),
+            BusRequest::Pause { us } => (Self::PAUSE, us),
+        };
+        self.request.store(request, Relaxed);
+        self.time.store(time, Relaxed);
+        poll_fn(|_| match self.response.load(Relaxed) {
+            Self::NO_RESPONSE => Poll::Pending,
+            response => {
+                self.response.store(Self::NO_RESPONSE, Relaxed);
+                Poll::Ready((response as u16).to_be_bytes())
+            }
         })
         .await
     }
 
-    /// Called by the driver: runs the procedure up to its next request (`Err`) or to its end (`Ok`).
-    pub(crate) fn resume<T>(&self, procedure: Pin<&mut impl Future<Output = T>>) -> Result<T, BusRequest> {
-        // The waker is never used: a procedure can go on only after respond().
-        match procedure.poll(&mut Context::from_waker(Waker::noop())) {
-            Poll::Ready(output) => Ok(output),
-            Poll::Pending => Err(self.request.get()),
+    /// Called by the driver: the request that the procedure has placed.
+    pub(crate) fn placed(&self) -> BusRequest {
+        let time = self.time.load(Relaxed);
+        match self.request.load(Relaxed) {
+            Self::PAUSE => BusRequest::Pause { us: time },
+            Self::CHIP_SELECT_PULSE => BusRequest::ChipSelectPulse { ns: time },
+            bytes => BusRequest::Frame { bytes: (bytes as u16).to_be_bytes(), stall_ns: time },
         }
     }
 
     /// Called by the driver: the two bytes that the part sent during a frame, or zeros for other requests.
     pub(crate) fn respond(&self, response: [u8; 2]) {
-        self.response.set(Some(response));
+        self.response.store(u32::from(u16::from_be_bytes(response)), Relaxed);
     }
+}
+
+/// Runs a procedure to its end (`Ready`) or up to its next request, which is then in its slot (`Pending`).
+pub(crate) fn resume<T>(procedure: Pin<&mut impl Future<Output = T>>) -> Poll<T> {
+    // The waker is never used: a procedure can go on only after respond().
+    procedure.poll(&mut Context::from_waker(Waker::noop()))
 }
 
 /// The error of a procedure, which has no bus that could fail.
@@ -74,19 +105,32 @@ pub(crate) struct DriverState {
     pub(crate) timing: Timing,
     /// Whether changed registers are read back and compared.
     pub(crate) verify: bool,
-    /// The power mode of the part. While it changes, low-power mode, which has the longer stall.
+    /// The power mode of the part. While it is unknown or changes, low-power mode, which has the longer stall.
     pub(crate) mode: ClockMode,
     /// Bias correction of gyro x that the driver adds instead of XGYRO_OFF, in counts of 0.0125 °/s.
     pub(crate) host_bias_x: i16,
     /// True if XGYRO_OFF was negative when it was last read or written.
     pub(crate) x_sign_at_risk: bool,
+    /// True from the moment before a stimulus of the manual self-test is switched on until it is known to be off.
+    pub(crate) stimulated: bool,
+    /// True if the part is known to have `config`.
+    pub(crate) configured: bool,
 }
 
 impl DriverState {
     pub(crate) const fn new(config: Config) -> Self {
         let timing = Timing::DEFAULT;
         let mode = timing.clock_mode(config.smpl_prd());
-        Self { config, timing, verify: true, mode, host_bias_x: 0, x_sign_at_risk: false }
+        Self {
+            config,
+            timing,
+            verify: true,
+            mode,
+            host_bias_x: 0,
+            x_sign_at_risk: false,
+            configured: false,
+            stimulated: false,
+        }
     }
 
     /// Stall after a frame in the present power mode, ns.

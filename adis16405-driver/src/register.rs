@@ -21,6 +21,7 @@ macro_rules! registers {
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[repr(u8)]
+        #[non_exhaustive]
         pub enum Register { $($(#[$doc])* $variant = $address,)* }
 
         impl Register {

@@ -62,7 +62,7 @@ pub enum Stimulus {
 /// MSC_CTRL bits that start a test and clear themselves at its end.
 const FLASH_TEST: u16 = 1 << 11;
 const SELF_TEST: u16 = 1 << 10;
-/// The other bits of MSC_CTRL, which a test must leave as they were.
+/// The other bits of MSC_CTRL: a test leaves them as they were, except that it switches [`STIMULI`] off.
 const SETTINGS: u16 = 0x03C7;
 /// MSC_CTRL bits of the manual self-test, positive and negative.
 const STIMULI: u16 = 0x0300;
@@ -95,7 +95,7 @@ impl Protocol<'_> {
     }
 
     /// Runs the test of an MSC_CTRL bit: sets the bit, waits until the part clears it, and restores the rest of the
-    /// register. Only the upper byte is written at the start, since the lower one holds the data-ready setting. Returns
+    /// register, but leaves the manual self-test off. Only the upper byte is written at the start, since the lower one holds the data-ready setting. Returns
     /// DIAG_STAT before the test, whether the test ran, and DIAG_STAT after it.
     async fn run_test(&mut self, bit: u16, usual_us: u32) -> Result<(Diagnosis, bool, Diagnosis), ProtocolError> {
         // A part that is absent may read as zeros, which would look like a test that has ended.
@@ -106,7 +106,8 @@ impl Protocol<'_> {
         let ran = self.wait_until_clear(Register::MscCtrl, bit, usual_us.saturating_mul(2)).await?;
         let diagnosis = self.diagnosis().await?;
         let now = self.read(Register::MscCtrl).await;
-        self.update_from(Register::MscCtrl, now, SETTINGS, control, WriteOrder::LowByteFirst).await?;
+        self.update_from(Register::MscCtrl, now, SETTINGS, control & !STIMULI, WriteOrder::LowByteFirst).await?;
+        self.state.stimulated = false;
         Ok((before, ran, diagnosis))
     }
 
@@ -115,16 +116,23 @@ impl Protocol<'_> {
             Stimulus::Positive => 1 << 8,
             Stimulus::Negative => 1 << 9,
         };
-        self.update_register(Register::MscCtrl, STIMULI, 0).await?;
+        self.stop_stimulus().await?;
         let rest = self.inertial_sums().await;
+        self.state.stimulated = true;
         self.update_register(Register::MscCtrl, STIMULI, bits).await?;
         let stimulated = self.inertial_sums().await;
-        self.update_register(Register::MscCtrl, STIMULI, 0).await?;
+        self.stop_stimulus().await?;
         let mut response = [0; 6];
         for (response, (with, without)) in response.iter_mut().zip(stimulated.into_iter().zip(rest)) {
             *response = ((with - without) / AVERAGED) as i16;
         }
         Ok(response)
+    }
+
+    pub(crate) async fn stop_stimulus(&mut self) -> Result<(), ProtocolError> {
+        self.update_register(Register::MscCtrl, STIMULI, 0).await?;
+        self.state.stimulated = false;
+        Ok(())
     }
 
     /// Sums over [`AVERAGED`] samples of the six inertial outputs, taken by single reads after the filter has settled.

@@ -11,7 +11,9 @@ bitflags::bitflags! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Faults: u16 {
-        /// The new-data flag of at least one word is clear: the word was read before.
+        /// The new-data flag of at least one inertial word (gyroscopes and accelerometers) is clear: the word was read
+        /// before. The flags of the other words are not used, since no source at hand confirms that supply,
+        /// magnetometers, temperature and auxiliary input are refreshed with every sample.
         const NO_NEW_DATA = 1 << 0;
         /// The error/alarm flag of at least one word is set; DIAG_STAT holds the reason.
         const ERROR_ALARM = 1 << 1;
@@ -90,19 +92,20 @@ impl Burst {
         let words = &self.words;
         let all = words.iter().fold(u16::MAX, |all, word| all & word.0);
         let any = words.iter().fold(0, |any, word| any | word.0);
+        let inertial = words[INERTIAL_WORDS].iter().fold(u16::MAX, |all, word| all & word.0);
         let possible = |channel| (-MAX_RATE..=MAX_RATE).contains(&words[channel as usize].counts(channel));
         let rates_are_possible = possible(Channel::GyroX) && possible(Channel::GyroY) && possible(Channel::GyroZ);
 
         let mut faults = Faults::empty();
-        faults.set(Faults::NO_NEW_DATA, !OutputWord(all).new_data());
+        faults.set(Faults::NO_NEW_DATA, !OutputWord(inertial).new_data());
         faults.set(Faults::ERROR_ALARM, OutputWord(any).error_alarm());
         faults.set(Faults::SUPPLY, !supply_in_range(words[Channel::Supply as usize]));
         faults.set(Faults::STUCK_LOW, any == 0x0000);
         faults.set(Faults::STUCK_HIGH, all == 0xFFFF);
         faults.set(Faults::IMPOSSIBLE_RATE, !rates_are_possible);
-        // A shifted burst also has an implausible supply and at least one clear new-data flag.
+        // A shifted burst also has an implausible supply and, in any of its words, a clear new-data flag.
         let stuck = faults.intersects(Faults::STUCK_LOW | Faults::STUCK_HIGH);
-        if faults.contains(Faults::NO_NEW_DATA | Faults::SUPPLY) && !stuck {
+        if faults.contains(Faults::SUPPLY) && !OutputWord(all).new_data() && !stuck {
             faults.set(Faults::SHIFTED, is_shifted(words));
         }
         faults
@@ -113,14 +116,18 @@ fn supply_in_range(word: OutputWord) -> bool {
     SUPPLY_COUNTS.contains(&word.counts(Channel::Supply))
 }
 
-/// Searches for a shift by which eleven words get a set new-data flag. Where the words came up to a byte late, the
-/// first shifted word is the supply and must be in range. Where they came early, the first shifted word is the x rate,
-/// of which any value is accepted; the supply, partly lost, is not checked.
+/// Searches for a shift by which the inertial words get a set new-data flag, and eleven words equal error/alarm flags,
+/// since the part sets that flag in all words or in none. Where the words came up to a byte late, the first shifted word
+/// is the supply and must be in range. Where they came early, it is the x rate, of which any value is accepted; the
+/// supply, partly lost, is not checked.
 fn is_shifted(words: &[OutputWord; 12]) -> bool {
+    let new = |words: &[OutputWord]| words.iter().all(|word| word.new_data());
     (1..16).any(|bits| {
-        let mut moved = words.windows(2).map(|pair| OutputWord(pair[0].0 << bits | pair[1].0 >> (16 - bits)));
-        let late = bits <= 8 && moved.clone().next().is_some_and(supply_in_range);
-        (late || bits >= 8) && moved.all(OutputWord::new_data)
+        let moved: [OutputWord; 11] =
+            core::array::from_fn(|n| OutputWord(words[n].0 << bits | words[n + 1].0 >> (16 - bits)));
+        let late = bits <= 8 && supply_in_range(moved[0]) && new(&moved[1..7]);
+        let early = bits >= 8 && new(&moved[..6]);
+        (late || early) && moved.iter().all(|word| word.error_alarm() == moved[0].error_alarm())
     })
 }
 
@@ -179,6 +186,8 @@ impl FaultCounters {
     }
 }
 
+/// The positions of the inertial words in a burst.
+const INERTIAL_WORDS: core::ops::RangeInclusive<usize> = Channel::GyroX as usize..=Channel::AcclZ as usize;
 /// The 14 bits of an output word below its flags.
 const DATA: u16 = 0x3FFF;
 /// Gyroscopes and accelerometers, bit n for channel n.

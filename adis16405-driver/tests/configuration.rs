@@ -4,6 +4,30 @@ use std::f64::consts::PI;
 
 use adis16405_driver::{BartlettFilter, ClockMode, Config, ConfigError, GyroRange, SamplePeriod, TimeBase};
 
+/// Integers and `f32` find the period that `f64` finds, and return its rate: for the rate of every period, for rates just
+/// off the middle between two, and beyond both ends.
+#[test]
+fn rates_in_f32_and_in_integers_are_those_in_f64() {
+    let rates = (0x01..=0xFF).map(|smpl_prd| SamplePeriod::from_register(smpl_prd).unwrap().millihz());
+    let others = [1, 412, 413, 1_000, 12_850, 12_851, 50_000, 100_000, 200_000, 682_000, 683_000, 819_201, u32::MAX];
+    for millihz in rates.chain(others) {
+        let expected = SamplePeriod::nearest(f64::from(millihz) * 1e-3).unwrap();
+        assert_eq!(SamplePeriod::nearest_millihz(millihz).unwrap().ticks(), expected.ticks(), "{millihz}");
+        assert_eq!(SamplePeriod::nearest_f32(millihz as f32 * 1e-3).unwrap().ticks(), expected.ticks(), "{millihz}");
+        assert_eq!(f64::from(expected.millihz()), (expected.hz() * 1e3).round());
+        assert!((f64::from(expected.hz_f32()) / expected.hz() - 1.0).abs() < 1e-7);
+    }
+    const PERIOD: SamplePeriod = match SamplePeriod::nearest_millihz(204_800) {
+        Ok(period) => period,
+        Err(_) => panic!("a rate above 0"),
+    };
+    assert_eq!((PERIOD.register(), PERIOD.millihz(), PERIOD.hz_f32()), (7, 204_800, 204.8));
+    assert_eq!(SamplePeriod::nearest_millihz(0), Err(ConfigError::Rate));
+    for hz in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(SamplePeriod::nearest_f32(hz), Err(ConfigError::Rate));
+    }
+}
+
 #[test]
 fn sample_periods_are_those_of_the_data_sheet_and_nearest_finds_them() {
     // 0.61035 ms · (NS + 1) and 18.921 ms · (NS + 1); 819.2 SPS after reset. The printed periods have five digits.

@@ -131,8 +131,9 @@ fn a_burst_is_one_transaction_of_26_bytes() {
     assert_eq!(burst.words[0].0, 0x8081);
     assert_eq!(burst.words[11].0, 0x9697);
 
-    let bus = [frame_with(STALL_NS, &sent, &answer)];
-    let sample = both!(config(GyroRange::Dps75, 4, 1); bus; NONE; |imu, delay| imu.sample()).unwrap();
+    let imu = Adis16405::new(Mock::new(&[]), config(GyroRange::Dps75, 4, 1));
+    let sample = imu.sample_from(burst);
+    imu.release().done();
     assert_eq!((*sample.counts(), sample.range()), (burst.counts(), GyroRange::Dps75));
 }
 

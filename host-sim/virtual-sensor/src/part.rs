@@ -42,6 +42,8 @@ pub struct VirtualAdis16405 {
     self_test_failures: u16,
     /// Outputs that have not been read since the latest sample.
     pub(crate) new_data: [bool; 12],
+    /// Every so many samples the outputs other than the inertial ones are refreshed.
+    slow_refresh: u32,
     /// DIAG_STAT.
     pub(crate) diagnosis: u16,
     pub(crate) burst_since_reset: bool,
@@ -75,6 +77,7 @@ impl VirtualAdis16405 {
             flash_damaged: false,
             self_test_failures: 0,
             new_data: [false; 12],
+            slow_refresh: 1,
             diagnosis: 0,
             burst_since_reset: false,
             samples: 0,
@@ -238,9 +241,12 @@ impl VirtualAdis16405 {
             let sens_avg = self.registers.read(registers::SENS_AVG);
             self.violations.add(self.now_ns, ViolationKind::Configuration { sens_avg });
         }
-        self.signal_chain.sample(&self.registers, time_s, period_s);
+        let slow_due = self.samples.is_multiple_of(u64::from(self.slow_refresh));
+        self.signal_chain.sample(&self.registers, time_s, period_s, slow_due);
         self.auto_null.add(self.signal_chain.rates());
-        self.new_data = [true; 12];
+        for (new, channel) in self.new_data.iter_mut().zip(OutputRegister::ALL) {
+            *new |= slow_due || OutputRegister::INERTIAL.contains(&channel);
+        }
         self.samples += 1;
         self.sampled_at_ns = Some(self.now_ns);
         let (counts, unfiltered) = (self.signal_chain.counts(), self.signal_chain.unfiltered());
@@ -259,8 +265,15 @@ impl VirtualAdis16405 {
     }
 }
 
-/// Faults.
+/// Faults, and behaviour that the data sheet leaves open.
 impl VirtualAdis16405 {
+    /// Refreshes supply, magnetometers, temperature and auxiliary input only with every n-th sample (0 is taken as 1, the
+    /// default): in between their words keep their counts, and once read they show no new data. No source at hand tells
+    /// at which rate the real part refreshes them.
+    pub fn set_slow_refresh(&mut self, samples: u32) {
+        self.slow_refresh = samples.max(1);
+    }
+
     /// Breaks the sensor of an inertial channel: its self-test fails. Without effect for other channels, which have none.
     pub fn break_sensor(&mut self, channel: OutputRegister) {
         if let Some(index) = OutputRegister::INERTIAL.iter().position(|&inertial| inertial == channel) {
@@ -271,6 +284,11 @@ impl VirtualAdis16405 {
     /// Damages the flash memory: its test and its update fail.
     pub fn damage_flash(&mut self) {
         self.flash_damaged = true;
+    }
+
+    /// Undoes [`damage_flash`](Self::damage_flash).
+    pub fn repair_flash(&mut self) {
+        self.flash_damaged = false;
     }
 
     /// Sets the answer of PROD_ID, also after a reset: another part of the family.

@@ -83,8 +83,9 @@ impl SignalChain {
         self.filters = std::array::from_fn(|_| CascadedBoxFilter::new(taps));
     }
 
-    /// Takes the sample at `time_s`. The random numbers drawn do not depend on the registers.
-    pub(crate) fn sample(&mut self, registers: &RegisterFile, time_s: f64, period_s: f64) {
+    /// Takes the sample at `time_s`. Outputs that are not inertial keep their counts unless `slow_due`. The random numbers
+    /// drawn do not depend on the registers.
+    pub(crate) fn sample(&mut self, registers: &RegisterFile, time_s: f64, period_s: f64, slow_due: bool) {
         let mut values = self.noise.sample();
         self.effects.disturb(&mut values, time_s, period_s);
         stimulate(&mut values, registers);
@@ -99,7 +100,7 @@ impl SignalChain {
                 *rate = sensed;
             }
             let value = self.effects.digitize(channel, correct(registers, channel, sensed), period_s);
-            if !repeated {
+            if !repeated && (slow_due || OutputRegister::INERTIAL.contains(&channel)) {
                 self.counts[index] = quantize(channel, gyro_lsb, value);
                 self.unfiltered[index] = quantize(channel, gyro_lsb, correct(registers, channel, unfiltered));
             }

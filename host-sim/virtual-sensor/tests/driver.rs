@@ -99,6 +99,27 @@ fn the_new_data_flag_shows_once() {
     assert!(burst.words[Channel::AuxAdc as usize].new_data());
 }
 
+/// No source tells at which rate the part refreshes its supply, magnetometer, temperature and auxiliary words.
+#[test]
+fn samples_are_usable_although_the_slow_words_refresh_slowly() {
+    let (bus, mut imu) = on_bus(NoiseModel::paper(), config(GyroRange::Dps300, 0, 7));
+    bus.part_mut().set_slow_refresh(8);
+    let mut validator = BurstValidator::default();
+    let mut new_supplies = 0;
+    for _ in 0..4000 {
+        bus.wait_for_data();
+        let burst = imu.burst().unwrap();
+        let validity = validator.validate(&burst);
+        assert!(validity.usable, "{:?}", validity.faults);
+        assert_eq!(burst.counts(), Counts::new(*bus.part().counts()));
+        new_supplies += u32::from(burst.words[Channel::Supply as usize].new_data());
+        // Read twice within a sample, the inertial words are not new.
+        assert_eq!(imu.burst().unwrap().faults(), Faults::NO_NEW_DATA);
+    }
+    assert_eq!(new_supplies, 500);
+    assert_eq!(bus.part().violations(), []);
+}
+
 #[test]
 fn answers_come_one_frame_later() {
     let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);

@@ -7,8 +7,8 @@ use std::task::{Context, Poll, Waker};
 
 use adis16405_driver::{
     Adis16405, Alarm, AlarmNumber, AlarmThreshold, AlarmWatch, BurstValidator, Channel, Config, DacLevel, Diagnosis,
-    Dio, DioLine, DioSignal, Error, FactoryRestore, Faults, Gpio, GyroBias, OnChipCompensation, Polarity, Product,
-    Register, Sleep, Stimulus,
+    Dio, DioLine, DioSignal, Error, FactoryRestore, Faults, FlashUpdate, Gpio, GyroBias, OnChipCompensation, Polarity,
+    Product, Register, Sleep, Stimulus,
 };
 
 use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
@@ -127,7 +127,7 @@ fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
         expect imu.auto_null(&mut delay) => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
         then assert!(!imu.x_sign_at_risk());
         then bus.wait_for_data();
-        take sample = imu.sample();
+        take sample = imu.read();
         then assert_eq!(sample.counts().gyro(), [10, 0, 0]);
         then assert_eq!(sample.gyro_udps(), [0, 0, 0]);
         then assert_eq!(sample.accl_ug(), [0, 0, -999_000]);
@@ -175,7 +175,15 @@ fn a_flash_update_outlives_a_reset() {
     both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
         expect imu.flash_writes() => Ok(0);
         expect imu.set_accl_offsets([1, 2, 3]) => Ok(());
-        expect imu.flash_update(&mut delay) => Ok(1);
+        // A failed update before left its flag in DIAG_STAT.
+        then bus.part_mut().damage_flash();
+        expect imu.write_register(Register::GlobCmd, 1 << 3) => Ok(());
+        then { let now = bus.part().now(); bus.advance_to(now + 100_000_000) };
+        then bus.part_mut().repair_flash();
+        given none = Diagnosis::empty();
+        given failed = Diagnosis::FLASH_UPDATE;
+        expect imu.flash_update(&mut delay)
+            => Ok(FlashUpdate { before: failed, writes_before: 0, writes: 1, diagnosis: none });
         expect imu.set_accl_offsets([0, 0, 0]) => Ok(());
         expect imu.set_filter_taps_log2(5) => Ok(());
         expect imu.set_sample_rate(200.0) => Ok(204.8);
@@ -185,7 +193,7 @@ fn a_flash_update_outlives_a_reset() {
 
         then bus.part_mut().damage_flash();
         expect imu.flash_update(&mut delay)
-            => Err(Error::FlashUpdate { before: 1, after: 1, diagnosis: Diagnosis::FLASH_UPDATE });
+            => Err(Error::FlashUpdate(FlashUpdate { before: none, writes_before: 1, writes: 1, diagnosis: failed }));
     );
 }
 
@@ -215,6 +223,8 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
     let change =
         Alarm { source: Channel::GyroY, watch: AlarmWatch::RateOfChange(4), threshold: AlarmThreshold::Above(99) };
     both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+        // A period of 4.9 ms, so that no sample is taken before the alarms are set.
+        expect imu.set_sample_rate(204.8) => Ok(204.8);
         expect imu.set_alarm_output(Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
         expect imu.set_alarm(AlarmNumber::One, Some(above)) => Ok(());
         expect imu.set_alarm(AlarmNumber::Two, Some(cold)) => Ok(());
@@ -324,7 +334,7 @@ fn the_x_gyro_erratum_occurs_and_is_avoided() {
         expect imu.keep_negative_x_bias_on_host() => Ok(GyroBias { part: [0; 3], host_x: -16 });
         then assert!(!imu.x_sign_at_risk());
         then for _ in 0..8 { bus.wait_for_data(); };
-        take sample = imu.sample();
+        take sample = imu.read();
         then assert_eq!(sample.counts().gyro(), [-4, -4, -4]);
         then assert_eq!(sample.gyro_udps(), [-400_000, -200_000, -200_000]);
     );
