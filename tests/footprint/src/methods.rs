@@ -46,7 +46,7 @@ pub(crate) fn blocking(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.set_aux_dac(black_box(DacLevel::default()))?);
     black_box(imu.sleep(black_box(Sleep::Indefinite))?);
     black_box(imu.wake(&mut delay)?);
-    black_box(imu.sample()?);
+    black_box(imu.read()?);
     Ok(())
 }
 
@@ -96,6 +96,6 @@ async fn call_all(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.set_aux_dac(black_box(DacLevel::default())).await?);
     black_box(imu.sleep(black_box(Sleep::Indefinite)).await?);
     black_box(imu.wake(&mut delay).await?);
-    black_box(imu.sample().await?);
+    black_box(imu.read().await?);
     Ok(())
 }
