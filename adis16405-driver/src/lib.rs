@@ -46,7 +46,7 @@
 //! | SCK, burst | 1 MHz at most | 300 kHz at most |
 //! | stall after a frame | at least 9 µs; the driver keeps 16 µs | the driver keeps 75 µs (unconfirmed) |
 //!
-//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK. Rates of 102.4 samples per second and
+//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK. Rates of 163.84 samples per second and
 //! below select low-power mode: reduce SCK first. After a restart of the microcontroller alone, the part may still be
 //! in that mode.
 //!

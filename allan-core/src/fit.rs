@@ -67,7 +67,7 @@ pub(crate) fn deviance<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model
 
 /// Sets `model` to the fitted coefficients of `kinds` and to the fitted shapes of those that are `free`, without bounds.
 ///
-/// `keep_on` is asked before every step of a shape search; if it returns false, the search ends where it is.
+/// `keep_on` is called before every step of a shape search; if it returns false, the search ends where it is.
 #[inline(never)]
 pub(crate) fn estimate<const POINTS: usize>(
     curve: &Curve<POINTS>,

@@ -180,7 +180,7 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// Tests the terms that were added before others were known again: each is replaced by another candidate that fits
+    /// Tests again the terms that were added before the latest one: each is replaced by another candidate that fits
     /// significantly better.
     #[inline(never)]
     fn reconsider<const POINTS: usize>(

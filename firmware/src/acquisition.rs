@@ -1,4 +1,4 @@
-//! Acquisition: bursts at data-ready (DRDY) edges, and what the times of the edges say of the sensor.
+//! Acquisition: bursts at data-ready (DRDY) edges, and what is concluded from the times of the edges.
 //!
 //! [`Sampler`] runs in the two sampling interrupts (data-ready edge, end of the DMA transfer) and queues [`TimedBurst`]s.
 //! [`DataReadyMonitor`] runs behind the queue: sample rate, lost and spurious edges, a suspect sensor.
@@ -74,7 +74,7 @@ impl<'q> Sampler<'q> {
     }
 
     /// To be called at the end of a transfer with the bytes received, or `None` if it failed.
-    pub fn burst_read(&mut self, received: Option<&[u8; BURST_BYTES]>) {
+    pub fn transfer_ended(&mut self, received: Option<&[u8; BURST_BYTES]>) {
         let Some(at_us) = self.reading.take() else { return };
         let timed = TimedBurst { at_us, dropped: self.dropped, burst: received.map(Burst::from_bytes) };
         match self.queue.enqueue(timed) {

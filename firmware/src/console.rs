@@ -83,7 +83,7 @@ impl Console {
     /// Queues an answer after those that wait.
     pub(crate) fn answer(&mut self, board: &mut impl Board, answer: Answer) {
         if self.answers.push_back(answer).is_err() {
-            self.print(board, format_args!("busy with the keys before; ask again"));
+            self.print(board, format_args!("too many answers waiting; repeat the command"));
         }
     }
 
@@ -207,7 +207,7 @@ fn validation_line(state: &DeviceState, index: usize) -> Option<TextLine> {
     let (raw, compensated) = (ShortFloat(drift.raw), ShortFloat(drift.compensated));
     let tau = ShortFloat(drift.n as f64 / state.config.sample_period().hz());
     let name = CHANNELS[index].name();
-    let text = format_args!("{name} unseen: drift at {tau} s {raw} -> {compensated}, error {before} -> {after}");
+    let text = format_args!("{name} unseen: adev at {tau} s {raw} -> {compensated}, error {before} -> {after}");
     Some(text_line(text))
 }
 
@@ -262,7 +262,7 @@ fn counter_line(health: &Health, index: usize) -> AnswerLine {
         ("queue_peak", health.queue_peak),
         ("lost_edges", health.lost_edges),
         ("spurious_edges", health.spurious_edges),
-        ("unchecked", health.unchecked),
+        ("suspect", health.suspect),
         ("recoveries", health.recoveries),
         ("raw_dropped", health.raw_dropped),
         ("serial_overruns", health.serial_overruns),

@@ -65,7 +65,7 @@ impl DeviceState {
         (now_us - self.epoch_start_us) / 1_000_000
     }
 
-    /// The counters of all levels and the load figures of the board.
+    /// The counters of sampling, estimating and the application and the load figures of the board.
     pub(crate) fn health(&self, board: &mut impl Board) -> Health {
         let (meters, now_us) = (board.meters(), board.now_us());
         let asleep_permille = (1000 * meters.asleep_us).checked_div(now_us).unwrap_or(0);
@@ -96,7 +96,11 @@ impl DeviceState {
                     board.estimators(|estimators| (estimators.is_suspect(), estimators.is_silent_at(now_us)));
                 if suspect || silent {
                     self.recoveries = self.recoveries.saturating_add(1);
-                    let reason = if silent { "no data-ready edges" } else { "silent, stuck or out of step" };
+                    let reason = if silent {
+                        "no data-ready edges"
+                    } else {
+                        "silent, edges at another rate, or only zeros or ones"
+                    };
                     log(board, format_args!("sensor: {reason}; probing it"));
                     board.set_sampling(false);
                     self.sensor = SensorState::Probing { at_us: now_us.max(since_us + RETRY_US) };

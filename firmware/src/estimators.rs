@@ -18,7 +18,7 @@ pub struct Estimators<'m> {
     statistics: &'m mut Statistics,
     validator: BurstValidator,
     monitor: DataReadyMonitor,
-    /// Counters of this level; those of the validator are added when they are read.
+    /// Counters of sampling and estimating; those of the validator are added when they are read.
     health: Health,
     /// Consecutive bursts of only zeros or only ones.
     stuck: u32,
@@ -58,7 +58,7 @@ impl<'m> Estimators<'m> {
         self.next_sample += u64::from(missing) + 1;
         let full =
             timed.burst.as_ref().is_some_and(|burst| self.raw_stream.push(burst, self.next_sample - 1, timed.at_us));
-        self.estimate_burst(timed.burst.as_ref());
+        self.add_burst(timed.burst.as_ref());
         full
     }
 
@@ -74,7 +74,7 @@ impl<'m> Estimators<'m> {
         self.monitor.is_silent_at(now_us)
     }
 
-    /// Has samples used from now on: the sensor was probed and configured at `now_us`.
+    /// Clears the suspicion, so that samples are used again: the sensor was probed and configured at `now_us`.
     pub fn mark_probed(&mut self, now_us: u64) {
         self.monitor.mark_probed(now_us);
         self.stuck = 0;
@@ -157,14 +157,14 @@ impl<'m> Estimators<'m> {
     }
 
     /// Validates a burst and adds it to the statistics; a burst that is not used is a gap of one sample.
-    fn estimate_burst(&mut self, burst: Option<&Burst>) {
+    fn add_burst(&mut self, burst: Option<&Burst>) {
         let Some(burst) = burst else {
             add(&mut self.health.bus_errors, 1);
             self.gap(1);
             return;
         };
         if self.is_suspect() {
-            add(&mut self.health.unchecked, 1);
+            add(&mut self.health.suspect, 1);
             self.gap(1);
             return;
         }

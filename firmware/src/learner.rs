@@ -12,7 +12,7 @@ use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Trace, trace_while
 use allan_core::{Curve, Model, NoiseTerm};
 use heapless::Vec;
 use link::{
-    LearnedMessage, MAX_DRIFTS, ReportedAddedTerm, ReportedCoefficient, ReportedDrift, ReportedModelError,
+    LearnedMessage, MAX_DEVIATIONS, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations, ReportedModelError,
     ReportedParameter, ReportedRegressor, ValidationMessage,
 };
 
@@ -207,8 +207,8 @@ fn fill_compensated(
 ) -> Option<()> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, config);
-    let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE).take(MAX_DRIFTS);
-    message.drift.extend(slow.map(|raw| ReportedDrift { n: raw.n, raw: libm::sqrt(raw.avar), compensated: 0.0 }));
+    let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE).take(MAX_DEVIATIONS);
+    message.drift.extend(slow.map(|raw| ReportedDeviations { n: raw.n, raw: libm::sqrt(raw.avar), compensated: 0.0 }));
     rebuild_compensated_curve(&mut curve, epoch, index, config, &model.regressors)?;
     let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE);
     message.drift.iter_mut().zip(slow).for_each(|(drift, point)| drift.compensated = libm::sqrt(point.avar));
@@ -257,7 +257,7 @@ pub(crate) struct ValidationResult {
     /// Deviance per point of N, B and K on the stream, and of the full model on the compensated stream.
     pub(crate) deviance_per_point: (f64, f64),
     /// Allan deviations at the longest averaging time that the epoch holds eight times.
-    pub(crate) drift: ReportedDrift,
+    pub(crate) drift: ReportedDeviations,
 }
 
 impl ValidationResult {

@@ -21,8 +21,8 @@
 //! | [`command`], `app` | commands, main loop |
 //! | [`retained`], `crash_record` | what survives a warm reset |
 //!
-//! Sampling has a higher priority than the estimators, and these a higher one than the main loop. No priority waits for a
-//! lower one.
+//! Sampling has a higher priority than the estimators, and these a higher one than the main loop. While a lower priority
+//! holds the lock of a shared resource, the interrupts that share it wait; locks are short.
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]

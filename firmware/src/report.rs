@@ -111,7 +111,7 @@ pub(crate) fn running_sums(board: &mut impl Board, index: usize) -> ChannelSums 
     board.estimators(|estimators| estimators.channel(index).map_or(ChannelSums::EMPTY, ChannelSums::from_estimator))
 }
 
-/// Sends a message, for which the caller has checked that there is room.
+/// Queues a message. If there is no room it is dropped, and the receiver counts it as missing.
 #[inline(never)]
 pub(crate) fn send(board: &mut impl Board, message: MessageRef<'_>) {
     board.transmit_queue(|queue| queue.send(message));
@@ -140,7 +140,7 @@ pub(crate) struct ReportProgress {
 }
 
 impl ReportProgress {
-    /// Starts a report on the running epoch. A report that is being sent already serves as this one.
+    /// Starts a report on the running epoch. Has no effect while a report is being sent.
     pub(crate) fn start(&mut self) {
         self.next.get_or_insert(0);
     }
@@ -175,8 +175,8 @@ impl ReportProgress {
         })
     }
 
-    /// Advances to the next message, unless the report that was sent has been replaced or abandoned meanwhile, which shows
-    /// in `ended_epoch`, its kind.
+    /// Advances to the next message, unless the report was replaced or abandoned while the message was made: then
+    /// `ended_epoch`, the kind of report that the message belongs to, differs from the present kind.
     pub(crate) fn advance(&mut self, ended_epoch: bool) {
         if self.ends_epoch == ended_epoch {
             self.next = self.next.map(|next| next + 1);

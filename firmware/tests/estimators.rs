@@ -100,7 +100,7 @@ fn after_a_silence_samples_are_not_used_before_the_probe() {
     let estimator = estimators.channel(0).unwrap();
     assert_eq!((estimator.len(), estimator.missing()), (2, 101));
     let health = estimators.health();
-    assert_eq!((health.lost_edges, health.unchecked, health.used), (99, 2, 2));
+    assert_eq!((health.lost_edges, health.suspect, health.used), (99, 2, 2));
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn a_full_queue_is_counted_with_the_next_burst_that_fits() {
     let mut sample = |at_us: u64| {
         assert!(sampler.data_ready(at_us));
         assert!(!sampler.data_ready(at_us + 1), "a burst is being transferred");
-        sampler.burst_read(Some(&burst(at_us as i16).to_bytes()));
+        sampler.transfer_ended(Some(&burst(at_us as i16).to_bytes()));
     };
     (0..capacity + 7).for_each(&mut sample);
     let mut queued = |count| -> Vec<(u64, u32)> {

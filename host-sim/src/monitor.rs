@@ -171,7 +171,7 @@ fn health(health: &Health) -> String {
         ("queue full", health.queue_full),
         ("lost DRDY edges", health.lost_edges),
         ("spurious DRDY edges", health.spurious_edges),
-        ("unchecked", health.unchecked),
+        ("suspect", health.suspect),
         ("recoveries", health.recoveries),
         ("raw messages dropped", health.raw_dropped),
         ("serial overruns", health.serial_overruns),

@@ -42,7 +42,7 @@ impl FreeShapes<'_> {
 
 /// Sets the shapes of all free terms to those with the least deviance at the present degrees of freedom, and returns it.
 ///
-/// `keep_on` is asked before every step; if it returns false, the search ends where it is.
+/// `keep_on` is called before every step; if it returns false, the search ends where it is.
 #[inline(never)]
 pub(super) fn search<const POINTS: usize>(
     points: &Points<POINTS>,

@@ -15,7 +15,7 @@ pub const MAX_ADDED_TERMS: usize = 5;
 /// Most covariates on which a channel is regressed.
 pub const MAX_COVARIATES: usize = 5;
 /// Most octaves for which the Allan deviation before and after compensation is sent.
-pub const MAX_DRIFTS: usize = 12;
+pub const MAX_DEVIATIONS: usize = 12;
 /// Most bursts in one raw message.
 pub const MAX_RAW_BURSTS: usize = 16;
 
@@ -280,13 +280,13 @@ pub struct ValidationMessage {
     /// restart.
     pub shift: Option<ReportedShift>,
     /// Allan deviations of both streams, by rising averaging factor.
-    pub drift: Vec<ReportedDrift, MAX_DRIFTS>,
+    pub drift: Vec<ReportedDeviations, MAX_DEVIATIONS>,
 }
 
 /// Change of a stream's mean from one epoch to the next, in the channel's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReportedShift {
-    /// Of the stream.
+    /// Of the stream as sampled.
     pub raw: f64,
     /// Of the compensated stream.
     pub compensated: f64,
@@ -294,10 +294,10 @@ pub struct ReportedShift {
 
 /// Allan deviation of a stream and of the same stream compensated, over the same samples, in the channel's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ReportedDrift {
+pub struct ReportedDeviations {
     /// Averaging factor in samples.
     pub n: u64,
-    /// Of the stream.
+    /// Of the stream as sampled.
     pub raw: f64,
     /// Of the compensated stream.
     pub compensated: f64,
@@ -335,7 +335,7 @@ pub struct Health {
     pub bursts: u32,
     /// Bursts that were used.
     pub used: u32,
-    /// Bursts with a word whose new-data bit was clear.
+    /// Bursts with an inertial word whose new-data bit was clear.
     pub no_new_data: u32,
     /// Bursts with a word whose error bit was set.
     pub error_alarm: u32,
@@ -345,7 +345,7 @@ pub struct Health {
     pub stuck_low: u32,
     /// Bursts in which every bit was 1.
     pub stuck_high: u32,
-    /// Bursts whose bits were shifted by one clock.
+    /// Bursts whose bits were shifted by 1 to 15 clocks.
     pub shifted: u32,
     /// Bursts whose twelve words had not changed for hundreds of samples.
     pub frozen: u32,
@@ -366,7 +366,7 @@ pub struct Health {
     /// Data-ready edges at no multiple of the sample period.
     pub spurious_edges: u32,
     /// Bursts not used because the sensor was suspect and had not been probed yet.
-    pub unchecked: u32,
+    pub suspect: u32,
     /// Times that the sensor was lost and probed again.
     pub recoveries: u32,
     /// Raw messages dropped because the transmit queue was full.

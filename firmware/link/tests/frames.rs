@@ -2,10 +2,10 @@
 
 use link::{
     ChannelMessage, Decoder, DecoderCounters, Encoder, Health, LearnedMessage, MAX_ADDED_TERMS, MAX_COEFFICIENTS,
-    MAX_COVARIATES, MAX_DRIFTS, MAX_FRAME, MAX_OCTAVES, MAX_RAW_BURSTS, MAX_RAW_FRAME, MAX_TEXT, Message, RawBurst,
-    RawMessage, Received, ReportedAddedTerm, ReportedCoefficient, ReportedDrift, ReportedModelError, ReportedOctave,
-    ReportedParameter, ReportedRegressor, ReportedShift, ReportedTerm, VERSION, ValidationMessage, text_line,
-    wire_bytes,
+    MAX_COVARIATES, MAX_DEVIATIONS, MAX_FRAME, MAX_OCTAVES, MAX_RAW_BURSTS, MAX_RAW_FRAME, MAX_TEXT, Message, RawBurst,
+    RawMessage, Received, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations, ReportedModelError,
+    ReportedOctave, ReportedParameter, ReportedRegressor, ReportedShift, ReportedTerm, VERSION, ValidationMessage,
+    text_line, wire_bytes,
 };
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -63,14 +63,14 @@ fn longest_raw() -> Message {
 /// The longest validation message.
 fn longest_validation() -> Message {
     let error = Some(ReportedModelError { deviance_per_point: f64::MAX, rms_percent: f64::MAX });
-    let drift = ReportedDrift { n: u64::MAX, raw: f64::MAX, compensated: f64::MIN_POSITIVE };
+    let drift = ReportedDeviations { n: u64::MAX, raw: f64::MAX, compensated: f64::MIN_POSITIVE };
     Message::Validation(ValidationMessage {
         channel: u8::MAX,
         epoch: u32::MAX,
         before: error,
         after: error,
         shift: Some(ReportedShift { raw: f64::MIN, compensated: f64::MAX }),
-        drift: core::iter::repeat_n(drift, MAX_DRIFTS).collect(),
+        drift: core::iter::repeat_n(drift, MAX_DEVIATIONS).collect(),
     })
 }
 

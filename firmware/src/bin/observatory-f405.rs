@@ -62,5 +62,5 @@ firmware::observatory! {
     data_ready: DataReady, EXTI0;
     bus: Bus, DMA2_STREAM0;
     port: Usart2Port, USART2;
-    estimators: CAN1_TX; // CAN is not used
+    estimators: CAN1_TX; // software-triggered: the interrupt of CAN1, a peripheral that is not used
 }

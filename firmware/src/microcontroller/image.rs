@@ -160,10 +160,10 @@ macro_rules! observatory {
 
             /// The end of the transfer: queues the burst and requests the estimators.
             #[task(binds = $burst_end, priority = 3, shared = [bus, sampler])]
-            fn burst_read(context: burst_read::Context) {
+            fn transfer_ended(context: transfer_ended::Context) {
                 measure(&SAMPLING_CYCLES, || {
-                    let burst_read::SharedResources { bus, sampler, .. } = context.shared;
-                    (bus, sampler).lock(|bus, sampler| sampler.burst_read(bus.end_burst()));
+                    let transfer_ended::SharedResources { bus, sampler, .. } = context.shared;
+                    (bus, sampler).lock(|bus, sampler| sampler.transfer_ended(bus.end_burst()));
                 });
                 rtic::pend(Interrupt::$free);
             }

@@ -50,8 +50,8 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let traced = of([Quantity::AngularRate, Quantity::SpecificForce]);
     let coupled = [traced.clone(), of([Quantity::Temperature, Quantity::SupplyVoltage])].concat();
     let profile = &measurement.profile;
-    let noises = NoiseGrids::default();
-    let preprocessing = Preprocessing::detect(measurement, &traced, &noises);
+    let noise_grids = NoiseGrids::default();
+    let preprocessing = Preprocessing::detect(measurement, &traced, &noise_grids);
     let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
     let estimators = RecordEstimators::estimate(measurement, &coupled, &preprocessing);
     let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel));
@@ -60,7 +60,7 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let analyses = in_parallel(&recorded, |&channel| {
         let traced = traced.iter().position(|of| *of == channel).map(|position| &series[position]);
         let analysis = match traced {
-            Some(own) => ChannelAnalysis::trace(&preprocessed, channel, own, &noises),
+            Some(own) => ChannelAnalysis::trace(&preprocessed, channel, own, &noise_grids),
             None => ChannelAnalysis::baseline(&preprocessed, channel),
         };
         let own = traced.map_or_else(|| Cow::Owned(Series::from_measurement(measurement, &channel)), Cow::Borrowed);
@@ -140,7 +140,7 @@ impl ChannelAnalysis {
     }
 
     /// The baseline model and what it lacks; `own` are the samples of the channel.
-    fn trace(record: &Preprocessed, channel: ChannelProfile, own: &Series, noises: &NoiseGrids) -> Self {
+    fn trace(record: &Preprocessed, channel: ChannelProfile, own: &Series, noise_grids: &NoiseGrids) -> Self {
         let &Preprocessed { profile, estimators, preprocessing, series } = record;
         let position = estimators.both.position(channel).unwrap_or_default();
         let own_half = own.first_half();
@@ -153,10 +153,10 @@ impl ChannelAnalysis {
             .filter(|(regressor, _)| regressor.quantity.is_environment())
             .map(|(regressor, series)| (*regressor, series.first_half()))
             .unzip();
-        let level = bias::find(&own_half, &slow_halves.iter().collect::<Vec<_>>(), noises);
+        let bias_changes = bias::find(&own_half, &slow_halves.iter().collect::<Vec<_>>(), noise_grids);
         let in_half = |regressor: ChannelProfile| {
             let is_of = |(number, _): &&(usize, bias::BiasSensitivity)| slow[*number] == regressor;
-            level.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)
+            bias_changes.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)
         };
         let has_ramp = preprocessing.has_ramp(channel);
         let first = CovariateFit::estimate(&estimators.first, position, has_ramp, in_half);

@@ -8,8 +8,8 @@ use allan_core::term::{Markov, MovingAverageFilter};
 use allan_core::trace::{LineCandidates, Trace, trace};
 use measurement::SensorProfile;
 
-/// Octaves in which the noise of a dithered channel reaches from one count to the next. Behind a filter neighbouring samples
-/// are alike, and the noise reaches that far only over several samples.
+/// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
+/// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times.
 pub(crate) const DITHERED_OCTAVES: usize = 7;
 /// p-value of a model's goodness of fit below which a trace with the lines of the curve itself is tried.
 const POOR_FIT: f64 = 1e-3;
@@ -71,12 +71,13 @@ impl ChannelFit {
     }
 }
 
-/// Replaces the filters of the channels by the one with the largest sum of scores, unless a channel contradicts it.
+/// Replaces the filters of the channels by the one with the largest sum of scores, unless the deviance of a dithered
+/// channel rises by more than [`MAX_DEVIANCE_RISE`].
 ///
 /// Each fit comes with whether the channel is dithered: whether its noise reaches from one count to the next. A channel that
 /// is not shows the filter badly, because its rounding error is no white noise and falls faster at the shortest averaging
-/// times than behind the filter; it neither votes nor contradicts. Of three channels or more at least half must show a
-/// filter; otherwise the filters are removed from what was added.
+/// times than behind the filter; its score is not counted, and it takes the filter without this test. Of three channels or more at least half must show a
+/// filter; otherwise no filter is reported; the fitted models keep theirs.
 pub(crate) fn agree_on_filter(channels: &mut [(&mut ChannelFit, bool)]) {
     let Some(agreed) = highest_scoring_filter(channels) else { return };
     let showing = channels.iter().filter(|(fit, _)| fit.added_filter().is_some()).count();

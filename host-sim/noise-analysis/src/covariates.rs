@@ -33,7 +33,7 @@ pub(crate) struct CovariateFit {
 }
 
 impl RegressionData {
-    /// With `known`, the covariates go on with the noise that was estimated there.
+    /// With `known`, the measurement noise of the covariates is taken from there instead of being estimated.
     fn new(part: &RecordPart, channel: usize, known: Option<&Self>) -> Self {
         let positions: Vec<usize> = regressors(part.channels[channel], part).collect();
         let covariate = |(index, &position): (usize, &usize)| match known {

@@ -40,12 +40,12 @@ impl CoupledEstimators {
         }
     }
 
-    /// So many samples are missing.
+    /// Records that `missing` samples are missing.
     pub(crate) fn gap(&mut self, missing: u32) {
         self.cascades.iter_mut().for_each(|cascade| cascade.gap(missing));
     }
 
-    /// These samples and, after a gap, those of `later`.
+    /// The estimators of these samples followed, after a gap, by those of `later`.
     pub(crate) fn followed_by(mut self, later: &Self) -> Self {
         self.cascades.iter_mut().zip(&later.cascades).for_each(|(cascade, later)| cascade.merge(later));
         self.couplings.iter_mut().zip(&later.couplings).for_each(|(coupling, later)| coupling.merge(later));

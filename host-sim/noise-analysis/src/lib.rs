@@ -1,15 +1,16 @@
 //! Noise analysis: the samples of a sensor and its profile in, findings out.
 //!
 //! ```text
-//! Measurement ─► series ─► preprocessing (time_base, detectors) ─► estimators ─► covariates ─► spectral_lines ─► channel_fit
-//!                                                                  └─► slow_drift ─► naming ─► analysis ─► report
-//! series ─► assessment: what the model is worth in navigation
-//! series ─► nonstationarity: what changes while the record is made
+//! Measurement ─► preprocessing (sampling_faults, detectors) ─► estimators ─► covariates ─► spectral_lines ─► channel_fit
+//!                      └─► series ─► assessment                                                            │
+//!                                                               report ◄─ naming ◄─ slow_drift ◄───────────┘
 //! ```
 //!
+//! `analysis` calls all of these; `nonstationarity` is the second entry, for what changes while the record is made.
+//!
 //! [`analysis::analyze`] is the pipeline to a [`report::Report`], [`nonstationarity::explain`] the one to an
-//! [`nonstationarity::Explanation`]. `spectra` and `detectors` serve both and know
-//! neither the model nor the report.
+//! [`nonstationarity::Explanation`]. `spectra` and `detectors` are used by both and
+//! depend neither on the model nor on the report.
 
 pub mod analysis;
 pub mod assessment;
@@ -23,11 +24,11 @@ mod naming;
 pub mod nonstationarity;
 mod preprocessing;
 pub mod report;
+mod sampling_faults;
 pub mod series;
 mod slow_drift;
 pub mod spectra;
 mod spectral_lines;
-mod time_base;
 pub mod uniform_series;
 mod units;
 

@@ -171,7 +171,7 @@ fn telegraph_effect(
     Effect { kind: "telegraph".to_owned(), parameters, evidence }
 }
 
-/// A Markov process in the place of a random walk that goes too far.
+/// A Markov process in place of a random walk that would exceed the initial bias error of the data sheet within an hour.
 fn bounded_drift_effect(found: &BoundedDrift, unit: &str) -> Effect {
     let evidence = format!(
         "a random walk of {:.1e} {} would take the bias {:.0} times as far in an hour as the biases of parts differ; {}",

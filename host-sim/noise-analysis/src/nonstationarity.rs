@@ -1,4 +1,4 @@
-//! Non-stationarity: what changes while a record is made, and the errors on the second half of models that know it.
+//! Non-stationarity: what changes while a record is made, and the errors on the second half of models that allow for the change.
 //!
 //! ```text
 //! Series ─► EpochCurves ─► Stationarity ─► FittedPart: which part of the first half the predictive model is fitted to
@@ -31,8 +31,8 @@ pub use related_line::RelatedLine;
 pub use tracked_parameters::{EpochEstimate, MovementTest, ParameterVector, TrackedModel, TrackedSet};
 
 use crate::OCTAVES;
+use crate::sampling_faults;
 use crate::series::Series;
-use crate::time_base;
 use allan_core::fit::fit_shapes;
 use allan_core::term::MovingAverageFilter;
 use allan_core::trace::{LineCandidates, Trace, trace};
@@ -122,7 +122,7 @@ pub fn explain(measurement: &Measurement) -> Explanation {
     Explanation {
         sample_rate_hz: measurement.sample_rate_hz,
         samples: measurement.len() as u64,
-        time_base: time_base::detect(measurement).into_iter().map(|finding| finding.effect.evidence).collect(),
+        time_base: sampling_faults::detect(measurement).into_iter().map(|finding| finding.effect.evidence).collect(),
         common_mode: CommonModeRegression::estimate(measurement, &names),
         searched,
         channels,

@@ -8,8 +8,8 @@ use crate::detectors::bias::{BiasChanges, BiasSensitivity};
 use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::{bias, effective_lsb, spikes};
 use crate::findings::{Correction, Detection, Effect};
+use crate::sampling_faults;
 use crate::series::Series;
-use crate::time_base;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
 use std::collections::BTreeSet;
@@ -33,9 +33,9 @@ pub(crate) struct Preprocessing {
 impl Preprocessing {
     /// Looks for spikes, steps, ramps, sensitivities and a coarse resolution in the channels `traced`, and for lost or
     /// repeated samples and a wrong sample rate in the whole recording.
-    pub(crate) fn detect(measurement: &Measurement, traced: &[ChannelProfile], noises: &NoiseGrids) -> Self {
+    pub(crate) fn detect(measurement: &Measurement, traced: &[ChannelProfile], noise_grids: &NoiseGrids) -> Self {
         let mut preprocessing = Self::default();
-        for finding in time_base::detect(measurement) {
+        for finding in sampling_faults::detect(measurement) {
             preprocessing.excluded.extend(excluded(&finding.correction));
             preprocessing.common_effects.push(finding.effect);
         }
@@ -61,8 +61,8 @@ impl Preprocessing {
                     (*regressor, series.clone().corrected(&Correction::Exclude(left_out.clone())))
                 })
                 .unzip();
-            let level = bias::find(&cleaned, &others.iter().collect::<Vec<_>>(), noises);
-            (lsb, spikes, level, profiles, left_out)
+            let bias_changes = bias::find(&cleaned, &others.iter().collect::<Vec<_>>(), noise_grids);
+            (lsb, spikes, bias_changes, profiles, left_out)
         });
         for (&channel, (lsb, spikes, BiasChanges { step, ramp, sensitivities }, regressors, left_out)) in
             traced.iter().zip(found)

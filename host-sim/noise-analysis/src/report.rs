@@ -39,7 +39,7 @@ pub struct ChannelReport {
     pub unit: String,
     /// Samples used.
     pub samples: u64,
-    /// Allan deviation over the whole record, octave by octave.
+    /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
     /// The coefficients by the slope method.
     pub read_off: SlopeMethodReport,
@@ -131,7 +131,7 @@ pub struct ModelReport {
 pub struct TermReport {
     /// Such as `angle_random_walk`.
     pub kind: String,
-    /// By name; a term with a single parameter calls it `value`.
+    /// By name; N, B, K and Q call theirs `value`.
     pub parameters: BTreeMap<String, Parameter>,
 }
 

@@ -20,7 +20,7 @@ const MERGE_WIDTHS: f64 = 3.0;
 const MERGE_RESOLUTIONS: f64 = 8.0;
 /// A peak at a lower frequency than so many of its widths is no line but a Markov process.
 const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
-/// Lower bound of the model's other noise, as a part of its Markov processes: where a filter leaves no noise, rounding does.
+/// Lower bound of the model's other noise, as a fraction of that of its Markov processes: in the nulls of a filter rounding noise remains.
 const MIN_NOISE: f64 = 1e-6;
 /// A line wider than this part of its frequency may be an error of the form of the background.
 const BROAD: f64 = 0.1;

@@ -55,7 +55,7 @@ pub struct Recording {
 pub struct Recorder {
     recording: Recording,
     validator: BurstValidator,
-    /// Faults that can be told with the channels that are recorded.
+    /// Faults that can be detected with the channels that are recorded.
     detectable: Faults,
 }
 
@@ -63,7 +63,7 @@ impl Recorder {
     /// Starts an empty recording of `channels`.
     pub fn new(mut channels: Vec<Channel>, range: GyroRange) -> Self {
         channels.sort();
-        // A sample that was read twice and a frozen output are told by equal counts of all six inertial channels; fewer
+        // A sample that was read twice and a frozen output are detected by equal counts of all six inertial channels; fewer
         // channels may be equal by chance.
         let detectable = if Channel::INERTIAL.iter().all(|c| channels.contains(c)) {
             Faults::all()

@@ -21,7 +21,7 @@ const REFUSED: Faults =
 /// farther apart are chance: a filtered output of few counts repeats about once in a thousand samples.
 const MAX_REPEATED_READ_INTERVAL: f64 = 0.75;
 
-/// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is told from a loss.
+/// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is distinguished from a loss.
 /// The last samples of a record have fewer after them, so there a late delivery may count as a loss.
 const MAX_QUEUE: usize = 64;
 
@@ -107,7 +107,7 @@ impl Usable {
     fn select(samples: &[RecordedSample], rate_hz: Option<f64>) -> Self {
         let times: Option<Vec<f64>> = samples.iter().map(|sample| sample.time_stamp.time_s).collect();
         let period_s = times.and_then(|times| sample_period(&times, rate_hz));
-        // 0 without times: then no sample is told to be read twice.
+        // 0 without times: then no sample is taken to be read twice.
         let shortest_s = MAX_REPEATED_READ_INTERVAL * period_s.unwrap_or(0.0);
         let time = |position: usize| samples[position].time_stamp.time_s;
         let read_twice = |position: usize| match (position.checked_sub(1).and_then(time), time(position)) {

@@ -73,7 +73,7 @@ pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> 
         let learned = number(common_mode.weights_at as f64 / sample_rate_hz);
         writeln!(out, "\nBias drift after over before, second half; weights learned in the first at τ = {learned} s")?;
         writeln!(out, "{}", gain_table(common_mode))?;
-        writeln!(out, "Trusted: weights of the first quarter made the second quarter better.")?;
+        writeln!(out, "Trusted: the weights of the first quarter reduced the variance of the second quarter.")?;
     }
     Ok(())
 }

@@ -123,7 +123,7 @@ impl SimulatedBoard {
         if self.sampler.data_ready(self.now_us) {
             let mut answer = [0; BURST_BYTES];
             let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
-            self.sampler.burst_read(Some(&answer));
+            self.sampler.transfer_ended(Some(&answer));
             self.now_us = self.now_us.max(self.bus.part().now() / 1000);
         }
         estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);

@@ -243,7 +243,7 @@ fn a_sensor_that_was_reset_is_configured_again() {
     let health = *after(&mut device, "r", 8 * SECOND).health();
     assert_eq!(health.recoveries, 1);
     assert_eq!(health.used, health.bursts);
-    let lost = health.lost_edges + health.unchecked;
+    let lost = health.lost_edges + health.suspect;
     assert!((20..250).contains(&lost), "{health:?}");
     assert!(u64::from(health.used + lost).abs_diff((6.0 * 204.8) as u64) < 10, "{health:?}");
 }

@@ -97,7 +97,7 @@ fn an_injected_temperature_effect_is_subtracted_in_the_next_epoch() {
         device.press(b"t");
         Transcript::decode(&device.run_until((3 * EPOCH_S + 2) * SECOND)).lines
     };
-    for expected in ["gyro_x sensitivity to temp: 5.", "gyro_x unseen: drift at "] {
+    for expected in ["gyro_x sensitivity to temp: 5.", "gyro_x unseen: adev at "] {
         assert!(lines.iter().any(|line| line.starts_with(expected)), "{expected}: {lines:#?}");
     }
 }

@@ -9,7 +9,7 @@ use firmware::epoch::estimate_regressors;
 use firmware::learner::{EpochFit, validate};
 use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Statistics, TimedBurst};
 use link::{
-    Decoder, LearnedMessage, Message, Received, ReportedDrift, ReportedParameter, ReportedTerm, ValidationMessage,
+    Decoder, LearnedMessage, Message, Received, ReportedDeviations, ReportedParameter, ReportedTerm, ValidationMessage,
 };
 use simulation::Device;
 use virtual_sensor::{
@@ -152,7 +152,7 @@ fn a_temperature_effect_is_learned_and_subtracted() {
         "gyro x follows temp: {:.4} ({:.4} to {:.4}) deg/s/degC, truth {SENSITIVITY}",
         temperature.value, temperature.low, temperature.high
     );
-    for ReportedDrift { n, raw, compensated } in &validated[0].drift {
+    for ReportedDeviations { n, raw, compensated } in &validated[0].drift {
         println!("second epoch, at {:5.1} s: {raw:.4} -> {compensated:.4} deg/s", *n as f64 / RATE_HZ);
     }
     // A cycle of amplitude A and period T has σ = A·sin²(πτ/T)/(πτ/T): 0.082 deg/s at 10 s. The noise of the gyro has

@@ -60,7 +60,7 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     let logs = decoded.logs();
     println!("{logs:#?}");
     let [quiet, reset, low, high, lost, unplugged, .., flood] = healths[..] else { panic!("{healths:?}") };
-    assert_eq!((quiet.lost_edges, quiet.unchecked, quiet.recoveries), (0, 0, 0), "{quiet:?}");
+    assert_eq!((quiet.lost_edges, quiet.suspect, quiet.recoveries), (0, 0, 0), "{quiet:?}");
 
     // After its reset the sensor gives no edge for at least 100 ms, and is configured before its samples are used.
     assert_eq!(reset.recoveries, 1);
@@ -92,7 +92,7 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     let hello =
         before.iter().rev().find_map(|message| if let Message::Hello(hello) = message { Some(hello) } else { None });
     let periods = (hello.expect("a report begins with its hello").uptime_us as f64 * 1e-6 - CONFIGURED_S) * rate_hz;
-    let counted = f64::from(flood.bursts + flood.lost_edges + flood.unchecked);
+    let counted = f64::from(flood.bursts + flood.lost_edges + flood.suspect);
     assert!(
         (periods - 0.07 * rate_hz..periods + 2.0 * rate_hz).contains(&counted),
         "{counted} of {periods}: {flood:?}"

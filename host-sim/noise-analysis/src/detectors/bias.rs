@@ -2,7 +2,7 @@
 //!
 //! In the differences of the Allan variance a change over the whole record has a few degrees of freedom and is lost in slow
 //! noise. Here each candidate is tested on block means against every mixture of white, flicker and random-walk noise, and
-//! against the other candidates: the one that explains the data best is accepted, then the next one beside it.
+//! against the other candidates: the one that explains the data best is accepted, then the next one given the first.
 
 use super::bias_step::{self, StepPosition};
 use super::block_means::{BlockMeans, NoiseGrid, NoiseGrids};

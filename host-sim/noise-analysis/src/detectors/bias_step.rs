@@ -48,7 +48,7 @@ pub(super) struct StepPosition {
     high: f64,
 }
 
-/// The likeliest step beside the `known` regressors, to which `regression` was fitted; `None` if the bias jumps more than
+/// The likeliest step given the `known` regressors, to which `regression` was fitted; `None` if the bias jumps more than
 /// once.
 pub(super) fn find(
     series: &Series,

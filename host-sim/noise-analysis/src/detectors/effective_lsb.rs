@@ -7,7 +7,7 @@
 use crate::findings::{Detection, Effect, Parameter};
 use crate::series::Series;
 
-/// Fewest changes of the value; all must be multiples of the step. Of a smooth density every second one would be odd.
+/// Fewest changes of the value; all must be multiples of the step. Without such rounding about half of the changes would be odd numbers of counts.
 const FEWEST_CHANGES: usize = 50;
 
 /// The largest number of counts that divides every difference of two values; 1 if the values change fewer than 50 times.

@@ -11,10 +11,10 @@ use super::block_means::{BlockMeans, NoiseCovariance, NoiseGrid};
 use crate::distributions::upper_tail;
 use nalgebra::{DMatrix, DVector};
 
-/// A regressor that keeps less than this fraction of its information beside the others is a combination of them.
+/// A regressor that keeps less than this fraction of its information when the others are fitted too is a combination of them.
 const COLLINEAR: f64 = 1e-6;
 
-/// Size of a regressor beside others.
+/// Coefficient of a regressor that is fitted together with others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegressionEstimate {
     /// Coefficient of the regressor, in the unit of the means over that of the regressor.
@@ -97,7 +97,7 @@ impl<'a> GlsRegression<'a> {
         self.fits.iter().map(|fit| freedom * fit.residual.ln() + fit.log_determinant).collect()
     }
 
-    /// Degrees of freedom beside the constant, the known regressors and one more.
+    /// Degrees of freedom left by the constant, the known regressors and one more.
     fn degrees_of_freedom(&self) -> f64 {
         self.blocks.means.len() as f64 - 2.0 - self.known.ncols() as f64
     }

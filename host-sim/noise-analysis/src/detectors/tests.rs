@@ -5,8 +5,8 @@ use super::block_means::NoiseGrids;
 use super::{effective_lsb, spikes};
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::findings::{Correction, Detection};
+use crate::sampling_faults;
 use crate::series::Series;
-use crate::time_base;
 use adis16405_driver::Channel;
 use measurement::Measurement;
 use simulation::{HostClock, Simulation};
@@ -50,9 +50,9 @@ impl Case {
             [spikes::find(&series), step, ramp]
         });
         let common = [
-            time_base::lost_samples(&self.measurement),
-            time_base::repeated_samples(&self.measurement),
-            time_base::sample_clock(&self.measurement),
+            sampling_faults::lost_samples(&self.measurement),
+            sampling_faults::repeated_samples(&self.measurement),
+            sampling_faults::sample_clock(&self.measurement),
         ];
         channels.chain(common).flatten().collect()
     }
@@ -228,18 +228,18 @@ fn values_of_twelve_bits_have_an_lsb_of_four_counts() {
 #[test]
 fn lost_and_repeated_samples_are_counted() {
     let lossy = Case::hiding(vec![InjectedEffect::DroppedSamples { fraction: 2e-3 }], 200.0, 8);
-    let detection = time_base::lost_samples(&lossy.measurement).unwrap();
+    let detection = sampling_faults::lost_samples(&lossy.measurement).unwrap();
     assert_covers(&detection, "fraction", 2e-3);
-    assert_eq!(time_base::repeated_samples(&lossy.measurement), None);
+    assert_eq!(sampling_faults::repeated_samples(&lossy.measurement), None);
 
     // Behind a long filter neighbouring samples are often equal, and none is repeated.
     let slow = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
-    assert_eq!(time_base::repeated_samples(&slow.measurement), None);
+    assert_eq!(sampling_faults::repeated_samples(&slow.measurement), None);
 
     let stale = Case::hiding(vec![InjectedEffect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
-    let detection = time_base::repeated_samples(&stale.measurement).unwrap();
+    let detection = sampling_faults::repeated_samples(&stale.measurement).unwrap();
     assert_covers(&detection, "fraction", 2e-3);
-    assert_eq!(time_base::lost_samples(&stale.measurement), None);
+    assert_eq!(sampling_faults::lost_samples(&stale.measurement), None);
     let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
     let values = stale.series(GYRO).values;
     assert!(positions.iter().all(|&position| values[position] == values[position - 1]));
@@ -252,7 +252,7 @@ fn a_deviating_sample_clock_is_distinguished_from_a_deviating_host_clock() {
         host: HostClock { latency_s: 30e-6, clock_ratio },
         ..Simulation::paper(100.0, 10)
     };
-    let find = |case: Case| time_base::sample_clock(&case.measurement);
+    let find = |case: Case| sampling_faults::sample_clock(&case.measurement);
     // The data sheet's tolerance is parts in a hundred, that of a host's clock parts in a hundred thousand.
     let off = find(Case::of(simulation(vec![InjectedEffect::SampleClock { ratio: 0.997 }], 1.0 + 20e-6))).unwrap();
     assert_covers(&off, "rate_hz", 204.8 * 0.997);

@@ -184,7 +184,7 @@ impl TrackedModel {
             let model = self.at(parameters);
             points.iter().map(|(point, _)| model.avar(point.n)).collect()
         };
-        // The part of the white noise, which the level multiplies: by a factor of 2 it adds as much again.
+        // Allan variance of the white noise: the difference between the models with its variance doubled and as it is.
         let white: Vec<f64> =
             avars([2f64.ln(), 0.0]).iter().zip(avars([0.0; 2])).map(|(twice, once)| twice - once).collect();
         let deviance = |level: f64, avars: &[f64]| {

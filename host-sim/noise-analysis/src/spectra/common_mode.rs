@@ -1,7 +1,7 @@
 //! Common-mode drift: a Markov process that several channels share, by the spectra of their mean and of their differences.
 //!
 //! The differences from the mean do not contain what all channels share alike, and their noise, scaled, has the same
-//! spectrum as the noise of the mean. So they tell the spectrum that the mean would have without the shared process,
+//! spectrum as the noise of the mean. So they give the spectrum that the mean would have without the shared process,
 //! whatever the noise of the channels is.
 
 use super::periodogram::{SineTapered, low_frequency_bands};

@@ -1,4 +1,4 @@
-//! The time base of a recording: lost samples, repeated samples, and the rate of the sample clock.
+//! Detectors of faults of the sampling: lost samples, repeated samples, and a sample rate other than the nominal one.
 
 use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
 use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
