@@ -83,7 +83,7 @@ impl Console {
     /// Queues an answer after those that wait.
     pub(crate) fn answer(&mut self, board: &mut impl Board, answer: Answer) {
         if self.answers.push_back(answer).is_err() {
-            self.print(board, format_args!("too many answers waiting; repeat the command"));
+            self.print(board, format_args!("busy: too many answers waiting; repeat the command"));
         }
     }
 
