@@ -22,7 +22,7 @@ const COUNTS: f64 = 64.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TestNoise {
     mixture: Mixture,
-    /// Whether the white noise passes through the filter of the part.
+    /// Whether the signal passes through the filter of the part.
     filtered: bool,
 }
 
@@ -92,23 +92,21 @@ impl TestNoise {
     pub fn record(self, samples: usize, seed: u64) -> Vec<i32> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let Coefficients { n, b, k } = self.coefficients();
-        let deviation = n * RATE_HZ.sqrt();
-        let extra = if self.filtered { 2 * usize::from(TAPS) } else { 0 };
-        let mut white: Vec<f64> = (0..samples + extra).map(|_| deviation * normal(&mut random)).collect();
-        if self.filtered {
-            for _ in 0..2 {
-                white = white.windows(TAPS.into()).map(|values| values.iter().sum::<f64>() / f64::from(TAPS)).collect();
-            }
-        }
-        let flicker = if b > 0.0 { flicker_noise(b, samples, &mut random) } else { vec![0.0; samples] };
-        let step = k / RATE_HZ.sqrt();
+        let (deviation, step) = (n * RATE_HZ.sqrt(), k / RATE_HZ.sqrt());
+        let stages = if self.filtered { 2 } else { 0 };
+        let length = samples + stages * usize::from(TAPS - 1);
+        let flicker = if b > 0.0 { flicker_noise(b, length, &mut random) } else { vec![0.0; length] };
         let mut walk = 0.0;
-        let mut sample = |(white, flicker): (&f64, f64)| {
+        let sum = |flicker: f64| {
             walk += step * normal(&mut random);
-            // A walk of hours stays far within 32 bits.
-            (white + flicker + walk).round() as i32
+            deviation * normal(&mut random) + flicker + walk
         };
-        white.iter().zip(flicker).map(&mut sample).collect()
+        let mut signal: Vec<f64> = flicker.into_iter().map(sum).collect();
+        for _ in 0..stages {
+            signal = signal.windows(TAPS.into()).map(|values| values.iter().sum::<f64>() / f64::from(TAPS)).collect();
+        }
+        // A walk of hours stays far within 32 bits.
+        signal.into_iter().map(|value| value.round() as i32).collect()
     }
 }
 
@@ -118,7 +116,7 @@ fn normal(random: &mut impl Rng) -> f64 {
 
 /// Flicker noise with the one-sided density `B²/(πf)`: half of a periodic record of twice the length.
 fn flicker_noise(b: f64, samples: usize, random: &mut impl Rng) -> Vec<f64> {
-    let length = 2 * samples;
+    let length = 2 * samples.next_power_of_two();
     let transform = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
     let mut spectrum = transform.make_input_vec();
     // The inverse transform sums without a factor: a density S at frequency f takes the amplitude √(S·Δf/2)/√2 in each of

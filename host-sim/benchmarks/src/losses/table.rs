@@ -50,19 +50,20 @@ pub struct OctaveRatio {
     pub edf: f64,
 }
 
-/// One coefficient of the model that is fitted to the curves.
+/// One coefficient of the model that is fitted to the curves. Behind the filter the model is an approximation, as flicker
+/// noise and walk are filtered too.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoefficientComparison {
     /// N, B or K.
     pub symbol: &'static str,
-    /// Mean estimate over the truth, minus 1.
-    pub bias: f64,
-    /// Standard error of the bias.
-    pub standard_error: f64,
-    /// The same for the complete records.
+    /// Mean estimate of the complete records over the truth, minus 1.
     pub complete_bias: f64,
-    /// Standard deviation of the estimates over the truth.
+    /// Standard deviation of the estimates of the complete records over the truth.
     pub scatter: f64,
+    /// Mean difference that the losses make to the estimate, over the truth.
+    pub shift: f64,
+    /// Standard error of the shift.
+    pub standard_error: f64,
     /// Records of which the 95 % interval contains the truth.
     pub covered: usize,
     /// The same without losses.
@@ -123,13 +124,14 @@ impl CoefficientComparison {
             let term = &record.model.terms()[term];
             (term.low..=term.high).contains(&truth)
         };
-        let lossy: Vec<f64> = pairs.iter().map(|(_, lossy)| estimate(lossy)).collect();
+        let complete: Vec<f64> = pairs.iter().map(|(complete, _)| estimate(complete)).collect();
+        let shifts: Vec<f64> = pairs.iter().map(|(complete, lossy)| estimate(lossy) - estimate(complete)).collect();
         Self {
             symbol,
-            bias: lossy.iter().mean() - 1.0,
-            standard_error: standard_error(&lossy),
-            complete_bias: pairs.iter().map(|(complete, _)| estimate(complete)).mean() - 1.0,
-            scatter: lossy.iter().std_dev(),
+            complete_bias: complete.iter().mean() - 1.0,
+            scatter: complete.iter().std_dev(),
+            shift: shifts.iter().mean(),
+            standard_error: standard_error(&shifts),
             covered: pairs.iter().filter(|(_, lossy)| covers(lossy)).count(),
             complete_covered: pairs.iter().filter(|(complete, _)| covers(complete)).count(),
         }
@@ -186,7 +188,11 @@ impl LossTable {
         writeln!(out, "{}\n", TextTable::new(header, 2, self.comparisons.iter().map(row)))?;
         writeln!(
             out,
-            "fitted coefficients: bias ± standard error and scatter in % of the truth, intervals that hold it"
+            "fitted coefficients, % of the truth: what the losses change ± its standard error, scatter and bias"
+        )?;
+        writeln!(
+            out,
+            "of the complete records; records of which the 95 % interval holds the truth, with and without losses"
         )?;
         let rows = self.comparisons.iter().flat_map(|comparison| {
             comparison.coefficients.iter().map(|coefficient| {
@@ -194,15 +200,15 @@ impl LossTable {
                     comparison.noise.to_string(),
                     comparison.loss.to_string(),
                     coefficient.symbol.to_owned(),
-                    format!("{:+.2} ± {:.2}", 100.0 * coefficient.bias, 100.0 * coefficient.standard_error),
-                    format!("{:+.2}", 100.0 * coefficient.complete_bias),
+                    format!("{:+.3} ± {:.3}", 100.0 * coefficient.shift, 100.0 * coefficient.standard_error),
                     number(100.0 * coefficient.scatter),
+                    format!("{:+.2}", 100.0 * coefficient.complete_bias),
                     coefficient.covered.to_string(),
                     coefficient.complete_covered.to_string(),
                 ]
             })
         });
-        let header = ["noise", "lost", "", "bias", "complete", "scatter", "hold", "complete"];
+        let header = ["noise", "lost", "", "change", "scatter", "bias", "hold", "complete"];
         writeln!(out, "{}", TextTable::new(header, 3, rows))
     }
 }
