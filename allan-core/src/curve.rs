@@ -153,6 +153,11 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         &self.points
     }
 
+    /// Keeps the points for which `keep` returns true: a fit to the others is a fit to a range of averaging times.
+    pub fn retain(&mut self, keep: impl FnMut(&AllanPoint) -> bool) {
+        self.points.retain(keep);
+    }
+
     /// The same curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {

@@ -105,7 +105,9 @@ impl LossPlan {
         });
         let estimate = |cascade: &Cascade<OCTAVES, 8>| {
             let curve = cascade.curve(1.0 / RATE_HZ);
-            let model = fit(&curve, noise.terms());
+            let mut fitted = curve.clone();
+            fitted.retain(|point| point.n >= noise.shortest_fitted());
+            let model = fit(&fitted, noise.terms());
             EstimatedRecord { curve, model, samples: cascade.len() }
         };
         std::iter::once(estimate(&complete)).chain(losses.map(|cascade| estimate(&cascade))).collect()

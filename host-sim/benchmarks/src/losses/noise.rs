@@ -80,6 +80,13 @@ impl TestNoise {
         }
     }
 
+    /// Shortest averaging factor to which the terms are fitted: four times the length of the filter, which the flicker noise and
+    /// the walk pass too and the terms leave out.
+    #[must_use]
+    pub fn shortest_fitted(self) -> u64 {
+        if self.filtered { 8 * u64::from(TAPS) } else { 1 }
+    }
+
     /// The true coefficients, each with its symbol, in counts and seconds.
     #[must_use]
     pub fn truth(self) -> Vec<(&'static str, f64)> {

@@ -50,8 +50,8 @@ pub struct OctaveRatio {
     pub edf: f64,
 }
 
-/// One coefficient of the model that is fitted to the curves. Behind the filter the model is an approximation, as flicker
-/// noise and walk are filtered too.
+/// One coefficient of the model that is fitted to the curves; behind the filter to averaging times of four times its length and
+/// more.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoefficientComparison {
     /// N, B or K.
