@@ -2,7 +2,7 @@
 //! from a measured curve.
 
 use crate::curve::{AllanPoint, Curve};
-use crate::math::{clamp, ln, sqrt};
+use crate::math::{abs, clamp, exp, ln, sqrt};
 use crate::noise_type::VarianceFractions;
 use crate::term::{MAX_SHAPE, NoiseTerm};
 use heapless::Vec;
@@ -158,6 +158,11 @@ pub struct Discrepancy {
     pub deviance_per_point: f64,
     /// `100·sqrt(mean (½ ln(v/m))²)`: the rms error of the Allan deviation in percent.
     pub rms_percent: f64,
+    /// The largest deviation of a point in standard deviations, over *all* octaves of the curve; positive where the measured
+    /// variance exceeds the model. The cube root of `v/m`, which is nearly normal also for few degrees of freedom (Wilson and
+    /// Hilferty; Abramowitz and Stegun, 26.4.14), is compared with its mean `1 − 2/9edf` and its variance `2/9edf`. The mean
+    /// deviance weighs short averaging times, and this figure shows a model that fails at the longest ones.
+    pub worst_sigma: f64,
     /// Number of octaves that were compared.
     pub points: usize,
 }
@@ -170,19 +175,35 @@ impl Discrepancy {
     #[must_use]
     pub fn between<const OCTAVES: usize>(model: &Model, curve: &Curve<OCTAVES>) -> Option<Self> {
         let (mut deviance, mut square, mut points) = (0.0, 0.0, 0);
-        for point in curve.points().iter().filter(|point| point.n <= curve.samples() / 8) {
-            let ratio = point.avar / model.avar(point.n);
+        let mut worst_sigma: f64 = 0.0;
+        for point in curve.points() {
+            let (ratio, edf) = (point.avar / model.avar(point.n), model.edf(point));
+            let sigma = cube_root_deviation(ratio, edf);
+            if abs(sigma) > abs(worst_sigma) {
+                worst_sigma = sigma;
+            }
+            if point.n > curve.samples() / 8 {
+                continue;
+            }
             let log = ln(ratio);
-            deviance += model.edf(point) * (ratio - 1.0 - log);
+            deviance += edf * (ratio - 1.0 - log);
             square += log * log / 4.0;
             points += 1;
         }
         (points > 0).then(|| Self {
             deviance_per_point: deviance / points as f64,
             rms_percent: 100.0 * sqrt(square / points as f64),
+            worst_sigma,
             points,
         })
     }
+}
+
+/// Deviation of `ratio`, a χ² variable over its `edf` degrees of freedom, from its expectation in standard deviations of a
+/// normal variable.
+fn cube_root_deviation(ratio: f64, edf: f64) -> f64 {
+    let variance = 2.0 / (9.0 * edf);
+    (exp(ln(ratio) / 3.0) - (1.0 - variance)) / sqrt(variance)
 }
 
 /// Largest number of differences per averaging time whose correlations are computed; more of them hardly change the result.

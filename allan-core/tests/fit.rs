@@ -79,6 +79,33 @@ fn a_correct_model_has_a_deviance_per_point_of_about_1() {
 }
 
 #[test]
+fn the_worst_deviation_is_normal_for_a_true_model_and_sees_a_long_octave_that_is_far_off() {
+    let worst = |seed: u64| {
+        let record = record(1 << 13, 0.05, 0.0, 4_000 + seed);
+        let curve = curve(&record);
+        let model = fit(&curve, &[NoiseTerm::AngleRandomWalk]);
+        let true_one = Discrepancy::between(&model, &curve).expect("octaves to compare").worst_sigma;
+        // The last octave, beyond the eighth of the record at which the mean deviance ends, measures 36 times as much.
+        let last = *curve.points().last().expect("a point");
+        let mut wrong = curve.clone();
+        wrong.replace_avar(|point| if point.n == last.n { 36.0 * point.avar } else { point.avar });
+        let wrong = Discrepancy::between(&model, &wrong).expect("octaves to compare").worst_sigma;
+        (true_one.abs(), wrong)
+    };
+    let worst: Vec<(f64, f64)> = (0..200).map(worst).collect();
+    // The largest of 13 correlated standard normal values: below 3.5 in 99.4 % even if they were independent.
+    let beyond = worst.iter().filter(|(sigma, _)| *sigma > 3.5).count();
+    assert!(beyond <= 6, "{beyond} of 200 true models deviate by more than 3.5 standard deviations");
+    let median = {
+        let mut all: Vec<f64> = worst.iter().map(|(sigma, _)| *sigma).collect();
+        all.sort_by(f64::total_cmp);
+        all[100]
+    };
+    assert!((1.0..2.2).contains(&median), "{median}");
+    assert!(worst.iter().filter(|(_, sigma)| *sigma > 3.0).count() >= 180);
+}
+
+#[test]
 fn the_slope_method_finds_the_coefficient_of_a_single_noise() {
     let white = curve(&record(1 << 17, 0.05, 0.0, 7));
     let n = slope_method::angle_random_walk(&white).expect("a −½ slope");
