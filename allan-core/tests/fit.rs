@@ -102,7 +102,8 @@ fn the_worst_deviation_is_normal_for_a_true_model_and_sees_a_long_octave_that_is
         all[100]
     };
     assert!((1.0..2.2).contains(&median), "{median}");
-    assert!(worst.iter().filter(|(_, sigma)| *sigma > 3.0).count() >= 180);
+    // The last octave has one degree of freedom: its cube root exceeds three deviations where χ² is above 0.29, in 59 %.
+    assert!(worst.iter().filter(|(_, sigma)| *sigma > 3.0).count() >= 100);
 }
 
 #[test]
