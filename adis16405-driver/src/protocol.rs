@@ -15,11 +15,12 @@ use crate::clock::{ClockMode, Timing};
 use crate::config::Config;
 use crate::error::Error;
 use crate::register::{Access, Register};
+use crate::spacing::FrameSpacing;
 
 /// An operation that a procedure requests from the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BusRequest {
-    /// Exchange a 16-bit frame in a transaction of its own, with a stall of `stall_ns` at its end.
+    /// Exchange a 16-bit frame in a transaction of its own, followed by a stall of `stall_ns`.
     Frame { bytes: [u8; 2], stall_ns: u32 },
     /// Hold chip select low for `ns` without clocking.
     ChipSelectPulse { ns: u32 },
@@ -131,6 +132,16 @@ impl DriverState {
             configured: false,
             stimulated: false,
         }
+    }
+
+    /// The part has loaded its registers from flash: until they are read, neither configuration nor power mode is known.
+    pub(crate) const fn forget_registers(&mut self) {
+        self.configured = false;
+        self.mode = ClockMode::LowPower;
+    }
+
+    pub(crate) const fn spacing(&self) -> FrameSpacing {
+        FrameSpacing { select: self.timing.stall_select, high_ns: self.timing.select_high_ns }
     }
 
     /// Stall after a frame in the present power mode, ns.

@@ -2,15 +2,17 @@
 
 use adis16405_driver::{Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, Register, SamplePeriod};
 
-use virtual_sensor::{Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405};
+use virtual_sensor::{
+    Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405, VirtualDelay,
+};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
 }
 
-fn on_bus(model: NoiseModel, config: Config) -> (EmulatedBus, Adis16405<EmulatedBus>) {
+fn on_bus(model: NoiseModel, config: Config) -> (EmulatedBus, Adis16405<EmulatedBus, VirtualDelay>) {
     let bus = EmulatedBus::new(VirtualAdis16405::new(model, 1));
-    let mut imu = Adis16405::new(bus.clone(), config);
+    let mut imu = Adis16405::new(bus.clone(), bus.delay(), config);
     imu.init().unwrap();
     (bus, imu)
 }
@@ -30,7 +32,7 @@ fn the_driver_configures_the_part_without_a_violation() {
 fn low_power_mode_needs_a_slow_clock() {
     let slow = config(GyroRange::Dps300, 2, 15);
     let bus = EmulatedBus::with_sck_hz(VirtualAdis16405::new(NoiseModel::paper(), 1), 300_000);
-    let mut imu = Adis16405::new(bus.clone(), slow);
+    let mut imu = Adis16405::new(bus.clone(), bus.delay(), slow);
     imu.init().unwrap();
     bus.wait_for_data();
     imu.burst().unwrap();
@@ -181,7 +183,7 @@ fn a_supply_alarm_sets_diag_stat_which_clears_on_read() {
 #[test]
 fn violations_of_the_bus_timing_are_recorded() {
     let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::noiseless(), 1));
-    let mut too_fast = Adis16405::new(bus.clone(), Config::default()).with_stall_ns(8_999);
+    let mut too_fast = Adis16405::new(bus.clone(), bus.delay(), Config::default()).with_stall_ns(8_999);
     too_fast.read_register(Register::ProdId).unwrap();
     let kind = ViolationKind::Stall { stall_ns: 8_999, least_ns: 9_000 };
     assert_eq!(bus.part().violations().iter().map(|violation| violation.kind).collect::<Vec<_>>(), [kind]);
