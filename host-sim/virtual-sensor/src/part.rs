@@ -57,6 +57,8 @@ pub struct VirtualAdis16405 {
     pub(crate) diagnosis: u16,
     pub(crate) burst_since_reset: bool,
     samples: u64,
+    /// `samples` at the latest reset: the first sample after it refreshes all outputs.
+    samples_at_reset: u64,
     /// Levels that DIO1 (bit 0) to DIO4 are driven to from outside.
     pub(crate) driven: u16,
     pub(crate) latched_dac: u16,
@@ -102,6 +104,7 @@ impl VirtualAdis16405 {
             diagnosis: 0,
             burst_since_reset: false,
             samples: 0,
+            samples_at_reset: 0,
             driven: 0,
             latched_dac: 0,
             spi: SpiPort::new(),
@@ -180,6 +183,7 @@ impl VirtualAdis16405 {
         self.new_data = [false; 12];
         self.diagnosis = 0;
         self.burst_since_reset = false;
+        self.samples_at_reset = self.samples;
         self.latched_dac = 0;
     }
 
@@ -286,7 +290,7 @@ impl VirtualAdis16405 {
             let sens_avg = self.registers.read(registers::SENS_AVG);
             self.violations.add(self.now_ns, ViolationKind::Configuration { sens_avg });
         }
-        let slow_due = self.samples.is_multiple_of(u64::from(self.slow_refresh));
+        let slow_due = (self.samples - self.samples_at_reset).is_multiple_of(u64::from(self.slow_refresh));
         self.signal_chain.sample(&self.registers, time_s, period_s, slow_due);
         self.auto_null.add(self.signal_chain.rates());
         for (new, channel) in self.new_data.iter_mut().zip(OutputRegister::ALL) {

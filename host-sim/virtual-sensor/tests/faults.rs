@@ -231,3 +231,19 @@ fn the_reset_line_resets_after_10_us() {
     assert_eq!(read(&mut bus.part_mut(), 0x3C), 0x0000);
     assert_eq!(bus.part().violation_count(), 3, "the short pulse and the two frames during the recovery");
 }
+
+#[test]
+fn the_first_sample_after_a_reset_refreshes_the_slow_words_too() {
+    let mut part = part();
+    part.set_slow_refresh(4);
+    // Two samples, so that the next one is not the fourth.
+    for _ in 0..2 {
+        part.advance_to(part.next_data_ready());
+    }
+    frame_after(&mut part, 20_000, 0xBE80);
+    part.advance_to(part.now() + 100 * MS);
+    part.advance_to(part.next_data_ready());
+    let words = burst(&mut part);
+    assert_eq!(words[0], 0x8000 | 2068, "5 V; 0 V would raise the flag of a low supply");
+    assert_eq!(read(&mut part, 0x3C), 0);
+}

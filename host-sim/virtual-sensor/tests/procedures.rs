@@ -11,7 +11,7 @@ use adis16405_driver::{
     Product, Register, Sleep, Stimulus,
 };
 
-use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
+use virtual_sensor::{BusyAnswers, EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
 
 /// Runs a future that is ready at once, as all futures of the emulated bus are.
 fn block_on<T>(future: impl Future<Output = T>) -> T {
@@ -21,19 +21,29 @@ fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
+/// A part that starts up from time 0 and answers garbage meanwhile, needs 1 µs of chip select high between frames, and
+/// refreshes its slow words with every fourth sample.
+fn demanding_part(model: NoiseModel) -> VirtualAdis16405 {
+    let mut part = VirtualAdis16405::cold(model, 1);
+    part.set_busy_answers(BusyAnswers::Garbage);
+    part.set_strict_select(Some(1_000));
+    part.set_slow_refresh(4);
+    part
+}
+
 /// Runs a script through both shells. `$imu` has started up on the part behind `$bus`. Lines are
 /// `expect call => value;` or `take name = call;`, where the call is awaited in the asynchronous run, `given
 /// name = value;` or `then action;`.
 macro_rules! both_shells {
     ($model:expr, |$bus:ident, $imu:ident| $($script:tt)*) => {{
         {
-            let $bus = EmulatedBus::new(VirtualAdis16405::new($model, 1));
+            let $bus = EmulatedBus::new(demanding_part($model));
             let mut $imu = Adis16405::new($bus.clone(), $bus.delay(), Config::default());
             both_shells!(@run [] expect $imu.start_up() => Ok(Product::Adis16405); $($script)*);
             assert_eq!($bus.part().violations(), []);
         }
         block_on(async {
-            let $bus = EmulatedBus::new(VirtualAdis16405::new($model, 1));
+            let $bus = EmulatedBus::new(demanding_part($model));
             let mut $imu = Adis16405::new_async($bus.clone(), $bus.delay(), Config::default());
             both_shells!(@run [.await] expect $imu.start_up() => Ok(Product::Adis16405); $($script)*);
             assert_eq!($bus.part().violations(), []);
