@@ -23,7 +23,7 @@ use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot, resume};
 use crate::register::Register;
 use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
-use crate::spacing::{FrameSpacing, SensorBus};
+use crate::spacing::{FramePauses, SensorBus};
 
 impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
     /// A driver on `spi` for a part that is to be configured with `config`; `delay` keeps the pauses between frames and
@@ -39,18 +39,19 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
     /// [`BurstValidator`](crate::BurstValidator) to decide.
     pub fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
-        let pauses = self.state.spacing().pauses(self.state.stall_ns());
-        match self.state.timing.word_gap_ns {
+        let pauses = self.state.frame_pauses();
+        let (mut whole, mut words);
+        let operations: &mut [_] = match self.state.timing.word_gap_ns {
             0 => {
-                let mut burst = [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(pauses.low_ns)];
-                transact(&mut self.bus, pauses.high_ns, pauses.operations(&mut burst))
+                whole = [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(pauses.low_ns)];
+                &mut whole
             }
             gap_ns => {
-                let mut burst = burst_with_gaps(&mut answer, gap_ns, pauses.low_ns);
-                transact(&mut self.bus, pauses.high_ns, pauses.operations(&mut burst))
+                words = burst_with_gaps(&mut answer, gap_ns, pauses.low_ns);
+                &mut words
             }
-        }
-        .map_err(Error::Spi)?;
+        };
+        transact(&mut self.bus, pauses, operations).map_err(Error::Spi)?;
         Ok(Burst::from_bytes(&answer))
     }
 
@@ -103,16 +104,16 @@ macro_rules! methods {
     (@plain [$($doc:tt)*] $name:ident [$($n:tt)*] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
         $($doc)*
         pub fn $name<$($n)*>(&mut self, $($declared)*) -> Result<$output, Error<SPI::Error>> {
-            let (slot, spacing) = (RequestSlot::new(), self.state.spacing());
-            run(&mut self.bus, spacing, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*))
+            let slot = RequestSlot::new();
+            run(&mut self.bus, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*))
         }
     };
     (@stimulating [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
         $($doc)*
         pub fn $name(&mut self, $($declared)*) -> Result<$output, Error<SPI::Error>> {
-            let (slot, spacing) = (RequestSlot::new(), self.state.spacing());
+            let slot = RequestSlot::new();
             let mut protocol = Protocol::new(&slot, &mut self.state);
-            let result = run(&mut self.bus, spacing, &slot, protocol.$name($($passed)*));
+            let result = run(&mut self.bus, &slot, protocol.$name($($passed)*));
             if self.state.stimulated {
                 // The first error is the one to report; the state tells whether this attempt has succeeded.
                 let _ = self.stop_stimulus();
@@ -126,7 +127,6 @@ procedures!(methods);
 /// Runs a procedure to its end.
 fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
     bus: &mut SensorBus<SPI, D>,
-    spacing: FrameSpacing,
     slot: &RequestSlot,
     procedure: impl Future<Output = Result<T, ProtocolError>>,
 ) -> Result<T, Error<SPI::Error>> {
@@ -134,27 +134,22 @@ fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
     loop {
         match resume(procedure.as_mut()) {
             Poll::Ready(result) => return result.map_err(Error::with_bus_error),
-            Poll::Pending => perform(bus, spacing, slot).map_err(Error::Spi)?,
+            Poll::Pending => perform(bus, slot).map_err(Error::Spi)?,
         }
     }
 }
 
 /// Carries out the request in the slot and responds to it. Not inlined, so that all methods share one copy in flash.
 #[inline(never)]
-fn perform<SPI: SpiDevice<u8>, D: DelayNs>(
-    bus: &mut SensorBus<SPI, D>,
-    spacing: FrameSpacing,
-    slot: &RequestSlot,
-) -> Result<(), SPI::Error> {
+fn perform<SPI: SpiDevice<u8>, D: DelayNs>(bus: &mut SensorBus<SPI, D>, slot: &RequestSlot) -> Result<(), SPI::Error> {
     let mut answer = [0; 2];
     match slot.placed() {
-        BusRequest::Frame { bytes, stall_ns } => {
-            let pauses = spacing.pauses(stall_ns);
+        BusRequest::Frame { bytes, pauses } => {
             let mut frame = [Operation::Transfer(&mut answer, &bytes), Operation::DelayNs(pauses.low_ns)];
-            transact(bus, pauses.high_ns, pauses.operations(&mut frame))?;
+            transact(bus, pauses, &mut frame)?;
         }
-        BusRequest::ChipSelectPulse { ns } => {
-            transact(bus, spacing.high_ns, &mut [Operation::DelayNs(ns)])?;
+        BusRequest::ChipSelectPulse { pauses } => {
+            transact(bus, pauses, &mut [Operation::DelayNs(pauses.low_ns)])?;
         }
         BusRequest::Pause { us } => bus.delay.delay_us(us),
     }
@@ -162,16 +157,16 @@ fn perform<SPI: SpiDevice<u8>, D: DelayNs>(
     Ok(())
 }
 
-/// Runs a transaction and waits for `high_ns` after it, whether it has succeeded or not. If an earlier call was
-/// interrupted in its pause, that pause is kept first.
+/// Runs a transaction, whose last operation is the pause with chip select low, and keeps the one with chip select high
+/// after it, whether it has succeeded or not. If an earlier call was interrupted in its pause, that is kept first.
 fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     bus: &mut SensorBus<SPI, D>,
-    high_ns: u32,
+    pauses: FramePauses,
     operations: &mut [Operation<'_, u8>],
 ) -> Result<(), SPI::Error> {
     pause(bus);
-    bus.owed_ns = high_ns;
-    let result = bus.spi.transaction(operations);
+    bus.owed_ns = pauses.high_ns;
+    let result = bus.spi.transaction(pauses.operations(operations));
     pause(bus);
     result
 }

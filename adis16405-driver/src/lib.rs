@@ -82,7 +82,7 @@
 //! `DelayNs` operation out only with its feature `time`.
 //!
 //! `examples/mock.rs` runs without hardware; `examples/spidev.rs` reads a part on a Linux host; the crate in
-//! `examples/stm32f405` has images for cortex-m-rt, RTIC and Embassy.
+//! `examples-stm32f405` has images for cortex-m-rt, RTIC and Embassy.
 //!
 //! # Validity of a burst
 //!
@@ -126,6 +126,9 @@
 //! | [`factory_restore`](Adis16405::factory_restore) | old or factory corrections | call it again; corrections that it has read are lost |
 //! | [`flash_update`](Adis16405::flash_update) | flash old, new or being written | wait, compare [`flash_writes`](Adis16405::flash_writes), call it again; flags of DIAG_STAT that were read are lost |
 //! | [`sleep`](Adis16405::sleep), [`wake`](Adis16405::wake) | asleep or awake | [`wake`](Adis16405::wake) |
+//!
+//! The SPI devices of embassy-embedded-hal 0.6 release chip select when their future is dropped; the asynchronous ones of
+//! embedded-hal-bus 0.3 do not, so let their futures end.
 //!
 //! A timeout around any method is therefore possible; `burst` and `read` may be dropped at any time without a loss other
 //! than that sample.

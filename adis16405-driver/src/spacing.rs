@@ -16,14 +16,6 @@ pub enum SelectDuringStall {
     Low,
 }
 
-/// How the pauses between frames divide into those with chip select low and high.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct FrameSpacing {
-    pub(crate) select: SelectDuringStall,
-    /// Least time that chip select is high between frames, ns.
-    pub(crate) high_ns: u32,
-}
-
 /// The pauses after a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FramePauses {
@@ -33,23 +25,22 @@ pub(crate) struct FramePauses {
     pub(crate) high_ns: u32,
 }
 
-impl FrameSpacing {
-    /// The pauses after a frame whose stall is `stall_ns`.
-    pub(crate) fn pauses(self, stall_ns: u32) -> FramePauses {
-        match self.select {
-            SelectDuringStall::High => FramePauses { low_ns: 0, high_ns: stall_ns.max(self.high_ns) },
-            SelectDuringStall::Low => FramePauses { low_ns: stall_ns, high_ns: self.high_ns },
+impl FramePauses {
+    /// The pauses after a frame whose stall is `stall_ns`; chip select is high for at least `least_high_ns`.
+    pub(crate) fn new(select: SelectDuringStall, stall_ns: u32, least_high_ns: u32) -> Self {
+        match select {
+            SelectDuringStall::High => Self { low_ns: 0, high_ns: stall_ns.max(least_high_ns) },
+            SelectDuringStall::Low => Self { low_ns: stall_ns, high_ns: least_high_ns },
         }
     }
-}
 
-impl FramePauses {
-    /// The operations of a transaction without its last one, a delay, if that is 0: an SPI device without a delay of its
-    /// own cannot carry it out.
+    /// The operations of a transaction, without the last one, which is the pause with chip select low, if that is 0: an SPI
+    /// device without a delay of its own cannot carry it out.
     pub(crate) fn operations<'a, 'b>(&self, operations: &'a mut [Operation<'b, u8>]) -> &'a mut [Operation<'b, u8>] {
-        let last_is_none = self.low_ns == 0 && matches!(operations.last(), Some(Operation::DelayNs(_)));
-        let used = operations.len() - usize::from(last_is_none);
-        operations.split_at_mut(used).0
+        if self.low_ns > 0 {
+            return operations;
+        }
+        operations.split_last_mut().map_or(&mut [], |(_, others)| others)
     }
 }
 
