@@ -58,8 +58,7 @@ fn the_stall_can_be_set() {
     assert_eq!(written, Ok(()));
 }
 
-/// Linux, PX4 and Canopus raise chip select between frames and wait then. A part may also be told apart from its
-/// neighbours on the bus only while it is high.
+/// Linux, PX4 and Canopus raise chip select between frames and wait then.
 #[test]
 fn chip_select_is_high_during_the_stall_unless_it_is_set_to_be_low() {
     let exchange = Step::Exchange { sent: vec![0xBE, 0x80], answer: vec![0, 0] };
