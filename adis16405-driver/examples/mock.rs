@@ -58,8 +58,8 @@ impl DelayNs for NoDelay {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut imu = Adis16405::new(MockPart::default(), Config::default());
-    let product = imu.start_up(&mut NoDelay)?;
+    let mut imu = Adis16405::new(MockPart::default(), NoDelay, Config::default());
+    let product = imu.start_up()?;
     let sample = imu.read()?;
     println!("{product:?}");
     println!("{:8.3?} °/s, {:8.5?} g, {:7.4?} gauss", sample.gyro_dps(), sample.accl_g(), sample.magn_gauss());

@@ -25,9 +25,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut spi = SpidevDevice::open(&device)?;
     spi.configure(&SpidevOptions::new().max_speed_hz(sck_hz).mode(SpiModeFlags::SPI_MODE_3).build())?;
 
-    let mut imu = Adis16405::new(spi, config);
-    let product = imu.start_up(&mut Delay)?;
-    let test = imu.self_test(&mut Delay)?;
+    let mut imu = Adis16405::new(spi, Delay, config);
+    let product = imu.start_up()?;
+    let test = imu.self_test()?;
     println!("{product:?}, self-test {}: {:?}", if test.passed() { "passed" } else { "failed" }, test.diagnosis);
 
     for _ in 0..100 {

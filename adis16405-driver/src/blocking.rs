@@ -4,6 +4,7 @@ use core::pin::pin;
 use core::task::Poll;
 
 use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{Operation, SpiDevice};
 
 use crate::alarms::{Alarm, AlarmNumber};
@@ -22,12 +23,13 @@ use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot, resume};
 use crate::register::Register;
 use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
+use crate::spacing::{FramePauses, SensorBus};
 
-impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
-    /// A driver on `spi` for a part that is to be configured with `config`. Nothing is sent before
-    /// [`init`](Self::init).
-    pub fn new(spi: SPI, config: Config) -> Self {
-        Self::with_state(spi, config)
+impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
+    /// A driver on `spi` for a part that is to be configured with `config`; `delay` keeps the pauses between frames and
+    /// those of the procedures. Nothing is sent before [`init`](Self::init).
+    pub fn new(spi: SPI, delay: D, config: Config) -> Self {
+        Self::with_state(spi, delay, config)
     }
 
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
@@ -37,14 +39,19 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
     /// [`BurstValidator`](crate::BurstValidator) to decide.
     pub fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
-        let stall_ns = self.state.stall_ns();
-        match self.state.timing.word_gap_ns {
-            0 => self
-                .spi
-                .transaction(&mut [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(stall_ns)]),
-            gap_ns => self.spi.transaction(&mut burst_with_gaps(&mut answer, gap_ns, stall_ns)),
-        }
-        .map_err(Error::Spi)?;
+        let pauses = self.state.frame_pauses();
+        let (mut whole, mut words);
+        let operations: &mut [_] = match self.state.timing.word_gap_ns {
+            0 => {
+                whole = [Operation::Transfer(&mut answer, &BURST_REQUEST), Operation::DelayNs(pauses.low_ns)];
+                &mut whole
+            }
+            gap_ns => {
+                words = burst_with_gaps(&mut answer, gap_ns, pauses.low_ns);
+                &mut words
+            }
+        };
+        transact(&mut self.bus, pauses, operations).map_err(Error::Spi)?;
         Ok(Burst::from_bytes(&answer))
     }
 
@@ -63,39 +70,50 @@ impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
         let burst = self.burst()?;
         self.checked_sample(burst).map_err(Error::Unusable)
     }
+
+    /// Resets the part by its reset line (RST, active low): drives `line` low for [`Timing::reset_pulse_us`], leaves the
+    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. The way out where the
+    /// part does not answer any more, and cannot receive the command of [`software_reset`](Self::software_reset).
+    ///
+    /// The line must be high before; `line` may be an open-drain output. As after every reset, the registers are loaded
+    /// from flash, and SMPL_PRD there may select low-power mode.
+    ///
+    /// # Errors
+    /// [`Error::ResetLine`] if the pin cannot be driven, and those of [`init`](Self::init).
+    pub fn hardware_reset(&mut self, line: &mut impl OutputPin) -> Result<Product, Error<SPI::Error>> {
+        self.state.forget_registers();
+        line.set_low().map_err(|_| Error::ResetLine)?;
+        self.bus.delay.delay_us(self.state.timing.reset_pulse_us);
+        line.set_high().map_err(|_| Error::ResetLine)?;
+        self.bus.delay.delay_us(self.state.timing.reset_us);
+        self.init()
+    }
 }
 
 macro_rules! methods {
     ($(
         $(#[$doc:meta])*
-        $pace:ident fn $name:ident $([const $length:ident: usize])? ($($argument:ident: $type:ty),*) -> $output:ty;
+        $kind:ident fn $name:ident $([const $length:ident: usize])? ($($argument:ident: $type:ty),*) -> $output:ty;
     )*) => {
-        impl<SPI: SpiDevice<u8>> Adis16405<SPI, Blocking> {
+        impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
             $(methods! {
-                @$pace [$(#[$doc])*] $name [$(const $length: usize)?] [$($argument: $type,)*] [$($argument),*] $output
+                @$kind [$(#[$doc])*] $name [$(const $length: usize)?] [$($argument: $type,)*] [$($argument),*] $output
             })*
         }
     };
-    (@framed [$($doc:tt)*] $name:ident [$($n:tt)*] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
+    (@plain [$($doc:tt)*] $name:ident [$($n:tt)*] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
         $($doc)*
         pub fn $name<$($n)*>(&mut self, $($declared)*) -> Result<$output, Error<SPI::Error>> {
             let slot = RequestSlot::new();
-            run(&mut self.spi, &mut NoPause, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*))
-        }
-    };
-    (@paced [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
-        $($doc)*
-        pub fn $name(&mut self, $($declared)* delay: &mut impl DelayNs) -> Result<$output, Error<SPI::Error>> {
-            let slot = RequestSlot::new();
-            run(&mut self.spi, delay, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*))
+            run(&mut self.bus, &slot, Protocol::new(&slot, &mut self.state).$name($($passed)*))
         }
     };
     (@stimulating [$($doc:tt)*] $name:ident [] [$($declared:tt)*] [$($passed:tt)*] $output:ty) => {
         $($doc)*
-        pub fn $name(&mut self, $($declared)* delay: &mut impl DelayNs) -> Result<$output, Error<SPI::Error>> {
+        pub fn $name(&mut self, $($declared)*) -> Result<$output, Error<SPI::Error>> {
             let slot = RequestSlot::new();
             let mut protocol = Protocol::new(&slot, &mut self.state);
-            let result = run(&mut self.spi, delay, &slot, protocol.$name($($passed)*));
+            let result = run(&mut self.bus, &slot, protocol.$name($($passed)*));
             if self.state.stimulated {
                 // The first error is the one to report; the state tells whether this attempt has succeeded.
                 let _ = self.stop_stimulus();
@@ -107,9 +125,8 @@ macro_rules! methods {
 procedures!(methods);
 
 /// Runs a procedure to its end.
-fn run<SPI: SpiDevice<u8>, T>(
-    spi: &mut SPI,
-    delay: &mut impl DelayNs,
+fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
+    bus: &mut SensorBus<SPI, D>,
     slot: &RequestSlot,
     procedure: impl Future<Output = Result<T, ProtocolError>>,
 ) -> Result<T, Error<SPI::Error>> {
@@ -117,29 +134,47 @@ fn run<SPI: SpiDevice<u8>, T>(
     loop {
         match resume(procedure.as_mut()) {
             Poll::Ready(result) => return result.map_err(Error::with_bus_error),
-            Poll::Pending => perform(spi, delay, slot).map_err(Error::Spi)?,
+            Poll::Pending => perform(bus, slot).map_err(Error::Spi)?,
         }
     }
 }
 
 /// Carries out the request in the slot and responds to it. Not inlined, so that all methods share one copy in flash.
 #[inline(never)]
-fn perform<SPI: SpiDevice<u8>>(spi: &mut SPI, delay: &mut impl DelayNs, slot: &RequestSlot) -> Result<(), SPI::Error> {
+fn perform<SPI: SpiDevice<u8>, D: DelayNs>(bus: &mut SensorBus<SPI, D>, slot: &RequestSlot) -> Result<(), SPI::Error> {
     let mut answer = [0; 2];
     match slot.placed() {
-        BusRequest::Frame { bytes, stall_ns } => {
-            spi.transaction(&mut [Operation::Transfer(&mut answer, &bytes), Operation::DelayNs(stall_ns)])?;
+        BusRequest::Frame { bytes, pauses } => {
+            let mut frame = [Operation::Transfer(&mut answer, &bytes), Operation::DelayNs(pauses.low_ns)];
+            transact(bus, pauses, &mut frame)?;
         }
-        BusRequest::ChipSelectPulse { ns } => spi.transaction(&mut [Operation::DelayNs(ns)])?,
-        BusRequest::Pause { us } => delay.delay_us(us),
+        BusRequest::ChipSelectPulse { pauses } => {
+            transact(bus, pauses, &mut [Operation::DelayNs(pauses.low_ns)])?;
+        }
+        BusRequest::Pause { us } => bus.delay.delay_us(us),
     }
     slot.respond(answer);
     Ok(())
 }
 
-/// The delay of methods whose procedure requests no pause.
-struct NoPause;
+/// Runs a transaction, whose last operation is the pause with chip select low, and keeps the one with chip select high
+/// after it, whether it has succeeded or not. If an earlier call was interrupted in its pause, that is kept first.
+fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
+    bus: &mut SensorBus<SPI, D>,
+    pauses: FramePauses,
+    operations: &mut [Operation<'_, u8>],
+) -> Result<(), SPI::Error> {
+    pause(bus);
+    bus.owed_ns = pauses.high_ns;
+    let result = bus.spi.transaction(pauses.operations(operations));
+    pause(bus);
+    result
+}
 
-impl DelayNs for NoPause {
-    fn delay_ns(&mut self, _: u32) {}
+/// Waits for the pause that is owed to the part.
+fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
+    if bus.owed_ns > 0 {
+        bus.delay.delay_ns(bus.owed_ns);
+        bus.owed_ns = 0;
+    }
 }

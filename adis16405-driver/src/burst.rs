@@ -14,12 +14,12 @@ pub const BURST_REQUEST: [u8; BURST_BYTES] = {
     request
 };
 
-/// The operations of a burst read with a pause of `gap_ns` after each word but the last, and of `stall_ns` after the
+/// The operations of a burst read with a pause of `gap_ns` after each word but the last, and of `last_ns` after the
 /// last.
 pub(crate) fn burst_with_gaps(
     answer: &mut [u8; BURST_BYTES],
     gap_ns: u32,
-    stall_ns: u32,
+    last_ns: u32,
 ) -> [Operation<'_, u8>; BURST_BYTES] {
     static REQUEST: [u8; BURST_BYTES] = BURST_REQUEST;
     let mut words = answer.chunks_exact_mut(2).zip(REQUEST.chunks_exact(2));
@@ -28,7 +28,7 @@ pub(crate) fn burst_with_gaps(
         let word = if index % 2 == 0 { words.next() } else { None };
         match word {
             Some((answer, request)) => Operation::Transfer(answer, request),
-            None => Operation::DelayNs(if index == BURST_BYTES - 1 { stall_ns } else { gap_ns }),
+            None => Operation::DelayNs(if index == BURST_BYTES - 1 { last_ns } else { gap_ns }),
         }
     })
 }

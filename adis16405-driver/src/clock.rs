@@ -3,6 +3,7 @@
 use core::fmt;
 
 use crate::channel::GyroRange;
+use crate::spacing::SelectDuringStall;
 
 /// Time base of the sample period, SMPL_PRD bit 7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -285,7 +286,7 @@ impl PerClockMode {
 /// The times that the driver keeps. Where sources for this part disagree, [`Timing::DEFAULT`] takes the longer time.
 ///
 /// These are not confirmed by any source at hand, so check them against your data sheet: the low-power stall, the times
-/// of a flash update, a factory restore and an auto-null, and the SMPL_PRD value above which low-power mode begins.
+/// of a flash update, a factory restore and an auto-null, the reset pulse, the least time of chip select high, and the SMPL_PRD value above which low-power mode begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -293,6 +294,11 @@ pub struct Timing {
     /// Stall after a frame, ns. In normal mode the part needs 9 µs, and Analog Devices' evaluation tool keeps 16 µs.
     /// The 75 µs of low-power mode are unconfirmed.
     pub stall_ns: PerClockMode,
+    /// Level of chip select during the stall.
+    pub stall_select: SelectDuringStall,
+    /// Least time that chip select is high between two frames, ns. No source at hand gives it for this part; the
+    /// ADIS16470 needs 1 µs. With [`SelectDuringStall::High`] chip select is high for at least the stall anyway.
+    pub select_high_ns: u32,
     /// Pause between the words of a burst, ns. The default is 0: Linux, PX4 and flight software of satellites read the
     /// part without a pause. Data sheets of sibling parts ask for one SCK period. With a pause, a burst is 13 transfers
     /// instead of one.
@@ -302,9 +308,11 @@ pub struct Timing {
     /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode. The default is the longer time,
     /// since the mode at power-on depends on the settings in flash.
     pub start_up_us: u32,
-    /// From a software reset until the part answers, µs: 100 ms, or 170 ms in low-power mode. The default is the longer
+    /// From a reset, by software or by the line, until the part answers, µs: 100 ms, or 170 ms in low-power mode. The default is the longer
     /// time.
     pub reset_us: u32,
+    /// Length of the low pulse on the reset line, µs. No source at hand gives the least; 10 µs are usual in the family.
+    pub reset_pulse_us: u32,
     /// Length of the chip-select pulse that wakes the part, ns. Unconfirmed.
     pub wake_pulse_ns: u32,
     /// From wake-up until the part answers, µs.
@@ -329,10 +337,13 @@ impl Timing {
     /// The times of a new driver.
     pub const DEFAULT: Self = Self {
         stall_ns: PerClockMode { normal: 16_000, low_power: 75_000 },
+        stall_select: SelectDuringStall::High,
+        select_high_ns: 1_000,
         word_gap_ns: 0,
         normal_mode_max_smpl_prd: 0x08,
         start_up_us: 290_000,
         reset_us: 170_000,
+        reset_pulse_us: 100,
         wake_pulse_ns: 10_000,
         wake_us: PerClockMode { normal: 4_000, low_power: 15_000 },
         flash_test_us: PerClockMode { normal: 17_000, low_power: 90_000 },

@@ -87,15 +87,9 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn start_up(&mut self) -> Result<Product, ProtocolError> {
-        self.forget_registers();
+        self.state.forget_registers();
         self.pause(self.state.timing.start_up_us).await;
         self.init().await
-    }
-
-    /// The registers were loaded from flash: until they are read, neither configuration nor power mode is known.
-    fn forget_registers(&mut self) {
-        self.state.configured = false;
-        self.state.mode = ClockMode::LowPower;
     }
 
     pub(crate) async fn configure(&mut self, config: Config) -> Result<(), ProtocolError> {
@@ -150,7 +144,7 @@ impl Protocol<'_> {
 
     pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
         self.write_low(Register::GlobCmd, SOFTWARE_RESET).await;
-        self.forget_registers();
+        self.state.forget_registers();
         self.pause(self.state.timing.reset_us).await;
         self.init().await
     }

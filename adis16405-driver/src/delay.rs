@@ -5,7 +5,9 @@ use core::cell::RefCell;
 use embedded_hal::delay::DelayNs;
 
 /// A delay that several owners use, for HALs whose delay can neither be cloned nor made twice: `&SharedDelay` is a
-/// [`DelayNs`] too.
+/// [`DelayNs`] too. The SPI device needs a delay beside the driver for [`wake`](crate::Adis16405::wake),
+/// [`SelectDuringStall::Low`](crate::SelectDuringStall::Low) and
+/// [`Timing::word_gap_ns`](crate::Timing::word_gap_ns).
 ///
 /// ```
 /// # use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiBus};
@@ -14,8 +16,8 @@ use embedded_hal::delay::DelayNs;
 /// # fn build<B: SpiBus<u8>, P: OutputPin, D: DelayNs>(bus: B, chip_select: P, timer: D) {
 /// let delay = SharedDelay::new(timer);
 /// let device = ExclusiveDevice::new(bus, chip_select, &delay).unwrap();
-/// let mut imu = Adis16405::new(device, Config::default());
-/// let started = imu.start_up(&mut &delay);
+/// let mut imu = Adis16405::new(device, &delay, Config::default());
+/// let started = imu.start_up();
 /// # let _ = started.is_ok(); }
 /// ```
 #[derive(Debug)]

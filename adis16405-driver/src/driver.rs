@@ -8,6 +8,7 @@ use crate::clock::{PerClockMode, Timing};
 use crate::config::Config;
 use crate::protocol::DriverState;
 use crate::sample::ImuSample;
+use crate::spacing::SensorBus;
 use crate::validity::{BurstValidator, FaultCounters, Faults};
 
 /// Type parameter of a driver over a blocking [`SpiDevice`](embedded_hal::spi::SpiDevice).
@@ -21,20 +22,23 @@ pub enum Async {}
 
 /// An ADIS16405 or ADIS16400 on an SPI bus: blocking, or asynchronous with `MODE` = `Async` (feature `async`).
 ///
-/// Every 16-bit frame is a transaction of its own, so that chip select is high between frames. The stall after the
-/// frame is part of the transaction, so the SPI device must support
-/// [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs).
+/// Every 16-bit frame is a transaction of its own, after which the driver waits for the stall with its delay `D`, chip
+/// select being high. [`Timing`] sets how long, and whether chip select stays low instead.
+///
+/// The SPI device must support [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) only for
+/// [`wake`](Self::wake), [`SelectDuringStall::Low`](crate::SelectDuringStall::Low) and [`Timing::word_gap_ns`].
 #[derive(Debug)]
-pub struct Adis16405<SPI, MODE = Blocking> {
-    pub(crate) spi: SPI,
+pub struct Adis16405<SPI, D, MODE = Blocking> {
+    pub(crate) bus: SensorBus<SPI, D>,
     pub(crate) state: DriverState,
     validator: BurstValidator,
     mode: PhantomData<MODE>,
 }
 
-impl<SPI, MODE> Adis16405<SPI, MODE> {
-    pub(crate) fn with_state(spi: SPI, config: Config) -> Self {
-        Self { spi, state: DriverState::new(config), validator: BurstValidator::default(), mode: PhantomData }
+impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
+    pub(crate) fn with_state(spi: SPI, delay: D, config: Config) -> Self {
+        let (state, validator) = (DriverState::new(config), BurstValidator::default());
+        Self { bus: SensorBus::new(spi, delay), state, validator, mode: PhantomData }
     }
 
     /// Sets the stall after each frame in ns, for both power modes.
@@ -102,16 +106,16 @@ impl<SPI, MODE> Adis16405<SPI, MODE> {
         if validity.usable { Ok(self.sample_from(burst)) } else { Err(validity.faults) }
     }
 
-    /// Returns the SPI device.
-    pub fn release(self) -> SPI {
-        self.spi
+    /// Returns the SPI device and the delay.
+    pub fn release(self) -> (SPI, D) {
+        (self.bus.spi, self.bus.delay)
     }
 }
 
 /// The methods of the driver that run a procedure of [`Protocol`](crate::protocol::Protocol), each with the name of its
-/// procedure. The macro `$make_methods` makes a blocking or an asynchronous method of each row. Procedures marked
-/// `framed` consist of frames only; those marked `paced` contain pauses, and their methods take a delay. A method marked
-/// `stimulating` is paced, and switches the stimulus of the manual self-test off if its procedure ends with an error.
+/// procedure. The macro `$make_methods` makes a blocking or an asynchronous method of each row. A method marked
+/// `stimulating` switches the stimulus of the manual self-test off if its procedure ends with an error; the others are
+/// `plain`.
 macro_rules! procedures {
     ($make_methods:ident) => {
         $make_methods! {
@@ -119,7 +123,7 @@ macro_rules! procedures {
             ///
             /// # Errors
             /// [`Error::Product`] if PROD_ID is not that of a supported part.
-            framed fn identity() -> Product;
+            plain fn identity() -> Product;
 
             /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and reads the gyro offsets
             /// ([`x_sign_at_risk`](Self::x_sign_at_risk)).
@@ -131,14 +135,14 @@ macro_rules! procedures {
             /// # Errors
             /// [`Error::Product`] if PROD_ID is not that of a supported part, [`Error::Verify`] if a register did not
             /// take its value.
-            framed fn init() -> Product;
+            plain fn init() -> Product;
 
             /// Waits for the start-up time of the part ([`Timing::start_up_us`]), then does what [`init`](Self::init)
             /// does.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
-            paced fn start_up() -> Product;
+            plain fn start_up() -> Product;
 
             /// Resets the part (GLOB_CMD bit 7), leaves the bus silent for [`Timing::reset_us`], and configures the
             /// part as [`init`](Self::init) does.
@@ -149,7 +153,7 @@ macro_rules! procedures {
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
-            paced fn software_reset() -> Product;
+            plain fn software_reset() -> Product;
 
             /// Sets sample period, gyro range and filter.
             ///
@@ -157,53 +161,53 @@ macro_rules! procedures {
             ///
             /// # Errors
             /// [`Error::Verify`] if a register did not take its value.
-            framed fn configure(config: Config) -> ();
+            plain fn configure(config: Config) -> ();
 
             /// Sets the period of the internal sample clock. [`SamplePeriod`] is made from a rate in `f64`, `f32` or
             /// 10⁻³ samples per second.
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_sample_period(period: SamplePeriod) -> ();
+            plain fn set_sample_period(period: SamplePeriod) -> ();
 
             /// Sets the sample rate nearest to `hz` and returns the rate that was set, both in samples per second. For
             /// targets without a double-precision FPU, [`set_sample_period`](Self::set_sample_period) is cheaper.
             ///
             /// # Errors
             /// [`Error::Config`] if `hz` is not finite and positive, [`Error::Verify`].
-            framed fn set_sample_rate(hz: f64) -> f64;
+            plain fn set_sample_rate(hz: f64) -> f64;
 
             /// Sets the gyro range.
             ///
             /// # Errors
             /// [`Error::Config`] if the range needs more filter taps than are set, [`Error::Verify`].
-            framed fn set_range(range: GyroRange) -> ();
+            plain fn set_range(range: GyroRange) -> ();
 
             /// Sets the filter: two cascaded averages of 2^M samples.
             ///
             /// # Errors
             /// [`Error::Config`] if M is above 6 or too small for the range, [`Error::Verify`].
-            framed fn set_filter_taps_log2(filter_taps_log2: u8) -> ();
+            plain fn set_filter_taps_log2(filter_taps_log2: u8) -> ();
 
             /// Reads a register in two frames; the answer comes in the second. Bits outside the register's width are
             /// returned as the part sends them.
             ///
             /// # Errors
             /// [`Error::WriteOnly`] for GLOB_CMD (reading it would start a burst) and SLP_CNT.
-            framed fn read_register(register: Register) -> u16;
+            plain fn read_register(register: Register) -> u16;
 
             /// Reads `N` registers in `N` + 1 frames: each frame brings the answer to the one before.
             ///
             /// # Errors
             /// [`Error::WriteOnly`] as for [`read_register`](Self::read_register); nothing is sent then.
-            framed fn read_registers[const N: usize](registers: [Register; N]) -> [u16; N];
+            plain fn read_registers[const N: usize](registers: [Register; N]) -> [u16; N];
 
             /// Writes a register without reading it back: the lower byte, then the upper one if the register is wider
             /// than 8 bits.
             ///
             /// # Errors
             /// [`Error::ReadOnly`] if it cannot be written.
-            framed fn write_register(register: Register, value: u16) -> ();
+            plain fn write_register(register: Register, value: u16) -> ();
 
             /// Sets the bits of `mask` to their value in `value` and leaves the others. Reads the register, writes only
             /// bytes that change, the lower one first, and reads back ([`with_verified_writes`]).
@@ -212,13 +216,13 @@ macro_rules! procedures {
             ///
             /// # Errors
             /// [`Error::ReadOnly`], [`Error::WriteOnly`], [`Error::Verify`] if the bits did not take their value.
-            framed fn update_register(register: Register, mask: u16, value: u16) -> ();
+            plain fn update_register(register: Register, mask: u16, value: u16) -> ();
 
             /// Reads DIAG_STAT, which clears it.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn diagnosis() -> Diagnosis;
+            plain fn diagnosis() -> Diagnosis;
 
             /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end. The other bits of MSC_CTRL keep
             /// their values, except that a manual self-test that was on is switched off.
@@ -226,13 +230,13 @@ macro_rules! procedures {
             /// # Errors
             /// [`Error::Deadline`] if it does not end within twice its usual time, [`Error::Product`] if the part does
             /// not answer, [`Error::Verify`].
-            paced fn self_test() -> SelfTest;
+            plain fn self_test() -> SelfTest;
 
             /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end. It too switches a manual self-test off.
             ///
             /// # Errors
             /// Those of [`self_test`](Self::self_test).
-            paced fn flash_test() -> FlashTest;
+            plain fn flash_test() -> FlashTest;
 
             /// Runs a manual self-test: deflects the sensors (MSC_CTRL bit 8 or 9) and returns the response of gyros x,
             /// y, z and accelerometers x, y, z in counts, each the difference of two means over eight samples. The part
@@ -250,171 +254,171 @@ macro_rules! procedures {
             ///
             /// # Errors
             /// [`Error::Verify`] if MSC_CTRL did not take the bits.
-            framed fn stop_stimulus() -> ();
+            plain fn stop_stimulus() -> ();
 
             /// The bias correction of the gyros, as applied by the part and by the driver.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn gyro_offsets() -> GyroBias;
+            plain fn gyro_offsets() -> GyroBias;
 
             /// Sets the bias correction of the gyros x, y, z in counts of 0.0125 °/s, −4096 to 4095, which is added to
             /// the outputs. A negative correction of x is applied by the driver: see [`GyroBias`].
             ///
             /// # Errors
             /// [`Error::Value`] if an offset does not fit, [`Error::Verify`].
-            framed fn set_gyro_offsets(offsets: [i16; 3]) -> GyroBias;
+            plain fn set_gyro_offsets(offsets: [i16; 3]) -> GyroBias;
 
             /// If XGYRO_OFF is negative, sets it to 0 and applies its value in the driver: see [`GyroBias`].
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn keep_negative_x_bias_on_host() -> GyroBias;
+            plain fn keep_negative_x_bias_on_host() -> GyroBias;
 
             /// The bias correction of the accelerometers x, y, z in counts of 3.33 mg.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn accl_offsets() -> [i16; 3];
+            plain fn accl_offsets() -> [i16; 3];
 
             /// Sets the bias correction of the accelerometers x, y, z in counts of 3.33 mg, −2048 to 2047.
             ///
             /// # Errors
             /// [`Error::Value`] if an offset does not fit, [`Error::Verify`].
-            framed fn set_accl_offsets(offsets: [i16; 3]) -> ();
+            plain fn set_accl_offsets(offsets: [i16; 3]) -> ();
 
             /// The hard-iron correction x, y, z in counts of 0.5 mgauss.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn hard_iron() -> [i16; 3];
+            plain fn hard_iron() -> [i16; 3];
 
             /// Sets the hard-iron correction x, y, z in counts of 0.5 mgauss, −8192 to 8191.
             ///
             /// # Errors
             /// [`Error::Value`] if a correction does not fit, [`Error::Verify`].
-            framed fn set_hard_iron(offsets: [i16; 3]) -> ();
+            plain fn set_hard_iron(offsets: [i16; 3]) -> ();
 
             /// The soft-iron factors x, y, z in units of 1/2048.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn soft_iron() -> [u16; 3];
+            plain fn soft_iron() -> [u16; 3];
 
             /// Sets the soft-iron factors x, y, z in units of 1/2048 (0x0800 = 1), 0 to 4095.
             ///
             /// # Errors
             /// [`Error::Value`] if a factor does not fit, [`Error::Verify`].
-            framed fn set_soft_iron(factors: [u16; 3]) -> ();
+            plain fn set_soft_iron(factors: [u16; 3]) -> ();
 
             /// Runs the auto-null (GLOB_CMD bit 0): the part sets its gyro offsets from its present outputs, and must
             /// be still. A negative offset of x is then applied by the driver: see [`GyroBias`].
             ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer after the command, [`Error::Verify`].
-            paced fn auto_null() -> GyroBias;
+            plain fn auto_null() -> GyroBias;
 
             /// Runs the precision auto-null (GLOB_CMD bit 4): as [`auto_null`](Self::auto_null), from an average over
             /// 30 s ([`Timing::precision_auto_null_us`]) during which the part must be still and the bus is left
             /// silent. On a sibling part it left a mean residual of 0.05 °/s.
             ///
-            /// The delay may feed a watchdog.
+            /// The delay of the driver may feed a watchdog.
             ///
             /// # Errors
             /// Those of [`auto_null`](Self::auto_null).
-            paced fn precision_auto_null() -> GyroBias;
+            plain fn precision_auto_null() -> GyroBias;
 
             /// Restores the factory calibration (GLOB_CMD bit 1), leaves the bus silent meanwhile, configures the part
             /// again, and returns the corrections that were overwritten.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
-            paced fn factory_restore() -> FactoryRestore;
+            plain fn factory_restore() -> FactoryRestore;
 
             /// The number of flash writes so far, FLASH_CNT.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn flash_writes() -> u16;
+            plain fn flash_writes() -> u16;
 
             /// Reads DIAG_STAT and FLASH_CNT, writes the present settings to flash (GLOB_CMD bit 3), leaves the bus
             /// silent meanwhile, and reads both again.
             ///
             /// # Errors
             /// [`Error::FlashUpdate`] if DIAG_STAT reports a failure of this update, or if FLASH_CNT did not change.
-            paced fn flash_update() -> FlashUpdate;
+            plain fn flash_update() -> FlashUpdate;
 
             /// The pin and polarity of the data-ready signal; `None` if it is off.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn data_ready() -> Option<DioSignal>;
+            plain fn data_ready() -> Option<DioSignal>;
 
             /// Sets the pin and polarity of the data-ready signal; `None` switches it off.
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_data_ready(signal: Option<DioSignal>) -> ();
+            plain fn set_data_ready(signal: Option<DioSignal>) -> ();
 
             /// The corrections between sensors that the part applies.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn compensation() -> OnChipCompensation;
+            plain fn compensation() -> OnChipCompensation;
 
             /// Sets the corrections between sensors that the part applies.
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_compensation(compensation: OnChipCompensation) -> ();
+            plain fn set_compensation(compensation: OnChipCompensation) -> ();
 
             /// The setting of an alarm; `None` if it has no source.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn alarm(number: AlarmNumber) -> Option<Alarm>;
+            plain fn alarm(number: AlarmNumber) -> Option<Alarm>;
 
             /// Sets an alarm, or switches it off with `None`. The alarm is off while its registers change.
             ///
             /// # Errors
             /// [`Error::Value`] if the threshold is outside the limits of the channel, [`Error::Verify`].
-            framed fn set_alarm(number: AlarmNumber, alarm: Option<Alarm>) -> ();
+            plain fn set_alarm(number: AlarmNumber, alarm: Option<Alarm>) -> ();
 
             /// Sets the pin and polarity of the alarm signal; `None` switches it off.
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_alarm_output(signal: Option<DioSignal>) -> ();
+            plain fn set_alarm_output(signal: Option<DioSignal>) -> ();
 
             /// Sets whether alarms compare filtered data.
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_alarm_filtering(filtered: bool) -> ();
+            plain fn set_alarm_filtering(filtered: bool) -> ();
 
             /// The direction and level of the general-purpose lines.
             ///
             /// # Errors
             /// [`Error::Spi`].
-            framed fn gpio() -> Gpio;
+            plain fn gpio() -> Gpio;
 
             /// Sets the direction of the general-purpose lines, and the level of outputs.
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_gpio(gpio: Gpio) -> ();
+            plain fn set_gpio(gpio: Gpio) -> ();
 
             /// Sets the auxiliary analog output: writes AUX_DAC, then latches it (GLOB_CMD bit 2).
             ///
             /// # Errors
             /// [`Error::Verify`].
-            framed fn set_aux_dac(level: DacLevel) -> ();
+            plain fn set_aux_dac(level: DacLevel) -> ();
 
             /// Sends the part to sleep. Leave the bus silent until the sleep is over, or call [`wake`](Self::wake).
             ///
             /// # Errors
             /// [`Error::Spi`]; SLP_CNT is not read back.
-            framed fn sleep(sleep: Sleep) -> ();
+            plain fn sleep(sleep: Sleep) -> ();
 
             /// Wakes the part by a low pulse on chip select ([`Timing::wake_pulse_ns`]), waits for [`Timing::wake_us`],
             /// and reads which part is connected. Only one source describes the pulse, without a test; a reset wakes
@@ -422,7 +426,7 @@ macro_rules! procedures {
             ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer.
-            paced fn wake() -> Product;
+            plain fn wake() -> Product;
         }
     };
 }

@@ -10,12 +10,12 @@
 //! use adis16405_driver::{Adis16405, Config, Error, GyroRange, SamplePeriod};
 //! use embedded_hal::{delay::DelayNs, spi::SpiDevice};
 //!
-//! fn read<SPI: SpiDevice<u8>>(spi: SPI, delay: &mut impl DelayNs) -> Result<(), Error<SPI::Error>> {
+//! fn read<SPI: SpiDevice<u8>>(spi: SPI, delay: impl DelayNs) -> Result<(), Error<SPI::Error>> {
 //!     let period = SamplePeriod::nearest(204.8)?;
 //!     let config = Config::new(GyroRange::Dps300, 2, period)?;
-//!     let mut imu = Adis16405::new(spi, config);
-//!     imu.start_up(delay)?;
-//!     let healthy = imu.self_test(delay)?.passed();
+//!     let mut imu = Adis16405::new(spi, delay, config);
+//!     imu.start_up()?; // 290 ms after power-on
+//!     let healthy = imu.self_test()?.passed();
 //!     // … at every data-ready edge:
 //!     match imu.read() {
 //!         Ok(sample) => {
@@ -36,7 +36,8 @@
 //! # Wiring and the bus
 //!
 //! SCLK, DIN, DOUT and CS go to an SPI controller in **mode 3**, most significant bit first. DIO1 carries data ready,
-//! active high; [`set_data_ready`](Adis16405::set_data_ready) changes that. The supply is 5 V (4.75 to 5.25 V). The
+//! active high; [`set_data_ready`](Adis16405::set_data_ready) changes that. RST, active low, may go to an output, best an
+//! open-drain one: [`hardware_reset`](Adis16405::hardware_reset) revives a part that does not answer. The supply is 5 V (4.75 to 5.25 V). The
 //! logic inputs take 3.3 V and 5 V levels; the outputs may reach 5 V. At a supply of 3.3 V the part answers, but its
 //! outputs saturate. Steel screws disturb the magnetometer.
 //!
@@ -50,23 +51,38 @@
 //! below select low-power mode: reduce SCK first. After a restart of the microcontroller alone, the part may still be
 //! in that mode.
 //!
-//! Each frame is a transaction, so that chip select is high between frames; the stall is an
-//! [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) at the end of the transaction. With embedded-hal-bus,
-//! use a constructor that takes a delay; `new_no_delay` panics on the first stall:
+//! Each frame is a transaction, after which the driver waits for the stall with its own delay: chip select is high
+//! meanwhile, and on a shared bus the other devices have the time. A burst is one transaction of 26 bytes.
+//! [`Timing`] sets these pauses:
+//!
+//! | field | default | |
+//! |---|---|---|
+//! | [`stall_ns`](Timing::stall_ns) | 16 µs, 75 µs in low-power mode | after each frame and burst |
+//! | [`stall_select`](Timing::stall_select) | [`High`](SelectDuringStall::High) | `Low` holds chip select low for the stall, as one transaction |
+//! | [`select_high_ns`](Timing::select_high_ns) | 1 µs | least time that chip select is high |
+//! | [`word_gap_ns`](Timing::word_gap_ns) | 0 | between the words of a burst; not 0 makes 13 transfers of it |
+//!
+//! The shortest burst is the default one with a stall of 9 µs, the least by the data sheet. A pause that was cut short,
+//! by a future that was dropped, is kept before the next frame.
+//!
+//! With embedded-hal-bus, `new_no_delay` is enough unless you use [`wake`](Adis16405::wake), `SelectDuringStall::Low` or a
+//! word gap, whose [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) it would panic on:
 //!
 //! ```
 //! # use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiBus};
 //! use adis16405_driver::{Adis16405, Config};
 //! use embedded_hal_bus::spi::ExclusiveDevice;
 //! # fn build<B: SpiBus<u8>, P: OutputPin, D: DelayNs>(bus: B, chip_select: P, timer: D) -> Result<(), P::Error> {
-//! let device = ExclusiveDevice::new(bus, chip_select, timer)?;
-//! let mut imu = Adis16405::new(device, Config::default());
+//! let device = ExclusiveDevice::new_no_delay(bus, chip_select)?;
+//! let mut imu = Adis16405::new(device, timer, Config::default());
 //! # Ok(()) }
 //! ```
 //!
-//! The methods that wait take a delay as well. If your HAL has only one, [`SharedDelay`] serves both.
+//! If both need a delay and your HAL has only one, [`SharedDelay`] serves both. embassy-embedded-hal carries a
+//! `DelayNs` operation out only with its feature `time`.
 //!
-//! `examples/mock.rs` runs without hardware; `examples/spidev.rs` reads a part on a Linux host.
+//! `examples/mock.rs` runs without hardware; `examples/spidev.rs` reads a part on a Linux host; the crate in
+//! `examples-stm32f405` has images for cortex-m-rt, RTIC and Embassy.
 //!
 //! # Validity of a burst
 //!
@@ -93,14 +109,15 @@
 //!
 //! A method whose bus fails, or whose future is dropped, stops where it is. A transaction that was under way may or may
 //! not have reached the part. The driver itself stays consistent, and the next call works: each read begins with its own
-//! request, and each transaction with a falling edge of chip select, provided that the SPI device releases it when its
-//! future is dropped. What the part may be left with, and the remedy:
+//! request, after the pause that the part needs, and each transaction with a falling edge of chip select, provided that
+//! the SPI device releases it when its future is dropped. What the part may be left with, and the remedy:
 //!
 //! | interrupted | state of the part | remedy |
 //! |---|---|---|
 //! | [`burst`](Adis16405::burst), [`read`](Adis16405::read), register reads | new-data flags are cleared | none; the next sample is new |
 //! | [`init`](Adis16405::init), [`configure`](Adis16405::configure) and the methods that set rate, range or filter | old or new period, range and filter | [`init`](Adis16405::init); until then [`read`](Adis16405::read) refuses |
 //! | [`start_up`](Adis16405::start_up), [`software_reset`](Adis16405::software_reset) | settings of the flash memory, perhaps still busy | [`start_up`](Adis16405::start_up); until then [`read`](Adis16405::read) refuses |
+//! | [`hardware_reset`](Adis16405::hardware_reset) | perhaps held in reset, the line being low | call it again; until then [`read`](Adis16405::read) refuses |
 //! | [`stimulus_response`](Adis16405::stimulus_response) | sensors deflected, unless the driver could switch that off | [`stop_stimulus`](Adis16405::stop_stimulus) or [`init`](Adis16405::init); until then [`read`](Adis16405::read) refuses |
 //! | [`self_test`](Adis16405::self_test), [`flash_test`](Adis16405::flash_test) | the test goes on and ends by itself | wait; flags of DIAG_STAT that were read are lost |
 //! | [`auto_null`](Adis16405::auto_null), [`precision_auto_null`](Adis16405::precision_auto_null) | busy up to 30 s; a negative XGYRO_OFF | wait, then [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
@@ -110,6 +127,9 @@
 //! | [`flash_update`](Adis16405::flash_update) | flash old, new or being written | wait, compare [`flash_writes`](Adis16405::flash_writes), call it again; flags of DIAG_STAT that were read are lost |
 //! | [`sleep`](Adis16405::sleep), [`wake`](Adis16405::wake) | asleep or awake | [`wake`](Adis16405::wake) |
 //!
+//! The SPI devices of embassy-embedded-hal 0.6 release chip select when their future is dropped; the asynchronous ones of
+//! embedded-hal-bus 0.3 do not, so let their futures end.
+//!
 //! A timeout around any method is therefore possible; `burst` and `read` may be dropped at any time without a loss other
 //! than that sample.
 //!
@@ -117,8 +137,9 @@
 //!
 //! No source at hand confirms the following. Each can be set or avoided:
 //!
-//! - the stall in low-power mode, the SMPL_PRD value where that mode begins, the gap between burst words, and the times
-//!   of flash update, factory restore, auto-null and wake-up pulse: [`Timing`];
+//! - the stall in low-power mode, the SMPL_PRD value where that mode begins, the gap between burst words, the least time
+//!   that chip select is high, and the times of reset pulse, flash update, factory restore, auto-null and wake-up pulse:
+//!   [`Timing`];
 //! - 0.14 °C or 0.1357 °C per count: [`ImuSample::temp_udegc`];
 //! - the layout of the alarm registers ([`Alarm`]) and the scale of the analog output ([`DacLevel`]):
 //!   [`update_register`](Adis16405::update_register) writes any other value;
@@ -153,6 +174,7 @@ mod protocol;
 mod register;
 mod sample;
 mod self_test;
+mod spacing;
 mod validity;
 
 pub use alarms::{Alarm, AlarmNumber, AlarmThreshold, AlarmWatch};
@@ -171,6 +193,7 @@ pub use pins::{DacLevel, Dio, DioLine, DioSignal, Gpio, Polarity};
 pub use register::{Access, Register};
 pub use sample::ImuSample;
 pub use self_test::{FlashTest, SelfTest, Stimulus};
+pub use spacing::SelectDuringStall;
 pub use validity::{BurstValidator, FaultCounters, Faults, Validity};
 
 /// Types that grow with the family need a wildcard arm.

@@ -15,14 +15,15 @@ use crate::clock::{ClockMode, Timing};
 use crate::config::Config;
 use crate::error::Error;
 use crate::register::{Access, Register};
+use crate::spacing::FramePauses;
 
 /// An operation that a procedure requests from the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BusRequest {
-    /// Exchange a 16-bit frame in a transaction of its own, with a stall of `stall_ns` at its end.
-    Frame { bytes: [u8; 2], stall_ns: u32 },
-    /// Hold chip select low for `ns` without clocking.
-    ChipSelectPulse { ns: u32 },
+    /// Exchange a 16-bit frame in a transaction of its own.
+    Frame { bytes: [u8; 2], pauses: FramePauses },
+    /// Hold chip select low, and then high, without clocking.
+    ChipSelectPulse { pauses: FramePauses },
     /// Wait for `us` without bus traffic.
     Pause { us: u32 },
 }
@@ -35,8 +36,10 @@ pub(crate) enum BusRequest {
 pub(crate) struct RequestSlot {
     /// The two bytes of a frame, or [`PAUSE`](Self::PAUSE), or [`CHIP_SELECT_PULSE`](Self::CHIP_SELECT_PULSE).
     request: AtomicU32,
-    /// Stall or pulse in ns, or pause in µs.
+    /// Time of chip select low in ns, or pause in µs.
     time: AtomicU32,
+    /// Time of chip select high in ns.
+    high_ns: AtomicU32,
     /// The two bytes received, or [`NO_RESPONSE`](Self::NO_RESPONSE).
     response: AtomicU32,
 }
@@ -50,19 +53,21 @@ impl RequestSlot {
         Self {
             request: AtomicU32::new(Self::PAUSE),
             time: AtomicU32::new(0),
+            high_ns: AtomicU32::new(0),
             response: AtomicU32::new(Self::NO_RESPONSE),
         }
     }
 
     /// Called by a procedure: places a request and waits for its response.
     async fn request(&self, request: BusRequest) -> [u8; 2] {
-        let (request, time) = match request {
-            BusRequest::Frame { bytes, stall_ns } => (u32::from(u16::from_be_bytes(bytes)), stall_ns),
-            BusRequest::ChipSelectPulse { ns } => (Self::CHIP_SELECT_PULSE, ns),
-            BusRequest::Pause { us } => (Self::PAUSE, us),
+        let (request, FramePauses { low_ns: time, high_ns }) = match request {
+            BusRequest::Frame { bytes, pauses } => (u32::from(u16::from_be_bytes(bytes)), pauses),
+            BusRequest::ChipSelectPulse { pauses } => (Self::CHIP_SELECT_PULSE, pauses),
+            BusRequest::Pause { us } => (Self::PAUSE, FramePauses { low_ns: us, high_ns: 0 }),
         };
         self.request.store(request, Relaxed);
         self.time.store(time, Relaxed);
+        self.high_ns.store(high_ns, Relaxed);
         poll_fn(|_| match self.response.load(Relaxed) {
             Self::NO_RESPONSE => Poll::Pending,
             response => {
@@ -76,10 +81,11 @@ impl RequestSlot {
     /// Called by the driver: the request that the procedure has placed.
     pub(crate) fn placed(&self) -> BusRequest {
         let time = self.time.load(Relaxed);
+        let pauses = FramePauses { low_ns: time, high_ns: self.high_ns.load(Relaxed) };
         match self.request.load(Relaxed) {
             Self::PAUSE => BusRequest::Pause { us: time },
-            Self::CHIP_SELECT_PULSE => BusRequest::ChipSelectPulse { ns: time },
-            bytes => BusRequest::Frame { bytes: (bytes as u16).to_be_bytes(), stall_ns: time },
+            Self::CHIP_SELECT_PULSE => BusRequest::ChipSelectPulse { pauses },
+            bytes => BusRequest::Frame { bytes: (bytes as u16).to_be_bytes(), pauses },
         }
     }
 
@@ -133,9 +139,17 @@ impl DriverState {
         }
     }
 
-    /// Stall after a frame in the present power mode, ns.
-    pub(crate) const fn stall_ns(&self) -> u32 {
-        self.timing.stall_ns.get(self.mode)
+    /// The part has loaded its registers from flash: until they are read, neither configuration nor power mode is known.
+    pub(crate) const fn forget_registers(&mut self) {
+        self.configured = false;
+        self.mode = ClockMode::LowPower;
+    }
+
+    /// The pauses after a frame in the present power mode.
+    #[inline(never)]
+    pub(crate) fn frame_pauses(&self) -> FramePauses {
+        let timing = &self.timing;
+        FramePauses::new(timing.stall_select, timing.stall_ns.get(self.mode), timing.select_high_ns)
     }
 }
 
@@ -159,7 +173,7 @@ impl<'a> Protocol<'a> {
 
     /// Sends a frame and returns the 16 bits received during it: the answer to the frame before.
     async fn frame(&self, bytes: [u8; 2]) -> u16 {
-        u16::from_be_bytes(self.slot.request(BusRequest::Frame { bytes, stall_ns: self.state.stall_ns() }).await)
+        u16::from_be_bytes(self.slot.request(BusRequest::Frame { bytes, pauses: self.state.frame_pauses() }).await)
     }
 
     /// Leaves the bus silent for `us`.
@@ -169,7 +183,8 @@ impl<'a> Protocol<'a> {
 
     /// Holds chip select low for `ns` without clocking.
     pub(crate) async fn chip_select_pulse(&self, ns: u32) {
-        self.slot.request(BusRequest::ChipSelectPulse { ns }).await;
+        let pauses = FramePauses { low_ns: ns, high_ns: self.state.timing.select_high_ns };
+        self.slot.request(BusRequest::ChipSelectPulse { pauses }).await;
     }
 
     /// Reads a register in two frames. The answer comes in the second, which itself requests FLASH_CNT, a register that

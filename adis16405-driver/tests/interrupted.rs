@@ -4,7 +4,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use adis16405_driver::{Adis16405, Burst, Config, Error, Faults, GyroRange, SharedDelay, Stimulus};
+use adis16405_driver::{
+    Adis16405, Burst, Config, Error, Faults, GyroRange, SelectDuringStall, SharedDelay, Stimulus, Timing,
+};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
@@ -111,20 +113,20 @@ impl DelayNs for NoDelay {
 }
 
 /// The number of transactions of a call that meets no fault.
-fn transactions_of(call: impl Fn(&mut Adis16405<Bus>)) -> usize {
+fn transactions_of(call: impl Fn(&mut Adis16405<Bus, NoDelay>)) -> usize {
     let bus = Bus::new(0..0);
-    call(&mut Adis16405::new(bus.clone(), Config::default()));
+    call(&mut Adis16405::new(bus.clone(), NoDelay, Config::default()));
     bus.transactions()
 }
 
 #[test]
 fn a_stimulus_is_switched_off_after_a_single_error_of_the_bus() {
     for stimulus in [Stimulus::Positive, Stimulus::Negative] {
-        let whole = transactions_of(|imu| drop(imu.stimulus_response(stimulus, &mut NoDelay)));
+        let whole = transactions_of(|imu| drop(imu.stimulus_response(stimulus)));
         for at in 0..whole {
             let bus = Bus::new(at..at + 1);
-            let mut imu = Adis16405::new(bus.clone(), Config::default());
-            assert_eq!(imu.stimulus_response(stimulus, &mut NoDelay), Err(Error::Spi(BusFault)));
+            let mut imu = Adis16405::new(bus.clone(), NoDelay, Config::default());
+            assert_eq!(imu.stimulus_response(stimulus), Err(Error::Spi(BusFault)));
             assert_eq!(bus.register(MSC_CTRL), 0x0006, "{stimulus:?}, error at transaction {at} of {whole}");
         }
     }
@@ -132,12 +134,12 @@ fn a_stimulus_is_switched_off_after_a_single_error_of_the_bus() {
 
 #[test]
 fn init_switches_off_a_stimulus_that_a_failed_bus_has_left_on() {
-    let whole = transactions_of(|imu| drop(imu.stimulus_response(Stimulus::Positive, &mut NoDelay)));
+    let whole = transactions_of(|imu| drop(imu.stimulus_response(Stimulus::Positive)));
     let mut left_on = 0;
     for at in 0..whole {
         let bus = Bus::new(at..usize::MAX);
-        let mut imu = Adis16405::new(bus.clone(), Config::default());
-        assert_eq!(imu.stimulus_response(Stimulus::Positive, &mut NoDelay), Err(Error::Spi(BusFault)));
+        let mut imu = Adis16405::new(bus.clone(), NoDelay, Config::default());
+        assert_eq!(imu.stimulus_response(Stimulus::Positive), Err(Error::Spi(BusFault)));
         left_on += u32::from(bus.register(MSC_CTRL) & STIMULI != 0);
         bus.repair();
         assert_eq!(imu.read(), Err(Error::NotReady));
@@ -155,7 +157,7 @@ fn after_an_error_the_range_is_that_of_the_part() {
     assert_eq!(whole, 7);
     for at in 0..whole {
         let bus = Bus::new(at..at + 1);
-        let mut imu = Adis16405::new(bus.clone(), Config::default());
+        let mut imu = Adis16405::new(bus.clone(), NoDelay, Config::default());
         assert_eq!(imu.set_range(GyroRange::Dps150), Err(Error::Spi(BusFault)));
         assert!(!imu.is_ready());
         assert_eq!(imu.read(), Err(Error::NotReady));
@@ -172,7 +174,7 @@ fn after_an_error_the_range_is_that_of_the_part() {
 #[test]
 fn read_gives_a_sample_or_says_why_not() {
     let bus = Bus::new(0..0);
-    let mut imu = Adis16405::new(bus.clone(), Config::default());
+    let mut imu = Adis16405::new(bus.clone(), NoDelay, Config::default());
     assert_eq!(imu.read(), Err(Error::NotReady), "before init");
     imu.init().unwrap();
     assert_eq!(imu.read().unwrap().supply_uv(), 2068 * 2418);
@@ -186,7 +188,7 @@ fn read_gives_a_sample_or_says_why_not() {
 
     bus.0.borrow_mut().failing = 0..usize::MAX;
     assert_eq!(imu.read(), Err(Error::Spi(BusFault)));
-    assert_eq!(imu.stimulus_response(Stimulus::Positive, &mut NoDelay), Err(Error::Spi(BusFault)));
+    assert_eq!(imu.stimulus_response(Stimulus::Positive), Err(Error::Spi(BusFault)));
     assert!(imu.is_ready(), "no stimulus was switched on");
 }
 
@@ -194,12 +196,12 @@ fn read_gives_a_sample_or_says_why_not() {
 #[test]
 fn an_interrupted_auto_null_leaves_no_stale_bias_on_the_host() {
     let bus = Bus::new(0..0);
-    let mut imu = Adis16405::new(bus.clone(), Config::default());
+    let mut imu = Adis16405::new(bus.clone(), NoDelay, Config::default());
     imu.init().unwrap();
     imu.set_gyro_offsets([-40, 0, 0]).unwrap();
     let command = bus.transactions();
     bus.0.borrow_mut().failing = command + 1..usize::MAX;
-    assert_eq!(imu.auto_null(&mut NoDelay), Err(Error::Spi(BusFault)));
+    assert_eq!(imu.auto_null(), Err(Error::Spi(BusFault)));
     assert_eq!(imu.sample_from(Burst::default()).host_bias_x(), 0);
     assert!(imu.x_sign_at_risk(), "XGYRO_OFF may have become negative");
 }
@@ -230,11 +232,13 @@ fn a_shared_delay_serves_both_the_spi_device_and_the_driver() {
     }
     let bus = Bus::new(0..0);
     let delay = SharedDelay::new(Total(0));
-    let mut imu = Adis16405::new(Device(bus.clone(), &delay), Config::default());
-    imu.start_up(&mut &delay).unwrap();
+    let mut imu = Adis16405::new(Device(bus.clone(), &delay), &delay, Config::default())
+        .with_timing(Timing { stall_select: SelectDuringStall::Low, ..Timing::DEFAULT });
+    imu.start_up().unwrap();
     let frames = bus.transactions() as u64;
-    // 290 ms of start-up; a stall of 75 µs after the first four frames, 16 µs after the others.
-    assert_eq!(delay.release().0, 290_000_000 + 4 * 75_000 + (frames - 4) * 16_000);
+    // 290 ms of start-up; a stall of 75 µs after the first four frames, 16 µs after the others, and 1 µs of chip select
+    // high after each.
+    assert_eq!(delay.release().0, 290_000_000 + 4 * 75_000 + (frames - 4) * 16_000 + frames * 1_000);
 }
 
 /// Futures that are dropped while a transaction is under way.
@@ -275,12 +279,12 @@ mod dropped {
 
     #[test]
     fn init_switches_off_a_stimulus_that_a_dropped_future_has_left_on() {
-        let whole = transactions_of(|imu| drop(imu.stimulus_response(Stimulus::Negative, &mut NoDelay)));
+        let whole = transactions_of(|imu| drop(imu.stimulus_response(Stimulus::Negative)));
         let mut left_on = 0;
         for at in 0..whole {
             let bus = Bus::new(at..at + 1);
-            let mut imu = Adis16405::new_async(HangingBus(bus.clone()), Config::default());
-            assert_eq!(poll_once(imu.stimulus_response(Stimulus::Negative, &mut NoDelay)), None);
+            let mut imu = Adis16405::new_async(HangingBus(bus.clone()), NoDelay, Config::default());
+            assert_eq!(poll_once(imu.stimulus_response(Stimulus::Negative)), None);
             left_on += u32::from(bus.register(MSC_CTRL) & STIMULI != 0);
             poll_once(imu.init()).unwrap().unwrap();
             assert_eq!(bus.register(MSC_CTRL), 0x0006, "dropped at transaction {at} of {whole}");

@@ -32,19 +32,19 @@ fn assert_send<T: Send>(_: T) {}
 
 #[test]
 fn the_futures_of_the_driver_are_send() {
-    let mut imu: Adis16405<ZeroBus, Async> = Adis16405::new_async(ZeroBus, Config::default());
+    let mut imu: Adis16405<ZeroBus, NoDelay, Async> = Adis16405::new_async(ZeroBus, NoDelay, Config::default());
     assert_send(imu.burst());
     assert_send(imu.read());
     assert_send(imu.init());
-    assert_send(imu.start_up(&mut NoDelay));
-    assert_send(imu.software_reset(&mut NoDelay));
+    assert_send(imu.start_up());
+    assert_send(imu.software_reset());
     assert_send(imu.configure(Config::default()));
     assert_send(imu.read_registers([Register::TempOut, Register::DiagStat]));
     assert_send(imu.update_register(Register::AuxDac, 1, 1));
-    assert_send(imu.self_test(&mut NoDelay));
-    assert_send(imu.stimulus_response(Stimulus::Positive, &mut NoDelay));
-    assert_send(imu.flash_update(&mut NoDelay));
+    assert_send(imu.self_test());
+    assert_send(imu.stimulus_response(Stimulus::Positive));
+    assert_send(imu.flash_update());
     assert_send(imu.sleep(Sleep::HalfSeconds(NonZeroU8::MIN)));
-    assert_send(imu.wake(&mut NoDelay));
+    assert_send(imu.wake());
     assert_send(imu);
 }

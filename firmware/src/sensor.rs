@@ -72,12 +72,12 @@ impl<E: fmt::Debug> fmt::Display for ProbeError<E> {
 /// # Errors
 /// As [`ProbeError`] lists them.
 pub fn probe<SPI: SpiDevice<u8>>(
-    (bus, mut delay): (SPI, impl DelayNs),
+    (bus, delay): (SPI, impl DelayNs),
     config: Config,
 ) -> Result<SensorIdentity, ProbeError<SPI::Error>> {
-    let mut sensor = Adis16405::new(bus, config);
+    let mut sensor = Adis16405::new(bus, delay, config);
     let product = sensor.init()?;
-    let test = sensor.self_test(&mut delay)?;
+    let test = sensor.self_test()?;
     if test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES) {
         return Err(ProbeError::SelfTest(test.diagnosis));
     }
@@ -94,10 +94,10 @@ pub fn probe<SPI: SpiDevice<u8>>(
 /// # Errors
 /// The bus failed, or the sensor does not answer afterwards.
 pub fn auto_null<SPI: SpiDevice<u8>>(
-    (bus, mut delay): (SPI, impl DelayNs),
+    (bus, delay): (SPI, impl DelayNs),
     config: Config,
 ) -> Result<(), Error<SPI::Error>> {
-    Adis16405::new(bus, config).auto_null(&mut delay).map(|_offsets| ())
+    Adis16405::new(bus, delay, config).auto_null().map(|_offsets| ())
 }
 
 #[cfg(test)]

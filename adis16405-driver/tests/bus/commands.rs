@@ -7,9 +7,8 @@ use adis16405_driver::{
     Adis16405, Config, ConfigError, Diagnosis, Error, FactoryRestore, FlashUpdate, GyroBias, GyroRange, Product,
     Register, SamplePeriod, Sleep,
 };
-use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 
-use crate::harness::{Frames, NONE, frame_with, gyro_offsets, init, read, read_all, write};
+use crate::harness::{Bench, Frames, NONE, Step, frame_with, gyro_offsets, init, read, read_all, write};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
@@ -18,13 +17,13 @@ fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
 #[test]
 fn both_parts_are_identified_and_others_refused() {
     for (answer, product) in [(0x4015, Product::Adis16405), (0x4010, Product::Adis16400)] {
-        assert_eq!(both!(Config::default(); [read(0x56, answer)]; NONE; |imu, delay| imu.identity()), Ok(product));
+        assert_eq!(both!(Config::default(); [read(0x56, answer)]; NONE; |imu| imu.identity()), Ok(product));
         assert_eq!(product.prod_id(), answer);
     }
     for answer in [0x0000, 0xFFFF, 0x4040, 0x0003] {
         let refused = Err(Error::Product { answer });
-        assert_eq!(both!(Config::default(); [read(0x56, answer)]; NONE; |imu, delay| imu.identity()), refused);
-        assert_eq!(both!(Config::default(); [read(0x56, answer)]; NONE; |imu, delay| imu.init()), refused);
+        assert_eq!(both!(Config::default(); [read(0x56, answer)]; NONE; |imu| imu.identity()), refused);
+        assert_eq!(both!(Config::default(); [read(0x56, answer)]; NONE; |imu| imu.init()), refused);
     }
     let error: Error<()> = Error::Product { answer: 0x4040 };
     assert_eq!(error.to_string(), "PROD_ID answered 16448 (0x4040), not 16405 or 16400");
@@ -32,7 +31,7 @@ fn both_parts_are_identified_and_others_refused() {
 
 #[test]
 fn init_of_a_part_that_is_already_configured_only_reads() {
-    let ready = both!(Config::default(); [init(0x0001, 0x0402)]; NONE; |imu, delay| imu.init());
+    let ready = both!(Config::default(); [init(0x0001, 0x0402)]; NONE; |imu| imu.init());
     assert_eq!(ready, Ok(Product::Adis16405));
 }
 
@@ -49,7 +48,7 @@ fn init_writes_the_lower_byte_first_and_reads_back() {
         read(0x38, 0x0104),
         gyro_offsets(0, 0, 0),
     ];
-    let ready = both!(config(GyroRange::Dps75, 4, 0x07); bus; NONE; |imu, delay| imu.init());
+    let ready = both!(config(GyroRange::Dps75, 4, 0x07); bus; NONE; |imu| imu.init());
     assert_eq!(ready, Ok(Product::Adis16405));
 }
 
@@ -58,7 +57,7 @@ fn init_writes_only_the_byte_that_changes() {
     // Bits outside the width of a register (8 of SMPL_PRD, 11 of SENS_AVG) are ignored.
     let bus = [read(0x56, 0x4015), read(0x36, 0xFF01), read(0x38, 0xF802), write(0x39, 0x04), read(0x38, 0xF402)];
     let bus = bus.into_iter().chain([gyro_offsets(0, 0, 0)]);
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.init()), Ok(Product::Adis16405));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.init()), Ok(Product::Adis16405));
 }
 
 /// From ±75 °/s, which needs 2⁴ taps, to no filter: with the filter written first, a sample might be taken with a
@@ -67,13 +66,13 @@ fn init_writes_only_the_byte_that_changes() {
 fn the_range_is_written_first_where_the_new_filter_is_too_short_for_the_old_range() {
     let bus = [read(0x36, 0x0001), read(0x38, 0x0104), write(0x39, 0x04), write(0x38, 0x00), read(0x38, 0x0400)];
     let unfiltered = config(GyroRange::Dps300, 0, 1);
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.configure(unfiltered)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.configure(unfiltered)), Ok(()));
 }
 
 #[test]
 fn init_reports_a_register_that_does_not_take_its_value() {
     let bus = [read(0x56, 0x4015), read(0x36, 0x0001), write(0x36, 0x07), read(0x36, 0x0001)];
-    let result = both!(config(GyroRange::Dps300, 2, 0x07); bus; NONE; |imu, delay| imu.init());
+    let result = both!(config(GyroRange::Dps300, 2, 0x07); bus; NONE; |imu| imu.init());
     assert_eq!(result, Err(Error::Verify { register: Register::SmplPrd, expected: 7, answer: 1 }));
     assert_eq!(result.unwrap_err().to_string(), "SMPL_PRD was written 0x0007 and answered 0x0001");
 }
@@ -90,7 +89,7 @@ fn the_longer_stall_is_kept_while_the_power_mode_changes() {
         slow([0x38, 0], 0),
         slow([0, 0], 0x0402),
     ];
-    let rate = both!(Config::default(); bus; NONE; |imu, delay| imu.set_sample_rate(100.0));
+    let rate = both!(Config::default(); bus; NONE; |imu| imu.set_sample_rate(100.0));
     assert_eq!(rate, Ok(1638.4 / 16.0), "the rate that was set");
 
     // Back to normal mode: the longer stall is kept until the new period was read back.
@@ -102,32 +101,32 @@ fn the_longer_stall_is_kept_while_the_power_mode_changes() {
         slow([0, 0], 0x0001),
         read(0x38, 0x0402),
     ];
-    let rate = both!(config(GyroRange::Dps300, 2, 0x0F); bus; NONE; |imu, delay| imu.set_sample_rate(819.2));
+    let rate = both!(config(GyroRange::Dps300, 2, 0x0F); bus; NONE; |imu| imu.set_sample_rate(819.2));
     assert_eq!(rate, Ok(819.2));
 }
 
 #[test]
 fn range_filter_and_external_clock_are_set_one_by_one() {
     let bus = [read(0x36, 0x0001), read(0x38, 0x0402), write(0x39, 0x02), read(0x38, 0x0202)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_range(GyroRange::Dps150)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_range(GyroRange::Dps150)), Ok(()));
     let bus = [read(0x36, 0x0001), read(0x38, 0x0402), write(0x38, 0x06), read(0x38, 0x0406)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_filter_taps_log2(6)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_filter_taps_log2(6)), Ok(()));
     // SMPL_PRD = 0 is the external clock.
     let bus = [read(0x36, 0x0001), write(0x36, 0x00), read(0x36, 0x0000), read(0x38, 0x0402)];
     let external = Config::default().with_external_clock();
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.configure(external)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.configure(external)), Ok(()));
 }
 
 #[test]
 fn settings_that_the_part_does_not_accept_are_not_sent() {
     let empty = || [Frames::new()];
-    let narrow = both!(Config::default(); empty(); NONE; |imu, delay| imu.set_range(GyroRange::Dps75));
+    let narrow = both!(Config::default(); empty(); NONE; |imu| imu.set_range(GyroRange::Dps75));
     let error = ConfigError::FilterTaps { range: GyroRange::Dps75, filter_taps_log2: 2 };
     assert_eq!(narrow, Err(Error::Config(error)));
-    let taps = both!(Config::default(); empty(); NONE; |imu, delay| imu.set_filter_taps_log2(7));
+    let taps = both!(Config::default(); empty(); NONE; |imu| imu.set_filter_taps_log2(7));
     let error = ConfigError::FilterTaps { range: GyroRange::Dps300, filter_taps_log2: 7 };
     assert_eq!(taps, Err(Error::Config(error)));
-    let rate = both!(Config::default(); empty(); NONE; |imu, delay| imu.set_sample_rate(-1.0));
+    let rate = both!(Config::default(); empty(); NONE; |imu| imu.set_sample_rate(-1.0));
     assert_eq!(rate, Err(Error::Config(ConfigError::Rate)));
 }
 
@@ -151,26 +150,27 @@ fn init_in_unknown_power_mode() -> Frames {
 #[test]
 fn after_start_up_and_reset_the_bus_is_silent_and_then_slow() {
     let bus = [init_in_unknown_power_mode()];
-    let started = both!(Config::default(); bus; [290_000]; |imu, delay| imu.start_up(&mut delay));
+    let started = both!(Config::default(); bus; [290_000]; |imu| imu.start_up());
     assert_eq!(started, Ok(Product::Adis16405));
     let bus = [write(0x3E, 0x80), init_in_unknown_power_mode()];
-    let reset = both!(Config::default(); bus; [170_000]; |imu, delay| imu.software_reset(&mut delay));
+    let reset = both!(Config::default(); bus; [170_000]; |imu| imu.software_reset());
     assert_eq!(reset, Ok(Product::Adis16405));
 }
 
 #[test]
 fn init_detects_a_negative_offset_of_x() {
     let bus = [read(0x56, 16405), read(0x36, 0x0001), read(0x38, 0x0402), gyro_offsets(0xFFC8, 0, 0)].concat();
-    let mut imu = Adis16405::new(Mock::new(&bus), Config::default());
+    let bench = Bench::new(bus, NONE);
+    let mut imu = Adis16405::new(bench.clone(), bench.clone(), Config::default());
     imu.init().unwrap();
     assert!(imu.x_sign_at_risk());
-    imu.release().done();
+    bench.done();
 }
 
 #[test]
 fn an_auto_null_is_followed_by_silence_and_the_driver_applies_a_negative_x() {
     let bus = [write(0x3E, 0x01), read(0x56, 16405), gyro_offsets(0x0028, 0xFFD8, 0x0000)];
-    let bias = both!(Config::default(); bus; [50_000]; |imu, delay| imu.auto_null(&mut delay));
+    let bias = both!(Config::default(); bus; [50_000]; |imu| imu.auto_null());
     assert_eq!(bias, Ok(GyroBias { part: [40, -40, 0], host_x: 0 }));
 
     let bus = [
@@ -182,7 +182,7 @@ fn an_auto_null_is_followed_by_silence_and_the_driver_applies_a_negative_x() {
         write(0x1B, 0x00),
         read(0x1A, 0x0000),
     ];
-    let bias = both!(Config::default(); bus; [30_000_000]; |imu, delay| imu.precision_auto_null(&mut delay)).unwrap();
+    let bias = both!(Config::default(); bus; [30_000_000]; |imu| imu.precision_auto_null()).unwrap();
     assert_eq!(bias, GyroBias { part: [0, 1, 0], host_x: -40 });
     assert_eq!(bias.total(), [-40, 1, 0]);
 }
@@ -190,7 +190,7 @@ fn an_auto_null_is_followed_by_silence_and_the_driver_applies_a_negative_x() {
 #[test]
 fn a_part_that_does_not_answer_after_an_auto_null_is_an_error() {
     let bus = [write(0x3E, 0x01), read(0x56, 0xFFFF)];
-    let bias = both!(Config::default(); bus; [50_000]; |imu, delay| imu.auto_null(&mut delay));
+    let bias = both!(Config::default(); bus; [50_000]; |imu| imu.auto_null());
     assert_eq!(bias, Err(Error::Product { answer: 0xFFFF }));
 }
 
@@ -204,7 +204,7 @@ fn a_factory_restore_returns_the_corrections_that_it_overwrites() {
         write(0x3E, 0x02),
         init(0x0001, 0x0402),
     ];
-    let lost = both!(Config::default(); bus; [50_000]; |imu, delay| imu.factory_restore(&mut delay));
+    let lost = both!(Config::default(); bus; [50_000]; |imu| imu.factory_restore());
     let expected = FactoryRestore {
         gyro: GyroBias { part: [1, 2, -1], host_x: 0 },
         accl: [-2048, 2047, -1],
@@ -226,7 +226,7 @@ fn a_flash_update_is_judged_by_flash_cnt_and_by_its_own_flags() {
             read(0x00, writes),
         ];
         let outcome = FlashUpdate { before, writes_before: 41, writes, diagnosis };
-        (both!(Config::default(); bus; [100_000]; |imu, delay| imu.flash_update(&mut delay)), outcome)
+        (both!(Config::default(); bus; [100_000]; |imu| imu.flash_update()), outcome)
     };
     let (none, failed, low) = (Diagnosis::empty(), Diagnosis::FLASH_UPDATE, Diagnosis::SUPPLY_LOW);
     for (before, writes, diagnosis) in [(none, 42, none), (failed | low, 42, none), (none, 42, low)] {
@@ -241,17 +241,17 @@ fn a_flash_update_is_judged_by_flash_cnt_and_by_its_own_flags() {
         update(none, 41, failed).0.unwrap_err().to_string(),
         "flash update failed: FLASH_CNT was 41 and is 41, DIAG_STAT 0x0004"
     );
-    assert_eq!(both!(Config::default(); [read(0x00, 9)]; NONE; |imu, delay| imu.flash_writes()), Ok(9));
+    assert_eq!(both!(Config::default(); [read(0x00, 9)]; NONE; |imu| imu.flash_writes()), Ok(9));
 }
 
 #[test]
 fn sleep_writes_one_byte_and_wake_pulses_chip_select() {
     let nap = Sleep::HalfSeconds(NonZeroU8::new(20).unwrap());
-    assert_eq!(both!(Config::default(); [write(0x3A, 20)]; NONE; |imu, delay| imu.sleep(nap)), Ok(()));
-    let sleep = both!(Config::default(); [write(0x3B, 0x01)]; NONE; |imu, delay| imu.sleep(Sleep::Indefinite));
+    assert_eq!(both!(Config::default(); [write(0x3A, 20)]; NONE; |imu| imu.sleep(nap)), Ok(()));
+    let sleep = both!(Config::default(); [write(0x3B, 0x01)]; NONE; |imu| imu.sleep(Sleep::Indefinite));
     assert_eq!(sleep, Ok(()));
 
-    let pulse = vec![Transaction::transaction_start(), Transaction::delay(10_000), Transaction::transaction_end()];
-    let woken = both!(Config::default(); [pulse, read(0x56, 16405)]; [4_000]; |imu, delay| imu.wake(&mut delay));
+    let pulse = vec![Step::Select, Step::Delay(10_000), Step::Deselect, Step::Delay(1_000)];
+    let woken = both!(Config::default(); [pulse, read(0x56, 16405)]; [4_000]; |imu| imu.wake());
     assert_eq!(woken, Ok(Product::Adis16405));
 }

@@ -1,24 +1,109 @@
-//! A mock bus that checks every byte and every pause, and the same call through the blocking and the asynchronous
+//! A mock bus that checks every byte, every pause and the level of chip select during it, and the same call through the blocking and the asynchronous
 //! driver.
 
-use embedded_hal_mock::eh1::spi::Transaction;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::rc::Rc;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
 /// Default stall in normal mode.
 pub(crate) const STALL_NS: u32 = 16_000;
 
-pub(crate) type Frames = Vec<Transaction<u8>>;
+/// What the part and a stop watch see of the driver.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// Chip select falls.
+    Select,
+    /// Bytes sent, and the answer.
+    Exchange { sent: Vec<u8>, answer: Vec<u8> },
+    /// A delay in ns, with chip select low or high.
+    Delay(u32),
+    /// Chip select rises.
+    Deselect,
+}
 
+pub(crate) type Frames = Vec<Step>;
+
+/// A transaction of one transfer, and a stall after it with chip select high.
 pub(crate) fn frame_with(stall_ns: u32, sent: &[u8], answer: &[u8]) -> Frames {
-    vec![
-        Transaction::transaction_start(),
-        Transaction::transfer(sent.to_vec(), answer.to_vec()),
-        Transaction::delay(stall_ns),
-        Transaction::transaction_end(),
-    ]
+    let exchange = Step::Exchange { sent: sent.to_vec(), answer: answer.to_vec() };
+    vec![Step::Select, exchange, Step::Deselect, Step::Delay(stall_ns)]
 }
 
 pub(crate) fn frame(sent: [u8; 2], answer: u16) -> Frames {
     frame_with(STALL_NS, &sent, &answer.to_be_bytes())
+}
+
+/// What the driver still has to do: steps on the bus, and pauses in µs between them.
+#[derive(Clone)]
+pub(crate) struct Bench(Rc<RefCell<(VecDeque<Step>, VecDeque<u32>)>>);
+
+impl Bench {
+    pub(crate) fn new(steps: impl IntoIterator<Item = Step>, pauses_us: impl IntoIterator<Item = u32>) -> Self {
+        Self(Rc::new(RefCell::new((steps.into_iter().collect(), pauses_us.into_iter().collect()))))
+    }
+
+    fn step(&self) -> Option<Step> {
+        self.0.borrow_mut().0.pop_front()
+    }
+
+    /// The driver has done all.
+    pub(crate) fn done(&self) {
+        assert_eq!(*self.0.borrow(), (VecDeque::new(), VecDeque::new()), "not done");
+    }
+}
+
+impl ErrorType for Bench {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Bench {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        assert_eq!(self.step(), Some(Step::Select));
+        for operation in operations {
+            match (self.step(), operation) {
+                (Some(Step::Exchange { sent, answer }), Operation::Transfer(read, write)) => {
+                    assert_eq!(write, &sent);
+                    read.copy_from_slice(&answer);
+                }
+                (Some(Step::Delay(expected)), Operation::DelayNs(ns)) => assert_eq!(*ns, expected),
+                (expected, operation) => panic!("{operation:?} instead of {expected:?}"),
+            }
+        }
+        assert_eq!(self.step(), Some(Step::Deselect));
+        Ok(())
+    }
+}
+
+impl DelayNs for Bench {
+    fn delay_ns(&mut self, ns: u32) {
+        assert_eq!(self.step(), Some(Step::Delay(ns)), "with chip select high");
+    }
+
+    fn delay_us(&mut self, us: u32) {
+        assert_eq!(self.0.borrow_mut().1.pop_front(), Some(us));
+    }
+}
+
+#[cfg(feature = "async")]
+impl embedded_hal_async::spi::SpiDevice for Bench {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        SpiDevice::transaction(self, operations)
+    }
+}
+
+#[cfg(feature = "async")]
+impl embedded_hal_async::delay::DelayNs for Bench {
+    async fn delay_ns(&mut self, ns: u32) {
+        DelayNs::delay_ns(self, ns);
+    }
+
+    async fn delay_us(&mut self, us: u32) {
+        DelayNs::delay_us(self, us);
+    }
 }
 
 /// The answer of the part where the data sheet defines none.
@@ -60,38 +145,34 @@ pub(crate) fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
-/// `both!(config; frames; pauses in µs; |imu, delay| call)`: makes the call on the blocking and on the asynchronous
-/// driver and returns its result, which must be the same. The bus must see exactly these frames, the delay these
-/// pauses. `with` sets options of the driver.
+/// `both!(config; frames; pauses in µs; |imu| call)`: makes the call on the blocking and on the asynchronous driver and
+/// returns its result, which must be the same. The bus must see exactly these frames and stalls, the delay these pauses.
+/// `with` sets options of the driver.
 macro_rules! both {
-    ($config:expr; $frames:expr; $pauses:expr; |$imu:ident, $delay:ident| $call:expr) => {
-        both!($config, with []; $frames; $pauses; |$imu, $delay| $call)
+    ($config:expr; $frames:expr; $pauses:expr; |$imu:ident| $call:expr) => {
+        both!($config, with []; $frames; $pauses; |$imu| $call)
     };
-    ($config:expr, with [$($change:tt)*]; $frames:expr; $pauses:expr; |$imu:ident, $delay:ident| $call:expr) => {{
-        use embedded_hal_mock::eh1::{delay, spi};
-        let frames: Vec<spi::Transaction<u8>> = $frames.into_iter().flatten().collect();
-        let pauses: Vec<_> = $pauses.into_iter().map(|us: u32| delay::Transaction::delay_us(us)).collect();
+    ($config:expr, with [$($change:tt)*]; $frames:expr; $pauses:expr; |$imu:ident| $call:expr) => {{
+        let frames: Vec<crate::harness::Step> = $frames.into_iter().flatten().collect();
+        let pauses: Vec<u32> = $pauses.into_iter().collect();
 
-        let mut $imu = adis16405_driver::Adis16405::new(spi::Mock::new(&frames), $config)$($change)*;
+        let bench = crate::harness::Bench::new(frames.clone(), pauses.clone());
         #[allow(unused_mut)]
-        let mut $delay = delay::CheckedDelay::new(&pauses);
+        let mut $imu = adis16405_driver::Adis16405::new(bench.clone(), bench.clone(), $config)$($change)*;
         let blocking = $call;
-        $imu.release().done();
-        $delay.done();
+        bench.done();
 
         #[cfg(feature = "async")]
         {
-            let mut $imu = adis16405_driver::Adis16405::new_async(spi::Mock::new(&frames), $config)$($change)*;
-            #[allow(unused_mut)]
-            let mut $delay = delay::CheckedDelay::new(&pauses);
+            let bench = crate::harness::Bench::new(frames, pauses);
+            let mut $imu = adis16405_driver::Adis16405::new_async(bench.clone(), bench.clone(), $config)$($change)*;
             let asynchronous = crate::harness::block_on(async { $call.await });
-            $imu.release().done();
-            $delay.done();
+            bench.done();
             assert_eq!(asynchronous, blocking, "the blocking and the asynchronous driver differ");
         }
         blocking
     }};
 }
 
-/// No pauses, for methods without a delay.
+/// No pauses.
 pub(crate) const NONE: [u32; 0] = [];

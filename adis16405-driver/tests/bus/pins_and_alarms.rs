@@ -20,13 +20,13 @@ fn data_ready_is_set_by_line_and_polarity() {
     {
         let signal = Some(DioSignal { line, polarity });
         let control = 0x0080 | bits;
-        assert_eq!(both!(Config::default(); [read(0x34, control)]; NONE; |imu, delay| imu.data_ready()), Ok(signal));
+        assert_eq!(both!(Config::default(); [read(0x34, control)]; NONE; |imu| imu.data_ready()), Ok(signal));
         let bus = [read(0x34, 0x0080), write(0x34, control as u8), read(0x34, control)];
-        assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_data_ready(signal)), Ok(()));
+        assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_data_ready(signal)), Ok(()));
     }
-    assert_eq!(both!(Config::default(); [read(0x34, 0x0003)]; NONE; |imu, delay| imu.data_ready()), Ok(None));
+    assert_eq!(both!(Config::default(); [read(0x34, 0x0003)]; NONE; |imu| imu.data_ready()), Ok(None));
     let bus = [read(0x34, 0x0086), write(0x34, 0x80), read(0x34, 0x0080)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_data_ready(None)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_data_ready(None)), Ok(()));
     assert_eq!(
         DioSignal::default(),
         DioSignal { line: Dio1, polarity: ActiveHigh },
@@ -37,17 +37,17 @@ fn data_ready_is_set_by_line_and_polarity() {
 #[test]
 fn gpio_writes_directions_and_the_levels_of_outputs_only() {
     let gpio = Gpio { outputs: Dio::DIO1 | Dio::DIO4, high: Dio::DIO4 | Dio::DIO2 };
-    assert_eq!(both!(Config::default(); [read(0x32, 0x0A09)]; NONE; |imu, delay| imu.gpio()), Ok(gpio));
+    assert_eq!(both!(Config::default(); [read(0x32, 0x0A09)]; NONE; |imu| imu.gpio()), Ok(gpio));
     // DIO2 is an input: its level bit shows the pin, 0 here, and is not written.
     let bus = [read(0x32, 0x0000), write(0x32, 0x09), write(0x33, 0x08), read(0x32, 0x0809)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_gpio(gpio)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_gpio(gpio)), Ok(()));
 }
 
 #[test]
 fn the_analog_output_is_latched_after_it_is_written() {
     let level = DacLevel::from_counts(0x0ABC).unwrap();
     let bus = [read(0x4A, 0x0000), write(0x4A, 0xBC), write(0x4B, 0x0A), read(0x4A, 0x0ABC), write(0x3E, 0x04)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_aux_dac(level)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_aux_dac(level)), Ok(()));
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn an_alarm_is_off_while_its_registers_change() {
         write(0x49, 0x27),
         read(0x48, 0x2716),
     ];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_alarm(AlarmNumber::One, Some(alarm))), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_alarm(AlarmNumber::One, Some(alarm))), Ok(()));
 
     // Alarm 2, below −5 counts of the 12-bit temperature (source 0xB) over 16 samples.
     let alarm =
@@ -97,10 +97,10 @@ fn an_alarm_is_off_while_its_registers_change() {
         write(0x49, 0xB7),
         read(0x48, 0xB780),
     ];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_alarm(AlarmNumber::Two, Some(alarm))), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_alarm(AlarmNumber::Two, Some(alarm))), Ok(()));
 
     let bus = [read(0x48, 0xB780), write(0x48, 0x00), write(0x49, 0x07), read(0x48, 0x0700)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_alarm(AlarmNumber::Two, None)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_alarm(AlarmNumber::Two, None)), Ok(()));
 }
 
 /// Sources are numbered from 1 in burst order; 0, 0xD, 0xE and 0xF are no source.
@@ -108,7 +108,7 @@ fn an_alarm_is_off_while_its_registers_change() {
 fn an_alarm_is_read_with_its_source() {
     for code in 0..16u16 {
         let bus = [read_all(&[(0x48, code << 8 | 0x40), (0x40, 0x8001), (0x44, 9)])];
-        let alarm = both!(Config::default(); bus; NONE; |imu, delay| imu.alarm(AlarmNumber::One)).unwrap();
+        let alarm = both!(Config::default(); bus; NONE; |imu| imu.alarm(AlarmNumber::One)).unwrap();
         let expected = usize::from(code)
             .checked_sub(1)
             .and_then(|index| Channel::ALL.get(index))
@@ -116,7 +116,7 @@ fn an_alarm_is_read_with_its_source() {
         assert_eq!(alarm, expected, "{code:#x}");
     }
     let bus = [read_all(&[(0x48, 0x2000), (0x42, 0x3FFF), (0x46, 0)])];
-    let alarm = both!(Config::default(); bus; NONE; |imu, delay| imu.alarm(AlarmNumber::Two)).unwrap();
+    let alarm = both!(Config::default(); bus; NONE; |imu| imu.alarm(AlarmNumber::Two)).unwrap();
     let expected = Alarm { source: Channel::GyroX, watch: AlarmWatch::Level, threshold: AlarmThreshold::Below(-1) };
     assert_eq!(alarm, Some(expected));
 }
@@ -125,11 +125,11 @@ fn an_alarm_is_read_with_its_source() {
 fn alarm_output_and_filtering_change_their_bits_only() {
     let signal = Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow });
     let bus = [read(0x48, 0x0702), write(0x48, 0x05), read(0x48, 0x0705)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_alarm_output(signal)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_alarm_output(signal)), Ok(()));
     let bus = [read(0x48, 0x0705), write(0x48, 0x15), read(0x48, 0x0715)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_alarm_filtering(true)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_alarm_filtering(true)), Ok(()));
     let bus = [read(0x48, 0x0715), write(0x48, 0x05), read(0x48, 0x0705)];
-    assert_eq!(both!(Config::default(); bus; NONE; |imu, delay| imu.set_alarm_filtering(false)), Ok(()));
+    assert_eq!(both!(Config::default(); bus; NONE; |imu| imu.set_alarm_filtering(false)), Ok(()));
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_threshold_outside_the_limits_of_its_channel_is_refused() {
         (Channel::AuxAdc, 4096, AlarmNumber::Two, Register::AlmMag2),
     ] {
         let alarm = Alarm { source, watch: AlarmWatch::Level, threshold: AlarmThreshold::Below(counts) };
-        let refused = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.set_alarm(number, Some(alarm)));
+        let refused = both!(Config::default(); [Frames::new()]; NONE; |imu| imu.set_alarm(number, Some(alarm)));
         assert_eq!(refused, Err(Error::Value { register, value: i32::from(counts) }));
     }
 }

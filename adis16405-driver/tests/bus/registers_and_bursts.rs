@@ -1,9 +1,10 @@
 //! Reads and writes of registers, and bursts.
 
-use adis16405_driver::{Access, Adis16405, Config, Error, GyroRange, Register, SamplePeriod, Timing};
-use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+use adis16405_driver::{
+    Access, Adis16405, Config, Error, GyroRange, Register, SamplePeriod, SelectDuringStall, Timing,
+};
 
-use crate::harness::{Frames, NONE, STALL_NS, frame_with, read, read_all, write};
+use crate::harness::{Bench, Frames, NONE, STALL_NS, Step, frame_with, read, read_all, write};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
@@ -11,21 +12,24 @@ fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
 
 #[test]
 fn new_sends_nothing() {
-    Adis16405::new(Mock::new(&[]), Config::default()).release().done();
+    // An empty bench refuses every step.
+    let bench = Bench::new([], NONE);
+    let (spi, delay) = Adis16405::new(bench.clone(), bench.clone(), Config::default()).release();
     #[cfg(feature = "async")]
-    Adis16405::new_async(Mock::new(&[]), Config::default()).release().done();
+    Adis16405::new_async(spi.clone(), delay.clone(), Config::default());
+    spi.done();
+    delay.done();
 }
 
 #[test]
 fn a_read_is_two_frames_and_several_reads_overlap() {
-    let value =
-        both!(Config::default(); [read(0x3C, 0x1234)]; NONE; |imu, delay| imu.read_register(Register::DiagStat));
+    let value = both!(Config::default(); [read(0x3C, 0x1234)]; NONE; |imu| imu.read_register(Register::DiagStat));
     assert_eq!(value, Ok(0x1234));
     let registers = [Register::XgyroOut, Register::TempOut, Register::ProdId];
     let bus = [read_all(&[(0x04, 0x8001), (0x16, 0x8002), (0x56, 0x4015)])];
-    let values = both!(Config::default(); bus; NONE; |imu, delay| imu.read_registers(registers));
+    let values = both!(Config::default(); bus; NONE; |imu| imu.read_registers(registers));
     assert_eq!(values, Ok([0x8001, 0x8002, 0x4015]));
-    let nothing = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.read_registers([]));
+    let nothing = both!(Config::default(); [Frames::new()]; NONE; |imu| imu.read_registers([]));
     assert_eq!(nothing, Ok([]));
 }
 
@@ -34,7 +38,7 @@ fn the_stall_is_75_us_in_low_power_mode() {
     let slow = |answer: [u8; 2], sent: [u8; 2]| frame_with(75_000, &sent, &answer);
     let bus = [slow([0, 0], [0x3C, 0]), slow([0x12, 0x34], [0, 0])];
     let low_power = config(GyroRange::Dps300, 2, 0x09);
-    assert_eq!(both!(low_power; bus; NONE; |imu, delay| imu.read_register(Register::DiagStat)), Ok(0x1234));
+    assert_eq!(both!(low_power; bus; NONE; |imu| imu.read_register(Register::DiagStat)), Ok(0x1234));
 }
 
 /// Linux has the limit of normal mode one higher than the data sheet.
@@ -42,7 +46,7 @@ fn the_stall_is_75_us_in_low_power_mode() {
 fn the_limit_of_normal_mode_can_be_set() {
     let timing = Timing { normal_mode_max_smpl_prd: 0x09, ..Timing::DEFAULT };
     let config = config(GyroRange::Dps300, 2, 0x09);
-    let value = both!(config, with [.with_timing(timing)]; [read(0x00, 7)]; NONE; |imu, delay| imu.flash_writes());
+    let value = both!(config, with [.with_timing(timing)]; [read(0x00, 7)]; NONE; |imu| imu.flash_writes());
     assert_eq!(value, Ok(7));
 }
 
@@ -50,23 +54,48 @@ fn the_limit_of_normal_mode_can_be_set() {
 fn the_stall_can_be_set() {
     let bus = [frame_with(9_000, &[0xBE, 0x80], &[0, 0])];
     let written = both!(Config::default(), with [.with_stall_ns(9_000)]; bus; NONE;
-        |imu, delay| imu.write_register(Register::GlobCmd, 0x80));
+        |imu| imu.write_register(Register::GlobCmd, 0x80));
     assert_eq!(written, Ok(()));
+}
+
+/// Linux, PX4 and Canopus raise chip select between frames and wait then.
+#[test]
+fn chip_select_is_high_during_the_stall_unless_it_is_set_to_be_low() {
+    let exchange = Step::Exchange { sent: vec![0xBE, 0x80], answer: vec![0, 0] };
+    let (select, deselect) = (Step::Select, Step::Deselect);
+    let high = |ns| vec![select.clone(), exchange.clone(), deselect.clone(), Step::Delay(ns)];
+    let low = |stall_ns, high_ns: Option<u32>| {
+        let inside = [select.clone(), exchange.clone(), Step::Delay(stall_ns), deselect.clone()];
+        inside.into_iter().chain(high_ns.map(Step::Delay)).collect::<Frames>()
+    };
+    let default = Timing::DEFAULT;
+    assert_eq!((default.stall_select, default.select_high_ns), (SelectDuringStall::High, 1_000));
+    let held_low = Timing { stall_select: SelectDuringStall::Low, ..default };
+    for (timing, bus) in [
+        (default, high(16_000)),
+        (Timing { select_high_ns: 20_000, ..default }, high(20_000)),
+        (held_low, low(16_000, Some(1_000))),
+        (Timing { select_high_ns: 0, ..held_low }, low(16_000, None)),
+    ] {
+        let written = both!(Config::default(), with [.with_timing(timing)]; [bus.clone()]; NONE;
+            |imu| imu.write_register(Register::GlobCmd, 0x80));
+        assert_eq!(written, Ok(()), "{timing:?}");
+    }
 }
 
 #[test]
 fn registers_are_written_by_bytes_with_the_lower_first() {
     let bus = [write(0x1A, 0x34), write(0x1B, 0x12)];
-    let written = both!(Config::default(); bus; NONE; |imu, delay| imu.write_register(Register::XgyroOff, 0x1234));
+    let written = both!(Config::default(); bus; NONE; |imu| imu.write_register(Register::XgyroOff, 0x1234));
     assert_eq!(written, Ok(()));
     let bus = [write(0x36, 0x07)];
-    let written = both!(Config::default(); bus; NONE; |imu, delay| imu.write_register(Register::SmplPrd, 0xFF07));
+    let written = both!(Config::default(); bus; NONE; |imu| imu.write_register(Register::SmplPrd, 0xFF07));
     assert_eq!(written, Ok(()), "SMPL_PRD has one byte");
 }
 
 #[test]
 fn an_update_writes_the_bytes_that_change_and_reads_back() {
-    let update = |bus: Vec<Frames>, mask, value| both!(Config::default(); bus.clone(); NONE; |imu, delay| imu.update_register(Register::AlmCtrl, mask, value));
+    let update = |bus: Vec<Frames>, mask, value| both!(Config::default(); bus.clone(); NONE; |imu| imu.update_register(Register::AlmCtrl, mask, value));
     assert_eq!(update(vec![read(0x48, 0x1234)], 0x00F0, 0x0030), Ok(()), "nothing changes");
     assert_eq!(update(vec![read(0x48, 0x1234), write(0x48, 0x54), read(0x48, 0x1254)], 0x00F0, 0xFF5F), Ok(()));
     assert_eq!(update(vec![read(0x48, 0x1234), write(0x49, 0xA2), read(0x48, 0xA234)], 0xF000, 0xA000), Ok(()));
@@ -82,7 +111,7 @@ fn an_update_writes_the_bytes_that_change_and_reads_back() {
 fn without_verification_nothing_is_read_back() {
     let bus = [read(0x36, 0x0001), write(0x36, 0x05)];
     let written = both!(Config::default(), with [.with_verified_writes(false)]; bus; NONE;
-        |imu, delay| imu.update_register(Register::SmplPrd, 0xFFFF, 0x05));
+        |imu| imu.update_register(Register::SmplPrd, 0xFFFF, 0x05));
     assert_eq!(written, Ok(()));
 }
 
@@ -92,22 +121,19 @@ fn a_forbidden_access_is_refused_without_bus_traffic() {
         if register.access() == Access::Read {
             let refused = Err(Error::ReadOnly(register));
             let empty = [Frames::new()];
-            assert_eq!(both!(Config::default(); empty; NONE; |imu, delay| imu.write_register(register, 0)), refused);
+            assert_eq!(both!(Config::default(); empty; NONE; |imu| imu.write_register(register, 0)), refused);
             let empty = [Frames::new()];
-            assert_eq!(
-                both!(Config::default(); empty; NONE; |imu, delay| imu.update_register(register, 1, 1)),
-                refused
-            );
+            assert_eq!(both!(Config::default(); empty; NONE; |imu| imu.update_register(register, 1, 1)), refused);
         }
     }
     for register in [Register::GlobCmd, Register::SlpCnt] {
         let refused = Err(Error::WriteOnly(register));
-        let read = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.read_register(register));
+        let read = both!(Config::default(); [Frames::new()]; NONE; |imu| imu.read_register(register));
         assert_eq!(read, refused.map(|()| 0));
         let several = both!(Config::default(); [Frames::new()]; NONE;
-            |imu, delay| imu.read_registers([Register::ProdId, register]));
+            |imu| imu.read_registers([Register::ProdId, register]));
         assert_eq!(several, refused.map(|()| [0, 0]));
-        let updated = both!(Config::default(); [Frames::new()]; NONE; |imu, delay| imu.update_register(register, 1, 1));
+        let updated = both!(Config::default(); [Frames::new()]; NONE; |imu| imu.update_register(register, 1, 1));
         assert_eq!(updated, refused);
     }
 }
@@ -127,30 +153,37 @@ fn burst_bytes() -> ([u8; 26], [u8; 26]) {
 fn a_burst_is_one_transaction_of_26_bytes() {
     let (sent, answer) = burst_bytes();
     let bus = [frame_with(STALL_NS, &sent, &answer)];
-    let burst = both!(Config::default(); bus; NONE; |imu, delay| imu.burst()).unwrap();
+    let burst = both!(Config::default(); bus; NONE; |imu| imu.burst()).unwrap();
     assert_eq!(burst.words[0].0, 0x8081);
     assert_eq!(burst.words[11].0, 0x9697);
 
-    let imu = Adis16405::new(Mock::new(&[]), config(GyroRange::Dps75, 4, 1));
-    let sample = imu.sample_from(burst);
-    imu.release().done();
+    let bench = Bench::new([], NONE);
+    let sample = Adis16405::new(bench.clone(), bench, config(GyroRange::Dps75, 4, 1)).sample_from(burst);
     assert_eq!((*sample.counts(), sample.range()), (burst.counts(), GyroRange::Dps75));
 }
 
 #[test]
 fn a_word_gap_splits_a_burst_into_13_transfers() {
     let (sent, answer) = burst_bytes();
-    let mut bus = vec![Transaction::transaction_start()];
-    for word in 0..13 {
+    let word = |word: usize| {
         let bytes = 2 * word..2 * word + 2;
-        bus.push(Transaction::transfer(sent[bytes.clone()].to_vec(), answer[bytes].to_vec()));
-        bus.push(Transaction::delay(if word < 12 { 1_000 } else { STALL_NS }));
-    }
-    bus.push(Transaction::transaction_end());
+        Step::Exchange { sent: sent[bytes.clone()].to_vec(), answer: answer[bytes].to_vec() }
+    };
+    let between = || (0..12).flat_map(|index| [word(index), Step::Delay(1_000)]);
+    let high = [Step::Select].into_iter().chain(between()).chain([word(12), Step::Deselect, Step::Delay(STALL_NS)]);
+    let low = [Step::Select].into_iter().chain(between()).chain([
+        word(12),
+        Step::Delay(STALL_NS),
+        Step::Deselect,
+        Step::Delay(1_000),
+    ]);
     let timing = Timing { word_gap_ns: 1_000, ..Timing::DEFAULT };
-    let burst = both!(Config::default(), with [.with_timing(timing)]; [bus]; NONE; |imu, delay| imu.burst()).unwrap();
-    assert_eq!(burst.words[0].0, 0x8081);
-    assert_eq!(burst.words[11].0, 0x9697);
+    let held_low = Timing { stall_select: SelectDuringStall::Low, ..timing };
+    for (timing, bus) in [(timing, high.collect::<Frames>()), (held_low, low.collect())] {
+        let burst = both!(Config::default(), with [.with_timing(timing)]; [bus.clone()]; NONE; |imu| imu.burst());
+        assert_eq!(burst.unwrap().words.map(|word| word.0)[..2], [0x8081, 0x8283]);
+        assert_eq!(burst.unwrap().words[11].0, 0x9697);
+    }
 }
 
 /// The addresses of the lower bytes, and widths, of the data sheet's register map.

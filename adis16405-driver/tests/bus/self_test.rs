@@ -18,7 +18,7 @@ fn a_self_test_is_polled_until_its_bit_clears() {
         read(0x3C, 0x1020),
         read(0x34, 0x0086),
     ];
-    let outcome = both!(Config::default(); bus; [1_000, 1_000]; |imu, delay| imu.self_test(&mut delay)).unwrap();
+    let outcome = both!(Config::default(); bus; [1_000, 1_000]; |imu| imu.self_test()).unwrap();
     let diagnosis = Diagnosis::GYRO_Z | Diagnosis::SELF_TEST;
     assert_eq!(outcome, SelfTest { before: Diagnosis::SUPPLY_LOW, ran: true, diagnosis });
     assert!(!outcome.passed());
@@ -36,7 +36,7 @@ fn a_self_test_switches_a_manual_self_test_off() {
         read(0x3C, 0),
         read(0x34, 0x0006),
     ];
-    let outcome = both!(Config::default(); bus; [1_000]; |imu, delay| imu.self_test(&mut delay)).unwrap();
+    let outcome = both!(Config::default(); bus; [1_000]; |imu| imu.self_test()).unwrap();
     assert!(outcome.passed());
 }
 
@@ -54,7 +54,7 @@ fn a_test_that_did_not_run_is_not_passed() {
             read(0x34, 6),
         ]
     };
-    let outcome = both!(Config::default(); bus(); NONE; |imu, delay| imu.self_test(&mut delay)).unwrap();
+    let outcome = both!(Config::default(); bus(); NONE; |imu| imu.self_test()).unwrap();
     assert_eq!((outcome.ran, outcome.diagnosis, outcome.passed()), (false, Diagnosis::empty(), false));
 }
 
@@ -64,7 +64,7 @@ fn a_flash_test_that_does_not_end_is_an_error_at_the_deadline() {
     let mut bus = vec![read(0x56, 16405), read(0x3C, 0), read(0x34, 6), write(0x35, 0x08)];
     bus.extend((0..35).map(|_| read(0x34, 0x0806)));
     let pauses = [1_000; 34];
-    let outcome = both!(Config::default(); bus; pauses; |imu, delay| imu.flash_test(&mut delay));
+    let outcome = both!(Config::default(); bus; pauses; |imu| imu.flash_test());
     assert_eq!(outcome, Err(Error::Deadline { register: Register::MscCtrl, mask: 0x0800, waited_us: 34_000 }));
     let text = outcome.unwrap_err().to_string();
     assert_eq!(text, "MSC_CTRL still has bits of 0x0800 set after 34000 µs");
@@ -82,7 +82,7 @@ fn a_flash_test_reports_a_wrong_checksum() {
         read(0x3C, 0x0040),
         read(0x34, 6),
     ];
-    let outcome = both!(Config::default(); bus; [1_000]; |imu, delay| imu.flash_test(&mut delay)).unwrap();
+    let outcome = both!(Config::default(); bus; [1_000]; |imu| imu.flash_test()).unwrap();
     let expected = FlashTest { before: Diagnosis::empty(), ran: true, diagnosis: Diagnosis::FLASH_CHECKSUM };
     assert_eq!(outcome, expected);
     assert!(!outcome.passed());
@@ -110,7 +110,7 @@ fn a_stimulus_response_is_a_difference_of_means_and_the_stimulus_is_switched_off
         let mean = [[12_000 + 8 * 1_222].as_slice(), [1_222; 8].as_slice()].concat();
         let pauses = [mean.clone(), mean].concat();
         let response = both!(Config::default(); bus.clone(); pauses.clone();
-            |imu, delay| imu.stimulus_response(stimulus, &mut delay));
+            |imu| imu.stimulus_response(stimulus));
         assert_eq!(response, Ok([490, 0, 0, 245, 0, 0]), "{stimulus:?}");
     }
 }
@@ -118,7 +118,7 @@ fn a_stimulus_response_is_a_difference_of_means_and_the_stimulus_is_switched_off
 #[test]
 fn a_diagnosis_has_the_bits_that_were_read() {
     for bits in [0x0000, 0xFFFF, 0x0080, 0x8420] {
-        let diagnosis = both!(Config::default(); [read(0x3C, bits)]; NONE; |imu, delay| imu.diagnosis());
+        let diagnosis = both!(Config::default(); [read(0x3C, bits)]; NONE; |imu| imu.diagnosis());
         assert_eq!(diagnosis.map(|diagnosis| diagnosis.bits()), Ok(bits));
     }
 }

@@ -4,6 +4,7 @@
 //! driver requests and decodes it as from a part; the decoded samples become the recording.
 
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
+use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::count_table::CountTable;
 use recordings::frame_log::{Frame, FrameLogReader};
@@ -80,13 +81,13 @@ pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
 /// The driver on a replay bus.
 struct Player {
     bus: ReplayBus,
-    driver: Adis16405<ReplayBus>,
+    driver: Adis16405<ReplayBus, NoDelay>,
 }
 
 impl Player {
     fn new() -> Self {
         let bus = ReplayBus::default();
-        Self { driver: Adis16405::new(bus.clone(), Config::default()), bus }
+        Self { driver: Adis16405::new(bus.clone(), NoDelay, Config::default()), bus }
     }
 
     /// Lets the driver read one recorded transaction.
@@ -94,6 +95,13 @@ impl Player {
         self.bus.load(mosi, miso);
         self.driver.burst().map_err(|e| Reason::Bus(e.to_string()))
     }
+}
+
+/// A replay takes no time.
+struct NoDelay;
+
+impl DelayNs for NoDelay {
+    fn delay_ns(&mut self, _: u32) {}
 }
 
 fn is_burst(frame: &Frame) -> bool {

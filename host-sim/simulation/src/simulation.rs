@@ -174,7 +174,7 @@ impl Simulation {
         samples: u64,
         mut progress: impl FnMut(u64),
     ) -> Result<Recording, SimulationError> {
-        let mut driver = Adis16405::new(device, self.config().map_err(SimulationError::Config)?);
+        let mut driver = Adis16405::new(device, bus.delay(), self.config().map_err(SimulationError::Config)?);
         driver.init().map_err(|e| SimulationError::Driver(e.to_string()))?;
         let mut recorder = Recorder::new(Channel::ALL.to_vec(), driver.config().range());
         let mut stamps = TimeStamps::new(self.host, self.scenario.missed_fraction(), self.seed);

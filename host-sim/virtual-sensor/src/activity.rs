@@ -66,3 +66,15 @@ impl Activity {
         }
     }
 }
+
+/// What the controller reads during an [`Activity`] that needs a silent bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BusyAnswers {
+    /// Zeros.
+    #[default]
+    Zeros,
+    /// Ones: the part ignores the bus and does not drive its data line, which is pulled up.
+    Ones,
+    /// Random words, the same in every run.
+    Garbage,
+}

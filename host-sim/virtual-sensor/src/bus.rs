@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use std::rc::Rc;
 
 use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
 use crate::part::VirtualAdis16405;
@@ -45,6 +46,11 @@ impl EmulatedBus {
     /// A delay in the part's virtual time.
     pub fn delay(&self) -> VirtualDelay {
         VirtualDelay { part: Rc::clone(&self.part) }
+    }
+
+    /// The reset line of the part, RST, active low.
+    pub fn reset_line(&self) -> VirtualResetLine {
+        VirtualResetLine { part: Rc::clone(&self.part) }
     }
 
     /// Advances time to the next data-ready pulse and returns that time, ns; `None` if no pulse is to come.
@@ -128,5 +134,27 @@ impl DelayNs for VirtualDelay {
 impl embedded_hal_async::delay::DelayNs for VirtualDelay {
     async fn delay_ns(&mut self, ns: u32) {
         DelayNs::delay_ns(self, ns);
+    }
+}
+
+/// The reset line of the virtual part, active low ([`VirtualAdis16405::drive_reset`]).
+#[derive(Clone, Debug)]
+pub struct VirtualResetLine {
+    part: Rc<RefCell<VirtualAdis16405>>,
+}
+
+impl embedded_hal::digital::ErrorType for VirtualResetLine {
+    type Error = Infallible;
+}
+
+impl OutputPin for VirtualResetLine {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.part.borrow_mut().drive_reset(false);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.part.borrow_mut().drive_reset(true);
+        Ok(())
     }
 }

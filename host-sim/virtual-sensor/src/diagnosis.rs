@@ -15,6 +15,68 @@ pub(crate) const ALARMS: u16 = ALARM_1 | ALARM_1 << 1;
 /// Self-test failure of gyro x; gyros y and z and the accelerometers follow.
 pub(crate) const GYRO_X: u16 = 1 << 10;
 
+/// A flag of DIAG_STAT. Bit 7 is unused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum DiagnosisFlag {
+    /// Supply below 4.75 V.
+    SupplyLow = 0,
+    /// Supply above 5.25 V.
+    SupplyHigh = 1,
+    /// A flash or control update failed.
+    FlashUpdate = 2,
+    /// A frame had a wrong number of clocks.
+    SpiCommunication = 3,
+    /// A sensor is beyond its range.
+    OverRange = 4,
+    /// A self-test failed.
+    SelfTest = 5,
+    /// The checksum of the flash is wrong.
+    FlashChecksum = 6,
+    /// Alarm 1.
+    Alarm1 = 8,
+    /// Alarm 2.
+    Alarm2 = 9,
+    /// Self-test of gyro x.
+    GyroX = 10,
+    /// Self-test of gyro y.
+    GyroY = 11,
+    /// Self-test of gyro z.
+    GyroZ = 12,
+    /// Self-test of accelerometer x.
+    AcclX = 13,
+    /// Self-test of accelerometer y.
+    AcclY = 14,
+    /// Self-test of accelerometer z.
+    AcclZ = 15,
+}
+
+impl DiagnosisFlag {
+    /// All flags.
+    pub const ALL: [Self; 15] = [
+        Self::SupplyLow,
+        Self::SupplyHigh,
+        Self::FlashUpdate,
+        Self::SpiCommunication,
+        Self::OverRange,
+        Self::SelfTest,
+        Self::FlashChecksum,
+        Self::Alarm1,
+        Self::Alarm2,
+        Self::GyroX,
+        Self::GyroY,
+        Self::GyroZ,
+        Self::AcclX,
+        Self::AcclY,
+        Self::AcclZ,
+    ];
+
+    /// The bit in DIAG_STAT.
+    pub const fn bit(self) -> u16 {
+        1 << self as u8
+    }
+}
+
 /// Limits of the supply voltage, V.
 const SUPPLY_RANGE_V: (f64, f64) = (4.75, 5.25);
 /// Size of a count of SUPPLY_OUT, V.

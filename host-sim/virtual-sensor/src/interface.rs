@@ -1,10 +1,10 @@
 //! The part as its controller meets it: SPI words, registers with the side effects of reading and writing them, and pins.
 
-use crate::activity::Activity;
+use crate::activity::{Activity, BusyAnswers};
 use crate::diagnosis;
 use crate::part::VirtualAdis16405;
 use crate::registers::{self, OutputRegister};
-use crate::spi::{FLOATING, UNDEFINED, ViolationKind};
+use crate::spi::{FLOATING, UNDEFINED, ViolationKind, WordStart};
 
 /// Bit 15 of an output register: new data.
 const NEW_DATA: u16 = 0x8000;
@@ -30,13 +30,13 @@ impl VirtualAdis16405 {
 
     /// Chip select falls.
     pub fn select(&mut self) {
-        self.spi.select();
+        self.spi.select(self.now_ns);
     }
 
     /// Chip select rises. An incomplete burst or frame is dropped; a pulse without a byte ends a sleep.
     pub fn deselect(&mut self) {
-        let end = self.spi.deselect();
-        if self.powered {
+        let end = self.spi.deselect(self.now_ns);
+        if self.is_alive() {
             if end.in_frame {
                 self.diagnosis |= diagnosis::SPI;
             }
@@ -61,15 +61,19 @@ impl VirtualAdis16405 {
             self.violations.add(self.now_ns, ViolationKind::NotSelected);
             return FLOATING;
         }
-        if self.spi.at_word_begin() && self.powered {
-            self.spi.begin_word(self.now_ns, self.is_low_power(), &mut self.violations);
+        if self.spi.at_word_begin() && self.is_alive() {
             if let Some(activity) = self.silent_activity() {
                 self.violations.add(self.now_ns, ViolationKind::Busy { activity });
+                self.answer_while_busy();
+            }
+            let start = self.spi.begin_word(self.now_ns, self.is_low_power(), &mut self.violations);
+            if start == WordStart::Garbled {
+                self.diagnosis |= diagnosis::SPI;
             }
         }
         self.advance_to(self.now_ns + self.spi.byte_ns());
         let shifted = self.spi.shift(byte);
-        if !self.powered {
+        if !self.is_alive() {
             return FLOATING;
         }
         if let Some(word) = shifted.word
@@ -85,12 +89,28 @@ impl VirtualAdis16405 {
         self.activity.map(|(activity, _)| activity).filter(|activity| activity.needs_silent_bus())
     }
 
+    /// Sets the word that goes out during a procedure that needs a silent bus.
+    fn answer_while_busy(&mut self) {
+        let word = match self.busy_answers {
+            BusyAnswers::Zeros => 0,
+            BusyAnswers::Ones => u16::MAX,
+            BusyAnswers::Garbage => {
+                // Marsaglia's xorshift generator of 32 bits.
+                self.garbage ^= self.garbage << 13;
+                self.garbage ^= self.garbage >> 17;
+                self.garbage ^= self.garbage << 5;
+                self.garbage as u16
+            }
+        };
+        self.spi.answer(word);
+    }
+
     /// Executes a frame: a write (bit 15), a burst read (a read of GLOB_CMD), or a read.
     fn execute(&mut self, word: u16) {
         let [upper, lower] = word.to_be_bytes();
         let address = upper & 0x7F;
         if self.silent_activity().is_some() {
-            self.spi.answer(0);
+            self.answer_while_busy();
         } else if upper & 0x80 != 0 {
             self.spi.answer(UNDEFINED);
             self.write(address, lower);

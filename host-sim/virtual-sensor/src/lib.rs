@@ -4,12 +4,24 @@
 //! effects, flash, self-test, auto-null, alarms, sleep, pins, SPI protocol, and a checker of the bus timing. Its register
 //! map is that of the data sheet and shares no code with the driver. [`EmulatedBus`] puts it behind an embedded-hal
 //! [`SpiDevice`](embedded_hal::spi::SpiDevice), over which the driver reads it.
+//!
+//! What a real part may do and a forgiving model does not, each off unless it is asked for:
+//!
+//! | the part is | by |
+//! |---|---|
+//! | cold: it starts up for 220 to 290 ms, and answers zeros, ones or garbage meanwhile | [`VirtualAdis16405::cold`], [`VirtualAdis16405::power_on`], [`VirtualAdis16405::set_start_up_ns`], [`VirtualAdis16405::set_busy_answers`] |
+//! | slow in its words of supply, magnetometers, temperature and auxiliary input | [`VirtualAdis16405::set_slow_refresh`] |
+//! | latched: a flag of DIAG_STAT is set, once or by a cause that persists | [`VirtualAdis16405::latch_flag`], [`VirtualAdis16405::hold_flag`] |
+//! | strict about chip select and stall: a frame that comes too soon is garbled and lost | [`VirtualAdis16405::set_strict_select`] |
+//! | reset by its pin, or held in reset | [`EmulatedBus::reset_line`], [`VirtualAdis16405::drive_reset`] |
+//! | broken, without power, or another product | [`VirtualAdis16405::break_sensor`], [`VirtualAdis16405::damage_flash`], [`VirtualAdis16405::power_off`], [`VirtualAdis16405::set_prod_id`] |
 
 mod activity;
 mod bus;
 mod diagnosis;
 mod effects;
 mod environment;
+mod faults;
 mod interface;
 mod noise;
 mod part;
@@ -17,8 +29,9 @@ mod registers;
 mod signal_chain;
 mod spi;
 
-pub use activity::Activity;
-pub use bus::{EmulatedBus, VirtualDelay};
+pub use activity::{Activity, BusyAnswers};
+pub use bus::{EmulatedBus, VirtualDelay, VirtualResetLine};
+pub use diagnosis::DiagnosisFlag;
 pub use effects::{EffectSource, InjectedEffect, SensorScenario};
 pub use environment::{Environment, Motion, SupplyProfile, TemperatureProfile};
 pub use noise::{ChannelNoise, NoiseModel, NoiseSource};

@@ -1,6 +1,6 @@
-//! The virtual part: its state, how time passes in it, its procedures, and the faults that a test can give it.
+//! The virtual part: its state, how time passes in it, and its procedures.
 
-use crate::activity::Activity;
+use crate::activity::{Activity, BusyAnswers};
 use crate::diagnosis::{self, Alarms};
 use crate::effects::SensorScenario;
 use crate::noise::NoiseModel;
@@ -27,7 +27,7 @@ const DATA_READY_ENABLED: u16 = 1 << 2;
 pub struct VirtualAdis16405 {
     pub(crate) now_ns: u64,
     /// Sixteenths of a ns; `None` while the part does not sample by itself.
-    next_sample_sixteenths: Option<u64>,
+    pub(crate) next_sample_sixteenths: Option<u64>,
     pub(crate) sampled_at_ns: Option<u64>,
     pub(crate) powered: bool,
     /// The procedure under way and its end, ns.
@@ -36,18 +36,29 @@ pub struct VirtualAdis16405 {
     alarms: Alarms,
     auto_null: AutoNull,
     pub(crate) registers: RegisterFile,
-    flash: RegisterFile,
-    flash_damaged: bool,
+    pub(crate) flash: RegisterFile,
+    pub(crate) flash_damaged: bool,
     /// Bits of DIAG_STAT that a self-test sets.
-    self_test_failures: u16,
+    pub(crate) self_test_failures: u16,
+    /// Bits of DIAG_STAT that every sample sets.
+    pub(crate) held_flags: u16,
+    pub(crate) busy_answers: BusyAnswers,
+    /// State of the generator of [`BusyAnswers::Garbage`]; not 0.
+    pub(crate) garbage: u32,
+    /// Duration of the start-up, ns; `None` for that of the power mode.
+    pub(crate) start_up_ns: Option<u64>,
+    /// When the reset line fell, ns; `None` while it is high.
+    pub(crate) reset_low_since_ns: Option<u64>,
     /// Outputs that have not been read since the latest sample.
     pub(crate) new_data: [bool; 12],
     /// Every so many samples the outputs other than the inertial ones are refreshed.
-    slow_refresh: u32,
+    pub(crate) slow_refresh: u32,
     /// DIAG_STAT.
     pub(crate) diagnosis: u16,
     pub(crate) burst_since_reset: bool,
     samples: u64,
+    /// `samples` at the latest reset: the first sample after it refreshes all outputs.
+    samples_at_reset: u64,
     /// Levels that DIO1 (bit 0) to DIO4 are driven to from outside.
     pub(crate) driven: u16,
     pub(crate) latched_dac: u16,
@@ -59,6 +70,13 @@ impl VirtualAdis16405 {
     /// A part just after its start-up, with reset values, at time 0. The same model and seed give the same samples.
     pub fn new(model: NoiseModel, seed: u64) -> Self {
         Self::with_scenario(&SensorScenario::default(), model, seed)
+    }
+
+    /// A part that is switched on at time 0 and starts up: see [`power_on`](Self::power_on).
+    pub fn cold(model: NoiseModel, seed: u64) -> Self {
+        let mut part = Self::new(model, seed);
+        part.power_on();
+        part
     }
 
     /// The same part in an environment and with effects that its noise model does not declare.
@@ -76,11 +94,17 @@ impl VirtualAdis16405 {
             flash: RegisterFile::new(),
             flash_damaged: false,
             self_test_failures: 0,
+            held_flags: 0,
+            busy_answers: BusyAnswers::default(),
+            garbage: 16405,
+            start_up_ns: None,
+            reset_low_since_ns: None,
             new_data: [false; 12],
             slow_refresh: 1,
             diagnosis: 0,
             burst_since_reset: false,
             samples: 0,
+            samples_at_reset: 0,
             driven: 0,
             latched_dac: 0,
             spi: SpiPort::new(),
@@ -159,6 +183,7 @@ impl VirtualAdis16405 {
         self.new_data = [false; 12];
         self.diagnosis = 0;
         self.burst_since_reset = false;
+        self.samples_at_reset = self.samples;
         self.latched_dac = 0;
     }
 
@@ -174,6 +199,29 @@ impl VirtualAdis16405 {
         if !activity.keeps_sampling() {
             self.next_sample_sixteenths = None;
         }
+    }
+
+    /// Switches the power off, or disconnects the part: it does not sample, and the controller reads ones.
+    pub fn power_off(&mut self) {
+        self.powered = false;
+        self.activity = None;
+        self.next_sample_sixteenths = None;
+        self.reset();
+    }
+
+    /// Switches the power on: the part starts up, for 220 ms, or for 290 ms if the SMPL_PRD in its flash selects low-power
+    /// mode ([`set_start_up_ns`](Self::set_start_up_ns) sets another time). Until then the controller must not use the bus;
+    /// what it reads if it does is set by [`set_busy_answers`](Self::set_busy_answers).
+    pub fn power_on(&mut self) {
+        self.powered = true;
+        self.reset();
+        let duration_ns = self.start_up_ns.unwrap_or(Activity::StartUp.duration_ns(self.is_low_power()));
+        self.begin_until(Activity::StartUp, self.now_ns + duration_ns);
+    }
+
+    /// True if the part drives its data line: it has power and is not held in reset.
+    pub(crate) fn is_alive(&self) -> bool {
+        self.powered && self.reset_low_since_ns.is_none()
     }
 
     /// Ends a sleep.
@@ -214,10 +262,11 @@ impl VirtualAdis16405 {
     /// Starts the sample clock anew, unless it is external: the first sample comes one period after `from_ns`.
     pub(crate) fn restart_sampling(&mut self, from_ns: u64) {
         let may_sample = self.activity.is_none_or(|(activity, _)| activity.keeps_sampling());
-        self.next_sample_sixteenths = self.period_sixteenths().filter(|_| may_sample && self.powered).map(|period| {
-            self.signal_chain.set_sample_period(period as f64 / 16e9);
-            from_ns * 16 + period
-        });
+        self.next_sample_sixteenths =
+            self.period_sixteenths().filter(|_| may_sample && self.is_alive()).map(|period| {
+                self.signal_chain.set_sample_period(period as f64 / 16e9);
+                from_ns * 16 + period
+            });
     }
 
     /// Sample period by SMPL_PRD and the true rate of the clock; `None` for the external clock.
@@ -241,7 +290,7 @@ impl VirtualAdis16405 {
             let sens_avg = self.registers.read(registers::SENS_AVG);
             self.violations.add(self.now_ns, ViolationKind::Configuration { sens_avg });
         }
-        let slow_due = self.samples.is_multiple_of(u64::from(self.slow_refresh));
+        let slow_due = (self.samples - self.samples_at_reset).is_multiple_of(u64::from(self.slow_refresh));
         self.signal_chain.sample(&self.registers, time_s, period_s, slow_due);
         self.auto_null.add(self.signal_chain.rates());
         for (new, channel) in self.new_data.iter_mut().zip(OutputRegister::ALL) {
@@ -250,65 +299,18 @@ impl VirtualAdis16405 {
         self.samples += 1;
         self.sampled_at_ns = Some(self.now_ns);
         let (counts, unfiltered) = (self.signal_chain.counts(), self.signal_chain.unfiltered());
-        self.diagnosis |= diagnosis::check_supply(counts) | self.alarms.check(&self.registers, counts, unfiltered);
+        let found = diagnosis::check_supply(counts) | self.alarms.check(&self.registers, counts, unfiltered);
+        self.diagnosis |= found | self.held_flags;
     }
 
     /// Takes a sample by the external clock; its period is the time since the sample before.
     pub(crate) fn sample_externally(&mut self) {
-        if self.activity.is_some_and(|(activity, _)| !activity.keeps_sampling()) || !self.powered {
+        if self.activity.is_some_and(|(activity, _)| !activity.keeps_sampling()) || !self.is_alive() {
             return;
         }
         let since_ns = self.now_ns - self.sampled_at_ns.unwrap_or(0);
         let period_s = since_ns.max(1) as f64 * 1e-9;
         self.signal_chain.set_sample_period(period_s);
         self.sample(self.now_ns as f64 * 1e-9, period_s);
-    }
-}
-
-/// Faults, and behaviour that the data sheet leaves open.
-impl VirtualAdis16405 {
-    /// Refreshes supply, magnetometers, temperature and auxiliary input only with every n-th sample (0 is taken as 1, the
-    /// default): in between their words keep their counts, and once read they show no new data. No source at hand tells
-    /// at which rate the real part refreshes them.
-    pub fn set_slow_refresh(&mut self, samples: u32) {
-        self.slow_refresh = samples.max(1);
-    }
-
-    /// Breaks the sensor of an inertial channel: its self-test fails. Without effect for other channels, which have none.
-    pub fn break_sensor(&mut self, channel: OutputRegister) {
-        if let Some(index) = OutputRegister::INERTIAL.iter().position(|&inertial| inertial == channel) {
-            self.self_test_failures |= diagnosis::GYRO_X << index;
-        }
-    }
-
-    /// Damages the flash memory: its test and its update fail.
-    pub fn damage_flash(&mut self) {
-        self.flash_damaged = true;
-    }
-
-    /// Undoes [`damage_flash`](Self::damage_flash).
-    pub fn repair_flash(&mut self) {
-        self.flash_damaged = false;
-    }
-
-    /// Sets the answer of PROD_ID, also after a reset: another part of the family.
-    pub fn set_prod_id(&mut self, prod_id: u16) {
-        self.registers.store(registers::PROD_ID, prod_id);
-        self.flash.store(registers::PROD_ID, prod_id);
-    }
-
-    /// Switches the power off, or disconnects the part: it does not sample, and the controller reads ones.
-    pub fn power_off(&mut self) {
-        self.powered = false;
-        self.activity = None;
-        self.next_sample_sixteenths = None;
-        self.reset();
-    }
-
-    /// Switches the power on: the part starts up.
-    pub fn power_on(&mut self) {
-        self.powered = true;
-        self.reset();
-        self.begin(Activity::StartUp);
     }
 }

@@ -39,6 +39,21 @@ pub enum ViolationKind {
         /// The least allowed, ns.
         least_ns: u64,
     },
+    /// Chip select was high for too short a time between frames, or not at all. Checked if the part is strict
+    /// ([`set_strict_select`](crate::VirtualAdis16405::set_strict_select)).
+    SelectHigh {
+        /// The time, ns.
+        high_ns: u64,
+        /// The least allowed, ns.
+        least_ns: u64,
+    },
+    /// The reset line was low for too short a time.
+    ResetPulse {
+        /// The time, ns.
+        low_ns: u64,
+        /// The least that resets the part, ns.
+        least_ns: u64,
+    },
     /// Chip select rose inside a 16-bit frame or a burst.
     FrameLength {
         /// Whole bytes since chip select fell.
@@ -78,6 +93,12 @@ impl fmt::Display for Violation {
         match self.kind {
             ViolationKind::Stall { stall_ns, least_ns } => {
                 write!(f, "stall of {stall_ns} ns between frames, at least {least_ns} ns needed")
+            }
+            ViolationKind::SelectHigh { high_ns, least_ns } => {
+                write!(f, "chip select high for {high_ns} ns between frames, at least {least_ns} ns needed")
+            }
+            ViolationKind::ResetPulse { low_ns, least_ns } => {
+                write!(f, "reset line low for {low_ns} ns, at least {least_ns} ns needed")
             }
             ViolationKind::FrameLength { bytes } => write!(f, "chip select rose after {bytes} bytes"),
             ViolationKind::Clock { sck_hz, most_hz } => write!(f, "SCK of {sck_hz} Hz, at most {most_hz} Hz allowed"),
@@ -119,7 +140,14 @@ impl ViolationLog {
 pub(crate) struct SpiPort {
     /// SCK, Hz; `None` if bytes take no time and the clock is not checked.
     pub(crate) sck_hz: Option<u32>,
+    /// The least time that chip select must be high between frames, ns, if the part is strict about it.
+    pub(crate) least_high_ns: Option<u64>,
     selected: bool,
+    deselected_at_ns: Option<u64>,
+    /// How long chip select was high before it fell, ns; `None` if it was never low before.
+    high_ns: Option<u64>,
+    /// A rule of the strict part was violated since chip select fell.
+    garbled: bool,
     bytes_since_select: usize,
     /// The first byte of a frame, until the second one comes.
     upper_byte: Option<u8>,
@@ -148,6 +176,18 @@ pub(crate) struct Deselected {
     pub(crate) in_burst: bool,
 }
 
+/// Whether a word begins within the rules of a strict part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WordStart {
+    Sound,
+    Garbled,
+}
+
+/// The word that goes out when the part should have sent `word` and was addressed too soon.
+fn garble(word: u16) -> u16 {
+    (word ^ UNDEFINED).rotate_left(1)
+}
+
 /// A byte as exchanged.
 pub(crate) struct Shifted {
     pub(crate) answer: u8,
@@ -159,7 +199,11 @@ impl SpiPort {
     pub(crate) fn new() -> Self {
         Self {
             sck_hz: None,
+            least_high_ns: None,
             selected: false,
+            deselected_at_ns: None,
+            high_ns: None,
+            garbled: false,
             bytes_since_select: 0,
             upper_byte: None,
             outgoing: UNDEFINED,
@@ -184,14 +228,17 @@ impl SpiPort {
     }
 
     /// Chip select falls.
-    pub(crate) fn select(&mut self) {
+    pub(crate) fn select(&mut self, now_ns: u64) {
         self.selected = true;
+        self.high_ns = self.deselected_at_ns.map(|at_ns| now_ns - at_ns);
+        self.garbled = false;
         self.bytes_since_select = 0;
         self.upper_byte = None;
     }
 
     /// Chip select rises; an incomplete frame or burst is dropped.
-    pub(crate) fn deselect(&mut self) -> Deselected {
+    pub(crate) fn deselect(&mut self, now_ns: u64) -> Deselected {
+        self.deselected_at_ns = Some(now_ns);
         Deselected {
             bytes: std::mem::take(&mut self.selected).then_some(self.bytes_since_select),
             in_frame: self.upper_byte.take().is_some(),
@@ -199,8 +246,19 @@ impl SpiPort {
         }
     }
 
-    /// Loads the word that goes out next and checks pause and clock before it.
-    pub(crate) fn begin_word(&mut self, now_ns: u64, low_power: bool, violations: &mut ViolationLog) {
+    /// Loads the word that goes out next and checks chip select, pause and clock before it.
+    pub(crate) fn begin_word(&mut self, now_ns: u64, low_power: bool, violations: &mut ViolationLog) -> WordStart {
+        if self.garbled {
+            self.outgoing = garble(self.answer);
+            return WordStart::Garbled;
+        }
+        if let (None, Some(least_ns)) = (&self.burst, self.least_high_ns) {
+            let high_ns = if self.bytes_since_select > 0 { Some(0) } else { self.high_ns };
+            if let Some(high_ns) = high_ns.filter(|high_ns| *high_ns < least_ns) {
+                violations.add(now_ns, ViolationKind::SelectHigh { high_ns, least_ns });
+                self.garbled = true;
+            }
+        }
         let (least_ns, most_hz) = match (low_power, &self.burst) {
             (true, _) => (MIN_STALL_LOW_POWER_NS, MAX_SCK_LOW_POWER_HZ),
             (false, None) => (MIN_STALL_NORMAL_NS, MAX_SCK_NORMAL_HZ),
@@ -210,12 +268,18 @@ impl SpiPort {
             let stall_ns = now_ns - end_ns;
             if stall_ns < least_ns {
                 violations.add(now_ns, ViolationKind::Stall { stall_ns, least_ns });
+                self.garbled |= self.least_high_ns.is_some();
             }
         }
         if let Some(sck_hz) = self.sck_hz.filter(|hz| *hz > most_hz) {
             violations.add(now_ns, ViolationKind::Clock { sck_hz, most_hz });
         }
+        if self.garbled {
+            self.outgoing = garble(self.answer);
+            return WordStart::Garbled;
+        }
         self.outgoing = self.burst.as_ref().map_or(self.answer, |burst| burst.words[burst.next]);
+        WordStart::Sound
     }
 
     /// Exchanges a byte, the upper one of a word first.
@@ -231,9 +295,12 @@ impl SpiPort {
         }
     }
 
-    /// Ends a word. Returns true if it was a frame to be executed, false if it was part of a burst.
+    /// Ends a word. Returns true if it was a frame to be executed, false if it was garbled or part of a burst.
     pub(crate) fn end_word(&mut self, now_ns: u64) -> bool {
         self.last_word_end_ns = Some(now_ns);
+        if self.garbled {
+            return false;
+        }
         let Some(burst) = &mut self.burst else {
             return true;
         };

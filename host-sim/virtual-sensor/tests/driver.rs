@@ -2,15 +2,17 @@
 
 use adis16405_driver::{Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, Register, SamplePeriod};
 
-use virtual_sensor::{Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405};
+use virtual_sensor::{
+    Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405, VirtualDelay,
+};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
 }
 
-fn on_bus(model: NoiseModel, config: Config) -> (EmulatedBus, Adis16405<EmulatedBus>) {
+fn on_bus(model: NoiseModel, config: Config) -> (EmulatedBus, Adis16405<EmulatedBus, VirtualDelay>) {
     let bus = EmulatedBus::new(VirtualAdis16405::new(model, 1));
-    let mut imu = Adis16405::new(bus.clone(), config);
+    let mut imu = Adis16405::new(bus.clone(), bus.delay(), config);
     imu.init().unwrap();
     (bus, imu)
 }
@@ -30,7 +32,7 @@ fn the_driver_configures_the_part_without_a_violation() {
 fn low_power_mode_needs_a_slow_clock() {
     let slow = config(GyroRange::Dps300, 2, 15);
     let bus = EmulatedBus::with_sck_hz(VirtualAdis16405::new(NoiseModel::paper(), 1), 300_000);
-    let mut imu = Adis16405::new(bus.clone(), slow);
+    let mut imu = Adis16405::new(bus.clone(), bus.delay(), slow);
     imu.init().unwrap();
     bus.wait_for_data();
     imu.burst().unwrap();
@@ -181,7 +183,7 @@ fn a_supply_alarm_sets_diag_stat_which_clears_on_read() {
 #[test]
 fn violations_of_the_bus_timing_are_recorded() {
     let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::noiseless(), 1));
-    let mut too_fast = Adis16405::new(bus.clone(), Config::default()).with_stall_ns(8_999);
+    let mut too_fast = Adis16405::new(bus.clone(), bus.delay(), Config::default()).with_stall_ns(8_999);
     too_fast.read_register(Register::ProdId).unwrap();
     let kind = ViolationKind::Stall { stall_ns: 8_999, least_ns: 9_000 };
     assert_eq!(bus.part().violations().iter().map(|violation| violation.kind).collect::<Vec<_>>(), [kind]);
@@ -262,4 +264,62 @@ fn white_noise_has_the_declared_variance() {
             assert!((variance / expected - 1.0).abs() < tolerance, "{variance} counts², expected {expected}");
         }
     }
+}
+
+/// Each sensed value, in its unit, comes back in that unit to half a count, both as an integer and as `f32`.
+#[test]
+fn values_are_those_that_the_part_senses() {
+    // Supply, gyros, accelerometers, magnetometers, temperature, auxiliary input.
+    let sensed = [5.1, 60.0, -33.3, 0.7, 10.0, -7.5, 3.0, 0.9, -1.2, 0.3, -39.9, 1.23];
+    let mut model = NoiseModel::noiseless();
+    for (channel, value) in OutputRegister::ALL.into_iter().zip(sensed) {
+        model.channel_mut(channel).bias = value;
+    }
+    let counts = [2.418e-3, 0.0, 0.0, 0.0, 3.33e-3, 3.33e-3, 3.33e-3, 5e-4, 5e-4, 5e-4, 0.14, 0.806e-3];
+    for (range, gyro_count) in [(GyroRange::Dps300, 0.05), (GyroRange::Dps150, 0.025), (GyroRange::Dps75, 0.0125)] {
+        let (bus, mut imu) = on_bus(model.clone(), config(range, 4, 1));
+        // The filter of 2·16 − 1 samples fills.
+        for _ in 0..40 {
+            bus.wait_for_data();
+        }
+        let burst = imu.burst().unwrap();
+        let sample = imu.sample_from(burst);
+        let [gx, gy, gz] = sample.gyro_udps();
+        let [ax, ay, az] = sample.accl_ug();
+        let [mx, my, mz] = sample.magn_ugauss();
+        let temp = sample.temp_mdegc() * 1000;
+        let integers = [sample.supply_uv(), gx, gy, gz, ax, ay, az, mx, my, mz, temp, sample.aux_adc_uv()];
+        let [gx, gy, gz] = sample.gyro_dps();
+        let [ax, ay, az] = sample.accl_g();
+        let [mx, my, mz] = sample.magn_gauss();
+        let floats = [sample.supply_v(), gx, gy, gz, ax, ay, az, mx, my, mz, sample.temp_degc(), sample.aux_adc_v()];
+        for (index, value) in sensed.into_iter().enumerate() {
+            let half = if (1..=3).contains(&index) { gyro_count } else { counts[index] } / 2.0;
+            let got = [f64::from(integers[index]) * 1e-6, f64::from(floats[index])];
+            for got in got {
+                assert!((got - value).abs() <= half + 1e-5, "{:?}: {got}, sensed {value}", OutputRegister::ALL[index]);
+            }
+        }
+        assert_eq!(bus.part().violations(), []);
+    }
+}
+
+/// From ±75 °/s, which needs 2⁴ taps, to ±300 °/s without a filter and back, at every phase of the sample clock: whichever
+/// byte of SENS_AVG is written when a sample is taken, range and filter must be a combination that the part allows.
+#[test]
+fn no_sample_is_taken_between_range_and_filter_of_a_new_configuration() {
+    let (narrow, wide) = (config(GyroRange::Dps75, 4, 1), config(GyroRange::Dps300, 0, 1));
+    let (bus, mut imu) = on_bus(NoiseModel::noiseless(), narrow);
+    let mut taken_between = 0;
+    for phase_us in (0..1220).step_by(10) {
+        for next in [wide, narrow] {
+            let ready_ns = bus.wait_for_data().unwrap();
+            bus.advance_to(ready_ns + phase_us * 1000);
+            let samples = bus.part().samples();
+            imu.configure(next).unwrap();
+            taken_between += bus.part().samples() - samples;
+        }
+    }
+    assert!(taken_between > 10, "the phases must meet the time of the writes: {taken_between}");
+    assert_eq!(bus.part().violations(), []);
 }

@@ -11,7 +11,7 @@ use adis16405_driver::{
     Product, Register, Sleep, Stimulus,
 };
 
-use virtual_sensor::{EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
+use virtual_sensor::{BusyAnswers, EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
 
 /// Runs a future that is ready at once, as all futures of the emulated bus are.
 fn block_on<T>(future: impl Future<Output = T>) -> T {
@@ -21,23 +21,31 @@ fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
-/// Runs a script through both shells. `$imu` has started up on the part behind `$bus`, `$delay` is in its time. Lines are
+/// A part that starts up from time 0 and answers garbage meanwhile, needs 1 µs of chip select high between frames, and
+/// refreshes its slow words with every fourth sample.
+fn demanding_part(model: NoiseModel) -> VirtualAdis16405 {
+    let mut part = VirtualAdis16405::cold(model, 1);
+    part.set_busy_answers(BusyAnswers::Garbage);
+    part.set_strict_select(Some(1_000));
+    part.set_slow_refresh(4);
+    part
+}
+
+/// Runs a script through both shells. `$imu` has started up on the part behind `$bus`. Lines are
 /// `expect call => value;` or `take name = call;`, where the call is awaited in the asynchronous run, `given
 /// name = value;` or `then action;`.
 macro_rules! both_shells {
-    ($model:expr, |$bus:ident, $imu:ident, $delay:ident| $($script:tt)*) => {{
+    ($model:expr, |$bus:ident, $imu:ident| $($script:tt)*) => {{
         {
-            let $bus = EmulatedBus::new(VirtualAdis16405::new($model, 1));
-            let mut $delay = $bus.delay();
-            let mut $imu = Adis16405::new($bus.clone(), Config::default());
-            both_shells!(@run [] expect $imu.start_up(&mut $delay) => Ok(Product::Adis16405); $($script)*);
+            let $bus = EmulatedBus::new(demanding_part($model));
+            let mut $imu = Adis16405::new($bus.clone(), $bus.delay(), Config::default());
+            both_shells!(@run [] expect $imu.start_up() => Ok(Product::Adis16405); $($script)*);
             assert_eq!($bus.part().violations(), []);
         }
         block_on(async {
-            let $bus = EmulatedBus::new(VirtualAdis16405::new($model, 1));
-            let mut $delay = $bus.delay();
-            let mut $imu = Adis16405::new_async($bus.clone(), Config::default());
-            both_shells!(@run [.await] expect $imu.start_up(&mut $delay) => Ok(Product::Adis16405); $($script)*);
+            let $bus = EmulatedBus::new(demanding_part($model));
+            let mut $imu = Adis16405::new_async($bus.clone(), $bus.delay(), Config::default());
+            both_shells!(@run [.await] expect $imu.start_up() => Ok(Product::Adis16405); $($script)*);
             assert_eq!($bus.part().violations(), []);
         });
     }};
@@ -70,25 +78,25 @@ fn with_rates(rates: [f64; 3]) -> NoiseModel {
 
 #[test]
 fn self_tests_name_the_failed_sensor_and_keep_the_configuration() {
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.set_data_ready(None) => Ok(());
         expect imu.set_compensation(OnChipCompensation { linear_acceleration: true, origin_alignment: false }) => Ok(());
         // Compensation, polarity and no data ready: bit 2 and with it bit 1 and 0 are cleared.
         expect imu.read_register(Register::MscCtrl) => Ok(0x0080);
-        take test = imu.self_test(&mut delay);
+        take test = imu.self_test();
         then assert!(test.passed() && test.ran && test.before.is_empty());
-        take flash = imu.flash_test(&mut delay);
+        take flash = imu.flash_test();
         then assert!(flash.passed() && flash.ran);
 
         then bus.part_mut().break_sensor(OutputRegister::GyroX);
         then bus.part_mut().break_sensor(OutputRegister::AcclZ);
         then bus.part_mut().damage_flash();
-        take test = imu.self_test(&mut delay);
+        take test = imu.self_test();
         then assert!(!test.passed());
         // DIAG_STAT 0x8420: bit 15 z accelerometer, bit 10 x gyro, bit 5 self-test.
         then assert_eq!(test.diagnosis.bits(), 0x8420);
         then assert!(test.diagnosis.failed_sensors().eq([Channel::GyroX, Channel::AcclZ]));
-        take flash = imu.flash_test(&mut delay);
+        take flash = imu.flash_test();
         then assert_eq!((flash.passed(), flash.diagnosis), (false, Diagnosis::FLASH_CHECKSUM));
         expect imu.diagnosis() => Ok(Diagnosis::empty());
         expect imu.read_register(Register::MscCtrl) => Ok(0x0080);
@@ -99,8 +107,8 @@ fn self_tests_name_the_failed_sensor_and_keep_the_configuration() {
 fn a_self_test_keeps_the_diagnosis_from_before() {
     let mut model = NoiseModel::noiseless();
     model.channel_mut(OutputRegister::Supply).bias = 5.5;
-    both_shells!(model.clone(), |bus, imu, delay|
-        take test = imu.self_test(&mut delay);
+    both_shells!(model.clone(), |bus, imu|
+        take test = imu.self_test();
         then assert_eq!(test.before, Diagnosis::SUPPLY_HIGH);
         then assert!(test.passed());
         // It persists, so it comes back with the next sample.
@@ -113,9 +121,9 @@ fn a_self_test_keeps_the_diagnosis_from_before() {
 fn a_stimulus_moves_every_inertial_sensor_both_ways() {
     // The virtual part moves by 40 °/s and 0.5 g: 800 and 150.15 counts.
     let expected = [800, 800, 800, 150, 150, 150];
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
-        expect imu.stimulus_response(Stimulus::Positive, &mut delay) => Ok(expected);
-        expect imu.stimulus_response(Stimulus::Negative, &mut delay) => Ok(expected.map(|counts| -counts));
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
+        expect imu.stimulus_response(Stimulus::Positive) => Ok(expected);
+        expect imu.stimulus_response(Stimulus::Negative) => Ok(expected.map(|counts| -counts));
         expect imu.read_register(Register::MscCtrl) => Ok(0x0006);
     );
 }
@@ -123,8 +131,8 @@ fn a_stimulus_moves_every_inertial_sensor_both_ways() {
 #[test]
 fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
     // 0.5 °/s is 40 counts of 0.0125 °/s.
-    both_shells!(with_rates([0.5, 0.5, -0.5]), |bus, imu, delay|
-        expect imu.auto_null(&mut delay) => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
+    both_shells!(with_rates([0.5, 0.5, -0.5]), |bus, imu|
+        expect imu.auto_null() => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
         then assert!(!imu.x_sign_at_risk());
         then bus.wait_for_data();
         take sample = imu.read();
@@ -141,9 +149,9 @@ fn the_precision_auto_null_averages_for_thirty_silent_seconds() {
     for channel in OutputRegister::GYROS {
         model.channel_mut(channel).angle_random_walk = 0.05;
     }
-    both_shells!(model.clone(), |bus, imu, delay|
+    both_shells!(model.clone(), |bus, imu|
         given before = bus.part().now();
-        take bias = imu.precision_auto_null(&mut delay);
+        take bias = imu.precision_auto_null();
         then assert!(bus.part().now() - before >= 30_000_000_000);
         // White noise of 0.05 °/√s over 30 s leaves 0.0091 °/s, 0.73 counts; five of these.
         then for (offset, expected) in bias.total().into_iter().zip([40, -20, 0]) { assert!((offset - expected).abs() <= 4) };
@@ -160,19 +168,19 @@ fn a_factory_restore_returns_the_calibration_it_erased() {
     };
     let restored =
         FactoryRestore { gyro: GyroBias::default(), accl: [0; 3], hard_iron: [0; 3], soft_iron: [0x0800; 3] };
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.set_gyro_offsets([-3, 1, -2]) => Ok(lost.gyro);
         expect imu.set_accl_offsets(lost.accl) => Ok(());
         expect imu.set_hard_iron(lost.hard_iron) => Ok(());
         expect imu.set_soft_iron(lost.soft_iron) => Ok(());
-        expect imu.factory_restore(&mut delay) => Ok(lost);
-        expect imu.factory_restore(&mut delay) => Ok(restored);
+        expect imu.factory_restore() => Ok(lost);
+        expect imu.factory_restore() => Ok(restored);
     );
 }
 
 #[test]
 fn a_flash_update_outlives_a_reset() {
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.flash_writes() => Ok(0);
         expect imu.set_accl_offsets([1, 2, 3]) => Ok(());
         // A failed update before left its flag in DIAG_STAT.
@@ -182,24 +190,24 @@ fn a_flash_update_outlives_a_reset() {
         then bus.part_mut().repair_flash();
         given none = Diagnosis::empty();
         given failed = Diagnosis::FLASH_UPDATE;
-        expect imu.flash_update(&mut delay)
+        expect imu.flash_update()
             => Ok(FlashUpdate { before: failed, writes_before: 0, writes: 1, diagnosis: none });
         expect imu.set_accl_offsets([0, 0, 0]) => Ok(());
         expect imu.set_filter_taps_log2(5) => Ok(());
         expect imu.set_sample_rate(200.0) => Ok(204.8);
-        expect imu.software_reset(&mut delay) => Ok(Product::Adis16405);
+        expect imu.software_reset() => Ok(Product::Adis16405);
         expect imu.accl_offsets() => Ok([1, 2, 3]);
         expect imu.read_registers([Register::SmplPrd, Register::SensAvg]) => Ok([0x0007, 0x0405]);
 
         then bus.part_mut().damage_flash();
-        expect imu.flash_update(&mut delay)
+        expect imu.flash_update()
             => Err(Error::FlashUpdate(FlashUpdate { before: none, writes_before: 1, writes: 1, diagnosis: failed }));
     );
 }
 
 #[test]
 fn sleep_and_wake() {
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.sleep(Sleep::HalfSeconds(NonZeroU8::new(3).unwrap())) => Ok(());
         given slept = bus.part().now();
         // Asleep for 1.5 s, 4 ms to recover, one period to the first sample.
@@ -211,7 +219,7 @@ fn sleep_and_wake() {
         given now = bus.part().now();
         then bus.advance_to(now + 3_600_000_000_000);
         then assert_eq!(bus.wait_for_data(), None);
-        expect imu.wake(&mut delay) => Ok(Product::Adis16405);
+        expect imu.wake() => Ok(Product::Adis16405);
         then assert!(bus.wait_for_data().is_some());
     );
 }
@@ -222,7 +230,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
     let cold = Alarm { source: Channel::Temp, watch: AlarmWatch::Level, threshold: AlarmThreshold::Below(-10) };
     let change =
         Alarm { source: Channel::GyroY, watch: AlarmWatch::RateOfChange(4), threshold: AlarmThreshold::Above(99) };
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         // A period of 4.9 ms, so that no sample is taken before the alarms are set.
         expect imu.set_sample_rate(204.8) => Ok(204.8);
         expect imu.set_alarm_output(Some(DioSignal { line: DioLine::Dio2, polarity: Polarity::ActiveLow })) => Ok(());
@@ -259,7 +267,7 @@ fn alarms_are_raised_by_level_and_by_change_and_show_on_their_pin() {
 
 #[test]
 fn lines_show_data_ready_and_gpio_levels() {
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.data_ready() => Ok(Some(DioSignal { line: DioLine::Dio1, polarity: Polarity::ActiveHigh }));
         then bus.wait_for_data();
         then assert!(bus.part().pin(1));
@@ -281,7 +289,7 @@ fn lines_show_data_ready_and_gpio_levels() {
 
 #[test]
 fn an_external_clock_triggers_the_samples() {
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.configure(Config::default().with_external_clock()) => Ok(());
         given taken = bus.part().samples();
         given now = bus.part().now();
@@ -296,7 +304,7 @@ fn an_external_clock_triggers_the_samples() {
 
 #[test]
 fn another_product_or_a_missing_part_is_an_error() {
-    both_shells!(NoiseModel::noiseless(), |bus, imu, delay|
+    both_shells!(NoiseModel::noiseless(), |bus, imu|
         then bus.part_mut().set_prod_id(16400);
         expect imu.identity() => Ok(Product::Adis16400);
         then bus.part_mut().set_prod_id(16448);
@@ -304,18 +312,18 @@ fn another_product_or_a_missing_part_is_an_error() {
         then bus.part_mut().set_prod_id(16405);
         then bus.part_mut().power_off();
         expect imu.init() => Err(Error::Product { answer: 0xFFFF });
-        expect imu.self_test(&mut delay) => Err(Error::Product { answer: 0xFFFF });
+        expect imu.self_test() => Err(Error::Product { answer: 0xFFFF });
         take burst = imu.burst();
         then assert_eq!(burst.faults().cause(), Some("stuck_high"));
         then bus.part_mut().power_on();
-        expect imu.start_up(&mut delay) => Ok(Product::Adis16405);
+        expect imu.start_up() => Ok(Product::Adis16405);
     );
 }
 
 /// EngineerZone, thread 81805: −8 read as 0x9FF8 instead of 0xBFF8, by burst and then by single reads.
 #[test]
 fn the_x_gyro_erratum_occurs_and_is_avoided() {
-    both_shells!(with_rates([-0.2, -0.2, -0.2]), |bus, imu, delay|
+    both_shells!(with_rates([-0.2, -0.2, -0.2]), |bus, imu|
         // −16 counts of 0.0125 °/s: with −0.2 °/s the rate is −0.4 °/s, −8 counts.
         expect imu.write_register(Register::XgyroOff, 0xFFF0) => Ok(());
         then bus.wait_for_data();

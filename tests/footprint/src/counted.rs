@@ -21,7 +21,7 @@ pub(crate) fn count(bus: Bus) {
     timer.clear_current();
     timer.enable_counter();
 
-    let mut imu = Adis16405::new(bus, Config::default());
+    let mut imu = Adis16405::new(bus, bus, Config::default());
     let mut validator = BurstValidator::default();
     let mut bytes = [0x80; BURST_BYTES];
     for (at, byte) in bytes.iter_mut().enumerate() {

@@ -34,7 +34,7 @@ fn main() -> ! {
 fn sample(bus: bus::Bus) -> Result<(), adis16405_driver::Error<core::convert::Infallible>> {
     use adis16405_driver::{Adis16405, BurstValidator, Config};
     use core::hint::black_box;
-    let mut imu = Adis16405::new(bus, black_box(Config::default()));
+    let mut imu = Adis16405::new(bus, bus, black_box(Config::default()));
     let mut validator = BurstValidator::default();
     imu.init()?;
     let burst = imu.burst()?;

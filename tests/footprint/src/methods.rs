@@ -9,10 +9,9 @@ use core::hint::black_box;
 
 #[cfg(feature = "everything")]
 pub(crate) fn blocking(bus: Bus) -> Result<(), Error<Infallible>> {
-    let mut delay = bus;
-    let mut imu = Adis16405::new(bus, Config::default());
-    black_box(imu.start_up(&mut delay)?);
-    black_box(imu.software_reset(&mut delay)?);
+    let mut imu = Adis16405::new(bus, bus, Config::default());
+    black_box(imu.start_up()?);
+    black_box(imu.software_reset()?);
     black_box(imu.configure(black_box(Config::default()))?);
     black_box(imu.set_sample_rate(black_box(204.8))?);
     black_box(imu.set_range(black_box(GyroRange::Dps75))?);
@@ -21,18 +20,18 @@ pub(crate) fn blocking(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.write_register(black_box(Register::AuxDac), black_box(1))?);
     black_box(imu.update_register(black_box(Register::AuxDac), black_box(1), black_box(1))?);
     black_box(imu.diagnosis()?);
-    black_box(imu.self_test(&mut delay)?);
-    black_box(imu.flash_test(&mut delay)?);
-    black_box(imu.stimulus_response(black_box(Stimulus::Positive), &mut delay)?);
+    black_box(imu.self_test()?);
+    black_box(imu.flash_test()?);
+    black_box(imu.stimulus_response(black_box(Stimulus::Positive))?);
     black_box(imu.set_gyro_offsets(black_box([0; 3]))?);
     black_box(imu.keep_negative_x_bias_on_host()?);
     black_box(imu.set_accl_offsets(black_box([0; 3]))?);
     black_box(imu.set_hard_iron(black_box([0; 3]))?);
     black_box(imu.set_soft_iron(black_box([0; 3]))?);
-    black_box(imu.auto_null(&mut delay)?);
-    black_box(imu.precision_auto_null(&mut delay)?);
-    black_box(imu.factory_restore(&mut delay)?);
-    black_box(imu.flash_update(&mut delay)?);
+    black_box(imu.auto_null()?);
+    black_box(imu.precision_auto_null()?);
+    black_box(imu.factory_restore()?);
+    black_box(imu.flash_update()?);
     black_box(imu.data_ready()?);
     black_box(imu.set_data_ready(black_box(None))?);
     black_box(imu.compensation()?);
@@ -45,7 +44,7 @@ pub(crate) fn blocking(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.set_gpio(black_box(Gpio::default()))?);
     black_box(imu.set_aux_dac(black_box(DacLevel::default()))?);
     black_box(imu.sleep(black_box(Sleep::Indefinite))?);
-    black_box(imu.wake(&mut delay)?);
+    black_box(imu.wake()?);
     black_box(imu.read()?);
     Ok(())
 }
@@ -59,10 +58,9 @@ pub(crate) fn asynchronous(bus: Bus) -> bool {
 
 #[cfg(feature = "asynchronous")]
 async fn call_all(bus: Bus) -> Result<(), Error<Infallible>> {
-    let mut delay = bus;
-    let mut imu = Adis16405::new_async(bus, Config::default());
-    black_box(imu.start_up(&mut delay).await?);
-    black_box(imu.software_reset(&mut delay).await?);
+    let mut imu = Adis16405::new_async(bus, bus, Config::default());
+    black_box(imu.start_up().await?);
+    black_box(imu.software_reset().await?);
     black_box(imu.configure(black_box(Config::default())).await?);
     black_box(imu.set_sample_rate(black_box(204.8)).await?);
     black_box(imu.set_range(black_box(GyroRange::Dps75)).await?);
@@ -71,18 +69,18 @@ async fn call_all(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.write_register(black_box(Register::AuxDac), black_box(1)).await?);
     black_box(imu.update_register(black_box(Register::AuxDac), black_box(1), black_box(1)).await?);
     black_box(imu.diagnosis().await?);
-    black_box(imu.self_test(&mut delay).await?);
-    black_box(imu.flash_test(&mut delay).await?);
-    black_box(imu.stimulus_response(black_box(Stimulus::Positive), &mut delay).await?);
+    black_box(imu.self_test().await?);
+    black_box(imu.flash_test().await?);
+    black_box(imu.stimulus_response(black_box(Stimulus::Positive)).await?);
     black_box(imu.set_gyro_offsets(black_box([0; 3])).await?);
     black_box(imu.keep_negative_x_bias_on_host().await?);
     black_box(imu.set_accl_offsets(black_box([0; 3])).await?);
     black_box(imu.set_hard_iron(black_box([0; 3])).await?);
     black_box(imu.set_soft_iron(black_box([0; 3])).await?);
-    black_box(imu.auto_null(&mut delay).await?);
-    black_box(imu.precision_auto_null(&mut delay).await?);
-    black_box(imu.factory_restore(&mut delay).await?);
-    black_box(imu.flash_update(&mut delay).await?);
+    black_box(imu.auto_null().await?);
+    black_box(imu.precision_auto_null().await?);
+    black_box(imu.factory_restore().await?);
+    black_box(imu.flash_update().await?);
     black_box(imu.data_ready().await?);
     black_box(imu.set_data_ready(black_box(None)).await?);
     black_box(imu.compensation().await?);
@@ -95,7 +93,7 @@ async fn call_all(bus: Bus) -> Result<(), Error<Infallible>> {
     black_box(imu.set_gpio(black_box(Gpio::default())).await?);
     black_box(imu.set_aux_dac(black_box(DacLevel::default())).await?);
     black_box(imu.sleep(black_box(Sleep::Indefinite)).await?);
-    black_box(imu.wake(&mut delay).await?);
+    black_box(imu.wake().await?);
     black_box(imu.read().await?);
     Ok(())
 }

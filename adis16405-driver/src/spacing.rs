@@ -1,0 +1,61 @@
+//! The pauses between frames, the level of chip select during them, and the bus that keeps them.
+
+use embedded_hal::spi::Operation;
+
+/// Level of chip select during the stall between frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum SelectDuringStall {
+    /// High, the default: each frame is a transaction of its transfer alone, after which the driver waits with its own
+    /// delay. Linux, PX4 and the flight software Canopus do so. On a shared bus, other devices can use the time.
+    #[default]
+    High,
+    /// Low: the stall is an [`Operation::DelayNs`] at the end of the transaction. Chip select is then high for
+    /// [`Timing::select_high_ns`](crate::Timing::select_high_ns) and the time of the code between two transactions.
+    Low,
+}
+
+/// The pauses after a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FramePauses {
+    /// With chip select low, ns.
+    pub(crate) low_ns: u32,
+    /// With chip select high, ns.
+    pub(crate) high_ns: u32,
+}
+
+impl FramePauses {
+    /// The pauses after a frame whose stall is `stall_ns`; chip select is high for at least `least_high_ns`.
+    pub(crate) fn new(select: SelectDuringStall, stall_ns: u32, least_high_ns: u32) -> Self {
+        match select {
+            SelectDuringStall::High => Self { low_ns: 0, high_ns: stall_ns.max(least_high_ns) },
+            SelectDuringStall::Low => Self { low_ns: stall_ns, high_ns: least_high_ns },
+        }
+    }
+
+    /// The operations of a transaction, without the last one, which is the pause with chip select low, if that is 0: an SPI
+    /// device without a delay of its own cannot carry it out.
+    pub(crate) fn operations<'a, 'b>(&self, operations: &'a mut [Operation<'b, u8>]) -> &'a mut [Operation<'b, u8>] {
+        if self.low_ns > 0 {
+            return operations;
+        }
+        operations.split_last_mut().map_or(&mut [], |(_, others)| others)
+    }
+}
+
+/// The SPI device of the part, and the delay that keeps the pauses between its transactions.
+#[derive(Debug)]
+pub(crate) struct SensorBus<SPI, D> {
+    pub(crate) spi: SPI,
+    pub(crate) delay: D,
+    /// The pause that has to pass before the next transaction, ns. Not 0 if the transaction or the pause before was
+    /// interrupted, by a future that was dropped.
+    pub(crate) owed_ns: u32,
+}
+
+impl<SPI, D> SensorBus<SPI, D> {
+    pub(crate) const fn new(spi: SPI, delay: D) -> Self {
+        Self { spi, delay, owed_ns: 0 }
+    }
+}

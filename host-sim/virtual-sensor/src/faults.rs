@@ -1,0 +1,108 @@
+//! Faults that a test can give the part, behaviour that the data sheet leaves open, and the reset line.
+
+use crate::activity::{Activity, BusyAnswers};
+use crate::diagnosis::{self, DiagnosisFlag};
+use crate::part::VirtualAdis16405;
+use crate::registers::{self, OutputRegister};
+use crate::spi::ViolationKind;
+
+/// Shortest low pulse on the reset line that resets the part, ns. Assumed: no source at hand gives it.
+const LEAST_RESET_PULSE_NS: u64 = 10_000;
+
+/// Behaviour that the data sheet leaves open.
+impl VirtualAdis16405 {
+    /// Refreshes supply, magnetometers, temperature and auxiliary input only with every n-th sample (0 is taken as 1, the
+    /// default): in between their words keep their counts, and once read they show no new data. No source at hand tells
+    /// at which rate the real part refreshes them.
+    pub fn set_slow_refresh(&mut self, samples: u32) {
+        self.slow_refresh = samples.max(1);
+    }
+
+    /// Sets what the controller reads while the part starts up, recovers from a reset, sleeps, or runs another procedure
+    /// that needs a silent bus. Each frame then is a [`ViolationKind::Busy`] and is not executed.
+    pub fn set_busy_answers(&mut self, answers: BusyAnswers) {
+        self.busy_answers = answers;
+    }
+
+    /// Sets the duration of the start-up after the next [`power_on`](Self::power_on), ns; `None` is the default, 220 ms, or
+    /// 290 ms in low-power mode.
+    pub fn set_start_up_ns(&mut self, duration_ns: Option<u64>) {
+        self.start_up_ns = duration_ns;
+    }
+
+    /// Makes the part strict about chip select: it must be high for at least `least_high_ns` between two frames. A frame
+    /// after a shorter time ([`ViolationKind::SelectHigh`]), a second frame without chip select having risen, and one after
+    /// too short a stall ([`ViolationKind::Stall`]) are garbled then: the controller reads wrong words until chip select
+    /// rises, no frame is executed, and DIAG_STAT bit 3 latches. With `None`, the default, chip select may rise and fall at
+    /// once, and too short a stall is recorded only.
+    ///
+    /// No source at hand gives the least time for this part. Those drivers that raise chip select between frames keep it
+    /// high for the stall, 9 µs or more; the ADIS16470 needs 1 µs.
+    pub fn set_strict_select(&mut self, least_high_ns: Option<u64>) {
+        self.spi.least_high_ns = least_high_ns;
+    }
+}
+
+/// Faults.
+impl VirtualAdis16405 {
+    /// Sets a flag of DIAG_STAT once, as a tap beyond the range or a glitch on chip select does. It stays set, and with it
+    /// the error/alarm flag of every output word, until DIAG_STAT is read or the part is reset.
+    pub fn latch_flag(&mut self, flag: DiagnosisFlag) {
+        self.diagnosis |= flag.bit();
+    }
+
+    /// Sets a flag of DIAG_STAT with every sample while `on`: the cause persists, and a read clears the flag only until the
+    /// next sample.
+    pub fn hold_flag(&mut self, flag: DiagnosisFlag, on: bool) {
+        let others = self.held_flags & !flag.bit();
+        self.held_flags = if on { others | flag.bit() } else { others };
+    }
+
+    /// Breaks the sensor of an inertial channel: its self-test fails. Without effect for other channels, which have none.
+    pub fn break_sensor(&mut self, channel: OutputRegister) {
+        if let Some(index) = OutputRegister::INERTIAL.iter().position(|&inertial| inertial == channel) {
+            self.self_test_failures |= diagnosis::GYRO_X << index;
+        }
+    }
+
+    /// Damages the flash memory: its test and its update fail.
+    pub fn damage_flash(&mut self) {
+        self.flash_damaged = true;
+    }
+
+    /// Undoes [`damage_flash`](Self::damage_flash).
+    pub fn repair_flash(&mut self) {
+        self.flash_damaged = false;
+    }
+
+    /// Sets the answer of PROD_ID, also after a reset: another part of the family.
+    pub fn set_prod_id(&mut self, prod_id: u16) {
+        self.registers.store(registers::PROD_ID, prod_id);
+        self.flash.store(registers::PROD_ID, prod_id);
+    }
+}
+
+/// The reset line.
+impl VirtualAdis16405 {
+    /// Drives the reset line (RST, active low). While it is low the part does not sample, and the controller reads ones.
+    /// After 10 µs or more it is reset when the line rises, and recovers for 100 ms, or 170 ms in low-power mode. A shorter
+    /// pulse is a [`ViolationKind::ResetPulse`] and does not reset it.
+    pub fn drive_reset(&mut self, high: bool) {
+        if !high {
+            self.reset_low_since_ns.get_or_insert(self.now_ns);
+            self.next_sample_sixteenths = None;
+            return;
+        }
+        let Some(since_ns) = self.reset_low_since_ns.take() else {
+            return;
+        };
+        let low_ns = self.now_ns - since_ns;
+        if low_ns >= LEAST_RESET_PULSE_NS {
+            self.reset();
+            self.begin(Activity::Reset);
+        } else {
+            self.violations.add(self.now_ns, ViolationKind::ResetPulse { low_ns, least_ns: LEAST_RESET_PULSE_NS });
+            self.restart_sampling(self.now_ns);
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Deliberate bugs, seeded into a copy of the driver one at a time: each is found by the driver's tests on the virtual
+//! part. So the tests are known to look, and the part not to share the driver's mistakes.
+//!
+//! A bug is one piece of source text that is replaced. One that does not apply any more is an error, also without
+//! `--long`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The test programs of this crate in which the driver reads the part.
+const TESTS: [&str; 3] = ["driver", "procedures", "misbehaving_part"];
+
+/// A bug in a file of the driver: the text that is there, the one that takes its place, what that means, and a test that
+/// finds it.
+struct Bug {
+    meaning: &'static str,
+    file: &'static str,
+    right: &'static str,
+    wrong: &'static str,
+    found_by: &'static str,
+}
+
+const fn bug(
+    meaning: &'static str,
+    file: &'static str,
+    right: &'static str,
+    wrong: &'static str,
+    found_by: &'static str,
+) -> Bug {
+    Bug { meaning, file, right, wrong, found_by }
+}
+
+#[rustfmt::skip]
+const BUGS: [Bug; 24] = [
+    bug("a burst is requested with 0x3C00", "burst.rs",
+        "request[0] = 0x3E;", "request[0] = 0x3C;",
+        "the_driver_reads_what_the_part_sampled"),
+    bug("the words of a burst are taken a byte early", "burst.rs",
+        "bytes[2..].chunks_exact(2)", "bytes[1..].chunks_exact(2)",
+        "the_driver_reads_what_the_part_sampled"),
+    bug("counts are not sign-extended", "burst.rs",
+        "Channel::ALL[index].signed());", "false);",
+        "the_driver_reads_what_the_part_sampled"),
+    bug("the temperature has 14 bits", "channel.rs",
+        "Channel::Supply | Channel::Temp | Channel::AuxAdc => 12,", "Channel::Supply | Channel::AuxAdc => 12,",
+        "values_are_those_that_the_part_senses"),
+    bug("an accelerometer count is 3.333 mg", "sample.rs",
+        "i32::from(count) * 3_330", "i32::from(count) * 3_333",
+        "values_are_those_that_the_part_senses"),
+    bug("the codes of ±150 °/s and ±75 °/s are exchanged", "channel.rs",
+        "GyroRange::Dps150 => 0b010,\n            GyroRange::Dps75 => 0b001,", "GyroRange::Dps150 => 0b001,\n            GyroRange::Dps75 => 0b010,",
+        "the_range_scales_the_gyros_only"),
+    bug("a read takes the answer of its own frame", "protocol.rs",
+        "self.frame(register.read_frame()).await;\n        self.frame(Register::FlashCnt.read_frame()).await", "self.frame(register.read_frame()).await",
+        "the_driver_configures_the_part_without_a_violation"),
+    bug("the upper byte is written to the address of the lower one", "register.rs",
+        "0x80 | (self.address() + 1)", "0x80 | self.address()",
+        "the_driver_configures_the_part_without_a_violation"),
+    bug("SENS_AVG has 8 bits", "register.rs",
+        "SensAvg \"SENS_AVG\" 0x38 ReadWrite 11", "SensAvg \"SENS_AVG\" 0x38 ReadWrite 8",
+        "the_driver_configures_the_part_without_a_violation"),
+    bug("the filter is written before the range although the old range needs more taps", "commands.rs",
+        "if needed > config.filter_taps_log2()", "if needed > 6",
+        "no_sample_is_taken_between_range_and_filter_of_a_new_configuration"),
+    bug("the start-up is not waited for", "commands.rs",
+        "self.pause(self.state.timing.start_up_us).await;", "",
+        "a_cold_part_is_left_alone_until_it_has_started_up"),
+    bug("the recovery from a reset is not waited for", "commands.rs",
+        "self.pause(self.state.timing.reset_us).await;", "",
+        "a_flash_update_outlives_a_reset"),
+    bug("the stall is 8 µs", "clock.rs",
+        "PerClockMode { normal: 16_000,", "PerClockMode { normal: 8_000,",
+        "the_default_keeps_chip_select_high_for_the_whole_stall"),
+    bug("chip select rises between frames, but the stall is not kept", "spacing.rs",
+        "high_ns: stall_ns.max(least_high_ns)", "high_ns: least_high_ns",
+        "the_default_keeps_chip_select_high_for_the_whole_stall"),
+    bug("a stall that a dropped future cut short is forgotten", "asynch.rs",
+        "    pause(bus).await;\n    bus.owed_ns = pauses.high_ns;", "    bus.owed_ns = pauses.high_ns;",
+        "a_stall_that_a_dropped_future_cut_short_is_kept_before_the_next_frame"),
+    bug("low-power mode begins above SMPL_PRD = 0x0F", "clock.rs",
+        "normal_mode_max_smpl_prd: 0x08,", "normal_mode_max_smpl_prd: 0x0F,",
+        "low_power_mode_needs_a_slow_clock"),
+    bug("new data is demanded of all twelve words", "validity.rs",
+        "let inertial = words[INERTIAL_WORDS].iter()", "let inertial = words.iter()",
+        "samples_are_usable_although_the_slow_words_refresh_slowly"),
+    bug("the error/alarm flag is ignored", "validity.rs",
+        "OutputWord(any).error_alarm()", "false",
+        "each_latched_flag_refuses_samples_until_its_diagnosis_is_read"),
+    bug("gyro x has the flag of gyro y", "error.rs",
+        "const GYRO_X = 1 << 10;", "const GYRO_X = 1 << 11;",
+        "self_tests_name_the_failed_sensor_and_keep_the_configuration"),
+    bug("a negative offset of gyro x is written to the part", "calibration.rs",
+        "let part = [x.max(0), y, z];", "let part = [x, y, z];",
+        "a_factory_restore_returns_the_calibration_it_erased"),
+    bug("the bias on the host is not added to the x rate", "sample.rs",
+        "[x + i32::from(self.host_bias_x) * BIAS_UDPS, y, z]", "[x + i32::from(self.host_bias_x) * 0 * BIAS_UDPS, y, z]",
+        "auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host"),
+    bug("a factory restore sends the bit of the DAC latch", "commands.rs",
+        "const FACTORY_RESTORE: u16 = 1 << 1;", "const FACTORY_RESTORE: u16 = 1 << 2;",
+        "a_factory_restore_returns_the_calibration_it_erased"),
+    bug("the source of an alarm is one too low", "alarms.rs",
+        "(self.source as u16 + 1) << number.source_shift()", "(self.source as u16) << number.source_shift()",
+        "alarms_are_raised_by_level_and_by_change_and_show_on_their_pin"),
+    bug("the reset line is left low", "blocking.rs",
+        "line.set_high().map_err", "line.set_low().map_err",
+        "the_reset_line_revives_a_part_that_hears_no_command"),
+];
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the repository")
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn write(path: &Path, text: &str) {
+    fs::create_dir_all(path.parent().expect("a folder")).expect("the folder is made");
+    fs::write(path, text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+}
+
+/// Copies the files of a folder, and those of the folders in it.
+fn copy(from: &Path, to: &Path) {
+    for entry in fs::read_dir(from).unwrap_or_else(|error| panic!("{}: {error}", from.display())) {
+        let path = entry.expect("an entry").path();
+        let target = to.join(path.file_name().expect("a name"));
+        if path.is_dir() { copy(&path, &target) } else { write(&target, &read(&path)) }
+    }
+}
+
+impl Bug {
+    /// The source file with the bug in it.
+    fn seeded(&self, source: &str) -> String {
+        let places = source.matches(self.right).count();
+        assert_eq!(places, 1, "{}: {:?} must be there once to seed: {}", self.file, self.right, self.meaning);
+        source.replace(self.right, self.wrong)
+    }
+}
+
+#[test]
+fn every_bug_applies_and_is_in_the_table_of_the_documentation() {
+    let page = read(&repository().join("docs/driver.md"));
+    let sources: String =
+        TESTS.iter().map(|name| read(&repository().join(format!("host-sim/virtual-sensor/tests/{name}.rs")))).collect();
+    for bug in &BUGS {
+        bug.seeded(&read(&repository().join("adis16405-driver/src").join(bug.file)));
+        assert!(sources.contains(&format!("fn {}()", bug.found_by)), "no such test: {}", bug.found_by);
+        let row = format!("| {} | `{}` |", bug.meaning, bug.found_by);
+        assert!(page.contains(&row), "docs/driver.md has no row\n{row}");
+    }
+}
+
+/// A workspace of the driver and the virtual part alone, in the target folder.
+struct Copy {
+    root: PathBuf,
+}
+
+impl Copy {
+    fn new() -> Self {
+        let (from, root) = (repository(), Path::new(env!("CARGO_TARGET_TMPDIR")).join("deliberate-bugs"));
+        let manifest = read(&from.join("Cargo.toml"));
+        let members = "members = [\"adis16405-driver\", \"host-sim/virtual-sensor\"]";
+        let kept = manifest.lines().filter(|line| !line.starts_with("exclude") && !line.starts_with("default-members"));
+        let lines = kept.map(|line| if line.starts_with("members") { members } else { line });
+        write(&root.join("Cargo.toml"), &lines.collect::<Vec<_>>().join("\n"));
+        write(&root.join("Cargo.lock"), &read(&from.join("Cargo.lock")));
+        for folder in ["adis16405-driver/src", "host-sim/virtual-sensor/src", "host-sim/virtual-sensor/tests"] {
+            let _absent_before_the_first_run = fs::remove_dir_all(root.join(folder));
+            copy(&from.join(folder), &root.join(folder));
+        }
+        for file in ["adis16405-driver/Cargo.toml", "adis16405-driver/README.md", "host-sim/virtual-sensor/Cargo.toml"]
+        {
+            write(&root.join(file), &read(&from.join(file)));
+        }
+        Self { root }
+    }
+
+    fn source(&self, bug: &Bug) -> PathBuf {
+        self.root.join("adis16405-driver/src").join(bug.file)
+    }
+
+    /// Runs the driver's tests on the virtual part; the names of those that fail.
+    fn failures(&self) -> Vec<String> {
+        let output = Command::new(env!("CARGO"))
+            .current_dir(&self.root)
+            .args(["test", "--offline", "--quiet", "--no-fail-fast", "--package", "virtual-sensor", "--target-dir"])
+            .arg(self.root.join("target"))
+            .args(TESTS.iter().flat_map(|name| ["--test", *name]))
+            .args(["--", "--format", "pretty"])
+            .env_remove("CARGO_TARGET_DIR")
+            .output()
+            .expect("cargo starts");
+        let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert_eq!(out.matches("test result: ").count(), TESTS.len(), "the tests do not run:\n{out}\n{err}");
+        let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_owned());
+        out.lines().filter_map(failed).collect()
+    }
+}
+
+#[test]
+#[ignore = "long: builds the driver 25 times, two minutes; run with --long"]
+fn each_bug_is_found_by_the_drivers_tests_on_the_virtual_part() {
+    let copy = Copy::new();
+    assert_eq!(copy.failures(), [""; 0], "without a bug");
+    let mut missed = Vec::new();
+    for bug in &BUGS {
+        let path = copy.source(bug);
+        let right = read(&path);
+        write(&path, &bug.seeded(&right));
+        let failures = copy.failures();
+        write(&path, &right);
+        println!("{}: {} tests fail", bug.meaning, failures.len());
+        if !failures.iter().any(|name| name == bug.found_by) {
+            missed.push(format!("{} ({}), found by {failures:?}", bug.meaning, bug.found_by));
+        }
+    }
+    assert!(missed.is_empty(), "not found by the test that is named:\n{}", missed.join("\n"));
+}
