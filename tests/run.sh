@@ -16,6 +16,7 @@ STEPS=(
     "tools:install what is missing"
     "format:formatting"
     "lint_images:lints of the firmware images"
+    "lint_examples:lints of the driver's examples for microcontrollers"
     "lint_libraries:lints of the libraries for microcontrollers"
     "lint_host:lints for the host"
     "documentation:documentation of the libraries"
@@ -71,6 +72,11 @@ lint_images() { # where the tests build them, so that their build scripts are co
     lint "${image[@]}" --bin observatory-f405 --features board-f405 --target "$MCU"
     lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
 }
+lint_examples() ( # a workspace of its own
+    cd adis16405-driver/examples-stm32f405
+    run cargo fmt --all --check
+    lint --target "$MCU" --target-dir "$TARGET/examples"
+)
 lint_libraries() {
     for target in "$MCU" "$SMALL"; do
         lint --package adis16405-driver --package allan-core --features allan-core/serde --target "$target"
