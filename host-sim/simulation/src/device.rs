@@ -4,11 +4,11 @@ use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::{
-    App, Board, BoardMeters, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler, Start,
-    Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
+    App, Board, BoardMeters, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler,
+    SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
 use heapless::spsc::Consumer;
-use link::Boot;
+use link::{Boot, BootCause};
 use std::collections::VecDeque;
 use virtual_sensor::{EmulatedBus, VirtualAdis16405, VirtualDelay};
 
@@ -61,7 +61,7 @@ impl Device {
         };
         let start = Start {
             spi_clock_hz: SCK_HZ,
-            boot: Boot::default(),
+            boot: Boot { cause: BootCause::Pin, ..Boot::default() },
             retained: RetainedRam::open(memory),
             finished: Box::leak(Box::new(FinishedEpoch::EMPTY)),
         };
@@ -150,6 +150,10 @@ impl Board for SimulatedBoard {
 
     fn set_sampling(&mut self, enabled: bool) {
         self.sampler.set_enabled(enabled);
+    }
+
+    fn sampling_activity(&mut self) -> SamplingActivity {
+        self.sampler.activity()
     }
 
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
