@@ -1,6 +1,6 @@
 //! The sensor's bus apart from sampling: serial clock, probing (identify, test, configure), auto-null.
 
-use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product, Register, SelfTest};
+use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product, Register, SelfTest, Timing};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -85,7 +85,8 @@ pub fn probe<SPI: SpiDevice<u8>>(
     config: Config,
     scope: ProbeScope,
 ) -> Result<SensorIdentity, ProbeError<SPI::Error>> {
-    let mut sensor = Adis16405::new(bus, config);
+    // The sensor may be in low-power mode until it is configured.
+    let mut sensor = Adis16405::new(bus, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power);
     if scope.pulse {
         // Whether the sensor answers is for the steps below to find out.
         let _ = sensor.wake(&mut delay);
