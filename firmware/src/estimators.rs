@@ -12,6 +12,12 @@ use link::{Health, MessageRef};
 /// Unusable bursts in a row from which on the sensor is in trouble. Every usable burst makes up for half an unusable one.
 const UNUSABLE_BURSTS: u32 = 16;
 
+/// Bursts in a row with equal inertial words, in lengths of the sensor's filter, from which on it is frozen. Neighbours behind
+/// the filter are often equal by chance, but not for so long.
+const FROZEN_FILTER_LENGTHS: u32 = 4;
+/// The same in bursts, where that is more.
+const FROZEN_BURSTS: u32 = 16;
+
 /// Why the sensor must be probed before its samples are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SensorTrouble {
@@ -40,6 +46,8 @@ pub struct Estimators<'m> {
     unusable: u32,
     /// Cause of the latest unusable burst.
     unusable_cause: &'static str,
+    /// Bursts in a row whose inertial words equal those of the burst before.
+    repeated: u32,
     /// Bursts used since the sensor was probed.
     used_since_probe: u32,
     /// The latest burst that a sensor can have sent had its error flag set.
@@ -63,6 +71,7 @@ impl<'m> Estimators<'m> {
             health: Health::default(),
             unusable: 0,
             unusable_cause: "",
+            repeated: 0,
             used_since_probe: 0,
             error_flag: false,
             processed: 0,
@@ -215,7 +224,7 @@ impl<'m> Estimators<'m> {
             stuck_low: counters.get(Faults::STUCK_LOW),
             stuck_high: counters.get(Faults::STUCK_HIGH),
             shifted: counters.get(Faults::SHIFTED),
-            frozen: counters.get(Faults::FROZEN),
+            frozen: counters.get(Faults::FROZEN).saturating_add(self.health.frozen),
             impossible_rate: counters.get(Faults::IMPOSSIBLE_RATE),
             x_sign: counters.get(Faults::X_SIGN),
             repeated: counters.get(Faults::REPEATED),
@@ -235,7 +244,12 @@ impl<'m> Estimators<'m> {
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
             return;
         }
-        let faults = self.validator.validate(burst).faults;
+        let mut faults = self.validator.validate(burst).faults;
+        self.repeated = if faults.contains(Faults::REPEATED) { self.repeated.saturating_add(1) } else { 0 };
+        if self.repeated >= self.frozen_after() && !faults.contains(Faults::FROZEN) {
+            faults |= Faults::FROZEN;
+            add(&mut self.health.frozen, 1);
+        }
         let refused = refused_channels(burst, faults);
         let counts = burst.counts();
         self.statistics.push(CHANNELS.map(|channel| i32::from(counts.get(channel))), refused);
@@ -252,6 +266,11 @@ impl<'m> Estimators<'m> {
         add(&mut health.used, 1);
         add(&mut health.partly_used, u32::from(!refused.is_empty()));
         add(&mut health.marked, u32::from(is_marked(faults)));
+    }
+
+    /// Repetitions from which on the sensor is frozen. The filter is two averages of 2^M samples.
+    fn frozen_after(&self) -> u32 {
+        (FROZEN_FILTER_LENGTHS << (self.config.filter_taps_log2() + 1)).max(FROZEN_BURSTS)
     }
 
     fn mark_unusable(&mut self, cause: &'static str) {

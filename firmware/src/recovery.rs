@@ -1,8 +1,8 @@
 //! Recovery of a sensor that is in trouble: which step comes next, from reading its registers again to a restart of the
 //! microcontroller.
 
-/// Bursts used in a row, so to speak, after which the sensor is known to work: more than a frozen one delivers before the
-/// validator finds out ([`BurstValidator::FROZEN_AFTER`](adis16405_driver::BurstValidator::FROZEN_AFTER)).
+/// Bursts used since the latest step after which the sensor is known to work: more than a frozen one delivers before it is
+/// found out, at most 512.
 pub(crate) const SETTLED_BURSTS: u32 = 600;
 /// Failed steps in a row after which the microcontroller is restarted. They come once a second.
 pub(crate) const FAILURES_BEFORE_RESTART: u32 = 30;

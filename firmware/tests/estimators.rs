@@ -238,12 +238,13 @@ fn damaged_bursts_are_counted_by_cause() {
     assert_eq!((health.impossible_rate, health.shifted, health.frozen, health.x_sign), (2, 1, 0, 0), "{health:?}");
 }
 
-/// The 513th of equal bursts is the first with 512 before it. After 16 of them the sensor is in trouble.
+/// The default filter of two averages of four samples is eight samples long: the 33rd of equal bursts is the first with four
+/// lengths of it before it. After 16 more the sensor is in trouble.
 #[test]
 fn a_frozen_sensor_is_counted() {
     let health = health_after(core::iter::repeat_n(with_rate(1), 600));
-    assert_eq!((health.bursts, health.frozen, health.used), (528, 16, 512), "{health:?}");
-    assert_eq!(health.suspect, 600 - 528);
+    assert_eq!((health.bursts, health.frozen, health.used), (48, 16, 32), "{health:?}");
+    assert_eq!(health.suspect, 600 - 48);
 }
 
 /// Samples and missing samples of every channel after these bursts.

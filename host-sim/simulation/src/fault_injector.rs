@@ -64,6 +64,8 @@ pub struct InjectedFaults {
     pub frames: Option<(FrameFault, FaultEnd)>,
     /// Bits of DIAG_STAT that are set until it is read, beside the sensor's own.
     pub status: u16,
+    /// Bursts damaged so far, usable or not.
+    pub damaged: u64,
     /// The data-ready line is interrupted.
     pub no_data_ready: bool,
     /// The estimators' interrupt does not come.
@@ -137,6 +139,7 @@ impl FaultyBus {
             *self.frozen.borrow_mut() = None;
             return;
         };
+        faults.damaged += u64::from(fault != FrameFault::LowSupply);
         match fault {
             FrameFault::ImpossibleRate => answer[4..6].copy_from_slice(&IMPOSSIBLE_RATE),
             FrameFault::Shifted => {
