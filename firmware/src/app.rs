@@ -4,7 +4,7 @@ use crate::board::{Board, BoardContext, Chip};
 use crate::command::{CommandError, CommandParser, DeviceCommand};
 use crate::console::{Answer, Console, VERSION_LINE};
 use crate::device::{
-    DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers, log,
+    DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers,
 };
 use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
@@ -13,8 +13,8 @@ use crate::retained::{RetainedRam, RetainedSettings};
 use crate::sensor::{LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
 use crate::status_flags::StatusFlags;
-use crate::task_monitor::{StoppedTask, TaskMonitor};
-use adis16405_driver::{ClockMode, Config, ConfigError, SamplePeriod};
+use crate::task_monitor::TaskMonitor;
+use adis16405_driver::{Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
 use link::{Boot, BootCause, MessageRef, text_line};
 
@@ -48,8 +48,6 @@ pub struct App {
     checkpoint_channel: usize,
     armed_until_us: u64,
     tasks: TaskMonitor,
-    /// The task for which the watchdog is no longer fed.
-    stopped: Option<StoppedTask>,
 }
 
 /// Runs the application on a board, without end.
@@ -118,7 +116,6 @@ impl App {
             checkpoint_channel: 0,
             armed_until_us: 0,
             tasks: TaskMonitor::new(now_us),
-            stopped: None,
         }
     }
 
@@ -131,7 +128,7 @@ impl App {
 
     /// What must not wait, also while a model is being fitted: watchdog, commands, sensor, checkpoints, timers.
     fn service(&mut self, board: &mut impl Board) {
-        if !self.tasks_are_alive(board) {
+        if !self.tasks.are_alive(board) {
             return; // nothing that would feed the watchdog
         }
         board.feed_watchdog();
@@ -147,18 +144,6 @@ impl App {
         }
         self.checkpoint(board);
         self.check_timers(board);
-    }
-
-    /// Whether sampling, estimators and reports are alive. The first one that is not is logged.
-    fn tasks_are_alive(&mut self, board: &mut impl Board) -> bool {
-        let (now_us, activity) = (board.now_us(), board.sampling_activity());
-        let processed = board.estimators(|estimators| estimators.processed());
-        let stopped = self.tasks.stopped(now_us, activity, processed);
-        if let Some(task) = stopped.filter(|_| self.stopped != stopped) {
-            log(board, format_args!("{} stopped; waiting for the watchdog", task.name()));
-        }
-        self.stopped = stopped;
-        stopped.is_none()
     }
 
     /// Sends waiting text, then a line of an answer and a message of the report. Returns false if nothing is left or there
@@ -268,12 +253,7 @@ impl App {
             Ok(config) => config,
             Err(error) => return self.print(board, format_args!("{error}")),
         };
-        let low_power = config.sample_period().clock_mode() == ClockMode::LowPower;
-        board.set_sampling(false);
-        // The probe that follows sets the clock of the configuration.
-        let clock_hz = board.set_spi_clock(LOW_POWER_LIMIT_HZ).unwrap_or(self.state.spi_clock_hz);
-        if low_power && clock_hz > LOW_POWER_LIMIT_HZ {
-            board.set_sampling(self.state.is_sampled());
+        if let Err(clock_hz) = self.state.prepare_clock(config, board) {
             let limit_hz = LOW_POWER_LIMIT_HZ;
             return self.print(
                 board,

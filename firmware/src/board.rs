@@ -32,10 +32,10 @@ pub trait Board {
     fn set_sampling(&mut self, enabled: bool);
     /// Transfers of bursts so far.
     fn sampling_activity(&mut self) -> SamplingActivity;
-    /// Sets the serial clock of the sensor's bus to the largest up to `limit_hz` that the hardware has, and returns it in
-    /// Hz; `None` if it is fixed. To be used only while sampling is disabled.
-    fn set_spi_clock(&mut self, _limit_hz: u32) -> Option<u32> {
-        None
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz, or
+    /// 0 if the board cannot set it. To be used only while sampling is disabled.
+    fn set_clock_limit(&mut self, _limit_hz: u32) -> u32 {
+        0
     }
     /// Resets the microcontroller's side of the sensor's bus. To be used only while sampling is disabled.
     fn reset_bus(&mut self) {}

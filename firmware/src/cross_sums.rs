@@ -118,7 +118,7 @@ fn wide(low: u64, high: i32) -> i128 {
 pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 
 /// Allan covariances and means of a finished epoch, rounded from its [`CrossSums`]: nothing is added to them any more.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
     /// Allan covariance of each pair at each octave in counts²; not a number where the pair was not observed.
     pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],

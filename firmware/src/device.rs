@@ -206,11 +206,9 @@ impl DeviceState {
             }
         }
         // The sensor may be in low-power mode until it is configured.
-        board.set_spi_clock(LOW_POWER_LIMIT_HZ);
+        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let result = probe(board.sensor_bus(), self.config, scope).map_err(|error| text_line(format_args!("{error}")));
-        if let Some(clock_hz) = board.set_spi_clock(self.clock_limit_hz()) {
-            self.spi_clock_hz = clock_hz;
-        }
+        self.set_clock(clock_limit_hz(self.config), board);
         match result {
             Ok(identity) => {
                 self.product_id = identity.product.prod_id();
@@ -235,12 +233,28 @@ impl DeviceState {
         }
     }
 
-    /// Largest serial clock of the configuration.
-    fn clock_limit_hz(&self) -> u32 {
-        match self.config.sample_period().clock_mode() {
-            ClockMode::Normal => BURST_LIMIT_HZ,
-            ClockMode::LowPower => LOW_POWER_LIMIT_HZ,
+    /// Sets the serial clock of the sensor's bus, unless the board cannot.
+    fn set_clock(&mut self, limit_hz: u32, board: &mut impl Board) {
+        let clock_hz = board.set_clock_limit(limit_hz);
+        if clock_hz > 0 {
+            self.spi_clock_hz = clock_hz;
         }
+    }
+
+    /// Disables sampling and sets a serial clock that the sensor takes with `config`; the probe that follows sets it again.
+    ///
+    /// # Errors
+    /// The clock in Hz, if the board has none that is slow enough; sampling goes on.
+    pub(crate) fn prepare_clock(&mut self, config: Config, board: &mut impl Board) -> Result<(), u32> {
+        board.set_sampling(false);
+        self.set_clock(clock_limit_hz(config), board);
+        if self.spi_clock_hz <= clock_limit_hz(config) {
+            return Ok(());
+        }
+        let clock_hz = self.spi_clock_hz;
+        self.set_clock(clock_limit_hz(self.config), board);
+        board.set_sampling(self.is_sampled());
+        Err(clock_hz)
     }
 
     /// Reads DIAG_STAT, which clears it, if the sensor has its error flag set: in the first half of a sample period, so that
@@ -262,6 +276,14 @@ impl DeviceState {
         if let Some(causes) = self.status_flags.add(diagnosis, now_us) {
             log(board, format_args!("sensor: DIAG_STAT {causes}"));
         }
+    }
+}
+
+/// Largest serial clock that the sensor takes with a configuration, in Hz.
+fn clock_limit_hz(config: Config) -> u32 {
+    match config.sample_period().clock_mode() {
+        ClockMode::Normal => BURST_LIMIT_HZ,
+        ClockMode::LowPower => LOW_POWER_LIMIT_HZ,
     }
 }
 

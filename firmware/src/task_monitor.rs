@@ -1,6 +1,8 @@
 //! Proof that every task is alive, without which the watchdog is not fed.
 
 use crate::acquisition::SamplingActivity;
+use crate::board::Board;
+use crate::device::log;
 
 /// Time for which a burst may take to arrive, or a queued burst to be processed. Both take less than a millisecond.
 const SAMPLING_US: u64 = 2_000_000;
@@ -9,7 +11,7 @@ const REPORT_US: u64 = 10_000_000;
 
 /// A task that has stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum StoppedTask {
+enum StoppedTask {
     /// The transfer of a burst does not end.
     Sampling,
     /// Bursts are queued and not processed.
@@ -20,7 +22,7 @@ pub(crate) enum StoppedTask {
 
 impl StoppedTask {
     /// Name for a log.
-    pub(crate) const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Sampling => "sampling",
             Self::Estimators => "estimators",
@@ -44,6 +46,8 @@ pub(crate) struct TaskMonitor {
     behind_since_us: Option<u64>,
     /// When the transmit queue had room, or nothing to transmit, for the last time.
     transmitted_us: u64,
+    /// The task that was found stopped.
+    stopped: Option<StoppedTask>,
 }
 
 impl TaskMonitor {
@@ -56,6 +60,7 @@ impl TaskMonitor {
             ended_then: 0,
             behind_since_us: None,
             transmitted_us: now_us,
+            stopped: None,
         }
     }
 
@@ -64,8 +69,20 @@ impl TaskMonitor {
         self.transmitted_us = now_us;
     }
 
+    /// Whether sampling, estimators and reports are alive. The first one that is not is logged, once.
+    pub(crate) fn are_alive(&mut self, board: &mut impl Board) -> bool {
+        let (now_us, activity) = (board.now_us(), board.sampling_activity());
+        let processed = board.estimators(|estimators| estimators.processed());
+        let stopped = self.find_stopped(now_us, activity, processed);
+        if let Some(task) = stopped.filter(|_| self.stopped != stopped) {
+            log(board, format_args!("{} stopped; waiting for the watchdog", task.name()));
+        }
+        self.stopped = stopped;
+        stopped.is_none()
+    }
+
     /// The first task that has stopped, by what sampling has done and how many bursts the estimators have processed.
-    pub(crate) fn stopped(&mut self, now_us: u64, activity: SamplingActivity, processed: u32) -> Option<StoppedTask> {
+    fn find_stopped(&mut self, now_us: u64, activity: SamplingActivity, processed: u32) -> Option<StoppedTask> {
         if activity.started == activity.ended || activity.started != self.activity.started {
             self.reading_since_us = None;
         } else {
@@ -105,7 +122,7 @@ mod tests {
             if transmitting {
                 monitor.mark_transmitted(now_us);
             }
-            monitor.stopped(now_us, activity, processed).map(|task| (task, now_us))
+            monitor.find_stopped(now_us, activity, processed).map(|task| (task, now_us))
         })
     }
 

@@ -51,6 +51,8 @@ struct SimulatedBoard {
     fed_us: u64,
     /// The serial clock cannot be changed.
     fixed_clock: bool,
+    /// The sensor's RST line is connected.
+    reset_line: bool,
     /// Time for which the samples of the sensor could have been used, µs.
     usable_us: u64,
 }
@@ -82,6 +84,13 @@ impl Device {
     #[must_use]
     pub fn with_fixed_clock(mut self) -> Self {
         self.board.fixed_clock = true;
+        self
+    }
+
+    /// Has a board that connects the sensor's RST line.
+    #[must_use]
+    pub fn with_reset_line(mut self) -> Self {
+        self.board.reset_line = true;
         self
     }
 
@@ -167,6 +176,7 @@ impl SimulatedBoard {
             restarts: 0,
             fed_us: now_us,
             fixed_clock: false,
+            reset_line: false,
             usable_us: 0,
         }
     }
@@ -175,8 +185,8 @@ impl SimulatedBoard {
     fn boot(&mut self, cause: BootCause, memory: &'static RetainedMemory) -> App {
         let fresh = Self::new(self.bus.clone(), self.now_us);
         let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
-        let Self { restarts, fixed_clock, usable_us, .. } = *self;
-        *self = Self { sent, received, restarts, fixed_clock, usable_us, ..fresh };
+        let Self { restarts, fixed_clock, reset_line, usable_us, .. } = *self;
+        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, ..fresh };
         let start = Start {
             spi_clock_hz: SCK_HZ,
             boot: Boot { cause, ..Boot::default() },
@@ -241,12 +251,20 @@ impl Board for SimulatedBoard {
         }
     }
 
-    fn set_spi_clock(&mut self, limit_hz: u32) -> Option<u32> {
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        if self.fixed_clock {
+            return 0;
+        }
         let clock_hz = limit_hz.min(SCK_HZ);
-        (!self.fixed_clock).then(|| {
-            self.bus.bus().part_mut().set_sck_hz(Some(clock_hz));
-            clock_hz
-        })
+        self.bus.bus().part_mut().set_sck_hz(Some(clock_hz));
+        clock_hz
+    }
+
+    fn reset_sensor(&mut self) -> bool {
+        if self.reset_line {
+            self.bus.reset_part();
+        }
+        self.reset_line
     }
 
     fn sampling_activity(&mut self) -> SamplingActivity {

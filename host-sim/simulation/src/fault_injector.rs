@@ -53,6 +53,8 @@ pub enum FaultEnd {
     Pulse,
     /// With a software reset.
     Reset,
+    /// With a pulse on the RST line.
+    ResetLine,
     /// Not by itself.
     Never,
 }
@@ -107,6 +109,16 @@ impl FaultyBus {
     /// The faults.
     pub(crate) fn faults(&self) -> &Rc<RefCell<InjectedFaults>> {
         &self.faults
+    }
+
+    /// A pulse on the RST line of the part, which then starts up.
+    pub(crate) fn reset_part(&self) {
+        let mut part = self.bus.part_mut();
+        part.power_off();
+        part.power_on();
+        let mut faults = self.faults.borrow_mut();
+        faults.status = 0;
+        faults.frames = faults.frames.filter(|(_, end)| !matches!(end, FaultEnd::Reset | FaultEnd::ResetLine));
     }
 
     /// Ends a frame fault by what the controller has sent.

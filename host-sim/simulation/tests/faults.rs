@@ -150,6 +150,20 @@ fn the_first_step_that_helps_ends_a_fault() {
     }
 }
 
+/// The RST line, where it is connected, comes after the software reset.
+#[test]
+fn a_sensor_that_takes_no_command_is_reset_by_its_line() {
+    let mut device = device().with_reset_line();
+    health_after(&mut device, 5.0);
+    device.faults().frames = Some((FrameFault::Stuck { high: true }, FaultEnd::ResetLine));
+    let health = health_after(&mut device, 10.0);
+    let steps = [health.rereads, health.bus_resets, health.sensor_resets, health.reset_lines];
+    assert_eq!(steps, [1, 1, 1, 1], "{health:?}");
+    let used = health_after(&mut device, 10.0).used - health.used;
+    assert!(f64::from(used) > 9.95 * RATE_HZ, "{used} samples in 10 s");
+    assert_eq!(device.restarts(), 0);
+}
+
 /// A single refused burst, and a rate that one gyro cannot measure, call for no step at all.
 #[test]
 fn a_refused_burst_costs_that_burst() {
