@@ -4,7 +4,7 @@
 use crate::board::Board;
 use crate::estimators::SensorTrouble;
 use crate::learner::Learner;
-use crate::recovery::{RecoveryLadder, RecoveryStep, SETTLED_BURSTS};
+use crate::recovery::{RecoveryLadder, RecoveryStep};
 use crate::retained::RetainedSettings;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, probe, read_diagnosis};
 use crate::status_flags::StatusFlags;
@@ -130,13 +130,14 @@ impl DeviceState {
             SensorState::Probing { at_us, step } if now_us >= at_us => self.probe(step, board),
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
-                let (trouble, used) =
-                    board.estimators(|estimators| (estimators.trouble(now_us), estimators.used_since_probe()));
+                let (trouble, used, settled) = board.estimators(|estimators| {
+                    (estimators.trouble(now_us), estimators.used_since_probe() > 0, estimators.is_settled())
+                });
                 if let Some(trouble) = trouble {
-                    self.recovery.recoveries = self.recovery.recoveries.saturating_add(u32::from(used > 0));
+                    self.recovery.recoveries = self.recovery.recoveries.saturating_add(u32::from(used));
                     self.recover(trouble, since_us + RETRY_US, board);
                 } else {
-                    if used >= SETTLED_BURSTS {
+                    if settled {
                         self.recovery.ladder.settle();
                     }
                     self.read_status(board);

@@ -18,6 +18,10 @@ const FROZEN_FILTER_LENGTHS: u32 = 4;
 /// The same in bursts, where that is more.
 const FROZEN_BURSTS: u32 = 16;
 
+/// Bursts used since the sensor was probed from which on it is known to work; behind a long filter twice as many as a frozen
+/// sensor delivers before it is found out.
+const SETTLED_BURSTS: u32 = 100;
+
 /// Why the sensor must be probed before its samples are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SensorTrouble {
@@ -136,6 +140,11 @@ impl<'m> Estimators<'m> {
     /// Bursts used since the sensor was probed.
     pub(crate) fn used_since_probe(&self) -> u32 {
         self.used_since_probe
+    }
+
+    /// Whether so many bursts were used since the sensor was probed that it is known to work.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.used_since_probe >= SETTLED_BURSTS.max(2 * self.frozen_after())
     }
 
     /// Number of bursts taken from the queue, modulo 2³².

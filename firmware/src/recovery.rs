@@ -1,9 +1,6 @@
 //! Recovery of a sensor that is in trouble: which step comes next, from reading its registers again to a restart of the
 //! microcontroller.
 
-/// Bursts used since the latest step after which the sensor is known to work: more than a frozen one delivers before it is
-/// found out, at most 512.
-pub(crate) const SETTLED_BURSTS: u32 = 600;
 /// Failed steps in a row after which the microcontroller is restarted. They come once a second.
 pub(crate) const FAILURES_BEFORE_RESTART: u32 = 30;
 
@@ -61,7 +58,7 @@ impl RecoveryLadder {
         }
     }
 
-    /// The sensor has delivered [`SETTLED_BURSTS`] usable bursts since the latest step.
+    /// The sensor has delivered so many usable bursts since the latest step that it is known to work.
     pub(crate) fn settle(&mut self) {
         *self = Self { taken: 0, has_settled: true };
     }
