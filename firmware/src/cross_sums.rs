@@ -35,8 +35,9 @@ pub(crate) struct CrossSums {
     /// Products in each sum: one in 32 samples at most.
     counts: [[u32; PAIRS.len()]; CROSS_OCTAVES],
     totals: [i64; CHANNELS.len()],
-    /// Samples of every channel in its total.
-    samples: [u64; CHANNELS.len()],
+    /// Samples that at least one channel has taken, and how many of them each channel lacks.
+    samples: u64,
+    lacking: [u64; CHANNELS.len()],
     /// A channel lacked a sample that others had, so that not all complete their differences together.
     uneven: bool,
     /// A channel has samples of before a restart, which are not in these sums.
@@ -50,7 +51,8 @@ impl CrossSums {
             high: [[0; PAIRS.len()]; CROSS_OCTAVES],
             counts: [[0; PAIRS.len()]; CROSS_OCTAVES],
             totals: [0; CHANNELS.len()],
-            samples: [0; CHANNELS.len()],
+            samples: 0,
+            lacking: [0; CHANNELS.len()],
             uneven: false,
             incomplete: false,
         }
@@ -61,7 +63,7 @@ impl CrossSums {
         self.low.fill([0; PAIRS.len()]);
         self.high.fill([0; PAIRS.len()]);
         self.counts.fill([0; PAIRS.len()]);
-        (self.totals, self.samples) = ([0; CHANNELS.len()], [0; CHANNELS.len()]);
+        (self.totals, self.samples, self.lacking) = ([0; CHANNELS.len()], 0, [0; CHANNELS.len()]);
         (self.uneven, self.incomplete) = (false, false);
     }
 
@@ -78,11 +80,15 @@ impl CrossSums {
         counts: [i32; CHANNELS.len()],
         refused: ChannelSet,
     ) {
-        self.uneven |= !refused.is_empty() && refused != ChannelSet::ALL;
-        for (index, (total, samples)) in self.totals.iter_mut().zip(&mut self.samples).enumerate() {
-            if !refused.contains(index) {
-                (*total, *samples) = (*total + i64::from(counts[index]), *samples + 1);
-            }
+        if refused == ChannelSet::ALL {
+            return;
+        }
+        self.samples += 1;
+        for (total, count) in self.totals.iter_mut().zip(counts) {
+            *total += i64::from(count);
+        }
+        if !refused.is_empty() {
+            self.take_back(counts, refused);
         }
         if !self.uneven && estimators[0].newest_difference(FIRST_CROSS_OCTAVE).is_none() {
             return; // the other channels, and longer octaves, have completed none either
@@ -95,6 +101,17 @@ impl CrossSums {
                 return; // longer octaves have completed none either
             }
             self.add_products(octave - FIRST_CROSS_OCTAVE, &differences);
+        }
+    }
+
+    /// Takes refused counts out of the totals again. Not inlined: they are rare.
+    #[inline(never)]
+    fn take_back(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
+        self.uneven = true;
+        for (index, (total, lacking)) in self.totals.iter_mut().zip(&mut self.lacking).enumerate() {
+            if refused.contains(index) {
+                (*total, *lacking) = (*total - i64::from(counts[index]), *lacking + 1);
+            }
         }
     }
 
@@ -136,7 +153,8 @@ impl AllanCovariances {
     /// Overwrites them with those of an epoch's sums, in place: 2.5 kB.
     pub(crate) fn fill(&mut self, sums: &CrossSums) {
         self.complete = !sums.incomplete;
-        self.means = core::array::from_fn(|index| sums.totals[index] as f64 / sums.samples[index].max(1) as f64);
+        let samples = |index: usize| (sums.samples - sums.lacking[index]).max(1);
+        self.means = core::array::from_fn(|index| sums.totals[index] as f64 / samples(index) as f64);
         for (pair, covariances) in self.pairs.iter_mut().enumerate() {
             for (k, covariance) in covariances.iter_mut().enumerate() {
                 let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
