@@ -137,7 +137,7 @@ pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 /// Allan covariances and means of a finished epoch, rounded from its [`CrossSums`]: nothing is added to them any more.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
-    /// Allan covariance of each pair at each octave in counts²; not a number where the pair was not observed.
+    /// Allan covariance of each pair at each octave in counts²; infinite where the pair was not observed.
     pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
     /// Mean of every channel; 0 without samples.
     pub means: ChannelMeans,
@@ -148,7 +148,7 @@ pub struct AllanCovariances {
 impl AllanCovariances {
     /// Covariances of no samples.
     pub const EMPTY: Self =
-        Self { pairs: [[f64::NAN; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
+        Self { pairs: [[f64::INFINITY; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
 
     /// Overwrites them with those of an epoch's sums, in place: 2.5 kB.
     pub(crate) fn fill(&mut self, sums: &CrossSums) {
@@ -158,8 +158,8 @@ impl AllanCovariances {
         for (pair, covariances) in self.pairs.iter_mut().enumerate() {
             for (k, covariance) in covariances.iter_mut().enumerate() {
                 let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
-                // 0/0 where the pair was not observed.
-                *covariance = wide(sums.low[k][pair], sums.high[k][pair]) as f64 / (2.0 * count * n * n);
+                let sum = wide(sums.low[k][pair], sums.high[k][pair]) as f64;
+                *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { f64::INFINITY };
             }
         }
     }
@@ -170,7 +170,7 @@ impl AllanCovariances {
     pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
         let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
         let octave = (n.trailing_zeros() as usize).checked_sub(FIRST_CROSS_OCTAVE).filter(|_| n.is_power_of_two())?;
-        self.pairs[pair].get(octave).copied().filter(|covariance| !covariance.is_nan())
+        self.pairs[pair].get(octave).copied().filter(|covariance| covariance.is_finite())
     }
 }
 
