@@ -34,6 +34,15 @@ pub struct TimedBurst {
     pub burst: Option<Burst>,
 }
 
+/// Transfers of bursts, counted modulo 2³².
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SamplingActivity {
+    /// Transfers started.
+    pub started: u32,
+    /// Transfers ended, whether the burst was queued or dropped.
+    pub ended: u32,
+}
+
 /// Decides at each data-ready edge whether a burst is read, and queues the bursts. It never blocks.
 pub struct Sampler<'q> {
     queue: spsc::Producer<'q, TimedBurst>,
@@ -41,12 +50,13 @@ pub struct Sampler<'q> {
     /// Time of the edge whose burst is being transferred.
     reading: Option<u64>,
     dropped: u32,
+    activity: SamplingActivity,
 }
 
 impl<'q> Sampler<'q> {
     /// A sampler that ignores edges until it is [enabled](Self::set_enabled).
     pub fn new(queue: spsc::Producer<'q, TimedBurst>) -> Self {
-        Self { queue, enabled: false, reading: None, dropped: 0 }
+        Self { queue, enabled: false, reading: None, dropped: 0, activity: SamplingActivity { started: 0, ended: 0 } }
     }
 
     /// Enables or disables sampling. A transfer in progress is completed and queued.
@@ -60,6 +70,12 @@ impl<'q> Sampler<'q> {
         self.reading.is_some()
     }
 
+    /// Transfers so far.
+    #[must_use]
+    pub fn activity(&self) -> SamplingActivity {
+        self.activity
+    }
+
     /// To be called at every data-ready edge; returns whether the transfer of a burst must be started now.
     ///
     /// An edge during a transfer starts none: its sample is lost, which
@@ -69,6 +85,7 @@ impl<'q> Sampler<'q> {
         let start = self.enabled && self.reading.is_none();
         if start {
             self.reading = Some(at_us);
+            self.activity.started = self.activity.started.wrapping_add(1);
         }
         start
     }
@@ -76,6 +93,7 @@ impl<'q> Sampler<'q> {
     /// To be called at the end of a transfer with the bytes received, or `None` if it failed.
     pub fn transfer_ended(&mut self, received: Option<&[u8; BURST_BYTES]>) {
         let Some(at_us) = self.reading.take() else { return };
+        self.activity.ended = self.activity.ended.wrapping_add(1);
         let timed = TimedBurst { at_us, dropped: self.dropped, burst: received.map(Burst::from_bytes) };
         match self.queue.enqueue(timed) {
             Ok(()) => self.dropped = 0,
@@ -162,6 +180,12 @@ impl DataReadyMonitor {
     #[must_use]
     pub const fn is_suspect(&self) -> bool {
         self.silent || self.suspicion >= SUSPECT
+    }
+
+    /// Time of the latest edge at a multiple of the period, µs; `None` before the first.
+    #[must_use]
+    pub fn last_edge_us(&self) -> Option<u64> {
+        self.last_us
     }
 
     /// Whether no edge has come for so long before `now_us` that the sensor may be disconnected or reset.

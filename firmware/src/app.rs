@@ -3,16 +3,20 @@
 use crate::board::{Board, BoardContext, Chip};
 use crate::command::{CommandError, CommandParser, DeviceCommand};
 use crate::console::{Answer, Console, VERSION_LINE};
-use crate::device::{DeviceState, FIRST_CONFIG, FIRST_SETTINGS, SensorState, config_from_registers};
+use crate::device::{
+    DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers,
+};
 use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
 use crate::report::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
 use crate::sensor::{LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
-use adis16405_driver::{ClockMode, Config, ConfigError, SamplePeriod};
+use crate::status_flags::StatusFlags;
+use crate::task_monitor::TaskMonitor;
+use adis16405_driver::{Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
-use link::{Boot, MessageRef, text_line};
+use link::{Boot, BootCause, MessageRef, text_line};
 
 /// What the start-up code of a board hands to the application.
 pub struct Start {
@@ -43,6 +47,7 @@ pub struct App {
     /// Channel of the last checkpoint.
     checkpoint_channel: usize,
     armed_until_us: u64,
+    tasks: TaskMonitor,
 }
 
 /// Runs the application on a board, without end.
@@ -85,6 +90,9 @@ impl App {
         }
         retained.write_settings(settings, first);
         let now_us = board.now_us();
+        // Unless the microcontroller alone was restarted, the sensor may be starting up too.
+        let sensor_runs = matches!(boot.cause, BootCause::Pin | BootCause::Software | BootCause::Watchdog);
+        let probe_us = if sensor_runs { now_us } else { now_us + START_UP_US };
         Self {
             state: DeviceState {
                 spi_clock_hz,
@@ -92,11 +100,12 @@ impl App {
                 settings,
                 config,
                 product_id: 0,
-                sensor: SensorState::Probing { at_us: now_us },
+                sensor: SensorState::Probing { at_us: probe_us, step: None },
                 learner: Learner::new(finished),
                 epoch_start_us: now_us,
-                recoveries: 0,
                 bad_commands: 0,
+                recovery: SensorRecovery::default(),
+                status_flags: StatusFlags::new(),
             },
             retained,
             parser: CommandParser::default(),
@@ -106,6 +115,7 @@ impl App {
             next_checkpoint_us: now_us + CHECKPOINT_US,
             checkpoint_channel: 0,
             armed_until_us: 0,
+            tasks: TaskMonitor::new(now_us),
         }
     }
 
@@ -118,6 +128,9 @@ impl App {
 
     /// What must not wait, also while a model is being fitted: watchdog, commands, sensor, checkpoints, timers.
     fn service(&mut self, board: &mut impl Board) {
+        if !self.tasks.are_alive(board) {
+            return; // nothing that would feed the watchdog
+        }
         board.feed_watchdog();
         while let Some(byte) = board.receive() {
             match self.parser.push(byte) {
@@ -126,7 +139,9 @@ impl App {
                 None => {}
             }
         }
-        self.state.supervise_sensor(board);
+        if self.state.supervise_sensor(board) {
+            self.restart(board);
+        }
         self.checkpoint(board);
         self.check_timers(board);
     }
@@ -134,12 +149,21 @@ impl App {
     /// Sends waiting text, then a line of an answer and a message of the report. Returns false if nothing is left or there
     /// is no room.
     fn transmit(&mut self, board: &mut impl Board) -> bool {
-        if !self.console.flush(board) {
+        if !self.flush(board) {
             return false;
         }
         self.console.send_line(&self.state, board);
         self.send_report_part(board);
         self.console.has_answers() || self.report.is_active()
+    }
+
+    /// Sends waiting text. Returns whether there is room for more.
+    fn flush(&mut self, board: &mut impl Board) -> bool {
+        let has_room = self.console.flush(board);
+        if has_room {
+            self.tasks.mark_transmitted(board.now_us());
+        }
+        has_room
     }
 
     fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
@@ -163,7 +187,8 @@ impl App {
             DeviceCommand::Report => self.report.start(),
             DeviceCommand::ResetStatistics => {
                 self.reset_statistics(board);
-                self.state.recoveries = 0;
+                self.state.recovery.reset_counters();
+                self.state.status_flags = StatusFlags::new();
                 self.state.bad_commands = 0;
                 self.print(board, format_args!("statistics reset"));
             }
@@ -193,18 +218,21 @@ impl App {
             }
             DeviceCommand::SelfTest => {
                 board.set_sampling(false);
-                self.state.sensor = SensorState::Probing { at_us: now_us };
+                self.state.recovery.tested = false;
+                self.state.request_probe(now_us);
             }
             DeviceCommand::ArmAutoNull => {
                 self.armed_until_us = now_us + ARMED_US;
                 self.print(board, format_args!("keep the sensor still; autonull within 10 s nulls its bias"));
             }
             DeviceCommand::AutoNull => self.auto_null(board, now_us),
-            DeviceCommand::Restart => {
-                (0..CHANNELS.len()).for_each(|index| self.checkpoint_channel(board, index));
-                board.restart();
-            }
+            DeviceCommand::Restart => self.restart(board),
         }
+    }
+
+    fn restart(&mut self, board: &mut impl Board) {
+        (0..CHANNELS.len()).for_each(|index| self.checkpoint_channel(board, index));
+        board.restart();
     }
 
     fn reject(&mut self, error: CommandError, board: &mut impl Board) {
@@ -225,22 +253,19 @@ impl App {
             Ok(config) => config,
             Err(error) => return self.print(board, format_args!("{error}")),
         };
-        let low_power = config.sample_period().clock_mode() == ClockMode::LowPower;
-        let clock_hz = self.state.spi_clock_hz;
-        if low_power && clock_hz > LOW_POWER_LIMIT_HZ {
+        if let Err(clock_hz) = self.state.prepare_clock(config, board) {
             let limit_hz = LOW_POWER_LIMIT_HZ;
             return self.print(
                 board,
                 format_args!("below 182 SPS the sensor takes a serial clock of {limit_hz} Hz, not {clock_hz} Hz"),
             );
         }
-        board.set_sampling(false);
         self.state.config = config;
         self.state.settings.smpl_prd = config.sample_period().register();
         self.state.settings.sens_avg = config.sens_avg();
         self.reset_statistics(board);
         board.estimators(|estimators| estimators.restart(config));
-        self.state.sensor = SensorState::Probing { at_us: board.now_us() };
+        self.state.request_probe(board.now_us());
         self.print(board, format_args!("statistics reset: the sensor is configured anew"));
     }
 
@@ -249,7 +274,7 @@ impl App {
             return self.print(board, format_args!("not armed: arm first, then autonull within 10 s"));
         }
         board.set_sampling(false);
-        self.state.sensor = SensorState::Probing { at_us: now_us };
+        self.state.request_probe(now_us);
         let done = auto_null(board.sensor_bus(), self.state.config).map_err(|error| text_line(format_args!("{error}")));
         match done {
             Ok(()) => {
@@ -360,7 +385,7 @@ impl App {
     /// Everything but reports and tables. Returns false if the fit is to be cancelled, since the statistics were reset.
     fn service_during_fit(&mut self, board: &mut impl Board) -> bool {
         self.service(board);
-        if self.console.flush(board) {
+        if self.flush(board) {
             self.console.send_quick_line(&self.state, board);
         }
         self.report.ends_epoch()

@@ -1,7 +1,7 @@
 //! The board as the main loop sees it: the trait, and the board context that implements it over a microcontroller's
 //! resources and interrupt locks.
 
-use crate::acquisition::Sampler;
+use crate::acquisition::{Sampler, SamplingActivity};
 use crate::estimators::Estimators;
 use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
@@ -9,8 +9,8 @@ use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use heapless::spsc;
 use rtic_core::Mutex;
 
-/// Time before the first frame after a burst in µs: the sensor's stall time.
-const STALL_US: u32 = 16;
+/// Time before the first frame after a burst in µs: the longer of the sensor's two stall times, that of low-power mode.
+const STALL_US: u32 = 75;
 
 /// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
 pub trait Board {
@@ -30,6 +30,19 @@ pub trait Board {
     /// Enables or disables sampling. On return after disabling, no burst is being transferred, and the sensor's stall time
     /// has passed.
     fn set_sampling(&mut self, enabled: bool);
+    /// Transfers of bursts so far.
+    fn sampling_activity(&mut self) -> SamplingActivity;
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz, or
+    /// 0 if the board cannot set it. To be used only while sampling is disabled.
+    fn set_clock_limit(&mut self, _limit_hz: u32) -> u32 {
+        0
+    }
+    /// Resets the microcontroller's side of the sensor's bus. To be used only while sampling is disabled.
+    fn reset_bus(&mut self) {}
+    /// Pulses the sensor's RST line. Returns false if the board does not connect it.
+    fn reset_sensor(&mut self) -> bool {
+        false
+    }
     /// Gives access to the estimators, which process no burst meanwhile: `access` must be short.
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
     /// Gives access to the transmit queue, and has what is queued transmitted.
@@ -194,6 +207,10 @@ where
             while self.locks.sampler.lock(|sampler| sampler.is_reading()) {}
             FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(STALL_US);
         }
+    }
+
+    fn sampling_activity(&mut self) -> SamplingActivity {
+        self.locks.sampler.lock(|sampler| sampler.activity())
     }
 
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {

@@ -134,11 +134,12 @@ const TABLE_HEAD: [&str; 2] = [
     "     tau/s     gyro_x     gyro_y     gyro_z     accl_x     accl_y     accl_z",
 ];
 
-/// Lines of an inertial channel below the table: the coefficients, its regressors, and this one, its validation.
+/// Lines of an inertial channel below the table: the coefficients, its regressors, its validation, and its missing samples.
 const VALIDATION_LINE: usize = 1 + MAX_COVARIATES;
+const MISSING_LINE: usize = VALIDATION_LINE + 1;
 
 /// Head, a row for every octave, then for every inertial channel the coefficients of the baseline model, for every
-/// regressor a line, and the validation on the last finished epoch.
+/// regressor a line, the validation on the last finished epoch, and the samples missing in the running one.
 #[inline(never)]
 fn table_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     if let Some(head) = TABLE_HEAD.get(index) {
@@ -153,6 +154,7 @@ fn table_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Answ
         0 => AnswerLine::Text(coefficients_line(state, board, channel)),
         1..=MAX_COVARIATES => regressor_line(state, channel, line - 1).into(),
         VALIDATION_LINE => validation_line(state, channel).into(),
+        MISSING_LINE => missing_line(board, channel).into(),
         _ => AnswerLine::End,
     }
 }
@@ -211,6 +213,14 @@ fn validation_line(state: &DeviceState, index: usize) -> Option<TextLine> {
     Some(text_line(text))
 }
 
+/// The samples missing in a channel; `None` if there are none.
+#[inline(never)]
+fn missing_line(board: &mut impl Board, index: usize) -> Option<TextLine> {
+    let losses = board.estimators(|estimators| estimators.losses(false));
+    let (name, lost, refused) = (CHANNELS[index].name(), losses.lost, losses.refused[index]);
+    (lost + refused > 0).then(|| text_line(format_args!("{name} missing: {lost} lost, {refused} refused")))
+}
+
 #[inline(never)]
 fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     let now_us = board.now_us();
@@ -232,11 +242,18 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
             let (samples, age) = (samples.unwrap_or(0), state.epoch_age_s(now_us));
             text_line(format_args!("{samples} samples, epoch {epoch}, begun {age} s ago, length {length} s"))
         }
-        3 => text_line(format_args!(
+        3 => {
+            let losses = board.estimators(|estimators| estimators.losses(false));
+            let (lost, [a, b, c, d, e, f, t, v]) = (losses.lost, losses.refused);
+            text_line(format_args!(
+                "missing: {lost} lost; refused gyros {a} {b} {c}, accelerometers {d} {e} {f}, temp {t}, supply {v}"
+            ))
+        }
+        4 => text_line(format_args!(
             "start {}: {:?}, {} channels restored",
             boot.starts, boot.cause, boot.restored_channels
         )),
-        4 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
+        5 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
         _ => return AnswerLine::End,
     })
 }
@@ -272,6 +289,22 @@ fn counter_line(health: &Health, index: usize) -> AnswerLine {
         ("estimator_cycles", health.estimator_cycles),
         ("stack_bytes", health.stack_bytes),
         ("stack_size", health.stack_size),
+        ("partly_used", health.partly_used),
+        ("marked", health.marked),
+        ("implausible_supply", health.implausible_supply),
+        ("diag_reads", health.diag_reads),
+        ("diag_supply_low", health.diag_supply_low),
+        ("diag_supply_high", health.diag_supply_high),
+        ("diag_flash_update", health.diag_flash_update),
+        ("diag_spi", health.diag_spi),
+        ("diag_over_range", health.diag_over_range),
+        ("diag_self_test", health.diag_self_test),
+        ("diag_flash_checksum", health.diag_flash_checksum),
+        ("diag_alarm", health.diag_alarm),
+        ("rereads", health.rereads),
+        ("bus_resets", health.bus_resets),
+        ("sensor_resets", health.sensor_resets),
+        ("reset_lines", health.reset_lines),
     ];
     match counters.get(index) {
         Some((name, count)) => (*count > 0).then(|| text_line(format_args!("{name} {count}"))).into(),

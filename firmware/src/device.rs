@@ -1,11 +1,14 @@
-//! State of the device, and supervision of the sensor: it is probed before its samples are used, and again when it is silent
-//! or suspect.
+//! State of the device, and supervision of the sensor: it is probed before its samples are used, recovered when it is in
+//! trouble, and its status register is read when it reports an error.
 
 use crate::board::Board;
+use crate::estimators::SensorTrouble;
 use crate::learner::Learner;
+use crate::recovery::{RecoveryLadder, RecoveryStep};
 use crate::retained::RetainedSettings;
-use crate::sensor::{SensorIdentity, probe};
-use adis16405_driver::{Config, GyroRange, SamplePeriod, TimeBase};
+use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, probe, read_diagnosis};
+use crate::status_flags::StatusFlags;
+use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
 use core::fmt::Arguments;
 use link::{Boot, Health, MessageRef, text_line};
 
@@ -28,6 +31,10 @@ pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
 
 /// Time between two probes of a sensor that does not answer.
 const RETRY_US: u64 = 1_000_000;
+/// Time for which a sensor that may have lost its supply is left alone: its longest start-up.
+pub(crate) const START_UP_US: u64 = Timing::DEFAULT.start_up_us as u64;
+/// Time for a log to be transmitted before the microcontroller is restarted.
+const FAREWELL_US: u64 = 200_000;
 
 /// What the application knows of itself and of the sensor.
 pub(crate) struct DeviceState {
@@ -42,18 +49,41 @@ pub(crate) struct DeviceState {
     pub(crate) sensor: SensorState,
     pub(crate) learner: Learner,
     pub(crate) epoch_start_us: u64,
-    /// Times that the sensor was lost.
-    pub(crate) recoveries: u32,
     pub(crate) bad_commands: u32,
+    pub(crate) recovery: SensorRecovery,
+    pub(crate) status_flags: StatusFlags,
 }
 
 /// Whether the sensor is in use.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum SensorState {
-    /// To be probed (identified, tested and configured) at this time.
-    Probing { at_us: u64 },
+    /// To be probed at this time, as this step of recovery or, with `None`, because it was requested.
+    Probing { at_us: u64, step: Option<RecoveryStep> },
     /// Sampled since this time.
     Sampled { since_us: u64 },
+    /// The microcontroller is to be restarted at this time.
+    Restarting { at_us: u64 },
+}
+
+/// What has been done to recover the sensor.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SensorRecovery {
+    ladder: RecoveryLadder,
+    /// The sensor has passed its self-test since the start, or since a test was requested.
+    pub(crate) tested: bool,
+    /// Times that the sensor was lost after it had delivered samples.
+    recoveries: u32,
+    rereads: u32,
+    bus_resets: u32,
+    sensor_resets: u32,
+    reset_lines: u32,
+}
+
+impl SensorRecovery {
+    /// Resets the counters.
+    pub(crate) fn reset_counters(&mut self) {
+        *self = Self { ladder: self.ladder, tested: self.tested, ..Self::default() };
+    }
 }
 
 impl DeviceState {
@@ -69,8 +99,13 @@ impl DeviceState {
     pub(crate) fn health(&self, board: &mut impl Board) -> Health {
         let (meters, now_us) = (board.meters(), board.now_us());
         let asleep_permille = (1000 * meters.asleep_us).checked_div(now_us).unwrap_or(0);
-        Health {
-            recoveries: self.recoveries,
+        let recovery = &self.recovery;
+        let mut health = Health {
+            recoveries: recovery.recoveries,
+            rereads: recovery.rereads,
+            bus_resets: recovery.bus_resets,
+            sensor_resets: recovery.sensor_resets,
+            reset_lines: recovery.reset_lines,
             bad_commands: self.bad_commands,
             serial_overruns: meters.serial_overruns,
             awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
@@ -79,59 +114,186 @@ impl DeviceState {
             stack_bytes: meters.stack_bytes,
             stack_size: meters.stack_size,
             ..board.estimators(|estimators| estimators.health())
-        }
+        };
+        self.status_flags.fill(&mut health);
+        health
     }
 
-    /// Probes the sensor when that is due, and stops using one that is silent or suspect.
+    /// Probes the sensor when that is due, and stops using one that is in trouble. Returns true if the microcontroller is to
+    /// be restarted, as the last step of recovery.
     ///
     /// Not inlined: its frame would otherwise be part of that of every model fit.
     #[inline(never)]
-    pub(crate) fn supervise_sensor(&mut self, board: &mut impl Board) {
+    pub(crate) fn supervise_sensor(&mut self, board: &mut impl Board) -> bool {
         let now_us = board.now_us();
         match self.sensor {
-            SensorState::Probing { at_us } if now_us >= at_us => self.probe(board),
+            SensorState::Probing { at_us, step } if now_us >= at_us => self.probe(step, board),
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
-                let (suspect, silent) =
-                    board.estimators(|estimators| (estimators.is_suspect(), estimators.is_silent_at(now_us)));
-                if suspect || silent {
-                    self.recoveries = self.recoveries.saturating_add(1);
-                    let reason = if silent {
-                        "no data-ready edges"
-                    } else {
-                        "silent, edges at another rate, or only zeros or ones"
-                    };
-                    log(board, format_args!("sensor: {reason}; probing it"));
-                    board.set_sampling(false);
-                    self.sensor = SensorState::Probing { at_us: now_us.max(since_us + RETRY_US) };
+                let (trouble, used, settled) = board.estimators(|estimators| {
+                    (estimators.trouble(now_us), estimators.used_since_probe() > 0, estimators.is_settled())
+                });
+                if let Some(trouble) = trouble {
+                    self.recovery.recoveries = self.recovery.recoveries.saturating_add(u32::from(used));
+                    self.recover(trouble, since_us + RETRY_US, board);
+                } else {
+                    if settled {
+                        self.recovery.ladder.settle();
+                    }
+                    self.read_status(board);
+                }
+            }
+            SensorState::Restarting { at_us } => {
+                if now_us >= at_us {
+                    // A board that does restart does not come here again.
+                    self.request_probe(now_us);
+                    return true;
                 }
             }
         }
+        false
     }
 
-    fn probe(&mut self, board: &mut impl Board) {
-        let result = probe(board.sensor_bus(), self.config).map_err(|error| text_line(format_args!("{error}")));
+    /// Has the sensor probed at `at_us`, because that was requested. Sampling must have been disabled.
+    pub(crate) fn request_probe(&mut self, at_us: u64) {
+        self.sensor = SensorState::Probing { at_us, step: None };
+    }
+
+    /// Stops using the sensor and begins the next step of recovery, not before `earliest_us`.
+    fn recover(&mut self, trouble: SensorTrouble, earliest_us: u64, board: &mut impl Board) {
+        let last_edge_us = board.estimators(|estimators| estimators.last_edge_us());
+        board.set_sampling(false);
+        let (reason, cause, left_alone_us) = match trouble {
+            // It may have lost its supply, and must not be clocked while it starts up.
+            SensorTrouble::NoEdges => ("no data-ready edges", "", last_edge_us.unwrap_or(0) + START_UP_US),
+            SensorTrouble::EdgeRate => ("silent, or edges at another rate", "", 0),
+            SensorTrouble::Unusable(cause) => ("unusable bursts: ", cause, 0),
+        };
+        self.take_step(earliest_us.max(left_alone_us), board, format_args!("{reason}{cause}"));
+    }
+
+    /// Begins the next step of recovery at `at_us` or now, whichever is later.
+    fn take_step(&mut self, at_us: u64, board: &mut impl Board, reason: Arguments<'_>) {
         let now_us = board.now_us();
+        let step = self.recovery.ladder.next_step();
+        if self.recovery.ladder.is_logged() || step == RecoveryStep::Restart {
+            log(board, format_args!("sensor: {reason}; {}", step.name()));
+        }
+        self.sensor = match step {
+            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + FAREWELL_US },
+            step => SensorState::Probing { at_us: at_us.max(now_us), step: Some(step) },
+        };
+    }
+
+    fn probe(&mut self, step: Option<RecoveryStep>, board: &mut impl Board) {
+        let mut scope = ProbeScope { pulse: false, reset: false, self_test: !self.recovery.tested };
+        let recovery = &mut self.recovery;
+        match step {
+            None | Some(RecoveryStep::Restart) => {}
+            Some(RecoveryStep::Reread) => count(&mut recovery.rereads),
+            Some(RecoveryStep::BusReset) => {
+                count(&mut recovery.bus_resets);
+                board.reset_bus();
+                scope = ProbeScope { pulse: true, reset: false, self_test: true };
+            }
+            Some(RecoveryStep::ResetLine) if board.reset_sensor() => {
+                count(&mut recovery.reset_lines);
+                recovery.tested = false;
+                return self.request_probe(board.now_us() + START_UP_US);
+            }
+            Some(RecoveryStep::SoftwareReset | RecoveryStep::ResetLine) => {
+                count(&mut recovery.sensor_resets);
+                scope = ProbeScope { pulse: true, reset: true, self_test: true };
+            }
+        }
+        // The sensor may be in low-power mode until it is configured.
+        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
+        let result = probe(board.sensor_bus(), self.config, scope).map_err(|error| text_line(format_args!("{error}")));
+        self.set_clock(clock_limit_hz(self.config), board);
         match result {
-            Ok(SensorIdentity { product, tested, diagnosis }) => {
-                self.product_id = product.prod_id();
-                let test = if tested { "passed" } else { "did not run" };
-                let (product, diagnosis) = (self.product_id, diagnosis.bits());
-                log(board, format_args!("sensor: ADIS{product}, self-test {test}, DIAG_STAT {diagnosis:#06x}"));
+            Ok(identity) => {
+                self.product_id = identity.product.prod_id();
+                self.recovery.tested = true;
+                let product = self.product_id;
+                match identity.test {
+                    Some(test) => {
+                        let (ran, diagnosis) = (if test.ran { "passed" } else { "did not run" }, test.diagnosis.bits());
+                        log(board, format_args!("sensor: ADIS{product}, self-test {ran}, DIAG_STAT {diagnosis:#06x}"));
+                    }
+                    None => log(board, format_args!("sensor: ADIS{product}, configured")),
+                }
+                let now_us = board.now_us();
                 board.estimators(|estimators| estimators.mark_probed(now_us));
                 board.set_sampling(true);
                 self.sensor = SensorState::Sampled { since_us: now_us };
             }
             Err(error) => {
-                log(board, format_args!("sensor: {error}; trying again"));
-                self.sensor = SensorState::Probing { at_us: now_us + RETRY_US };
+                let retry_us = board.now_us() + RETRY_US;
+                self.take_step(retry_us, board, format_args!("{error}"));
             }
+        }
+    }
+
+    /// Sets the serial clock of the sensor's bus, unless the board cannot.
+    fn set_clock(&mut self, limit_hz: u32, board: &mut impl Board) {
+        let clock_hz = board.set_clock_limit(limit_hz);
+        if clock_hz > 0 {
+            self.spi_clock_hz = clock_hz;
+        }
+    }
+
+    /// Disables sampling and sets a serial clock that the sensor takes with `config`; the probe that follows sets it again.
+    ///
+    /// # Errors
+    /// The clock in Hz, if the board has none that is slow enough; sampling goes on.
+    pub(crate) fn prepare_clock(&mut self, config: Config, board: &mut impl Board) -> Result<(), u32> {
+        board.set_sampling(false);
+        self.set_clock(clock_limit_hz(config), board);
+        if self.spi_clock_hz <= clock_limit_hz(config) {
+            return Ok(());
+        }
+        let clock_hz = self.spi_clock_hz;
+        self.set_clock(clock_limit_hz(self.config), board);
+        board.set_sampling(self.is_sampled());
+        Err(clock_hz)
+    }
+
+    /// Reads DIAG_STAT, which clears it, if the sensor has its error flag set: in the first half of a sample period, so that
+    /// the next burst is not missed, and once a second at most.
+    fn read_status(&mut self, board: &mut impl Board) {
+        let now_us = board.now_us();
+        let half_period_us = (5e5 / self.config.sample_period().hz()) as u64;
+        let due = board.estimators(|estimators| {
+            let since_edge = estimators.last_edge_us().map(|edge_us| now_us.saturating_sub(edge_us));
+            estimators.has_error_flag() && since_edge.is_some_and(|since_us| since_us < half_period_us)
+        });
+        if !due || !self.status_flags.is_due(now_us) {
+            return;
+        }
+        board.set_sampling(false);
+        let diagnosis = read_diagnosis(board.sensor_bus(), self.config);
+        board.set_sampling(true);
+        board.estimators(|estimators| estimators.clear_error_flag());
+        if let Some(causes) = self.status_flags.add(diagnosis, now_us) {
+            log(board, format_args!("sensor: DIAG_STAT {causes}"));
         }
     }
 }
 
+/// Largest serial clock that the sensor takes with a configuration, in Hz.
+fn clock_limit_hz(config: Config) -> u32 {
+    match config.sample_period().clock_mode() {
+        ClockMode::Normal => BURST_LIMIT_HZ,
+        ClockMode::LowPower => LOW_POWER_LIMIT_HZ,
+    }
+}
+
+fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}
+
 /// Sends a text as a log message, which host programs receive too.
-fn log(board: &mut impl Board, text: Arguments<'_>) {
+pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));
 }

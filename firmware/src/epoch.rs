@@ -65,8 +65,7 @@ impl FinishedEpoch {
     /// The covariances of the channels; `None` if they do not cover all samples of the channels, as after a restart.
     #[must_use]
     pub fn covariances(&self) -> Option<&AllanCovariances> {
-        let complete = (0..CHANNELS.len()).all(|index| self.samples(index) == self.covariances.samples);
-        complete.then_some(&self.covariances)
+        self.covariances.complete.then_some(&self.covariances)
     }
 }
 

@@ -1,27 +1,63 @@
 //! The path of every sample: data-ready monitor, burst validation, statistics; and the counters of samples not used.
 
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
-use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, Statistics};
+use crate::channel_validity::{is_marked, refused_channels, supply_is_plausible};
+use crate::channels::ChannelSet;
+use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
 use adis16405_driver::{Burst, BurstValidator, Config, Faults};
 use heapless::spsc;
 use link::{Health, MessageRef};
 
-/// Consecutive bursts of only zeros or only ones from which on the sensor is suspect.
-const STUCK_BURSTS: u32 = 16;
+/// Unusable bursts in a row from which on the sensor is in trouble. Every usable burst makes up for half an unusable one.
+const UNUSABLE_BURSTS: u32 = 16;
 
-/// The estimators of all channels, which take the same samples and have the same gaps.
+/// Bursts in a row with equal inertial words, in lengths of the sensor's filter, from which on it is frozen. Neighbours behind
+/// the filter are often equal by chance, but not for so long.
+const FROZEN_FILTER_LENGTHS: u32 = 4;
+/// The same in bursts, where that is more.
+const FROZEN_BURSTS: u32 = 16;
+
+/// Bursts used since the sensor was probed from which on it is known to work; behind a long filter twice as many as a frozen
+/// sensor delivers before it is found out.
+const SETTLED_BURSTS: u32 = 100;
+
+/// Why the sensor must be probed before its samples are used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SensorTrouble {
+    /// No data-ready edge has come for several periods.
+    NoEdges,
+    /// There was such a silence, or the edges come at another rate.
+    EdgeRate,
+    /// Burst after burst was unusable, the latest one for this cause.
+    Unusable(&'static str),
+}
+
+/// The estimators of all channels. A sample that never arrived is missing in all of them, one that was refused in a channel
+/// in that channel alone.
 ///
 /// The [`Statistics`] are borrowed, so that a board can place them in memory that is zero at the start.
 pub struct Estimators<'m> {
     config: Config,
     statistics: &'m mut Statistics,
+    /// Losses of the epoch that was finished last.
+    finished_losses: SampleLosses,
     validator: BurstValidator,
     monitor: DataReadyMonitor,
     /// Counters of sampling and estimating; those of the validator are added when they are read.
     health: Health,
-    /// Consecutive bursts of only zeros or only ones.
-    stuck: u32,
+    /// Rises by 2 with every unusable burst, falls by 1 with every usable one.
+    unusable: u32,
+    /// Cause of the latest unusable burst.
+    unusable_cause: &'static str,
+    /// Bursts in a row whose inertial words equal those of the burst before.
+    repeated: u32,
+    /// Bursts used since the sensor was probed.
+    used_since_probe: u32,
+    /// The latest burst that a sensor can have sent had its error flag set.
+    error_flag: bool,
+    /// Bursts taken from the queue; wraps.
+    processed: u32,
     /// Number of the next sample since sampling began at this rate.
     next_sample: u64,
     raw_stream: RawStream,
@@ -35,8 +71,14 @@ impl<'m> Estimators<'m> {
             statistics,
             validator: BurstValidator::default(),
             monitor: DataReadyMonitor::new(config.sample_period()),
+            finished_losses: SampleLosses::NONE,
             health: Health::default(),
-            stuck: 0,
+            unusable: 0,
+            unusable_cause: "",
+            repeated: 0,
+            used_since_probe: 0,
+            error_flag: false,
+            processed: 0,
             next_sample: 0,
             raw_stream: RawStream::off(),
         }
@@ -45,6 +87,7 @@ impl<'m> Estimators<'m> {
     /// Processes the burst of one data-ready edge; `waiting` is the number of further bursts in the queue. Returns true if a
     /// message of the raw stream is full now.
     pub fn process(&mut self, timed: TimedBurst, waiting: usize) -> bool {
+        self.processed = self.processed.wrapping_add(1);
         let health = &mut self.health;
         health.queue_peak = health.queue_peak.max(u32::try_from(waiting).unwrap_or(u32::MAX).saturating_add(1));
         add(&mut health.queue_full, timed.dropped);
@@ -54,7 +97,7 @@ impl<'m> Estimators<'m> {
         };
         let missing = periods.saturating_sub(1);
         add(&mut health.lost_edges, missing.saturating_sub(timed.dropped));
-        self.gap(missing);
+        self.statistics.lose(missing);
         self.next_sample += u64::from(missing) + 1;
         let full =
             timed.burst.as_ref().is_some_and(|burst| self.raw_stream.push(burst, self.next_sample - 1, timed.at_us));
@@ -65,19 +108,57 @@ impl<'m> Estimators<'m> {
     /// Whether the sensor must be probed before its samples are used again.
     #[must_use]
     pub fn is_suspect(&self) -> bool {
-        self.monitor.is_suspect() || self.stuck >= STUCK_BURSTS
+        self.monitor.is_suspect() || self.unusable >= 2 * UNUSABLE_BURSTS
     }
 
-    /// Whether no data-ready edge has come for so long before `now_us` that the sensor may be disconnected or reset.
+    /// Why the sensor must be probed at `now_us`; `None` if it need not be.
+    pub(crate) fn trouble(&self, now_us: u64) -> Option<SensorTrouble> {
+        if self.monitor.is_silent_at(now_us) {
+            Some(SensorTrouble::NoEdges)
+        } else if self.monitor.is_suspect() {
+            Some(SensorTrouble::EdgeRate)
+        } else {
+            self.is_suspect().then_some(SensorTrouble::Unusable(self.unusable_cause))
+        }
+    }
+
+    /// Time of the latest data-ready edge, µs; `None` before the first.
+    pub(crate) fn last_edge_us(&self) -> Option<u64> {
+        self.monitor.last_edge_us()
+    }
+
+    /// Whether the sensor has its error flag set.
+    pub(crate) fn has_error_flag(&self) -> bool {
+        self.error_flag
+    }
+
+    /// DIAG_STAT was read, which clears the error flag until its cause comes back.
+    pub(crate) fn clear_error_flag(&mut self) {
+        self.error_flag = false;
+    }
+
+    /// Bursts used since the sensor was probed.
+    pub(crate) fn used_since_probe(&self) -> u32 {
+        self.used_since_probe
+    }
+
+    /// Whether so many bursts were used since the sensor was probed that it is known to work.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.used_since_probe >= SETTLED_BURSTS.max(2 * self.frozen_after())
+    }
+
+    /// Number of bursts taken from the queue, modulo 2³².
     #[must_use]
-    pub fn is_silent_at(&self, now_us: u64) -> bool {
-        self.monitor.is_silent_at(now_us)
+    pub fn processed(&self) -> u32 {
+        self.processed
     }
 
     /// Clears the suspicion, so that samples are used again: the sensor was probed and configured at `now_us`.
     pub fn mark_probed(&mut self, now_us: u64) {
         self.monitor.mark_probed(now_us);
-        self.stuck = 0;
+        self.unusable = 0;
+        self.used_since_probe = 0;
+        self.error_flag = false;
     }
 
     /// Starts again without samples, for a sensor that has the configuration `config` from now on. The raw stream stays on
@@ -95,12 +176,14 @@ impl<'m> Estimators<'m> {
     /// Passes the statistics of the epoch to `take` and starts the next epoch with the next sample; the counters go on.
     pub(crate) fn end_epoch(&mut self, take: impl FnOnce(&Statistics)) {
         take(self.statistics);
+        self.finished_losses = self.statistics.losses;
         self.statistics.reset();
     }
 
     /// Resets statistics and counters. The data-ready monitor and the sample numbers go on.
     pub fn reset(&mut self) {
         self.statistics.reset();
+        self.finished_losses = SampleLosses::NONE;
         self.validator = BurstValidator::default();
         self.health = Health::default();
     }
@@ -118,9 +201,12 @@ impl<'m> Estimators<'m> {
 
     /// Has the estimator of [`CHANNELS`]`[index]` continue from sums of before a restart.
     pub fn restore(&mut self, index: usize, sums: &ChannelSums) {
-        if let Some(estimator) = self.statistics.estimators.get_mut(index) {
-            sums.restore(estimator);
-        }
+        self.statistics.restore(index, sums);
+    }
+
+    /// Samples lost and refused in the running epoch, or in the finished one.
+    pub(crate) fn losses(&self, finished: bool) -> SampleLosses {
+        if finished { self.finished_losses } else { self.statistics.losses }
     }
 
     /// The configuration that the sensor is assumed to have.
@@ -141,14 +227,13 @@ impl<'m> Estimators<'m> {
         let counters = self.validator.counters();
         Health {
             bursts: counters.bursts,
-            used: counters.bursts - counters.unusable,
             no_new_data: counters.get(Faults::NO_NEW_DATA),
             error_alarm: counters.get(Faults::ERROR_ALARM),
             supply: counters.get(Faults::SUPPLY),
             stuck_low: counters.get(Faults::STUCK_LOW),
             stuck_high: counters.get(Faults::STUCK_HIGH),
             shifted: counters.get(Faults::SHIFTED),
-            frozen: counters.get(Faults::FROZEN),
+            frozen: counters.get(Faults::FROZEN).saturating_add(self.health.frozen),
             impossible_rate: counters.get(Faults::IMPOSSIBLE_RATE),
             x_sign: counters.get(Faults::X_SIGN),
             repeated: counters.get(Faults::REPEATED),
@@ -156,33 +241,50 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Validates a burst and adds it to the statistics; a burst that is not used is a gap of one sample.
+    /// Validates a burst and adds its channels to the statistics, except those that are refused.
     fn add_burst(&mut self, burst: Option<&Burst>) {
         let Some(burst) = burst else {
             add(&mut self.health.bus_errors, 1);
-            self.gap(1);
-            return;
+            self.statistics.lose(1);
+            return self.mark_unusable("bus error");
         };
         if self.is_suspect() {
             add(&mut self.health.suspect, 1);
-            self.gap(1);
+            self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
             return;
         }
-        let validity = self.validator.validate(burst);
-        let stuck = validity.faults.intersects(Faults::STUCK_LOW | Faults::STUCK_HIGH);
-        self.stuck = if stuck { self.stuck + 1 } else { 0 };
-        if !validity.usable {
-            self.gap(1);
-            return;
+        let mut faults = self.validator.validate(burst).faults;
+        self.repeated = if faults.contains(Faults::REPEATED) { self.repeated.saturating_add(1) } else { 0 };
+        if self.repeated >= self.frozen_after() && !faults.contains(Faults::FROZEN) {
+            faults |= Faults::FROZEN;
+            add(&mut self.health.frozen, 1);
         }
+        let refused = refused_channels(burst, faults);
         let counts = burst.counts();
-        self.statistics.push(CHANNELS.map(|channel| i32::from(counts.get(channel))));
+        self.statistics.push(CHANNELS.map(|channel| i32::from(counts.get(channel))), refused);
+        if refused.has_all_inertial() {
+            let damaged = Faults::STUCK_LOW | Faults::STUCK_HIGH | Faults::SHIFTED | Faults::NO_NEW_DATA;
+            let implausible = !supply_is_plausible(burst) && !faults.intersects(damaged);
+            add(&mut self.health.implausible_supply, u32::from(implausible));
+            return self.mark_unusable(faults.cause().unwrap_or_default());
+        }
+        self.unusable = self.unusable.saturating_sub(1);
+        self.used_since_probe = self.used_since_probe.saturating_add(1);
+        self.error_flag = faults.contains(Faults::ERROR_ALARM);
+        let health = &mut self.health;
+        add(&mut health.used, 1);
+        add(&mut health.partly_used, u32::from(!refused.is_empty()));
+        add(&mut health.marked, u32::from(is_marked(faults)));
     }
 
-    fn gap(&mut self, missing: u32) {
-        for estimator in &mut self.statistics.estimators {
-            estimator.gap(missing);
-        }
+    /// Repetitions from which on the sensor is frozen. The filter is two averages of 2^M samples.
+    fn frozen_after(&self) -> u32 {
+        (FROZEN_FILTER_LENGTHS << (self.config.filter_taps_log2() + 1)).max(FROZEN_BURSTS)
+    }
+
+    fn mark_unusable(&mut self, cause: &'static str) {
+        self.unusable = self.unusable.saturating_add(2);
+        self.unusable_cause = cause;
     }
 }
 

@@ -12,10 +12,13 @@
 //! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
 //! | [`sensor`] | serial clock, probing, auto-null |
 //! | `estimators` | the path of every sample into the statistics, health counters |
-//! | `statistics` | exact sums of a channel and of pairs of channels; curve, baseline model and report made of them |
+//! | `channel_validity` | which channels of a burst are refused, by its faults |
+//! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve, baseline model and report made of them |
 //! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
 //! | `device` | state of the device, supervision of the sensor |
+//! | `recovery`, `status_flags` | steps by which a sensor in trouble is recovered; what its status register has shown |
+//! | `task_monitor` | proof that every task is alive, for the watchdog |
 //! | `report`, [`console`] | reports in frames, answers in text |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
@@ -30,9 +33,12 @@
 pub mod acquisition;
 mod app;
 mod board;
+mod channel_validity;
+mod channels;
 pub mod command;
 pub mod console;
 mod crash_record;
+mod cross_sums;
 mod device;
 pub mod epoch;
 mod estimators;
@@ -40,13 +46,16 @@ pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 #[allow(unsafe_code, reason = "registers, and memory that is not initialised at the start")]
 pub mod microcontroller;
+mod recovery;
 mod report;
 pub mod retained;
 pub mod sensor;
 mod statistics;
+mod status_flags;
+mod task_monitor;
 mod transmit;
 
-pub use acquisition::{BurstQueue, Sampler, TimedBurst};
+pub use acquisition::{BurstQueue, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
 pub use board::{Board, BoardContext, BoardMeters, Chip, Locks, Uptime};
 pub use crash_record::CrashRecord;

@@ -67,7 +67,9 @@ impl DeviceState {
         let model = self.learner.models.get(index);
         let unseen_error = model.and_then(|model| self.unseen_error(model, channel, sums));
         let baseline = model.map(|_| sums.fit_baseline(channel, self.config));
-        send_channel_message(board, channel, sums, baseline.as_ref(), unseen_error);
+        let losses = board.estimators(|estimators| estimators.losses(ends_epoch));
+        let lost = (losses.lost, losses.refused[index]);
+        send_channel_message(board, channel, sums, lost, baseline.as_ref(), unseen_error);
     }
 
     #[inline(never)]
@@ -98,10 +100,12 @@ fn send_channel_message(
     board: &mut impl Board,
     channel: Channel,
     sums: &ChannelSums,
+    (lost, refused): (u64, u64),
     baseline: Option<&Model>,
     unseen_error: Option<ReportedModelError>,
 ) {
-    let report = sums.report(channel, baseline, unseen_error);
+    let mut report = sums.report(channel, baseline, unseen_error);
+    (report.lost, report.refused) = (lost, refused);
     send(board, MessageRef::Channel(&report));
 }
 

@@ -1,6 +1,6 @@
 //! The sensor's bus apart from sampling: serial clock, probing (identify, test, configure), auto-null.
 
-use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product};
+use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product, Register, SelfTest, Timing};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -31,15 +31,24 @@ pub const fn prescaled_clock_hz(bus_hz: u32, field: u8) -> u32 {
     bus_hz.div_ceil(1 << (field as u32 % 8 + 1))
 }
 
+/// How thoroughly a sensor is probed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProbeScope {
+    /// First end an unfinished frame, and wake a sensor that sleeps, by a pulse on chip select.
+    pub pulse: bool,
+    /// First reset the sensor by its command.
+    pub reset: bool,
+    /// Run the self-test.
+    pub self_test: bool,
+}
+
 /// A sensor that has passed a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SensorIdentity {
     /// Product that answered.
     pub product: Product,
-    /// Whether the self-test was seen to run; a sensor in sleep mode runs none.
-    pub tested: bool,
-    /// DIAG_STAT after the self-test.
-    pub diagnosis: Diagnosis,
+    /// The self-test, if it was requested.
+    pub test: Option<SelfTest>,
 }
 
 /// Why a probe has failed.
@@ -74,11 +83,17 @@ impl<E: fmt::Debug> fmt::Display for ProbeError<E> {
 pub fn probe<SPI: SpiDevice<u8>>(
     (bus, delay): (SPI, impl DelayNs),
     config: Config,
+    scope: ProbeScope,
 ) -> Result<SensorIdentity, ProbeError<SPI::Error>> {
-    let mut sensor = Adis16405::new(bus, delay, config);
-    let product = sensor.init()?;
-    let test = sensor.self_test()?;
-    if test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES) {
+    // The sensor may be in low-power mode until it is configured.
+    let mut sensor = Adis16405::new(bus, delay, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power);
+    if scope.pulse {
+        // Whether the sensor answers is for the steps below to find out.
+        let _ = sensor.wake();
+    }
+    let product = if scope.reset { sensor.software_reset()? } else { sensor.init()? };
+    let test = if scope.self_test { Some(sensor.self_test()?) } else { None };
+    if let Some(test) = test.filter(|test| test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES)) {
         return Err(ProbeError::SelfTest(test.diagnosis));
     }
     // With such a bias, bursts lose the sign of negative x rates (erratum). The Allan variance does not depend on the bias.
@@ -86,7 +101,17 @@ pub fn probe<SPI: SpiDevice<u8>>(
         sensor.keep_negative_x_bias_on_host()?;
     }
     sensor.set_data_ready(Some(DioSignal::default()))?;
-    Ok(SensorIdentity { product, tested: test.ran, diagnosis: test.diagnosis })
+    Ok(SensorIdentity { product, test })
+}
+
+/// Reads DIAG_STAT, which clears it. `None` if the sensor does not answer: the bus failed, or all bits are set, of which one
+/// is not defined.
+pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
+    (bus, delay): (SPI, impl DelayNs),
+    config: Config,
+) -> Option<Diagnosis> {
+    let answer = Adis16405::new(bus, delay, config).read_register(Register::DiagStat).ok()?;
+    (answer != u16::MAX).then(|| Diagnosis::from_bits_truncate(answer))
 }
 
 /// Has the sensor store its present gyro output as the bias; it must be still.

@@ -1,28 +1,16 @@
 //! Statistics of the running epoch: exact sums for every channel and every pair of channels, and the curve, baseline model
 //! and report that are made of one channel's sums.
 
+pub use crate::channels::{CHANNELS, ChannelEstimator, OCTAVES, OVERLAP};
+pub(crate) use crate::channels::{GYROS, INERTIAL};
+pub(crate) use crate::cross_sums::{AllanCovariances, CROSS_OCTAVES, ChannelMeans, FIRST_CROSS_OCTAVE};
+
+use crate::channels::ChannelSet;
+use crate::cross_sums::CrossSums;
 use adis16405_driver::{Channel, Config};
 use allan_core::{Cascade, Curve, Model, NoiseTerm, OctaveSums, fit::fit, model};
 use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
-
-/// Channels that are estimated, by index: the six inertial channels, then the covariates temperature and supply.
-pub const CHANNELS: [Channel; 8] = {
-    let [a, b, c, d, e, f] = Channel::INERTIAL;
-    [a, b, c, d, e, f, Channel::Temp, Channel::Supply]
-};
-/// Number of inertial channels, which come first in [`CHANNELS`] and have models.
-pub(crate) const INERTIAL: usize = Channel::INERTIAL.len();
-/// Number of gyros, which come first in [`CHANNELS`].
-pub(crate) const GYROS: usize = 3;
-
-/// Octaves of averaging factors on the device: up to 2²³ samples, 11 hours at 204.8 samples a second.
-pub const OCTAVES: usize = 24;
-/// Overlap of the second differences on the device.
-pub const OVERLAP: usize = 8;
-
-/// The streaming estimator of one channel.
-pub type ChannelEstimator = Cascade<OCTAVES, OVERLAP>;
 
 /// The statistics of the running epoch.
 #[derive(Debug)]
@@ -31,27 +19,82 @@ pub struct Statistics {
     pub(crate) estimators: [ChannelEstimator; CHANNELS.len()],
     /// Sums over pairs of channels.
     pub(crate) cross_sums: CrossSums,
+    pub(crate) losses: SampleLosses,
+}
+
+/// Samples missing in [`Statistics`], since these began or, after a restart of the device, since that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SampleLosses {
+    /// Samples that never arrived, in all channels.
+    pub(crate) lost: u64,
+    /// Samples that arrived and were refused in a channel, for each of [`CHANNELS`].
+    pub(crate) refused: [u64; CHANNELS.len()],
+}
+
+impl SampleLosses {
+    /// No losses.
+    pub(crate) const NONE: Self = Self { lost: 0, refused: [0; CHANNELS.len()] };
 }
 
 impl Statistics {
     /// Statistics of no sample.
     #[must_use]
     pub const fn new() -> Self {
-        Self { estimators: [const { ChannelEstimator::new() }; CHANNELS.len()], cross_sums: CrossSums::new() }
+        Self {
+            estimators: [const { ChannelEstimator::new() }; CHANNELS.len()],
+            cross_sums: CrossSums::new(),
+            losses: SampleLosses::NONE,
+        }
     }
 
-    /// Takes one sample of every channel.
-    pub(crate) fn push(&mut self, counts: [i32; CHANNELS.len()]) {
-        for (estimator, count) in self.estimators.iter_mut().zip(counts) {
-            estimator.push(count);
+    /// Takes one sample of every channel, except of those that are `refused`: in these it is missing.
+    pub(crate) fn push(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
+        if refused.is_empty() {
+            for (estimator, count) in self.estimators.iter_mut().zip(counts) {
+                estimator.push(count);
+            }
+        } else {
+            self.push_some(counts, refused);
         }
-        self.cross_sums.add(&self.estimators, counts);
+        self.cross_sums.add(&self.estimators, counts, refused);
+    }
+
+    /// Not inlined: refused samples are rare.
+    #[inline(never)]
+    fn push_some(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
+        let channels = self.estimators.iter_mut().zip(counts).zip(&mut self.losses.refused);
+        for (index, ((estimator, count), refusals)) in channels.enumerate() {
+            if refused.contains(index) {
+                estimator.gap(1);
+                *refusals = refusals.saturating_add(1);
+            } else {
+                estimator.push(count);
+            }
+        }
+    }
+
+    /// A number of samples of all channels never arrived.
+    pub(crate) fn lose(&mut self, missing: u32) {
+        self.losses.lost = self.losses.lost.saturating_add(u64::from(missing));
+        for estimator in &mut self.estimators {
+            estimator.gap(missing);
+        }
+    }
+
+    /// Has the estimator of [`CHANNELS`]`[index]` continue from sums of before a restart, which the sums over pairs do not
+    /// cover.
+    pub(crate) fn restore(&mut self, index: usize, sums: &ChannelSums) {
+        if let Some(estimator) = self.estimators.get_mut(index) {
+            sums.restore(estimator);
+            self.cross_sums.mark_incomplete();
+        }
     }
 
     /// Discards all samples.
     pub(crate) fn reset(&mut self) {
         self.estimators.iter_mut().for_each(Cascade::reset);
         self.cross_sums.reset();
+        self.losses = SampleLosses::NONE;
     }
 }
 
@@ -68,7 +111,7 @@ impl Default for Statistics {
 pub struct ChannelSums {
     /// Samples taken.
     pub samples: u64,
-    /// Samples missing between them.
+    /// Samples missing between them: lost or refused.
     pub missing: u64,
     /// For every octave the sum of the squared second differences in counts², and their number.
     pub octaves: [(u128, u64); OCTAVES],
@@ -118,7 +161,7 @@ impl ChannelSums {
         model_error(model, &curve)
     }
 
-    /// The report on one channel; `unseen_error` is that of the previous epoch's model.
+    /// The report on one channel, without losses; `unseen_error` is that of the previous epoch's model.
     #[must_use]
     pub fn report(
         &self,
@@ -133,6 +176,8 @@ impl ChannelSums {
             octaves: Vec::new(),
             coefficients: Vec::new(),
             unseen_error,
+            lost: 0,
+            refused: 0,
         };
         let octaves = self.octaves.iter().enumerate().filter(|(_, (_, count))| *count > 0);
         let octaves = octaves.map(|(octave, &(sum, count))| ReportedOctave { n: 1 << octave, sum, count });
@@ -169,129 +214,5 @@ pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
         NoiseTerm::Markov(_) => ReportedTerm::Markov,
         NoiseTerm::Resonance(_) => ReportedTerm::Resonance,
         NoiseTerm::Sinusoid(_) => ReportedTerm::Sinusoid,
-    }
-}
-
-/// First octave of the cross sums: 256 samples. Covariates act slowly, and the sums over pairs are updated once in 32
-/// samples at most, an eighth of this octave's averaging time.
-pub(crate) const FIRST_CROSS_OCTAVE: usize = 8;
-/// Octaves of the cross sums: up to 2¹⁹ samples, 43 minutes at 204.8 samples a second.
-pub(crate) const CROSS_OCTAVES: usize = 12;
-/// Pairs of channels of which one may be a regressor of the other: all but the pairs of two gyros.
-const PAIRS: [(usize, usize); 25] = {
-    let mut pairs = [(0, 0); 25];
-    let (mut low, mut at) = (0, 0);
-    while low < CHANNELS.len() {
-        let mut high = if low < GYROS { GYROS } else { low + 1 };
-        while high < CHANNELS.len() {
-            pairs[at] = (low, high);
-            (high, at) = (high + 1, at + 1);
-        }
-        low += 1;
-    }
-    assert!(at == pairs.len());
-    pairs
-};
-
-/// Sums of products of the second differences of pairs of channels, octave by octave, and the sum of every channel's counts,
-/// over the samples that all channels have taken.
-///
-/// A count has 14 bits, so a difference is within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum exceeds
-/// 2⁷¹·n ≤ 2⁹⁰. A sum takes 96 bits: a low word of 64 and a high word of 32 bits.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct CrossSums {
-    low: [[u64; PAIRS.len()]; CROSS_OCTAVES],
-    high: [[i32; PAIRS.len()]; CROSS_OCTAVES],
-    /// Products in each octave's sums.
-    counts: [u64; CROSS_OCTAVES],
-    totals: [i64; CHANNELS.len()],
-    samples: u64,
-}
-
-impl CrossSums {
-    const fn new() -> Self {
-        let (low, high) = ([[0; PAIRS.len()]; CROSS_OCTAVES], [[0; PAIRS.len()]; CROSS_OCTAVES]);
-        Self { low, high, counts: [0; CROSS_OCTAVES], totals: [0; CHANNELS.len()], samples: 0 }
-    }
-
-    fn reset(&mut self) {
-        // In place: assigning a new value would build it, 3.8 kB, on the stack first.
-        self.low.fill([0; PAIRS.len()]);
-        self.high.fill([0; PAIRS.len()]);
-        (self.counts, self.totals, self.samples) = ([0; CROSS_OCTAVES], [0; CHANNELS.len()], 0);
-    }
-
-    /// Adds the counts that all estimators have just taken, and the second differences that these completed.
-    fn add(&mut self, estimators: &[ChannelEstimator; CHANNELS.len()], counts: [i32; CHANNELS.len()]) {
-        self.samples += 1;
-        for (total, count) in self.totals.iter_mut().zip(counts) {
-            *total += i64::from(count);
-        }
-        for (octave, count) in (FIRST_CROSS_OCTAVE..).zip(&mut self.counts) {
-            if estimators[0].newest_difference(octave).is_none() {
-                return; // longer octaves have completed none either
-            }
-            // All channels have the same gaps, so they complete their differences together.
-            let differences =
-                estimators.each_ref().map(|estimator| estimator.newest_difference(octave).unwrap_or_default());
-            let row = octave - FIRST_CROSS_OCTAVE;
-            let sums = self.low[row].iter_mut().zip(&mut self.high[row]);
-            for ((low, high), (a, b)) in sums.zip(PAIRS) {
-                let sum = wide(*low, *high) + i128::from(differences[a]) * i128::from(differences[b]);
-                (*low, *high) = (sum as u64, (sum >> 64) as i32);
-            }
-            *count += 1;
-        }
-    }
-}
-
-fn wide(low: u64, high: i32) -> i128 {
-    i128::from(high) << 64 | i128::from(low)
-}
-
-/// Mean of every channel of [`CHANNELS`] in counts.
-pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
-
-/// Allan covariances and means of a finished epoch, rounded from its [`CrossSums`]: nothing is added to them any more.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AllanCovariances {
-    /// Allan covariance of each pair at each octave in counts².
-    pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
-    counts: [u64; CROSS_OCTAVES],
-    /// Mean of every channel; 0 without samples.
-    pub means: ChannelMeans,
-    /// Samples that all channels took together.
-    pub samples: u64,
-}
-
-impl AllanCovariances {
-    /// Covariances of no samples.
-    pub const EMPTY: Self = Self {
-        pairs: [[0.0; CROSS_OCTAVES]; PAIRS.len()],
-        counts: [0; CROSS_OCTAVES],
-        means: [0.0; CHANNELS.len()],
-        samples: 0,
-    };
-
-    /// Overwrites them with those of an epoch's sums, in place: 2.6 kB.
-    pub(crate) fn fill(&mut self, sums: &CrossSums) {
-        (self.counts, self.samples) = (sums.counts, sums.samples);
-        self.means = sums.totals.map(|total| total as f64 / sums.samples.max(1) as f64);
-        for (pair, covariances) in self.pairs.iter_mut().enumerate() {
-            for (k, covariance) in covariances.iter_mut().enumerate() {
-                let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, sums.counts[k].max(1) as f64);
-                *covariance = wide(sums.low[k][pair], sums.high[k][pair]) as f64 / (2.0 * count * n * n);
-            }
-        }
-    }
-
-    /// Allan covariance of two channels at averaging factor `n`, in the product of their counts; `None` where it was not
-    /// estimated, as for two gyros.
-    #[must_use]
-    pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
-        let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
-        let octave = (n.trailing_zeros() as usize).checked_sub(FIRST_CROSS_OCTAVE).filter(|_| n.is_power_of_two())?;
-        let known = *self.counts.get(octave)? > 0;
-        known.then(|| self.pairs[pair][octave])
     }
 }

@@ -234,13 +234,70 @@ fn damaged_bursts_are_counted_by_cause() {
         with_rate(5),
     ];
     let health = health_after(damaged);
-    assert_eq!((health.bursts, health.used), (7, 4), "{health:?}");
+    assert_eq!((health.bursts, health.used, health.partly_used), (7, 6, 2), "{health:?}");
     assert_eq!((health.impossible_rate, health.shifted, health.frozen, health.x_sign), (2, 1, 0, 0), "{health:?}");
 }
 
-/// The 513th of equal bursts is the first with 512 before it.
+/// The default filter of two averages of four samples is eight samples long: the 33rd of equal bursts is the first with four
+/// lengths of it before it. After 16 more the sensor is in trouble.
 #[test]
 fn a_frozen_sensor_is_counted() {
     let health = health_after(core::iter::repeat_n(with_rate(1), 600));
-    assert_eq!((health.bursts, health.frozen, health.used), (600, 88, 512), "{health:?}");
+    assert_eq!((health.bursts, health.frozen, health.used), (48, 16, 32), "{health:?}");
+    assert_eq!(health.suspect, 600 - 48);
+}
+
+/// Samples and missing samples of every channel after these bursts.
+fn samples_after(bursts: &[Burst]) -> [(u64, u64); CHANNELS.len()] {
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, Config::default());
+    for (period, burst) in (0..).zip(bursts) {
+        estimators.process(timed(period, Some(*burst)), 0);
+    }
+    core::array::from_fn(|index| {
+        let estimator = estimators.channel(index).unwrap();
+        (estimator.len(), estimator.missing())
+    })
+}
+
+/// A rate that the sensor cannot measure is missing in that gyro, and a word that was not refreshed in its channel.
+#[test]
+fn a_sample_that_is_refused_in_one_channel_is_missing_in_that_channel_alone() {
+    let mut stale = with_rate(2);
+    stale.words[Channel::AcclY as usize].0 &= 0x7FFF;
+    let samples = samples_after(&[with_rate(1), with_rate(7_001), stale, with_rate(3)]);
+    let mut expected = [(4, 0); CHANNELS.len()];
+    (expected[0], expected[4]) = ((3, 1), (3, 1));
+    assert_eq!(samples, expected);
+}
+
+/// 4.70 V, as from a USB port, with the error flag that the sensor sets then: a warning in every burst, and no sample is lost.
+#[test]
+fn a_low_supply_and_the_error_flag_mark_samples_and_refuse_none() {
+    let low = |k: i16| {
+        let mut burst = with_rate(k);
+        burst.words[0] = OutputWord::from_counts(Channel::Supply, 1944);
+        burst.words.iter_mut().for_each(|word| word.0 |= 0x4000);
+        burst
+    };
+    let bursts: Vec<Burst> = (0..100).map(low).collect();
+    assert_eq!(samples_after(&bursts), [(100, 0); CHANNELS.len()]);
+    let health = health_after(bursts);
+    assert_eq!((health.used, health.supply, health.error_alarm), (100, 100, 100), "{health:?}");
+}
+
+/// A bus that damages every other burst is in trouble; one that damages a quarter of them, or one a second, is not.
+#[test]
+fn scattered_unusable_bursts_are_no_trouble() {
+    let suspect_with_one_in = |every: u32| {
+        let mut statistics = Statistics::new();
+        let mut estimators = Estimators::new(&mut statistics, Config::default());
+        (0..10_000_u32).any(|period| {
+            let good = with_rate((period % 100) as i16);
+            let burst = if period % every == 0 { shifted(&good) } else { good };
+            estimators.process(timed(period, Some(burst)), 0);
+            estimators.is_suspect()
+        })
+    };
+    assert_eq!([2, 4, 819].map(suspect_with_one_in), [true, false, false]);
 }

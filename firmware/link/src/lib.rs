@@ -1,4 +1,4 @@
-//! The wire format between the firmware and the host, version 3.
+//! The wire format between the firmware and the host, version 4.
 //!
 //! **Frames.** A frame carries one [`Message`]: format version (`u8`), sequence number (`u16`) and message, serialised by
 //! postcard, then the CRC-32 (ISO-HDLC, little endian) of these bytes. The whole is COBS-encoded, so that it contains no

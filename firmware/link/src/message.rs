@@ -133,7 +133,7 @@ pub struct ChannelMessage {
     pub channel: u8,
     /// Samples that the estimator has taken.
     pub samples: u64,
-    /// Samples missing between them.
+    /// Samples missing between them, for whatever reason. Time goes on through them.
     pub missing: u64,
     /// Sums of every octave, by rising averaging factor.
     pub octaves: Vec<ReportedOctave, MAX_OCTAVES>,
@@ -141,6 +141,11 @@ pub struct ChannelMessage {
     pub coefficients: Vec<ReportedCoefficient, MAX_COEFFICIENTS>,
     /// Error of the previous epoch's model on this epoch's curve; `None` without a previous model or a curve.
     pub unseen_error: Option<ReportedModelError>,
+    /// Missing samples that never arrived: edges that did not come, failed transfers, bursts dropped because the queue was
+    /// full. Counted since the epoch began or the device started.
+    pub lost: u64,
+    /// Missing samples that arrived and were refused in this channel, counted likewise. [`Health`] has the causes.
+    pub refused: u64,
 }
 
 /// Sums of one averaging factor of one channel, as exact integers.
@@ -333,13 +338,13 @@ pub struct RawBurst {
 pub struct Health {
     /// Bursts that arrived, usable or not.
     pub bursts: u32,
-    /// Bursts that were used.
+    /// Bursts of which at least one inertial channel was used.
     pub used: u32,
     /// Bursts with an inertial word whose new-data bit was clear.
     pub no_new_data: u32,
-    /// Bursts with a word whose error bit was set.
+    /// Bursts with a word whose error bit was set; a warning, the samples are used. The `diag_` counters have the causes.
     pub error_alarm: u32,
-    /// Bursts with a supply outside 4.75 V to 5.25 V.
+    /// Bursts with a supply outside 4.75 V to 5.25 V; a warning, the samples are used.
     pub supply: u32,
     /// Bursts in which every bit was 0.
     pub stuck_low: u32,
@@ -367,7 +372,7 @@ pub struct Health {
     pub spurious_edges: u32,
     /// Bursts not used because the sensor was suspect and had not been probed yet.
     pub suspect: u32,
-    /// Times that the sensor was lost and probed again.
+    /// Times that the sensor was lost after it had delivered samples.
     pub recoveries: u32,
     /// Raw messages dropped because the transmit queue was full.
     pub raw_dropped: u32,
@@ -385,4 +390,36 @@ pub struct Health {
     pub stack_bytes: u32,
     /// Size of the stack in bytes.
     pub stack_size: u32,
+    /// Used bursts of which a channel was refused.
+    pub partly_used: u32,
+    /// Used bursts with a warning: error bit set, or supply outside 4.75 V to 5.25 V.
+    pub marked: u32,
+    /// Bursts refused because their supply was below 3 V or above 6 V, at which the sensor does not run.
+    pub implausible_supply: u32,
+    /// Reads of DIAG_STAT because the error bit was set, at most one a second.
+    pub diag_reads: u32,
+    /// Of these, reads with bit 0: supply below 4.75 V.
+    pub diag_supply_low: u32,
+    /// With bit 1: supply above 5.25 V.
+    pub diag_supply_high: u32,
+    /// With bit 2: a flash update failed.
+    pub diag_flash_update: u32,
+    /// With bit 3: a frame had a wrong number of clocks.
+    pub diag_spi: u32,
+    /// With bit 4: a sensor was beyond its range.
+    pub diag_over_range: u32,
+    /// With bit 5 or one of bits 10 to 15: a self-test failed.
+    pub diag_self_test: u32,
+    /// With bit 6: the checksum of the flash memory is wrong.
+    pub diag_flash_checksum: u32,
+    /// With bit 8 or 9: an alarm was raised.
+    pub diag_alarm: u32,
+    /// Steps of recovery: the registers were read again and set where they differed.
+    pub rereads: u32,
+    /// Steps of recovery: the microcontroller's SPI was reset and the sensor probed.
+    pub bus_resets: u32,
+    /// Steps of recovery: the sensor was reset by its software command.
+    pub sensor_resets: u32,
+    /// Steps of recovery: the sensor was reset by its RST line.
+    pub reset_lines: u32,
 }

@@ -50,6 +50,8 @@ fn longest_channel() -> Message {
         octaves: core::iter::repeat_n(point, MAX_OCTAVES).collect(),
         coefficients: core::iter::repeat_n(coefficient, MAX_COEFFICIENTS).collect(),
         unseen_error: Some(ReportedModelError { deviance_per_point: f64::MAX, rms_percent: f64::MAX }),
+        lost: u64::MAX,
+        refused: u64::MAX,
     })
 }
 
@@ -141,13 +143,13 @@ fn no_frame_exceeds_the_stated_maximum() {
     }
 }
 
-/// The bytes of one short frame worked out by hand: version 3, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is
-/// zlib's of 03 00 03 01 41; COBS puts a length before each block without zeros.
+/// The bytes of one short frame worked out by hand: version 4, sequence 0, variant 3 (log), length 1, 'A'; the CRC-32 is
+/// zlib's of 04 00 03 01 41; COBS puts a length before each block without zeros.
 #[test]
 fn a_frame_matches_bytes_worked_out_by_hand() {
     let frame = frame(&mut Encoder::new(), &log("A"));
-    let [a, b, c, d] = 0x9B04_73D3_u32.to_le_bytes();
-    assert_eq!(frame.as_slice(), [0, 2, 3, 8, 3, 1, 0x41, a, b, c, d, 0]);
+    let [a, b, c, d] = 0x2924_AFC3_u32.to_le_bytes();
+    assert_eq!(frame.as_slice(), [0, 2, 4, 8, 3, 1, 0x41, a, b, c, d, 0]);
 }
 
 /// CRC-32 detects every burst of errors up to 32 bits; a changed byte may also split or join frames, which must not

@@ -1,14 +1,16 @@
 //! The firmware's application on the host: the same code as in the image, with the virtual sensor, in virtual time.
 
+use crate::fault_injector::{FaultyBus, InjectedFaults};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::{
-    App, Board, BoardMeters, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler, Start,
-    Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
+    App, Board, BoardMeters, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler,
+    SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
 use heapless::spsc::Consumer;
-use link::Boot;
+use link::{Boot, BootCause};
+use std::cell::RefMut;
 use std::collections::VecDeque;
 use virtual_sensor::{EmulatedBus, VirtualAdis16405, VirtualDelay};
 
@@ -18,16 +20,25 @@ const SCK_HZ: u32 = 1_000_000;
 /// Longest time between two passes of the main loop, µs.
 const WAKE_US: u64 = 100_000;
 
+/// Time after which the watchdog restarts the microcontroller if it is not fed, µs.
+const WATCHDOG_US: u64 = 8_000_000;
+
+/// Stall before the first frame after a burst, µs: that of low-power mode, of which the time of the part may lack a fraction.
+const STALL_US: u64 = 76;
+
 /// A simulated device: the application, the virtual sensor, and both ends of the serial link, whose transfers take no
 /// virtual time.
 pub struct Device {
     app: App,
     board: SimulatedBoard,
+    memory: &'static RetainedMemory,
+    /// Restarts are carried out, and the watchdog runs.
+    restarting: bool,
 }
 
 /// The simulated board: all but the application.
 struct SimulatedBoard {
-    bus: EmulatedBus,
+    bus: FaultyBus,
     now_us: u64,
     sampler: Sampler<'static>,
     estimators: Estimators<'static>,
@@ -37,35 +48,60 @@ struct SimulatedBoard {
     sent: Vec<u8>,
     received: VecDeque<u8>,
     restarts: u32,
+    fed_us: u64,
+    /// The serial clock cannot be changed.
+    fixed_clock: bool,
+    /// The sensor's RST line is connected.
+    reset_line: bool,
+    /// Time for which the samples of the sensor could have been used, µs.
+    usable_us: u64,
 }
 
 impl Device {
-    /// Starts the application with a sensor and the contents of the retained memory.
+    /// Starts the application, as the reset pin does, with a running sensor and the contents of the retained memory.
     ///
     /// Queues and statistics, 50 kB, are leaked: on the target they are statics.
     pub fn new(part: VirtualAdis16405, memory: &'static RetainedMemory) -> Self {
-        let (to_estimators, arrivals) = Box::leak(Box::new(BurstQueue::new())).split();
-        let (to_port, outgoing) = Box::leak(Box::new(TransmitBuffer::new())).split();
-        let statistics = Box::leak(Box::new(Statistics::new()));
-        let mut board = SimulatedBoard {
-            now_us: part.now() / 1000,
-            bus: EmulatedBus::with_sck_hz(part, SCK_HZ),
-            sampler: Sampler::new(to_estimators),
-            estimators: Estimators::new(statistics, FIRST_CONFIG),
-            arrivals,
-            transmit_queue: TransmitQueue::new(to_port),
-            outgoing,
-            sent: Vec::new(),
-            received: VecDeque::new(),
-            restarts: 0,
-        };
-        let start = Start {
-            spi_clock_hz: SCK_HZ,
-            boot: Boot::default(),
-            retained: RetainedRam::open(memory),
-            finished: Box::leak(Box::new(FinishedEpoch::EMPTY)),
-        };
-        Self { app: App::new(start, &mut board), board }
+        Self::started_by(BootCause::Pin, part, memory)
+    }
+
+    /// Starts the application for this cause.
+    pub fn started_by(cause: BootCause, part: VirtualAdis16405, memory: &'static RetainedMemory) -> Self {
+        let now_us = part.now() / 1000;
+        let mut board = SimulatedBoard::new(FaultyBus::new(EmulatedBus::with_sck_hz(part, SCK_HZ)), now_us);
+        let app = board.boot(cause, memory);
+        Self { app, board, memory, restarting: false }
+    }
+
+    /// Has restarts carried out from now on, those by the watchdog included.
+    #[must_use]
+    pub fn with_restarts(mut self) -> Self {
+        self.restarting = true;
+        self
+    }
+
+    /// Has a board whose serial clock cannot be changed.
+    #[must_use]
+    pub fn with_fixed_clock(mut self) -> Self {
+        self.board.fixed_clock = true;
+        self
+    }
+
+    /// Has a board that connects the sensor's RST line.
+    #[must_use]
+    pub fn with_reset_line(mut self) -> Self {
+        self.board.reset_line = true;
+        self
+    }
+
+    /// The faults, to change them.
+    pub fn faults(&self) -> RefMut<'_, InjectedFaults> {
+        self.board.bus.faults().borrow_mut()
+    }
+
+    /// Time for which the samples of the sensor could have been used, µs: no fault hid them, and the sensor was sampling.
+    pub fn usable_us(&self) -> u64 {
+        self.board.usable_us
     }
 
     /// Retained memory without valid contents.
@@ -82,11 +118,11 @@ impl Device {
     pub fn run_until(&mut self, until_us: u64) -> Vec<u8> {
         self.turn();
         while self.board.now_us < until_us {
-            let ready_us = self.board.bus.part().next_data_ready() / 1000 + 1;
+            let ready_us = self.board.bus.bus().part().next_data_ready() / 1000 + 1;
             let next_us = ready_us.min(self.board.now_us + WAKE_US).min(until_us);
-            let before = self.board.bus.part().samples();
+            let before = self.board.bus.bus().part().samples();
             self.board.advance_to(next_us);
-            if self.board.bus.part().samples() > before {
+            if self.board.bus.bus().part().samples() > before && !self.faults().no_data_ready {
                 self.board.data_ready();
             }
             self.turn();
@@ -96,26 +132,77 @@ impl Device {
 
     /// The bus and the part on it.
     pub fn bus(&self) -> &EmulatedBus {
-        &self.board.bus
+        self.board.bus.bus()
     }
 
-    /// Number of restarts that the application requested.
+    /// Number of restarts that the application requested or the watchdog made.
     pub fn restarts(&self) -> u32 {
         self.board.restarts
     }
 
     fn turn(&mut self) {
-        while self.app.turn(&mut self.board) {
+        let restarts = self.board.restarts;
+        while self.app.turn(&mut self.board) && self.board.restarts == restarts {
             self.board.transmit();
         }
         self.board.transmit();
+        if !self.restarting {
+            return;
+        }
+        let starved = self.board.now_us > self.board.fed_us + WATCHDOG_US;
+        self.board.restarts += u32::from(starved);
+        if self.board.restarts > restarts {
+            let cause = if starved { BootCause::Watchdog } else { BootCause::Software };
+            self.app = self.board.boot(cause, self.memory);
+        }
     }
 }
 
 impl SimulatedBoard {
+    fn new(bus: FaultyBus, now_us: u64) -> Self {
+        let (to_estimators, arrivals) = Box::leak(Box::new(BurstQueue::new())).split();
+        let (to_port, outgoing) = Box::leak(Box::new(TransmitBuffer::new())).split();
+        let statistics = Box::leak(Box::new(Statistics::new()));
+        Self {
+            bus,
+            now_us,
+            sampler: Sampler::new(to_estimators),
+            estimators: Estimators::new(statistics, FIRST_CONFIG),
+            arrivals,
+            transmit_queue: TransmitQueue::new(to_port),
+            outgoing,
+            sent: Vec::new(),
+            received: VecDeque::new(),
+            restarts: 0,
+            fed_us: now_us,
+            fixed_clock: false,
+            reset_line: false,
+            usable_us: 0,
+        }
+    }
+
+    /// Starts the application; all that is not retained is new.
+    fn boot(&mut self, cause: BootCause, memory: &'static RetainedMemory) -> App {
+        let fresh = Self::new(self.bus.clone(), self.now_us);
+        let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
+        let Self { restarts, fixed_clock, reset_line, usable_us, .. } = *self;
+        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, ..fresh };
+        let start = Start {
+            spi_clock_hz: SCK_HZ,
+            boot: Boot { cause, ..Boot::default() },
+            retained: RetainedRam::open(memory),
+            finished: Box::leak(Box::new(FinishedEpoch::EMPTY)),
+        };
+        App::new(start, self)
+    }
+
     fn advance_to(&mut self, us: u64) {
-        self.bus.advance_to(us * 1000);
-        self.now_us = us;
+        let sampling = self.bus.bus().part().next_data_ready() != u64::MAX;
+        if sampling && !self.bus.faults().borrow().hide_samples() {
+            self.usable_us += us.saturating_sub(self.now_us);
+        }
+        self.bus.bus().advance_to(us * 1000);
+        self.now_us = self.now_us.max(us);
     }
 
     /// The two sampling interrupts and the one of the estimators.
@@ -124,32 +211,64 @@ impl SimulatedBoard {
             let mut answer = [0; BURST_BYTES];
             let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
             self.sampler.transfer_ended(Some(&answer));
-            self.now_us = self.now_us.max(self.bus.part().now() / 1000);
+            self.now_us();
         }
-        estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);
+        if !self.bus.faults().borrow().no_estimators {
+            estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);
+        }
     }
 
     fn transmit(&mut self) {
-        self.sent.extend(std::iter::from_fn(|| self.outgoing.dequeue()));
+        if !self.bus.faults().borrow().no_transmission {
+            self.sent.extend(std::iter::from_fn(|| self.outgoing.dequeue()));
+        }
     }
 }
 
 impl Board for SimulatedBoard {
-    type Bus<'a> = EmulatedBus;
+    type Bus<'a> = FaultyBus;
     type Delay<'a> = VirtualDelay;
 
     fn now_us(&mut self) -> u64 {
         // Transactions of the driver advance the part's time.
-        self.now_us = self.now_us.max(self.bus.part().now() / 1000);
-        self.now_us
+        let now_us = self.now_us.max(self.bus.bus().part().now() / 1000);
+        if !self.bus.faults().borrow().hide_samples() {
+            self.usable_us += now_us - self.now_us;
+        }
+        self.now_us = now_us;
+        now_us
     }
 
-    fn sensor_bus(&mut self) -> (EmulatedBus, VirtualDelay) {
-        (self.bus.clone(), self.bus.delay())
+    fn sensor_bus(&mut self) -> (FaultyBus, VirtualDelay) {
+        (self.bus.clone(), self.bus.bus().delay())
     }
 
     fn set_sampling(&mut self, enabled: bool) {
         self.sampler.set_enabled(enabled);
+        if !enabled {
+            let stalled_us = self.now_us() + STALL_US;
+            self.advance_to(stalled_us);
+        }
+    }
+
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        if self.fixed_clock {
+            return 0;
+        }
+        let clock_hz = limit_hz.min(SCK_HZ);
+        self.bus.bus().part_mut().set_sck_hz(Some(clock_hz));
+        clock_hz
+    }
+
+    fn reset_sensor(&mut self) -> bool {
+        if self.reset_line {
+            self.bus.reset_part();
+        }
+        self.reset_line
+    }
+
+    fn sampling_activity(&mut self) -> SamplingActivity {
+        self.sampler.activity()
     }
 
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
@@ -168,7 +287,9 @@ impl Board for SimulatedBoard {
         BoardMeters::default()
     }
 
-    fn feed_watchdog(&mut self) {}
+    fn feed_watchdog(&mut self) {
+        self.fed_us = self.now_us;
+    }
 
     fn restart(&mut self) {
         self.restarts += 1;

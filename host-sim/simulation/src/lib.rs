@@ -1,11 +1,13 @@
 //! The driver, or the whole firmware, on the virtual sensor or on a replayed recording.
 
 mod device;
+mod fault_injector;
 mod logged_bus;
 mod replay;
 mod simulation;
 
 pub use device::Device;
+pub use fault_injector::{FaultEnd, FaultyBus, FrameFault, InjectedFaults};
 pub use replay::{Replay, replay, replay_log, replay_table};
 pub use simulation::{HostClock, LONGEST_S, SAMPLE_RATE_HZ, Simulation, SimulationError};
 

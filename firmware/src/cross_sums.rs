@@ -1,0 +1,243 @@
+//! Sums over pairs of channels: Allan covariances and means of an epoch.
+
+use crate::channels::{CHANNELS, ChannelEstimator, ChannelSet, GYROS};
+
+/// First octave of the cross sums: 256 samples. Covariates act slowly, and the sums over pairs are updated once in 32
+/// samples at most, an eighth of this octave's averaging time.
+pub(crate) const FIRST_CROSS_OCTAVE: usize = 8;
+/// Octaves of the cross sums: up to 2¹⁹ samples, 43 minutes at 204.8 samples a second.
+pub(crate) const CROSS_OCTAVES: usize = 12;
+/// Pairs of channels of which one may be a regressor of the other: all but the pairs of two gyros.
+const PAIRS: [(usize, usize); 25] = {
+    let mut pairs = [(0, 0); 25];
+    let (mut low, mut at) = (0, 0);
+    while low < CHANNELS.len() {
+        let mut high = if low < GYROS { GYROS } else { low + 1 };
+        while high < CHANNELS.len() {
+            pairs[at] = (low, high);
+            (high, at) = (high + 1, at + 1);
+        }
+        low += 1;
+    }
+    assert!(at == pairs.len());
+    pairs
+};
+
+/// Sums of products of the second differences of pairs of channels, octave by octave, and the sum of every channel's counts.
+/// A pair is observed where both channels have completed a difference with the newest sample.
+///
+/// A count has 14 bits, so a difference is within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum exceeds
+/// 2⁷¹·n ≤ 2⁹⁰. A sum takes 96 bits: a low word of 64 and a high word of 32 bits.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct CrossSums {
+    low: [[u64; PAIRS.len()]; CROSS_OCTAVES],
+    high: [[i32; PAIRS.len()]; CROSS_OCTAVES],
+    /// Products in each sum: one in 32 samples at most.
+    counts: [[u32; PAIRS.len()]; CROSS_OCTAVES],
+    totals: [i64; CHANNELS.len()],
+    /// Samples that at least one channel has taken, and how many of them each channel lacks.
+    samples: u64,
+    lacking: [u64; CHANNELS.len()],
+    /// A channel lacked a sample that others had, so that not all complete their differences together.
+    uneven: bool,
+    /// A channel has samples of before a restart, which are not in these sums.
+    incomplete: bool,
+}
+
+impl CrossSums {
+    pub(crate) const fn new() -> Self {
+        Self {
+            low: [[0; PAIRS.len()]; CROSS_OCTAVES],
+            high: [[0; PAIRS.len()]; CROSS_OCTAVES],
+            counts: [[0; PAIRS.len()]; CROSS_OCTAVES],
+            totals: [0; CHANNELS.len()],
+            samples: 0,
+            lacking: [0; CHANNELS.len()],
+            uneven: false,
+            incomplete: false,
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        // In place: assigning a new value would build it, 5 kB, on the stack first.
+        self.low.fill([0; PAIRS.len()]);
+        self.high.fill([0; PAIRS.len()]);
+        self.counts.fill([0; PAIRS.len()]);
+        (self.totals, self.samples, self.lacking) = ([0; CHANNELS.len()], 0, [0; CHANNELS.len()]);
+        (self.uneven, self.incomplete) = (false, false);
+    }
+
+    /// The channels have samples that are not in these sums.
+    pub(crate) fn mark_incomplete(&mut self) {
+        self.incomplete = true;
+    }
+
+    /// Adds the counts that the estimators of all channels but the `refused` ones have just taken, and the second
+    /// differences that these completed.
+    pub(crate) fn add(
+        &mut self,
+        estimators: &[ChannelEstimator; CHANNELS.len()],
+        counts: [i32; CHANNELS.len()],
+        refused: ChannelSet,
+    ) {
+        if refused == ChannelSet::ALL {
+            return;
+        }
+        self.samples += 1;
+        for (total, count) in self.totals.iter_mut().zip(counts) {
+            *total += i64::from(count);
+        }
+        if !refused.is_empty() {
+            self.take_back(counts, refused);
+        }
+        if !self.uneven && estimators[0].newest_difference(FIRST_CROSS_OCTAVE).is_none() {
+            return; // the other channels, and longer octaves, have completed none either
+        }
+        for octave in FIRST_CROSS_OCTAVE..FIRST_CROSS_OCTAVE + CROSS_OCTAVES {
+            let newest =
+                |index: usize| estimators[index].newest_difference(octave).filter(|_| !refused.contains(index));
+            let differences: [Option<i64>; CHANNELS.len()] = core::array::from_fn(newest);
+            if differences.iter().all(Option::is_none) {
+                return; // longer octaves have completed none either
+            }
+            self.add_products(octave - FIRST_CROSS_OCTAVE, &differences);
+        }
+    }
+
+    /// Takes refused counts out of the totals again. Not inlined: they are rare.
+    #[inline(never)]
+    fn take_back(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
+        self.uneven = true;
+        for (index, (total, lacking)) in self.totals.iter_mut().zip(&mut self.lacking).enumerate() {
+            if refused.contains(index) {
+                (*total, *lacking) = (*total - i64::from(counts[index]), *lacking + 1);
+            }
+        }
+    }
+
+    fn add_products(&mut self, row: usize, differences: &[Option<i64>; CHANNELS.len()]) {
+        let sums = self.low[row].iter_mut().zip(&mut self.high[row]).zip(&mut self.counts[row]);
+        for (((low, high), count), (a, b)) in sums.zip(PAIRS) {
+            if let (Some(a), Some(b)) = (differences[a], differences[b]) {
+                let sum = wide(*low, *high) + i128::from(a) * i128::from(b);
+                (*low, *high) = (sum as u64, (sum >> 64) as i32);
+                *count = count.saturating_add(1);
+            }
+        }
+    }
+}
+
+fn wide(low: u64, high: i32) -> i128 {
+    i128::from(high) << 64 | i128::from(low)
+}
+
+/// Mean of every channel of [`CHANNELS`] in counts.
+pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
+
+/// Allan covariances and means of a finished epoch, rounded from its [`CrossSums`]: nothing is added to them any more.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AllanCovariances {
+    /// Allan covariance of each pair at each octave in counts²; infinite where the pair was not observed.
+    pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
+    /// Mean of every channel; 0 without samples.
+    pub means: ChannelMeans,
+    /// Whether they cover all samples of the channels: not after a restart in the epoch.
+    pub complete: bool,
+}
+
+impl AllanCovariances {
+    /// Covariances of no samples.
+    pub const EMPTY: Self =
+        Self { pairs: [[f64::INFINITY; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
+
+    /// Overwrites them with those of an epoch's sums, in place: 2.5 kB.
+    pub(crate) fn fill(&mut self, sums: &CrossSums) {
+        self.complete = !sums.incomplete;
+        let samples = |index: usize| (sums.samples - sums.lacking[index]).max(1);
+        self.means = core::array::from_fn(|index| sums.totals[index] as f64 / samples(index) as f64);
+        for (pair, covariances) in self.pairs.iter_mut().enumerate() {
+            for (k, covariance) in covariances.iter_mut().enumerate() {
+                let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
+                let sum = wide(sums.low[k][pair], sums.high[k][pair]) as f64;
+                *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { f64::INFINITY };
+            }
+        }
+    }
+
+    /// Allan covariance of two channels at averaging factor `n`, in the product of their counts; `None` where it was not
+    /// estimated, as for two gyros.
+    #[must_use]
+    pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
+        let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
+        let octave = (n.trailing_zeros() as usize).checked_sub(FIRST_CROSS_OCTAVE).filter(|_| n.is_power_of_two())?;
+        self.pairs[pair].get(octave).copied().filter(|covariance| covariance.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use std::boxed::Box;
+
+    const GYRO_X: usize = 0;
+    const TEMPERATURE: usize = 6;
+    const SUPPLY: usize = 7;
+
+    /// Counts of a sawtooth, the same in every channel.
+    fn count(k: u32) -> i32 {
+        (k % 1000) as i32
+    }
+
+    /// Sums over samples of which `refused` says, for each, which channels lack it.
+    fn sums(samples: u32, refused: impl Fn(u32) -> ChannelSet) -> Box<CrossSums> {
+        let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);
+        let mut sums = Box::new(CrossSums::new());
+        for k in 0..samples {
+            for (index, estimator) in estimators.iter_mut().enumerate() {
+                if refused(k).contains(index) { estimator.gap(1) } else { estimator.push(count(k)) }
+            }
+            sums.add(&estimators, [count(k); CHANNELS.len()], refused(k));
+        }
+        sums
+    }
+
+    fn observed(sums: &CrossSums, a: usize, b: usize) -> u32 {
+        let pair = PAIRS.iter().position(|&pair| pair == (a, b)).expect("a pair");
+        sums.counts[0][pair]
+    }
+
+    /// The 600th sample of gyro x is refused: the pair of temperature and supply loses nothing, and the means are those of
+    /// what each channel has.
+    #[test]
+    fn a_channel_without_a_sample_costs_its_own_pairs_only() {
+        let complete = sums(4096, |_| ChannelSet::EMPTY);
+        let gap = |k| if k == 600 { ChannelSet(1 << GYRO_X) } else { ChannelSet::EMPTY };
+        let gapped = sums(4096, gap);
+        let pair = (TEMPERATURE, SUPPLY);
+        // 512 samples complete the first difference at n = 256, and then every 32nd does.
+        assert_eq!(observed(&complete, pair.0, pair.1), (4096 - 512) / 32 + 1);
+        assert_eq!(observed(&gapped, pair.0, pair.1), observed(&complete, pair.0, pair.1));
+        assert!(observed(&gapped, GYRO_X, TEMPERATURE) < observed(&complete, GYRO_X, TEMPERATURE));
+        let mut covariances = Box::new(AllanCovariances::EMPTY);
+        covariances.fill(&complete);
+        let expected = covariances.covariance(pair.0, pair.1, 256);
+        covariances.fill(&gapped);
+        assert!(expected.is_some_and(|value| value > 0.0));
+        assert_eq!(covariances.covariance(pair.0, pair.1, 256), expected);
+        let total: i64 = (0..4096).map(|k| i64::from(count(k))).sum();
+        assert_eq!(covariances.means[GYRO_X], (total - i64::from(count(600))) as f64 / 4095.0);
+        assert_eq!(covariances.means[SUPPLY], total as f64 / 4096.0);
+    }
+
+    #[test]
+    fn a_pair_that_was_never_observed_has_no_covariance() {
+        let never = sums(2048, |_| ChannelSet(1 << GYRO_X));
+        let mut covariances = Box::new(AllanCovariances::EMPTY);
+        covariances.fill(&never);
+        assert_eq!(covariances.covariance(GYRO_X, TEMPERATURE, 256), None);
+        assert!(covariances.covariance(TEMPERATURE, SUPPLY, 256).is_some());
+        assert_eq!(covariances.means[GYRO_X], 0.0);
+    }
+}
