@@ -99,9 +99,6 @@ impl Console {
     }
 
     /// Makes and sends the next line of the first answer.
-    ///
-    /// Not inlined, here and below: frames of up to 1.9 kB (text lines, model) would otherwise be part of every caller's.
-    #[inline(never)]
     pub(crate) fn send_line(&mut self, state: &DeviceState, board: &mut impl Board) {
         let Some(&answer) = self.answers.front() else { return };
         let index = self.next_line;
@@ -139,7 +136,6 @@ const VALIDATION_LINE: usize = 1 + MAX_COVARIATES;
 
 /// Head, a row for every octave, then for every inertial channel the coefficients of the baseline model, for every
 /// regressor a line, and the validation on the last finished epoch.
-#[inline(never)]
 fn table_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     if let Some(head) = TABLE_HEAD.get(index) {
         return AnswerLine::Text(text_line(format_args!("{head}")));
@@ -177,7 +173,6 @@ fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
     any.then(|| text_line(format_args!("{tau:>10} {a:>10} {b:>10} {c:>10} {d:>10} {e:>10} {f:>10}")))
 }
 
-#[inline(never)]
 fn coefficients_line(state: &DeviceState, board: &mut impl Board, index: usize) -> TextLine {
     let channel = CHANNELS[index];
     let model = running_sums(board, index).fit_baseline(channel, state.config);
@@ -191,7 +186,6 @@ fn coefficients_line(state: &DeviceState, board: &mut impl Board, index: usize) 
 }
 
 /// A covariate that has been subtracted from the channel since the last finished epoch.
-#[inline(never)]
 fn regressor_line(state: &DeviceState, index: usize, number: usize) -> Option<TextLine> {
     let regressor = state.learner.models[index].regressors.get(number)?;
     let (value, error) = (ShortFloat(regressor.value), ShortFloat(regressor.error));
@@ -200,7 +194,6 @@ fn regressor_line(state: &DeviceState, index: usize, number: usize) -> Option<Te
 }
 
 /// The validation of the channel's model on the last finished epoch.
-#[inline(never)]
 fn validation_line(state: &DeviceState, index: usize) -> Option<TextLine> {
     let ValidationResult { deviance_per_point, drift } = state.learner.results[index]?;
     let (before, after) = (ShortFloat(deviance_per_point.0), ShortFloat(deviance_per_point.1));
@@ -211,7 +204,6 @@ fn validation_line(state: &DeviceState, index: usize) -> Option<TextLine> {
     Some(text_line(text))
 }
 
-#[inline(never)]
 fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     let now_us = board.now_us();
     let boot = &state.boot;
@@ -242,7 +234,6 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
 }
 
 /// A line for each counter that is not 0.
-#[inline(never)]
 fn counter_line(health: &Health, index: usize) -> AnswerLine {
     let counters = [
         ("bursts", health.bursts),

@@ -83,9 +83,6 @@ impl DeviceState {
     }
 
     /// Probes the sensor when that is due, and stops using one that is silent or suspect.
-    ///
-    /// Not inlined: its frame would otherwise be part of that of every model fit.
-    #[inline(never)]
     pub(crate) fn supervise_sensor(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         match self.sensor {

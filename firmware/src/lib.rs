@@ -19,7 +19,7 @@
 //! | `report`, [`console`] | reports in frames, answers in text |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
-//! | [`retained`], `crash_record` | what survives a warm reset |
+//! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
 //!
 //! Sampling has a higher priority than the estimators, and these a higher one than the main loop. While a lower priority
 //! holds the lock of a shared resource, the interrupts that share it wait; locks are short.
@@ -35,6 +35,7 @@ pub mod console;
 mod crash_record;
 mod device;
 pub mod epoch;
+mod epoch_record;
 mod estimators;
 pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]

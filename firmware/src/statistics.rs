@@ -91,9 +91,6 @@ impl ChannelSums {
     }
 
     /// Rebuilds the Allan variance curve of a channel in its unit.
-    ///
-    /// Not inlined, here and below: frames of 0.7 to 1.9 kB (curve, sums) would otherwise be part of every caller's.
-    #[inline(never)]
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, config: Config) {
         let period = 1.0 / config.sample_period().hz();
         ChannelEstimator::rebuild_curve(curve, period, self.samples, |octave| self.octave(octave));
@@ -102,7 +99,6 @@ impl ChannelSums {
 
     /// Fits the baseline model (N, B and K) to the curve of a channel, in its unit.
     #[must_use]
-    #[inline(never)]
     pub fn fit_baseline(&self, channel: Channel, config: Config) -> Model {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, config);
@@ -111,7 +107,6 @@ impl ChannelSums {
 
     /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
     #[must_use]
-    #[inline(never)]
     pub(crate) fn error_of(&self, model: &Model, channel: Channel, config: Config) -> Option<ReportedModelError> {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, config);
@@ -178,7 +173,7 @@ pub(crate) const FIRST_CROSS_OCTAVE: usize = 8;
 /// Octaves of the cross sums: up to 2¹⁹ samples, 43 minutes at 204.8 samples a second.
 pub(crate) const CROSS_OCTAVES: usize = 12;
 /// Pairs of channels of which one may be a regressor of the other: all but the pairs of two gyros.
-const PAIRS: [(usize, usize); 25] = {
+pub(crate) const PAIRS: [(usize, usize); 25] = {
     let mut pairs = [(0, 0); 25];
     let (mut low, mut at) = (0, 0);
     while low < CHANNELS.len() {
@@ -256,8 +251,8 @@ pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
     /// Allan covariance of each pair at each octave in counts².
-    pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
-    counts: [u64; CROSS_OCTAVES],
+    pub(crate) pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
+    pub(crate) counts: [u64; CROSS_OCTAVES],
     /// Mean of every channel; 0 without samples.
     pub means: ChannelMeans,
     /// Samples that all channels took together.

@@ -27,7 +27,10 @@ pub(crate) fn build(board: &str, target: &str) -> PathBuf {
     folder().join(target).join("image").join(bin)
 }
 
+/// Vector table of the STM32F405, and the start of its core-coupled memory, which is the stack (RM0090 section 2.3).
 const FLASH_START: u32 = 0x0800_0000;
+const STACK_START: u32 = 0x1000_0000;
+/// Where every Cortex-M has its RAM.
 const RAM: std::ops::Range<u32> = 0x2000_0000..0x3000_0000;
 
 /// An ELF of 32 bits, little-endian.
@@ -51,23 +54,20 @@ impl Elf {
 #[derive(Debug)]
 pub(crate) struct Size {
     pub(crate) flash: u32,
-    /// Static variables, that is without the stack.
+    /// Static variables, retained memory among them; without the stack.
     pub(crate) statics: u32,
-    /// From the start of memory, where the stack is, to the end of the last static variable.
-    pub(crate) ram: u32,
 }
 
 /// The size of an image by the section headers of its ELF.
 pub(crate) fn size(image: &Path) -> Size {
     let elf = Elf::read(image);
-    let mut size = Size { flash: 0, statics: 0, ram: 0 };
+    let mut size = Size { flash: 0, statics: 0 };
     for section in 0..elf.half(48) {
         let header = elf.word(32) as usize + section * elf.half(46);
         let [kind, flags, address, bytes] = [4, 8, 12, 20].map(|field| elf.word(header + field));
         let (allocated, without_bits) = (flags & 2 != 0, kind == 8);
         if allocated && RAM.contains(&address) {
             size.statics += bytes;
-            size.ram = size.ram.max(address + bytes - RAM.start);
         }
         if allocated && !without_bits {
             size.flash += bytes;
@@ -84,7 +84,7 @@ pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
     let mut headers = (0..elf.half(44)).map(|segment| elf.word(28) as usize + 32 * segment);
     let vectors = headers.find(|&header| elf.word(header + 12) == FLASH_START && elf.word(header + 16) > 0);
     let at = elf.word(vectors.expect("a vector table") + 4) as usize;
-    elf.0[at..at + 4].copy_from_slice(&(RAM.start + bytes).to_le_bytes());
+    elf.0[at..at + 4].copy_from_slice(&(STACK_START + bytes).to_le_bytes());
     std::fs::create_dir_all(folder()).expect("a folder");
     let copy = folder().join(format!("observatory-f405-stack-{bytes}"));
     std::fs::write(&copy, elf.0).expect("room");

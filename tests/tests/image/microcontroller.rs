@@ -12,8 +12,9 @@ use rigless::soc::stm32f427::{Stm32f427, peripherals::gpio::Pin};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
-/// RM0090 section 2.3.1: SRAM1 and SRAM2.
+/// RM0090 section 2.3.1: SRAM1 and SRAM2, and the core-coupled memory.
 const RAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
+const CORE_COUPLED: std::ops::Range<u64> = 0x1000_0000..0x1001_0000;
 const LINES: usize = 5;
 /// Position of EXTI0 among the interrupts that the emulator's table gives the instance; EXTI1 and so on follow it.
 const FIRST_INTERRUPT: usize = 1;
@@ -118,7 +119,7 @@ impl Device for Exti {
 /// Fills the memory with the output of a linear congruential generator (Knuth's MMIX constants).
 pub(crate) fn fill_memory_with_noise(host: &mut dyn Host) {
     let mut state = 1_u64;
-    for address in RAM.step_by(4) {
+    for address in RAM.chain(CORE_COUPLED).step_by(4) {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         host.write(address, Width::W32, state >> 32).expect("memory");
     }
