@@ -8,16 +8,14 @@ use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
 use crate::report::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
-use crate::sensor::{LOW_POWER_LIMIT_HZ, auto_null};
+use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
-use adis16405_driver::{ClockMode, Config, ConfigError, SamplePeriod};
+use adis16405_driver::{Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
 use link::{Boot, MessageRef, text_line};
 
 /// What the start-up code of a board hands to the application.
 pub struct Start {
-    /// Serial clock of the sensor's bus as set in the hardware, in Hz.
-    pub spi_clock_hz: u32,
     /// Why the microcontroller started, and the crash record.
     pub boot: Boot,
     /// The retained RAM.
@@ -65,7 +63,7 @@ fn interval_us(settings: RetainedSettings) -> u64 {
 impl App {
     /// Restores settings and statistics from retained RAM, if it holds any.
     pub fn new(start: Start, board: &mut impl Board) -> Self {
-        let Start { spi_clock_hz, mut boot, mut retained, finished } = start;
+        let Start { mut boot, mut retained, finished } = start;
         let restored = retained
             .settings()
             .and_then(|settings| Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?)));
@@ -82,7 +80,8 @@ impl App {
         }
         retained.write_settings(settings, first);
         // A restart while the last finished epoch was being learned from: its report starts again.
-        let interrupted = !first && retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch;
+        let interrupted =
+            !first && retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch;
         let mut report = ReportProgress::default();
         if interrupted {
             report.start_epoch_end();
@@ -90,7 +89,7 @@ impl App {
         let now_us = board.now_us();
         Self {
             state: DeviceState {
-                spi_clock_hz,
+                spi_clock_hz: board.set_clock_limit(BURST_LIMIT_HZ),
                 boot,
                 settings,
                 config,
@@ -226,15 +225,6 @@ impl App {
             Ok(config) => config,
             Err(error) => return self.print(board, format_args!("{error}")),
         };
-        let low_power = config.sample_period().clock_mode() == ClockMode::LowPower;
-        let clock_hz = self.state.spi_clock_hz;
-        if low_power && clock_hz > LOW_POWER_LIMIT_HZ {
-            let limit_hz = LOW_POWER_LIMIT_HZ;
-            return self.print(
-                board,
-                format_args!("below 182 SPS the sensor takes a serial clock of {limit_hz} Hz, not {clock_hz} Hz"),
-            );
-        }
         board.set_sampling(false);
         self.state.config = config;
         self.state.settings.smpl_prd = config.sample_period().register();
@@ -251,6 +241,7 @@ impl App {
         }
         board.set_sampling(false);
         self.state.sensor = SensorState::Probing { at_us: now_us };
+        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let done = auto_null(board.sensor_bus(), self.state.config).map_err(|error| text_line(format_args!("{error}")));
         match done {
             Ok(()) => {
@@ -263,14 +254,19 @@ impl App {
 
     // Checkpoints and timers
 
-    /// Writes one channel at a time to retained RAM, all of them once in 0.8 s: a restart loses no more than that.
+    /// Writes one channel after the other to retained RAM, all of them once in 0.8 s: a restart loses no more than that. What
+    /// became due during a long step of a fit is written at once.
     fn checkpoint(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
-        if now_us >= self.next_checkpoint_us {
-            self.next_checkpoint_us = now_us + CHECKPOINT_US;
+        for _ in 0..CHANNELS.len() {
+            if now_us < self.next_checkpoint_us {
+                return;
+            }
+            self.next_checkpoint_us += CHECKPOINT_US;
             self.checkpoint_channel = (self.checkpoint_channel + 1) % CHANNELS.len();
             self.checkpoint_channel(board, self.checkpoint_channel);
         }
+        self.next_checkpoint_us = self.next_checkpoint_us.max(now_us);
     }
 
     fn checkpoint_channel(&mut self, board: &mut impl Board, index: usize) {

@@ -9,8 +9,35 @@ use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use heapless::spsc;
 use rtic_core::Mutex;
 
-/// Time before the first frame after a burst in µs: the sensor's stall time.
-const STALL_US: u32 = 16;
+/// Time before the first frame after a burst in µs: the sensor's longest stall time, that of its low-power mode.
+const STALL_US: u32 = 75;
+/// Time in µs after which a burst is abandoned: the longest one, at 164 kHz with gaps of 16 µs, takes 1.5 ms.
+const BURST_US: u32 = 5_000;
+
+/// Times of the sensor's bus that the board keeps. The stall after a frame is the driver's
+/// (`adis16405_driver::Timing::stall_ns`); the board keeps it while chip select is high.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BusTiming {
+    /// Least time that chip select is high between two frames, in ns.
+    pub select_high_ns: u32,
+    /// The same at a serial clock of at most 300 kHz: the sensor is, or may be, in low-power mode.
+    pub low_power_select_high_ns: u32,
+    /// Pause between two words of a burst in ns; 0 for none. With a pause every word is a DMA transfer of its own, with an
+    /// interrupt at its end.
+    pub word_gap_ns: u32,
+}
+
+impl BusTiming {
+    /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the driver's stall in
+    /// low-power mode. Bursts have no pauses, as with the drivers of Linux and PX4.
+    pub const SAFE: Self = Self { select_high_ns: 16_000, low_power_select_high_ns: 75_000, word_gap_ns: 0 };
+}
+
+/// The sensor's bus, whose serial clock can be changed between two frames.
+pub trait SensorBus: SpiDevice<u8> {
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
+}
 
 /// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
 pub trait Board {
@@ -27,6 +54,9 @@ pub trait Board {
     fn now_us(&mut self) -> u64;
     /// The sensor's bus and a delay. To be used only while sampling is disabled.
     fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz. To be
+    /// used only while sampling is disabled.
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
     /// Enables or disables sampling. On return after disabling, no burst is being transferred, and the sensor's stall time
     /// has passed.
     fn set_sampling(&mut self, enabled: bool);
@@ -92,6 +122,8 @@ pub trait Chip {
     fn sleep(&mut self, clock: impl FnMut(u32));
     /// Requests the interrupt that transmits what is queued.
     fn transmit(&mut self);
+    /// Requests the interrupt of the end of a burst, which then fails if it is still being transferred.
+    fn abandon_burst(&mut self);
     /// Feeds the watchdog.
     fn feed(&mut self);
     /// Restarts the microcontroller.
@@ -162,8 +194,7 @@ impl<C, T, B, S, E, Q> Board for BoardContext<'_, C, T, B, S, E, Q>
 where
     C: Chip,
     T: Mutex<T = Uptime>,
-    B: Mutex,
-    B::T: SpiDevice<u8>,
+    B: Mutex<T: SensorBus>,
     S: Mutex<T = Sampler<'static>>,
     E: Mutex<T = Estimators<'static>>,
     Q: Mutex<T = TransmitQueue<'static>>,
@@ -187,11 +218,19 @@ where
         (LockedBus(&mut self.locks.bus), FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog })
     }
 
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        self.locks.bus.lock(|bus| bus.set_clock_limit(limit_hz))
+    }
+
     fn set_sampling(&mut self, enabled: bool) {
         self.locks.sampler.lock(|sampler| sampler.set_enabled(enabled));
         if !enabled {
-            // The transfer of a burst takes 0.4 ms at most.
-            while self.locks.sampler.lock(|sampler| sampler.is_reading()) {}
+            let start = self.chip.microseconds();
+            while self.locks.sampler.lock(|sampler| sampler.is_reading()) {
+                if self.chip.microseconds().wrapping_sub(start) > BURST_US {
+                    self.chip.abandon_burst();
+                }
+            }
             FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(STALL_US);
         }
     }
@@ -291,6 +330,7 @@ mod tests {
 
         fn sleep(&mut self, _: impl FnMut(u32)) {}
         fn transmit(&mut self) {}
+        fn abandon_burst(&mut self) {}
         fn restart(&mut self) {}
         fn meters(&mut self) -> BoardMeters {
             BoardMeters::default()

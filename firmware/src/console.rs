@@ -9,7 +9,7 @@ use crate::report::running_sums;
 use crate::statistics::{CHANNELS, INERTIAL, OCTAVES};
 use core::fmt::{self, Arguments};
 use heapless::Deque;
-use link::{Health, MAX_COVARIATES, TextLine, text_line};
+use link::{ClockSource, Health, MAX_COVARIATES, TextLine, text_line};
 
 /// Answer to the version command.
 pub(crate) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
@@ -228,7 +228,11 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
             "start {}: {:?}, {} channels restored",
             boot.starts, boot.cause, boot.restored_channels
         )),
-        4 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
+        4 => match boot.clock {
+            ClockSource::Crystal => text_line(format_args!("clock: crystal")),
+            ClockSource::Internal => text_line(format_args!("clock: internal oscillator, the crystal did not start")),
+        },
+        5 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
         _ => return AnswerLine::End,
     })
 }

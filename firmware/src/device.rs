@@ -4,8 +4,8 @@
 use crate::board::Board;
 use crate::learner::Learner;
 use crate::retained::RetainedSettings;
-use crate::sensor::{SensorIdentity, probe};
-use adis16405_driver::{Config, GyroRange, SamplePeriod, TimeBase};
+use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, SensorIdentity, probe};
+use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase};
 use core::fmt::Arguments;
 use link::{Boot, Health, MessageRef, text_line};
 
@@ -107,7 +107,13 @@ impl DeviceState {
     }
 
     fn probe(&mut self, board: &mut impl Board) {
+        // The sensor may be in low-power mode still, from before a restart: it takes any clock that this mode takes.
+        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let result = probe(board.sensor_bus(), self.config).map_err(|error| text_line(format_args!("{error}")));
+        self.spi_clock_hz = board.set_clock_limit(match self.config.sample_period().clock_mode() {
+            ClockMode::Normal => BURST_LIMIT_HZ,
+            ClockMode::LowPower => LOW_POWER_LIMIT_HZ,
+        });
         let now_us = board.now_us();
         match result {
             Ok(SensorIdentity { product, tested, diagnosis }) => {

@@ -26,11 +26,8 @@ pub struct FinishedEpoch {
 
 impl FinishedEpoch {
     /// An epoch of no samples.
-    pub const EMPTY: Self = Self {
-        number: 0,
-        sums: [const { ChannelSums::EMPTY }; CHANNELS.len()],
-        covariances: AllanCovariances::EMPTY,
-    };
+    pub const EMPTY: Self =
+        Self { number: 0, sums: [const { ChannelSums::EMPTY }; CHANNELS.len()], covariances: AllanCovariances::EMPTY };
 
     /// Ends the running epoch of `estimators` and overwrites this value with its statistics.
     pub fn fill(&mut self, estimators: &mut Estimators<'_>) {

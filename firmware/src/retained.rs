@@ -143,7 +143,9 @@ impl RetainedRam {
 
     fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
         // There is one slot more than kinds, so at least one holds no newest version.
-        let Some(free) = (0..self.memory.slots.len()).find(|index| !self.newest.contains(&Some(*index))) else { return };
+        let Some(free) = (0..self.memory.slots.len()).find(|index| !self.newest.contains(&Some(*index))) else {
+            return;
+        };
         let slot = &self.memory.slots[free];
         self.version = self.version.wrapping_add(1);
         slot[0].store(MAGIC | kind as u32, Relaxed);

@@ -95,6 +95,16 @@ pub struct Hello {
     pub boot: Boot,
 }
 
+/// What a microcontroller's clocks are derived from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ClockSource {
+    /// The crystal of the board: within some 50 ppm.
+    #[default]
+    Crystal,
+    /// The internal oscillator, within some percent, since the crystal did not start.
+    Internal,
+}
+
 /// How the application was started.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Boot {
@@ -106,6 +116,8 @@ pub struct Boot {
     pub restored_channels: u8,
     /// Text of the panic or fault that ended the previous run; empty if there was none.
     pub crash_record: String<MAX_TEXT>,
+    /// What the microcontroller's clocks, and with them all times and rates of the report, are derived from.
+    pub clock: ClockSource,
 }
 
 /// Why the microcontroller started.

@@ -60,7 +60,6 @@ impl Device {
             restarts: 0,
         };
         let start = Start {
-            spi_clock_hz: SCK_HZ,
             boot: Boot::default(),
             retained: RetainedRam::open(memory),
             finished: Box::leak(Box::new(FinishedEpoch::EMPTY)),
@@ -146,6 +145,12 @@ impl Board for SimulatedBoard {
 
     fn sensor_bus(&mut self) -> (EmulatedBus, VirtualDelay) {
         (self.bus.clone(), self.bus.delay())
+    }
+
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        let sck_hz = limit_hz.min(SCK_HZ);
+        self.bus.part_mut().set_sck_hz(Some(sck_hz));
+        sck_hz
     }
 
     fn set_sampling(&mut self, enabled: bool) {

@@ -190,7 +190,8 @@ fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
     const RESET_S: f64 = EPOCH_S + 6.0;
     let keys = vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (RESET_S + 25.0, b"r".to_vec())];
     let events = vec![(RESET_S, Event::ResetPin)];
-    let scenario = Scenario { sensor: Some(warming_sensor(vec![])), keys, events, seconds: RESET_S + 28.0 };
+    let sensor = Some(warming_sensor(vec![]));
+    let scenario = Scenario { sensor, keys, events, seconds: RESET_S + 28.0, ..Scenario::default() };
     let Outcome { sensor, received, .. } = run(image(), scenario);
     let bursts = sensor.expect("the sensor on the bus").bursts;
     let (before, after): (Vec<_>, Vec<_>) = received.into_iter().partition(|(at, _)| *at as f64 <= RESET_S * 1e9);

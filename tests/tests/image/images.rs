@@ -86,7 +86,7 @@ pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
     let at = elf.word(vectors.expect("a vector table") + 4) as usize;
     elf.0[at..at + 4].copy_from_slice(&(STACK_START + bytes).to_le_bytes());
     std::fs::create_dir_all(folder()).expect("a folder");
-    let copy = folder().join(format!("observatory-f405-stack-{bytes}"));
+    let copy = folder().join(format!("observatory-h405-stack-{bytes}"));
     std::fs::write(&copy, elf.0).expect("room");
     copy
 }

@@ -1,6 +1,7 @@
 //! The image for the STM32F405, as it is built to be flashed, run in an emulator against the virtual sensor.
 
 mod bench;
+mod boards;
 mod compensation;
 mod decoded;
 mod faults;

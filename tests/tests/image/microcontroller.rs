@@ -27,12 +27,14 @@ pub(crate) struct Microcontroller {
     rcc_slot: usize,
     /// Whether the next reset is reported as one by the supply.
     pub(crate) brown_out: bool,
+    /// Whether the crystal oscillator never becomes ready.
+    pub(crate) crystal_fails: bool,
 }
 
 impl Microcontroller {
     pub(crate) fn new(part: Stm32f427) -> Result<Self, Error> {
         let (exti_slot, rcc_slot) = (part.bus().slot("EXTI")?, part.bus().slot("RCC")?);
-        Ok(Self { part, exti: Exti::default(), exti_slot, rcc_slot, brown_out: false })
+        Ok(Self { part, exti: Exti::default(), exti_slot, rcc_slot, brown_out: false, crystal_fails: false })
     }
 
     /// Sets the level of a pin of a port, and of the interrupt line of its number.
@@ -67,6 +69,11 @@ impl Mcu for Microcontroller {
 
     fn poll(&mut self, now: VirtualNanos) {
         self.part.poll(now);
+        if self.crystal_fails {
+            let (registers, _) = self.part.bus_mut().drive(now, self.rcc_slot);
+            let control = registers.get(rcc::Register::Cr);
+            registers.set(rcc::Register::Cr, rcc::cr::HSERDY.set(control, 0));
+        }
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
@@ -139,8 +146,13 @@ pub(crate) fn clear_in_memory(host: &mut dyn Host, value: u64) {
     assert!(cleared > 0, "{value} is not in memory");
 }
 
+/// Reads a peripheral's register, as a debugger would.
+pub(crate) fn read<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64) -> u64 {
+    session.access(Access::new(AccessKind::Read, address, Width::W32, 0), host).0
+}
+
 /// Clears bits of a peripheral's register, as a debugger would.
 pub(crate) fn clear_bits<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64, bits: u64) {
-    let (value, _) = session.access(Access::new(AccessKind::Read, address, Width::W32, 0), host);
+    let value = read(session, host, address);
     session.access(Access::new(AccessKind::Write, address, Width::W32, value & !bits), host);
 }

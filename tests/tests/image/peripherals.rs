@@ -8,8 +8,11 @@ use rigless::time::VirtualNanos;
 use std::collections::VecDeque;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// The bus clock of the board (84 MHz) divided by the first power of two that brings it to 1 MHz or less.
-pub(crate) const SCK_HZ: u32 = 84_000_000 / 128;
+/// Clock of the peripheral bus of the boards.
+const BUS_HZ: u32 = 42_000_000;
+/// The bus clock divided by the first power of two that brings it to 1 MHz or less, and to 300 kHz or less.
+pub(crate) const SCK_HZ: u32 = BUS_HZ / 64;
+const SLOW_SCK_HZ: u32 = BUS_HZ / 256;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Sensor {
@@ -23,6 +26,7 @@ pub(crate) struct Sensor {
     /// Words of another width than eight bits.
     pub(crate) odd_words: u64,
     byte_ns: u64,
+    selected_at: u64,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
     /// Whether a frame is under way.
@@ -31,12 +35,14 @@ pub(crate) struct Sensor {
 
 impl Sensor {
     /// The emulator reports a byte at its end, while the part is told when it began: it is taken to have lasted eight
-    /// periods of [`SCK_HZ`]. [`shortest_byte_ns`](Self::shortest_byte_ns) shows how long it really lasted.
+    /// periods of [`SCK_HZ`] or, by the time of the first byte of its frame, of [`SLOW_SCK_HZ`].
+    /// [`shortest_byte_ns`](Self::shortest_byte_ns) shows how long it really lasted.
     pub(crate) fn new(mut part: VirtualAdis16405) -> Self {
         part.set_sck_hz(Some(SCK_HZ));
         Self {
             part,
-            byte_ns: 8_000_000_000 / u64::from(SCK_HZ),
+            byte_ns: byte_ns(SCK_HZ),
+            selected_at: 0,
             bursts: Vec::new(),
             shortest_byte_ns: u64::MAX,
             stuck_at: None,
@@ -58,6 +64,11 @@ impl Sensor {
     }
 }
 
+/// Time of eight periods of a serial clock.
+fn byte_ns(sck_hz: u32) -> u64 {
+    8_000_000_000 / u64::from(sck_hz)
+}
+
 impl Store for Sensor {}
 
 impl spi::Peer for Sensor {
@@ -67,6 +78,11 @@ impl spi::Peer for Sensor {
             self.shortest_byte_ns = self.shortest_byte_ns.min(now - last);
         }
         self.odd_words += u64::from(bits != 8);
+        if self.frame.is_empty() {
+            let sck_hz = if now - self.selected_at < byte_ns(SLOW_SCK_HZ) { SCK_HZ } else { SLOW_SCK_HZ };
+            self.byte_ns = byte_ns(sck_hz);
+            self.part.set_sck_hz(Some(sck_hz));
+        }
         self.part.advance_to(now.saturating_sub(self.byte_ns));
         let answer = self.part.transfer_byte(mosi as u8);
         let miso = self.stuck_at.unwrap_or(answer);
@@ -78,6 +94,7 @@ impl spi::Peer for Sensor {
         self.part.advance_to(context.now().0);
         self.part.select();
         self.selected = true;
+        self.selected_at = context.now().0;
         self.frame.clear();
         self.last_byte = None;
     }
