@@ -31,6 +31,13 @@ impl BusTiming {
     /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the driver's stall in
     /// low-power mode. Bursts have no pauses, as with the drivers of Linux and PX4.
     pub const SAFE: Self = Self { select_high_ns: 16_000, low_power_select_high_ns: 75_000, word_gap_ns: 0 };
+
+    /// For a sensor that answers wrongly with [`SAFE`](Self::SAFE): chip select is high for 50 µs, as with the driver of
+    /// Linux, and every word of a burst is followed by the stall of a frame. A burst takes 0.45 ms at 656 kHz.
+    pub const CAREFUL: Self = Self { select_high_ns: 50_000, low_power_select_high_ns: 100_000, word_gap_ns: 9_000 };
+
+    /// The times that the image was built with: [`CAREFUL`](Self::CAREFUL) with feature `careful-bus`.
+    pub const CONFIGURED: Self = if cfg!(feature = "careful-bus") { Self::CAREFUL } else { Self::SAFE };
 }
 
 /// The sensor's bus, whose serial clock can be changed between two frames.

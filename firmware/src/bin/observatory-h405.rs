@@ -36,7 +36,7 @@ fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Stm32f4, Da
     let settings = serial::Config::default().baudrate(BAUD.bps());
     let usart = device.USART2.serial((gpioa.pa2, gpioa.pa3), settings, &mut rcc).expect("the baud rate is in range");
     let wires = (gpioa.pa4, gpioa.pa5, gpioa.pa6, gpioa.pa7);
-    let bus = spi1_bus((device.SPI1, device.DMA2), wires, &mut rcc, BusTiming::SAFE);
+    let bus = spi1_bus((device.SPI1, device.DMA2), wires, &mut rcc, BusTiming::CONFIGURED);
     let data_ready = data_ready_input(gpiob.pb0, (device.EXTI, device.SYSCFG), &mut rcc);
     let led = gpioc.pc12.into_push_pull_output();
 

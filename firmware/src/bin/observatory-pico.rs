@@ -69,7 +69,7 @@ fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Rp2040, Dat
     let mode = spi::FrameFormat::MotorolaSpi(embedded_hal::spi::MODE_3);
     let spi = spi.init(&mut resets, peripheral, BURST_LIMIT_HZ.Hz(), mode);
     let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
-    let bus = Spi0Bus::new((spi, peripheral), select, device.DMA, &mut resets, BusTiming::SAFE);
+    let bus = Spi0Bus::new((spi, peripheral), select, device.DMA, &mut resets, BusTiming::CONFIGURED);
 
     let data_ready = pins.gpio20.into_floating_input();
     data_ready.set_interrupt_enabled(gpio::Interrupt::EdgeHigh, true);

@@ -61,14 +61,14 @@ pub(crate) const FEATHER: Wiring = Wiring { crystal_hz: 12_000_000, data_ready: 
 /// The image for the Olimex STM32-H405, built at most once a run; `OBSERVATORY_IMAGE` names another.
 pub(crate) fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    let build = || images::build("h405", "thumbv7em-none-eabihf");
+    let build = || images::build("h405", "thumbv7em-none-eabihf", &[]);
     IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
 }
 
 /// The image for the Adafruit Feather STM32F405, built at most once a run.
 pub(crate) fn feather_image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    IMAGE.get_or_init(|| images::build("feather", "thumbv7em-none-eabihf"))
+    IMAGE.get_or_init(|| images::build("feather", "thumbv7em-none-eabihf", &[]))
 }
 
 /// Address of the register at `offset` of a GPIO port.

@@ -67,10 +67,32 @@ fn a_rate_of_low_power_mode_is_sampled_with_a_slower_serial_clock() {
     assert_eq!(sensor.expect("a sensor").part.violations(), []);
 }
 
+/// As other drivers do, the board raises chip select between frames and keeps the stall then; in a burst it stays low. The
+/// times are settings, which the feature `careful-bus` makes longer.
+#[test]
+fn chip_select_is_high_for_the_stall_and_words_are_apart_as_set() {
+    let careful = images::build("h405", "thumbv7em-none-eabihf", &["careful-bus"]);
+    for (image, high_us, gap_us) in [(image(), 16, 0), (&careful, 50, 9)] {
+        let keys = vec![(0.1, b"i 0\rf 819.2\r".to_vec()), (2.0, b"r".to_vec())];
+        let sensor = Some(Sensor::published(24));
+        let Outcome { sensor, received, .. } =
+            run(image, Scenario { sensor, keys, seconds: 4.0, ..Scenario::default() });
+        let sensor = sensor.expect("a sensor");
+        assert_eq!(sensor.part.violations(), []);
+        println!("chip select high for {} ns, gap of {} ns", sensor.shortest_high_ns, sensor.shortest_gap_ns);
+        // Up to 2 us more by the resolution of the counter, and the time of the code between.
+        assert!((high_us * 1000..(high_us + 4) * 1000).contains(&sensor.shortest_high_ns), "{high_us} us");
+        assert!((gap_us * 1000..(gap_us + 4) * 1000).contains(&sensor.shortest_gap_ns), "{gap_us} us");
+        let health = **Decoded::decode(&received).healths().last().expect("a report");
+        assert_eq!((health.used, health.lost_edges, health.bus_errors), (health.bursts, 0, 0), "{health:?}");
+        assert!(f64::from(health.used) > 1.7 * 819.2, "{health:?}");
+    }
+}
+
 /// `cargo run` shows the log: its texts are in the image.
 #[test]
 fn the_image_logs_its_start() {
-    let elf = std::fs::read(images::build("h405", "thumbv7em-none-eabihf")).expect("the image");
+    let elf = std::fs::read(image()).expect("the image");
     let contains = |text: &[u8]| elf.windows(text.len()).any(|window| window == text);
     assert!(contains(b"crash record: {=str}"), "texts below the level error are not compiled in");
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Mutex;
 
 pub(crate) fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
@@ -13,9 +14,13 @@ pub(crate) fn folder() -> PathBuf {
     workspace().join(target).join("image")
 }
 
-/// Builds the image `observatory-{board}` for a target and returns the path of its ELF.
-pub(crate) fn build(board: &str, target: &str) -> PathBuf {
-    let (bin, feature) = (format!("observatory-{board}"), format!("board-{board}"));
+/// Builds the image `observatory-{board}` for a target, with further features, and returns the path of its ELF: a copy, since
+/// cargo overwrites the image when it builds it with other features.
+pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
+    static BUILD: Mutex<()> = Mutex::new(());
+    let _one_at_a_time = BUILD.lock();
+    let bin = format!("observatory-{board}");
+    let feature = [&[format!("board-{board}").as_str()], further].concat().join(",");
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace())
         .args(["build", "--package", "firmware", "--bin", &bin, "--features", &feature, "--target", target])
@@ -24,7 +29,12 @@ pub(crate) fn build(board: &str, target: &str) -> PathBuf {
         .status()
         .expect("cargo starts");
     assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    folder().join(target).join("image").join(bin)
+    let copy = folder().join([&[bin.as_str()], further].concat().join("-")).with_extension("elf");
+    // Renamed when it is whole: another run of the tests may be reading the one before.
+    let partial = copy.with_extension(std::process::id().to_string());
+    std::fs::copy(folder().join(target).join("image").join(bin), &partial).expect("room");
+    std::fs::rename(partial, &copy).expect("the same folder");
+    copy
 }
 
 /// Vector table of the STM32F405, and the start of its core-coupled memory, which is the stack (RM0090 section 2.3).
@@ -86,7 +96,7 @@ pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
     let at = elf.word(vectors.expect("a vector table") + 4) as usize;
     elf.0[at..at + 4].copy_from_slice(&(STACK_START + bytes).to_le_bytes());
     std::fs::create_dir_all(folder()).expect("a folder");
-    let copy = folder().join(format!("observatory-h405-stack-{bytes}"));
+    let copy = folder().join(format!("observatory-h405-stack-{bytes}.elf"));
     std::fs::write(&copy, elf.0).expect("room");
     copy
 }

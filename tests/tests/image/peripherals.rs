@@ -21,12 +21,17 @@ pub(crate) struct Sensor {
     pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
     /// Shortest time from one byte to the next within a frame, in ns.
     pub(crate) shortest_byte_ns: u64,
+    /// Shortest time between the last SCK edge of a word of a burst and the first of the next, in ns.
+    pub(crate) shortest_gap_ns: u64,
+    /// Shortest time for which chip select was high between two frames, in ns.
+    pub(crate) shortest_high_ns: u64,
     /// Byte at which the data line to the processor is held.
     pub(crate) stuck_at: Option<u8>,
     /// Words of another width than eight bits.
     pub(crate) odd_words: u64,
     byte_ns: u64,
     selected_at: u64,
+    deselected_at: Option<u64>,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
     /// Whether a frame is under way.
@@ -45,6 +50,9 @@ impl Sensor {
             selected_at: 0,
             bursts: Vec::new(),
             shortest_byte_ns: u64::MAX,
+            shortest_gap_ns: u64::MAX,
+            shortest_high_ns: u64::MAX,
+            deselected_at: None,
             stuck_at: None,
             odd_words: 0,
             frame: Vec::new(),
@@ -76,6 +84,9 @@ impl spi::Peer for Sensor {
         let now = context.now().0;
         if let Some(last) = self.last_byte.replace(now) {
             self.shortest_byte_ns = self.shortest_byte_ns.min(now - last);
+            if self.frame.len().is_multiple_of(2) {
+                self.shortest_gap_ns = self.shortest_gap_ns.min((now - last).saturating_sub(self.byte_ns));
+            }
         }
         self.odd_words += u64::from(bits != 8);
         if self.frame.is_empty() {
@@ -95,6 +106,9 @@ impl spi::Peer for Sensor {
         self.part.select();
         self.selected = true;
         self.selected_at = context.now().0;
+        if let Some(deselected_at) = self.deselected_at {
+            self.shortest_high_ns = self.shortest_high_ns.min(self.selected_at - deselected_at);
+        }
         self.frame.clear();
         self.last_byte = None;
     }
@@ -103,6 +117,7 @@ impl spi::Peer for Sensor {
         self.part.advance_to(context.now().0);
         self.part.deselect();
         self.selected = false;
+        self.deselected_at = Some(context.now().0);
         let burst_requested = self.frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
         let answers: Vec<u8> = self.frame.iter().map(|&(_, miso)| miso).collect();
         if burst_requested && let Ok(burst) = answers.try_into() {

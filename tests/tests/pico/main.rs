@@ -10,7 +10,7 @@ mod decoded;
 mod images;
 
 use adis16405_driver::Burst;
-use bench::{Event, Outcome, run};
+use bench::{Event, Outcome, Pico, SOUND, image, run};
 use decoded::{Decoded, on_host};
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
@@ -24,7 +24,7 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
 #[ignore = "long: 20 emulated seconds with software floating point take half a minute; run with --long"]
 fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     const SECONDS: f64 = 20.0;
-    let outcome = run(sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
+    let outcome = run(SOUND, sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
     println!("{} instructions in {SECONDS} s; {}", outcome.instructions, outcome.diagnostics);
     let (bursts, part) = (&outcome.bursts, &outcome.part);
     // The sensor checks the 16 us between frames. It is not told the clock, which the firmware reports (below).
@@ -60,7 +60,7 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
         (7.5, Event::EdgesLost(true)),
         (7.6, Event::EdgesLost(false)),
     ];
-    let Outcome { part, bursts, received, .. } = run(sensor(9), 9.2, &keys, &events);
+    let Outcome { part, bursts, received, .. } = run(SOUND, sensor(9), 9.2, &keys, &events);
     let decoded = Decoded::decode(&received);
     println!("{:#?}", decoded.logs());
     assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
@@ -87,4 +87,59 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert!(decoded.lines.iter().any(|line| line.contains("sensor sampled")), "{:?}", decoded.lines);
     assert!(decoded.lines.iter().any(|line| line.starts_with("start 1: PowerOn")), "{:?}", decoded.lines);
     assert_eq!(part.violations(), []);
+}
+
+/// An error of the DMA costs the burst and what comes until the transfer is abandoned, 25 ms later; then no byte of it is left
+/// and the channel works.
+#[test]
+fn a_failed_transfer_is_recovered_from() {
+    let board = Pico { dma_error_at: 1.0, ..SOUND };
+    let Outcome { received, led_changes, .. } = run(board, sensor(12), 2.6, &["0.1=i 0\r", "2.2=k"], &[]);
+    let decoded = Decoded::decode(&received);
+    let counter = |name: &str| {
+        let number = |line: &String| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok();
+        decoded.lines.iter().find_map(number).unwrap_or(0_u32)
+    };
+    println!("{:#?}", decoded.lines);
+    assert_eq!((counter("bus_errors"), counter("recoveries"), counter("shifted")), (1, 1, 0));
+    assert!(counter("bursts").abs_diff(counter("used")) <= 1 && f64::from(counter("used")) > 1.9 * RATE_HZ);
+    assert!((4..=6).contains(&led_changes), "{led_changes} changes of the LED in 2.6 s");
+}
+
+/// Without the crystal there is no serial port; the LED changes its level 80 times and the next attempt follows.
+#[test]
+fn without_a_crystal_the_led_blinks_fast() {
+    let board = Pico { crystal_starts: false, ..SOUND };
+    let Outcome { received, led_changes, .. } = run(board, sensor(13), 0.4, &[], &[]);
+    assert_eq!(received, []);
+    assert!((40..=80).contains(&led_changes), "{led_changes} changes of the LED in 0.4 s");
+}
+
+#[test]
+fn the_image_fits_its_flash_and_memory() {
+    let size = images::size(image());
+    println!("{size:?}");
+    // An eighth of 2 MiB, and three quarters of the 200 KiB beside the stack.
+    assert!(size.flash <= 256 * 1024 && size.statics <= 150 * 1024, "{size:?}");
+}
+
+/// A whole epoch: its report, the models of all channels, a quarter of the stack never used, and the watchdog, whose time is
+/// 8.3 s, fed at least twice as often as it must be.
+#[test]
+#[ignore = "long: 200 emulated seconds with software floating point take some minutes; run with --long"]
+fn the_pico_learns_from_an_epoch() {
+    const SECONDS: f64 = 200.0;
+    let keys = ["0.2=i 0\r", "0.5=e 20\r", "22.0=e 0\r"];
+    let outcome = run(SOUND, sensor(14), SECONDS, &keys, &[]);
+    let decoded = Decoded::decode(&outcome.received);
+    println!("{:#?}", decoded.lines);
+    println!("the watchdog was not fed for {:.2} s at most", outcome.longest_unfed_s);
+    let learned = decoded.messages.iter().filter(|message| matches!(message, link::Message::Learned(_))).count();
+    let health = **decoded.healths().last().expect("the report of an epoch");
+    println!("{health:?}");
+    assert_eq!((decoded.channels().len() % 8, learned % 6), (0, 0));
+    assert!(learned >= 6);
+    assert!(outcome.longest_unfed_s < 4.15, "{} s", outcome.longest_unfed_s);
+    assert!(4 * health.stack_bytes <= 3 * health.stack_size, "{health:?}");
+    assert_eq!((health.lost_edges, health.queue_full), (0, 0), "{health:?}");
 }

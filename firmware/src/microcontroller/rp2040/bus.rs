@@ -85,7 +85,8 @@ impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> Spi0Bus<W, S> {
         let complete = [RX, TX].iter().all(|&channel| {
             let registers = self.dma.ch(channel);
             let control = registers.ch_ctrl_trig().read();
-            control.ahb_error().bit_is_clear()
+            control.read_error().bit_is_clear()
+                && control.write_error().bit_is_clear()
                 && control.busy().bit_is_clear()
                 && registers.ch_trans_count().read().bits() == 0
         });
