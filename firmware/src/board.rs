@@ -180,6 +180,28 @@ impl WatchdogFeeder {
     }
 }
 
+/// Prolongs the time of a watchdog that is shorter than a step of the main loop: a periodic interrupt feeds it as long as the
+/// main loop has done so within the last ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WatchdogExtension {
+    /// Feedings by the main loop that have been seen.
+    feedings: u32,
+    ticks_left: u32,
+}
+
+impl WatchdogExtension {
+    /// Before the first feeding.
+    pub const START: Self = Self { feedings: 0, ticks_left: 0 };
+
+    /// To be called at every tick with the number of feedings by the main loop so far. Returns whether the watchdog is to be
+    /// fed: for `ticks` ticks after each of them.
+    pub fn tick(&mut self, feedings: u32, ticks: u32) -> bool {
+        self.ticks_left = if feedings == self.feedings { self.ticks_left.saturating_sub(1) } else { ticks };
+        self.feedings = feedings;
+        self.ticks_left > 0
+    }
+}
+
 impl<'r, C: Chip, T, B, S, E, Q> BoardContext<'r, C, T, B, S, E, Q> {
     /// `received` is the queue of bytes from the serial port.
     pub fn new(chip: C, locks: Locks<T, B, S, E, Q>, received: &'r mut spsc::Consumer<'static, u8>) -> Self {
@@ -342,6 +364,19 @@ mod tests {
         fn meters(&mut self) -> BoardMeters {
             BoardMeters::default()
         }
+    }
+
+    #[test]
+    fn a_long_step_is_fed_through_and_a_hang_is_not() {
+        let mut extension = WatchdogExtension::START;
+        let fed = |extension: &mut WatchdogExtension, feedings, ticks| {
+            (0..ticks).filter(|_| extension.tick(feedings, 480)).count()
+        };
+        assert_eq!(fed(&mut extension, 0, 100), 0, "nothing has been fed yet");
+        assert_eq!(fed(&mut extension, 1, 400), 400, "25 s at 16 ticks a second");
+        assert_eq!(fed(&mut extension, 2, 1000), 480, "the main loop hangs");
+        assert_eq!(fed(&mut extension, 2, 1000), 0);
+        assert_eq!(fed(&mut extension, 3, 1), 1);
     }
 
     #[test]

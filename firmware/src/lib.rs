@@ -49,7 +49,7 @@ mod transmit;
 
 pub use acquisition::{BurstQueue, Sampler, TimedBurst};
 pub use app::{App, Start, run};
-pub use board::{Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, SensorBus, Uptime};
+pub use board::{Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, SensorBus, Uptime, WatchdogExtension};
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;

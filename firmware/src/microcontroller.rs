@@ -12,7 +12,7 @@ pub mod rp2040;
 #[cfg(feature = "stm32f4")]
 pub mod stm32f4;
 
-use crate::board::{BusTiming, SensorBus};
+use crate::board::{BusTiming, SensorBus, WatchdogExtension};
 use crate::sensor::LOW_POWER_LIMIT_HZ;
 use adis16405_driver::BURST_BYTES;
 use core::convert::Infallible;
@@ -61,6 +61,9 @@ pub trait Microcontroller {
     fn feed(&mut self);
     /// Restarts processor and peripherals; the RAM keeps its content.
     fn restart() -> !;
+    /// To be called at every interrupt of SysTick, of which there are [`processor::WAKE_HZ`] a second: prolongs the time of a
+    /// watchdog that is shorter than a step of the main loop.
+    fn extend_watchdog(_extension: &mut WatchdogExtension) {}
 }
 
 /// The data-ready pin, which raises an interrupt at rising edges.

@@ -84,7 +84,7 @@ macro_rules! observatory {
             };
             use $crate::{
                 BoardContext, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, Sampler, Start, Statistics,
-                TimedBurst, TransmitBuffer, TransmitQueue, Uptime, estimate, run,
+                TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
             };
 
             #[shared]
@@ -195,9 +195,10 @@ macro_rules! observatory {
                 count_lost_bytes(context.local.port.serve());
             }
 
-            #[task(binds = SysTick, priority = 1, local = [blinker])]
+            #[task(binds = SysTick, priority = 1, local = [blinker, extension: WatchdogExtension = WatchdogExtension::START])]
             fn wake(context: wake::Context) {
                 context.local.blinker.tick();
+                <$microcontroller>::extend_watchdog(context.local.extension);
             }
         }
 

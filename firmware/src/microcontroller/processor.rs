@@ -16,7 +16,7 @@ pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
 static SERIAL_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
 /// Rate in Hz at which SysTick wakes the main loop, also without a sensor. At 168 MHz the reload value fits SysTick's 24 bits.
-const WAKE_HZ: u32 = 16;
+pub const WAKE_HZ: u32 = 16;
 
 /// Runs `work` and stores the cycles that it took in `longest` if they are the most so far. `work` must take less than one
 /// period of SysTick, which counts down.

@@ -123,8 +123,8 @@ fn the_image_fits_its_flash_and_memory() {
     assert!(size.flash <= 256 * 1024 && size.statics <= 150 * 1024, "{size:?}");
 }
 
-/// A whole epoch: its report, the models of all channels, a quarter of the stack never used, and the watchdog, whose time is
-/// 8.3 s, fed at least twice as often as it must be.
+/// A whole epoch: its report, the models of all channels, and a quarter of the stack never used. The watchdog, whose time is
+/// 8.3 s, is fed during the longest step too.
 #[test]
 #[ignore = "long: 200 emulated seconds with software floating point take some minutes; run with --long"]
 fn the_pico_learns_from_an_epoch() {
@@ -139,7 +139,7 @@ fn the_pico_learns_from_an_epoch() {
     println!("{health:?}");
     assert_eq!((decoded.channels().len() % 8, learned % 6), (0, 0));
     assert!(learned >= 6);
-    assert!(outcome.longest_unfed_s < 4.15, "{} s", outcome.longest_unfed_s);
+    assert!(outcome.longest_unfed_s < 0.5, "{} s", outcome.longest_unfed_s);
     assert!(4 * health.stack_bytes <= 3 * health.stack_size, "{health:?}");
     assert_eq!((health.lost_edges, health.queue_full), (0, 0), "{health:?}");
 }

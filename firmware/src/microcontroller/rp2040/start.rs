@@ -1,6 +1,9 @@
 //! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
 
+use crate::board::WatchdogExtension;
+use crate::microcontroller::processor::WAKE_HZ;
 use crate::microcontroller::{DataReadyPin, Microcontroller};
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use embedded_hal::digital::StatefulOutputPin;
 use link::BootCause;
 use rp2040_hal::clocks::{ClocksManager, InitError, init_clocks_and_plls};
@@ -11,8 +14,14 @@ use rp2040_hal::{Timer, Watchdog};
 
 /// Crystal of the Pico.
 const CRYSTAL_HZ: u32 = 12_000_000;
-/// Time without feeding after which the watchdog restarts; its maximum is 8.388 s.
+/// Time after which the watchdog restarts if neither the main loop nor SysTick feeds it; its maximum is 8.388 s.
 const WATCHDOG_MS: u32 = 8_300;
+/// Time for which SysTick feeds the watchdog after the main loop, in s. The longest step of the main loop is the fit of one
+/// channel: with 20 points it takes 118 million instructions (tests/instructions, thumbv6m) and up to three of them follow
+/// one another, 2.5 s in the emulator with 12 points; slow flash may double that.
+const EXTENSION_S: u32 = 30;
+/// Feedings by the main loop.
+static FEEDINGS: AtomicU32 = AtomicU32::new(0);
 /// Readings of the flag of the crystal, each of at least three cycles of at most 12 MHz: 100 ms. It is set 1 ms after the
 /// oscillator runs.
 const CRYSTAL_READINGS: u32 = 400_000;
@@ -110,6 +119,15 @@ impl Microcontroller for Rp2040 {
 
     fn feed(&mut self) {
         self.watchdog.feed();
+        FEEDINGS.store(FEEDINGS.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+
+    fn extend_watchdog(extension: &mut WatchdogExtension) {
+        if extension.tick(FEEDINGS.load(Relaxed), EXTENSION_S * WAKE_HZ) {
+            // The counter falls by two a microsecond (erratum RP2040-E1).
+            // SAFETY: feeds the watchdog, as the main loop does.
+            unsafe { (*WATCHDOG::ptr()).load().write(|w| w.bits(2 * 1000 * WATCHDOG_MS)) };
+        }
     }
 
     /// Restarts by the watchdog, since a reset of the core alone would not reset the peripherals.
