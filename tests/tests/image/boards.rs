@@ -1,6 +1,7 @@
 //! What the boards differ in, and what their documents demand: crystal, pins, the 5 V of the sensor, brown-out, log.
 
 use crate::bench::{FEATHER, FLASH_OPTCR, H405, Outcome, PUPDR, Scenario, feather_image, gpio, image, run};
+use crate::costs::{Costs, Memory, assert_within_budget, counter};
 use crate::decoded::Decoded;
 use crate::images;
 use crate::peripherals::Sensor;
@@ -96,4 +97,25 @@ fn the_image_logs_its_start() {
     let elf = std::fs::read(image()).expect("the image");
     let contains = |text: &[u8]| elf.windows(text.len()).any(|window| window == text);
     assert!(contains(b"crash record: {=str}"), "texts below the level error are not compiled in");
+}
+
+/// Sampling alone at 819.2 SPS, then an epoch that is learned from: flash, RAM, stack, processor, interrupts.
+#[test]
+fn each_board_is_within_its_budget() {
+    // RM0090 sections 2.3.1 and 3.4.
+    let memory = Memory { flash: 1 << 20, ram: 128 << 10 };
+    for (board, image, wiring) in
+        [("Olimex STM32-H405", image(), H405), ("Feather STM32F405", feather_image(), FEATHER)]
+    {
+        let keys = vec![(0.1, b"i 0\rf 819.2\re 10\r".to_vec()), (8.0, b"k".to_vec()), (11.0, b"e 0\r".to_vec())];
+        let sensor = Some(Sensor::published(25));
+        let Outcome { received, diagnostics, .. } =
+            run(image, Scenario { wiring, sensor, keys, seconds: 35.0, ..Scenario::default() });
+        assert_eq!(diagnostics, [""; 0]);
+        let decoded = Decoded::decode(&received);
+        let awake_percent = f64::from(counter(&decoded.lines, "awake_permille").expect("the counters")) / 10.0;
+        let health = **decoded.healths().last().expect("the report of the epoch");
+        assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{health:?}");
+        assert_within_budget(&Costs { board, memory, image, core_mhz: 168.0, awake_percent, health });
+    }
 }

@@ -2,6 +2,7 @@
 //! cause of a restart.
 
 use crate::bench::{Event, Outcome, Scenario, image, run};
+use crate::costs::counter;
 use crate::decoded::{Decoded, in_stretches};
 use crate::images;
 use crate::peripherals::Sensor;
@@ -236,10 +237,7 @@ fn a_stack_overflow_faults_and_is_recorded() {
         assert!(lines.iter().any(|line| line.contains(expected)), "{expected}: {lines:?}");
     }
     // All bursts since the restart were used: at 204.8 SPS more than 300 until the counters were printed.
-    let counter = |name: &str| {
-        let number = |line: &String| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok();
-        lines.iter().find_map(number).unwrap_or(0_u32)
-    };
+    let counter = |name: &str| counter(&lines, name).unwrap_or(0);
     assert_eq!(counter("used"), counter("bursts"));
     assert!(counter("lost_edges") == 0 && counter("bursts") > 300, "{lines:?}");
     assert!(sensor.is_some_and(|sensor| sensor.part.violations().is_empty()));

@@ -3,6 +3,7 @@
 mod bench;
 mod boards;
 mod compensation;
+mod costs;
 mod decoded;
 mod faults;
 mod full_speed;
@@ -92,16 +93,6 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
         (received.iter().rfind(|bytes| bytes.0 < 4_500_000_000).map_or(0, sent), received.last().map_or(0, sent));
     println!("{health:?}");
     println!("a report took {:.3} s", (last - first.max(4_500_000_000)) as f64 * 1e-9);
-}
-
-#[test]
-fn the_image_fits_its_flash_and_memory() {
-    let size = images::size(image());
-    println!("{size:?}");
-    // A quarter of 1 MiB.
-    assert!(size.flash <= 256 * 1024, "{size:?}");
-    // Three quarters of 128 KiB. The stack, which other tests assert to suffice, has the core-coupled memory.
-    assert!(size.statics <= 96 * 1024, "{size:?}");
 }
 
 #[test]
