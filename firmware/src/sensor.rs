@@ -9,6 +9,8 @@ use embedded_hal::spi::SpiDevice;
 pub const BURST_LIMIT_HZ: u32 = 1_000_000;
 /// Largest serial clock in the sensor's low-power mode in Hz (data sheet Rev. B, page 10).
 pub(crate) const LOW_POWER_LIMIT_HZ: u32 = 300_000;
+/// Stall after single frames in ns: that of low-power mode, in which the sensor may still be.
+const STALL_NS: u32 = 75_000;
 
 /// The largest clock of at most `limit_hz` that a divider by 2, 4, 8 … 256 makes of `bus_hz`; `None` if 256 is not enough.
 ///
@@ -75,7 +77,7 @@ pub fn probe<SPI: SpiDevice<u8>>(
     (bus, mut delay): (SPI, impl DelayNs),
     config: Config,
 ) -> Result<SensorIdentity, ProbeError<SPI::Error>> {
-    let mut sensor = Adis16405::new(bus, config);
+    let mut sensor = Adis16405::new(bus, config).with_stall_ns(STALL_NS);
     let product = sensor.init()?;
     let test = sensor.self_test(&mut delay)?;
     if test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES) {
@@ -97,7 +99,7 @@ pub fn auto_null<SPI: SpiDevice<u8>>(
     (bus, mut delay): (SPI, impl DelayNs),
     config: Config,
 ) -> Result<(), Error<SPI::Error>> {
-    Adis16405::new(bus, config).auto_null(&mut delay).map(|_offsets| ())
+    Adis16405::new(bus, config).with_stall_ns(STALL_NS).auto_null(&mut delay).map(|_offsets| ())
 }
 
 #[cfg(test)]

@@ -15,6 +15,9 @@ use virtual_sensor::{EmulatedBus, VirtualAdis16405, VirtualDelay};
 /// SCK of the sensor's bus, Hz.
 const SCK_HZ: u32 = 1_000_000;
 
+/// Time before the first frame after a burst, µs.
+const STALL_US: u64 = 75;
+
 /// Longest time between two passes of the main loop, µs.
 const WAKE_US: u64 = 100_000;
 
@@ -155,6 +158,10 @@ impl Board for SimulatedBoard {
 
     fn set_sampling(&mut self, enabled: bool) {
         self.sampler.set_enabled(enabled);
+        if !enabled {
+            let stalled_us = self.now_us() + STALL_US;
+            self.advance_to(stalled_us);
+        }
     }
 
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
