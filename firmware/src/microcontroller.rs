@@ -137,6 +137,8 @@ fn wait_ns<M: Microcontroller>(ns: u32) {
 trait ByteExchange {
     /// Sends a byte and returns the one received meanwhile.
     fn exchange(&mut self, byte: u8) -> Result<u8, BusFault>;
+    /// Waits until the last clock period of the last byte has ended.
+    fn finish(&mut self) -> Result<(), BusFault>;
 }
 
 /// The chip-select pin, active low, which stays high between two frames for the time that the settings ask for.
@@ -186,7 +188,7 @@ fn transfer<M: Microcontroller, S: OutputPin<Error = Infallible>>(
         frame => (frame, 0),
     };
     select.select::<M>();
-    let done = frame.iter_mut().try_for_each(|operation| perform::<M>(bytes, operation));
+    let done = frame.iter_mut().try_for_each(|operation| perform::<M>(bytes, operation)).and_then(|()| bytes.finish());
     select.deselect::<M>();
     wait_ns::<M>(stall_ns);
     done

@@ -1,7 +1,7 @@
 //! The image on an emulated STM32F427, which has what the STM32F405 has and more, with a crystal, a sensor and a terminal.
 
 use crate::images;
-use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise, read};
+use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise, read, write};
 use crate::peripherals::{Sensor, Terminal};
 use link::Health;
 use rigless::cpu::armv7m as cpu;
@@ -26,9 +26,9 @@ const SUPPLY_MV: u32 = 3300;
 const CHIP_SELECT: u8 = 4; // PA4
 const SPI1: usize = 0;
 const TIM2: std::ops::Range<u64> = 0x4000_0000..0x4000_0400;
-/// Control register of TIM2, and its bit that lets it count (RM0090 section 18.4.1).
-const TIM2_CR1: u64 = TIM2.start;
-const CEN: u64 = 1;
+/// Reset register of the bus of TIM2, and the bit that holds it in reset (RM0090 section 6.3.8).
+const RCC_APB1RSTR: u64 = 0x4002_3820;
+const TIM2RST: u64 = 1;
 /// Control register of the DMA stream that receives bursts, and its bit that enables the interrupt at the end of a
 /// transfer (RM0090 section 10.5.5).
 const DMA2_S0CR: u64 = 0x4002_6410;
@@ -227,7 +227,7 @@ impl Plant {
             }
             Event::LoseBurstEnd => self.burst_fault = TCIE,
             Event::StopReceiving => self.burst_fault = EN,
-            Event::StopCounter => clear_bits(session, host, TIM2_CR1, CEN),
+            Event::StopCounter => write(session, host, RCC_APB1RSTR, TIM2RST),
             Event::BusError => session.fail_next(TIM2.start, TIM2.end),
             Event::ClearInMemory(value) => clear_in_memory(host, value),
         }

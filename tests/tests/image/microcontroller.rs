@@ -151,8 +151,13 @@ pub(crate) fn read<D: Board>(session: &mut Session<D>, host: &mut dyn Host, addr
     session.access(Access::new(AccessKind::Read, address, Width::W32, 0), host).0
 }
 
+/// Writes a peripheral's register, as a debugger would.
+pub(crate) fn write<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64, value: u64) {
+    session.access(Access::new(AccessKind::Write, address, Width::W32, value), host);
+}
+
 /// Clears bits of a peripheral's register, as a debugger would.
 pub(crate) fn clear_bits<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64, bits: u64) {
     let value = read(session, host, address);
-    session.access(Access::new(AccessKind::Write, address, Width::W32, value & !bits), host);
+    write(session, host, address, value & !bits);
 }

@@ -181,6 +181,11 @@ impl ByteExchange for Spi0Bytes {
         let received = spi.sspdr().read().data().bits() as u8;
         if spi.sspris().read().rorris().bit_is_set() { Err(BusFault::Overrun) } else { Ok(received) }
     }
+
+    fn finish(&mut self) -> Result<(), BusFault> {
+        let idle = wait_for(|| registers().sspsr().read().bsy().bit_is_clear());
+        if idle { Ok(()) } else { Err(BusFault::Timeout) }
+    }
 }
 
 impl<W: ValidSpiPinout<SPI0>, S> ErrorType for Spi0Bus<W, S> {

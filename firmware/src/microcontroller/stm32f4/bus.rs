@@ -172,6 +172,11 @@ impl ByteExchange for Spi1Bytes {
         let received = spi.dr().read().dr().bits() as u8;
         if spi.sr().read().ovr().bit_is_set() { Err(BusFault::Overrun) } else { Ok(received) }
     }
+
+    fn finish(&mut self) -> Result<(), BusFault> {
+        let idle = wait_for(|| registers().sr().read().bsy().bit_is_clear());
+        if idle { Ok(()) } else { Err(BusFault::Timeout) }
+    }
 }
 
 impl<S> ErrorType for Spi1Bus<S> {
