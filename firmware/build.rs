@@ -3,8 +3,11 @@
 use std::{env, fs, path::PathBuf};
 
 /// Feature of each board, as cargo spells it here, and its memory map.
-const BOARDS: [(&str, &str); 2] =
-    [("CARGO_FEATURE_BOARD_F405", "memory/f405.x"), ("CARGO_FEATURE_BOARD_PICO", "memory/rp2040.x")];
+const BOARDS: [(&str, &str); 3] = [
+    ("CARGO_FEATURE_BOARD_H405", "memory/f405.x"),
+    ("CARGO_FEATURE_BOARD_FEATHER", "memory/f405.x"),
+    ("CARGO_FEATURE_BOARD_PICO", "memory/rp2040.x"),
+];
 
 fn main() {
     println!("cargo:rerun-if-changed=memory");

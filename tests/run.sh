@@ -69,7 +69,8 @@ tools() {
 format() { run cargo fmt --all --check; }
 lint_images() { # where the tests build them, so that their build scripts are compiled once
     local image=(--profile image --target-dir "$TARGET/image" --package firmware)
-    lint "${image[@]}" --bin observatory-f405 --features board-f405 --target "$MCU"
+    lint "${image[@]}" --bin observatory-h405 --features board-h405 --target "$MCU"
+    lint "${image[@]}" --bin observatory-feather --features board-feather --target "$MCU"
     lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
 }
 lint_examples() ( # a workspace of its own

@@ -260,6 +260,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.missing.saturating_add(self.absent).saturating_add(self.pending)
     }
 
+    /// Missing samples that the curve replaces: those in gaps that its longer octaves bridge.
+    #[must_use]
+    pub fn replaced(&self) -> u64 {
+        self.octaves.iter().map(|octave| u64::from(octave.interpolation.replaced())).sum()
+    }
+
     /// Whether a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
     #[must_use]
     pub fn is_saturated(&self) -> bool {

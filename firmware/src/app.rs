@@ -10,7 +10,7 @@ use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
 use crate::report::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
-use crate::sensor::{LOW_POWER_LIMIT_HZ, auto_null};
+use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
 use crate::status_flags::StatusFlags;
 use crate::task_monitor::TaskMonitor;
@@ -20,8 +20,6 @@ use link::{Boot, BootCause, MessageRef, text_line};
 
 /// What the start-up code of a board hands to the application.
 pub struct Start {
-    /// Serial clock of the sensor's bus as set in the hardware, in Hz.
-    pub spi_clock_hz: u32,
     /// Why the microcontroller started, and the crash record.
     pub boot: Boot,
     /// The retained RAM.
@@ -69,11 +67,8 @@ fn interval_us(settings: RetainedSettings) -> u64 {
 
 impl App {
     /// Restores settings and statistics from retained RAM, if it holds any.
-    ///
-    /// Not inlined: its frame of 4.7 kB (temporaries) would otherwise be part of the main loop's.
-    #[inline(never)]
     pub fn new(start: Start, board: &mut impl Board) -> Self {
-        let Start { spi_clock_hz, mut boot, mut retained, finished } = start;
+        let Start { mut boot, mut retained, finished } = start;
         let restored = retained
             .settings()
             .and_then(|settings| Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?)));
@@ -89,13 +84,20 @@ impl App {
             }
         }
         retained.write_settings(settings, first);
+        // A restart while the last finished epoch was being learned from: its report starts again.
+        let interrupted =
+            !first && retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch;
+        let mut report = ReportProgress::default();
+        if interrupted {
+            report.start_epoch_end();
+        }
         let now_us = board.now_us();
         // Unless the microcontroller alone was restarted, the sensor may be starting up too.
         let sensor_runs = matches!(boot.cause, BootCause::Pin | BootCause::Software | BootCause::Watchdog);
         let probe_us = if sensor_runs { now_us } else { now_us + START_UP_US };
         Self {
             state: DeviceState {
-                spi_clock_hz,
+                spi_clock_hz: board.set_clock_limit(BURST_LIMIT_HZ),
                 boot,
                 settings,
                 config,
@@ -110,7 +112,7 @@ impl App {
             retained,
             parser: CommandParser::default(),
             console: Console::new(),
-            report: ReportProgress::default(),
+            report,
             next_report_us: now_us + interval_us(settings),
             next_checkpoint_us: now_us + CHECKPOINT_US,
             checkpoint_channel: 0,
@@ -172,8 +174,6 @@ impl App {
 
     // Commands
 
-    /// Not inlined: its frame would otherwise be part of that of every model fit.
-    #[inline(never)]
     fn execute(&mut self, command: DeviceCommand, board: &mut impl Board) {
         let now_us = board.now_us();
         let (range, taps, period) =
@@ -275,6 +275,7 @@ impl App {
         }
         board.set_sampling(false);
         self.state.request_probe(now_us);
+        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let done = auto_null(board.sensor_bus(), self.state.config).map_err(|error| text_line(format_args!("{error}")));
         match done {
             Ok(()) => {
@@ -287,15 +288,19 @@ impl App {
 
     // Checkpoints and timers
 
-    /// Writes one channel at a time to retained RAM, all of them once in 0.8 s: a restart loses no more than that.
+    /// Writes one channel after the other to retained RAM, all of them once in 0.8 s: a restart loses no more than that. What
+    /// became due during a long step of a fit is written at once.
     fn checkpoint(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
-        // During the report that ends an epoch the records hold the finished epoch.
-        if now_us >= self.next_checkpoint_us && !self.report.ends_epoch() {
-            self.next_checkpoint_us = now_us + CHECKPOINT_US;
+        for _ in 0..CHANNELS.len() {
+            if now_us < self.next_checkpoint_us {
+                return;
+            }
+            self.next_checkpoint_us += CHECKPOINT_US;
             self.checkpoint_channel = (self.checkpoint_channel + 1) % CHANNELS.len();
             self.checkpoint_channel(board, self.checkpoint_channel);
         }
+        self.next_checkpoint_us = self.next_checkpoint_us.max(now_us);
     }
 
     fn checkpoint_channel(&mut self, board: &mut impl Board, index: usize) {
@@ -323,6 +328,7 @@ impl App {
         board.estimators(|estimators| estimators.reset());
         self.state.settings.epoch = 0;
         self.state.learner.reset();
+        self.retained.clear_epoch();
         self.report = ReportProgress::default();
         self.start_epoch(board);
     }
@@ -332,9 +338,10 @@ impl App {
     fn finish_epoch(&mut self, board: &mut impl Board) {
         let finished = self.state.learner.finished.as_deref_mut();
         let Some(finished) = finished.filter(|_| !self.report.ends_epoch()) else { return };
-        let retained = &mut self.retained;
-        board.estimators(|estimators| finished.fill(estimators, retained));
+        board.estimators(|estimators| finished.fill(estimators));
         finished.number = self.state.settings.epoch;
+        // Before the settings, so that a restart in between finds the epoch either running or finished.
+        self.retained.write_epoch(finished);
         self.state.settings.epoch = self.state.settings.epoch.saturating_add(1);
         self.report.start_epoch_end();
         self.start_epoch(board);
@@ -345,11 +352,15 @@ impl App {
         self.retained.write_settings(self.state.settings, true);
     }
 
-    /// Makes and sends the next message of the report, for which there must be room. Not inlined, as `execute`.
-    #[inline(never)]
+    /// Makes and sends the next message of the report, for which there must be room.
     fn send_report_part(&mut self, board: &mut impl Board) {
         let ends_epoch = self.report.ends_epoch();
-        let Some(part) = self.report.part() else { return };
+        let Some(part) = self.report.part() else {
+            if ends_epoch {
+                self.retained.clear_epoch(); // it has been learned from
+            }
+            return;
+        };
         match part {
             ReportPart::Hello => self.state.send_hello(ends_epoch, board),
             ReportPart::Channel(index) => self.state.send_channel(index, ends_epoch, board),
@@ -370,8 +381,6 @@ impl App {
         self.state.learner.finished = Some(epoch);
     }
 
-    /// Not inlined: its frame of 2.5 kB (the fit) would otherwise add to that of the regression in `learn`.
-    #[inline(never)]
     fn fit_model(&mut self, board: &mut impl Board, epoch: &FinishedEpoch, index: usize, regressors: Regressors) {
         let config = self.state.config;
         let mut fit = EpochFit::new(regressors);
@@ -392,8 +401,6 @@ impl App {
     }
 }
 
-/// Not inlined: its frame of 1.7 kB (the message) would otherwise add to that of the fit.
-#[inline(never)]
 fn send_learned(board: &mut impl Board, fit: &EpochFit, index: usize, epoch: u32) {
     let message = fit.message(index, epoch);
     send(board, MessageRef::Learned(&message));

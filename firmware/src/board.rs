@@ -9,8 +9,42 @@ use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use heapless::spsc;
 use rtic_core::Mutex;
 
-/// Time before the first frame after a burst in µs: the longer of the sensor's two stall times, that of low-power mode.
+/// Time before the first frame after a burst in µs: the sensor's longest stall time, that of its low-power mode.
 const STALL_US: u32 = 75;
+/// Time in µs after which a burst is abandoned: the longest one, at 164 kHz with gaps of 16 µs, takes 1.5 ms.
+const BURST_US: u32 = 5_000;
+
+/// Times of the sensor's bus that the board keeps. The stall after a frame is the driver's
+/// (`adis16405_driver::Timing::stall_ns`); the board keeps it while chip select is high.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BusTiming {
+    /// Least time that chip select is high between two frames, in ns.
+    pub select_high_ns: u32,
+    /// The same at a serial clock of at most 300 kHz: the sensor is, or may be, in low-power mode.
+    pub low_power_select_high_ns: u32,
+    /// Pause between two words of a burst in ns; 0 for none. With a pause every word is a DMA transfer of its own, with an
+    /// interrupt at its end.
+    pub word_gap_ns: u32,
+}
+
+impl BusTiming {
+    /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the driver's stall in
+    /// low-power mode. Bursts have no pauses, as with the drivers of Linux and PX4.
+    pub const SAFE: Self = Self { select_high_ns: 16_000, low_power_select_high_ns: 75_000, word_gap_ns: 0 };
+
+    /// For a sensor that answers wrongly with [`SAFE`](Self::SAFE): chip select is high for 50 µs, as with the driver of
+    /// Linux, and every word of a burst is followed by the stall of a frame. A burst takes 0.45 ms at 656 kHz.
+    pub const CAREFUL: Self = Self { select_high_ns: 50_000, low_power_select_high_ns: 100_000, word_gap_ns: 9_000 };
+
+    /// The times that the image was built with: [`CAREFUL`](Self::CAREFUL) with feature `careful-bus`.
+    pub const CONFIGURED: Self = if cfg!(feature = "careful-bus") { Self::CAREFUL } else { Self::SAFE };
+}
+
+/// The sensor's bus, whose serial clock can be changed between two frames.
+pub trait SensorBus: SpiDevice<u8> {
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
+}
 
 /// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
 pub trait Board {
@@ -27,16 +61,14 @@ pub trait Board {
     fn now_us(&mut self) -> u64;
     /// The sensor's bus and a delay. To be used only while sampling is disabled.
     fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz. To be
+    /// used only while sampling is disabled.
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
     /// Enables or disables sampling. On return after disabling, no burst is being transferred, and the sensor's stall time
     /// has passed.
     fn set_sampling(&mut self, enabled: bool);
     /// Transfers of bursts so far.
     fn sampling_activity(&mut self) -> SamplingActivity;
-    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz, or
-    /// 0 if the board cannot set it. To be used only while sampling is disabled.
-    fn set_clock_limit(&mut self, _limit_hz: u32) -> u32 {
-        0
-    }
     /// Resets the microcontroller's side of the sensor's bus. To be used only while sampling is disabled.
     fn reset_bus(&mut self) {}
     /// Pulses the sensor's RST line. Returns false if the board does not connect it.
@@ -105,6 +137,8 @@ pub trait Chip {
     fn sleep(&mut self, clock: impl FnMut(u32));
     /// Requests the interrupt that transmits what is queued.
     fn transmit(&mut self);
+    /// Requests the interrupt of the end of a burst, which then fails if it is still being transferred.
+    fn abandon_burst(&mut self);
     /// Feeds the watchdog.
     fn feed(&mut self);
     /// Restarts the microcontroller.
@@ -154,6 +188,28 @@ impl WatchdogFeeder {
     }
 }
 
+/// Prolongs the time of a watchdog that is shorter than a step of the main loop: a periodic interrupt feeds it as long as the
+/// main loop has done so within the last ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WatchdogExtension {
+    /// Feedings by the main loop that have been seen.
+    feedings: u32,
+    ticks_left: u32,
+}
+
+impl WatchdogExtension {
+    /// Before the first feeding.
+    pub const START: Self = Self { feedings: 0, ticks_left: 0 };
+
+    /// To be called at every tick with the number of feedings by the main loop so far. Returns whether the watchdog is to be
+    /// fed: for `ticks` ticks after each of them.
+    pub fn tick(&mut self, feedings: u32, ticks: u32) -> bool {
+        self.ticks_left = if feedings == self.feedings { self.ticks_left.saturating_sub(1) } else { ticks };
+        self.feedings = feedings;
+        self.ticks_left > 0
+    }
+}
+
 impl<'r, C: Chip, T, B, S, E, Q> BoardContext<'r, C, T, B, S, E, Q> {
     /// `received` is the queue of bytes from the serial port.
     pub fn new(chip: C, locks: Locks<T, B, S, E, Q>, received: &'r mut spsc::Consumer<'static, u8>) -> Self {
@@ -175,8 +231,7 @@ impl<C, T, B, S, E, Q> Board for BoardContext<'_, C, T, B, S, E, Q>
 where
     C: Chip,
     T: Mutex<T = Uptime>,
-    B: Mutex,
-    B::T: SpiDevice<u8>,
+    B: Mutex<T: SensorBus>,
     S: Mutex<T = Sampler<'static>>,
     E: Mutex<T = Estimators<'static>>,
     Q: Mutex<T = TransmitQueue<'static>>,
@@ -200,11 +255,19 @@ where
         (LockedBus(&mut self.locks.bus), FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog })
     }
 
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        self.locks.bus.lock(|bus| bus.set_clock_limit(limit_hz))
+    }
+
     fn set_sampling(&mut self, enabled: bool) {
         self.locks.sampler.lock(|sampler| sampler.set_enabled(enabled));
         if !enabled {
-            // The transfer of a burst takes 0.4 ms at most.
-            while self.locks.sampler.lock(|sampler| sampler.is_reading()) {}
+            let start = self.chip.microseconds();
+            while self.locks.sampler.lock(|sampler| sampler.is_reading()) {
+                if self.chip.microseconds().wrapping_sub(start) > BURST_US {
+                    self.chip.abandon_burst();
+                }
+            }
             FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(STALL_US);
         }
     }
@@ -308,10 +371,24 @@ mod tests {
 
         fn sleep(&mut self, _: impl FnMut(u32)) {}
         fn transmit(&mut self) {}
+        fn abandon_burst(&mut self) {}
         fn restart(&mut self) {}
         fn meters(&mut self) -> BoardMeters {
             BoardMeters::default()
         }
+    }
+
+    #[test]
+    fn a_long_step_is_fed_through_and_a_hang_is_not() {
+        let mut extension = WatchdogExtension::START;
+        let fed = |extension: &mut WatchdogExtension, feedings, ticks| {
+            (0..ticks).filter(|_| extension.tick(feedings, 480)).count()
+        };
+        assert_eq!(fed(&mut extension, 0, 100), 0, "nothing has been fed yet");
+        assert_eq!(fed(&mut extension, 1, 400), 400, "25 s at 16 ticks a second");
+        assert_eq!(fed(&mut extension, 2, 1000), 480, "the main loop hangs");
+        assert_eq!(fed(&mut extension, 2, 1000), 0);
+        assert_eq!(fed(&mut extension, 3, 1), 1);
     }
 
     #[test]

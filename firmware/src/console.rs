@@ -6,10 +6,10 @@ use crate::device::DeviceState;
 use crate::estimators::Estimators;
 use crate::learner::ValidationResult;
 use crate::report::running_sums;
-use crate::statistics::{CHANNELS, INERTIAL, OCTAVES};
+use crate::statistics::{CHANNELS, ChannelEstimator, INERTIAL, OCTAVES};
 use core::fmt::{self, Arguments};
 use heapless::Deque;
-use link::{Health, MAX_COVARIATES, TextLine, text_line};
+use link::{ClockSource, Health, MAX_COVARIATES, TextLine, text_line};
 
 /// Answer to the version command.
 pub(crate) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
@@ -99,9 +99,6 @@ impl Console {
     }
 
     /// Makes and sends the next line of the first answer.
-    ///
-    /// Not inlined, here and below: frames of up to 1.9 kB (text lines, model) would otherwise be part of every caller's.
-    #[inline(never)]
     pub(crate) fn send_line(&mut self, state: &DeviceState, board: &mut impl Board) {
         let Some(&answer) = self.answers.front() else { return };
         let index = self.next_line;
@@ -140,7 +137,6 @@ const MISSING_LINE: usize = VALIDATION_LINE + 1;
 
 /// Head, a row for every octave, then for every inertial channel the coefficients of the baseline model, for every
 /// regressor a line, the validation on the last finished epoch, and the samples missing in the running one.
-#[inline(never)]
 fn table_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     if let Some(head) = TABLE_HEAD.get(index) {
         return AnswerLine::Text(text_line(format_args!("{head}")));
@@ -179,7 +175,6 @@ fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
     any.then(|| text_line(format_args!("{tau:>10} {a:>10} {b:>10} {c:>10} {d:>10} {e:>10} {f:>10}")))
 }
 
-#[inline(never)]
 fn coefficients_line(state: &DeviceState, board: &mut impl Board, index: usize) -> TextLine {
     let channel = CHANNELS[index];
     let model = running_sums(board, index).fit_baseline(channel, state.config);
@@ -193,7 +188,6 @@ fn coefficients_line(state: &DeviceState, board: &mut impl Board, index: usize) 
 }
 
 /// A covariate that has been subtracted from the channel since the last finished epoch.
-#[inline(never)]
 fn regressor_line(state: &DeviceState, index: usize, number: usize) -> Option<TextLine> {
     let regressor = state.learner.models[index].regressors.get(number)?;
     let (value, error) = (ShortFloat(regressor.value), ShortFloat(regressor.error));
@@ -202,7 +196,6 @@ fn regressor_line(state: &DeviceState, index: usize, number: usize) -> Option<Te
 }
 
 /// The validation of the channel's model on the last finished epoch.
-#[inline(never)]
 fn validation_line(state: &DeviceState, index: usize) -> Option<TextLine> {
     let ValidationResult { deviance_per_point, drift } = state.learner.results[index]?;
     let (before, after) = (ShortFloat(deviance_per_point.0), ShortFloat(deviance_per_point.1));
@@ -214,14 +207,14 @@ fn validation_line(state: &DeviceState, index: usize) -> Option<TextLine> {
 }
 
 /// The samples missing in a channel; `None` if there are none.
-#[inline(never)]
 fn missing_line(board: &mut impl Board, index: usize) -> Option<TextLine> {
     let losses = board.estimators(|estimators| estimators.losses(false));
     let (name, lost, refused) = (CHANNELS[index].name(), losses.lost, losses.refused[index]);
-    (lost + refused > 0).then(|| text_line(format_args!("{name} missing: {lost} lost, {refused} refused")))
+    let replaced = board.estimators(|estimators| estimators.channel(index).map_or(0, ChannelEstimator::replaced));
+    let text = format_args!("{name} missing: {lost} lost, {refused} refused; {replaced} replaced in the curve");
+    (lost + refused > 0).then(|| text_line(text))
 }
 
-#[inline(never)]
 fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     let now_us = board.now_us();
     let boot = &state.boot;
@@ -253,13 +246,16 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
             "start {}: {:?}, {} channels restored",
             boot.starts, boot.cause, boot.restored_channels
         )),
-        5 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
+        5 => match boot.clock {
+            ClockSource::Crystal => text_line(format_args!("clock: crystal")),
+            ClockSource::Internal => text_line(format_args!("clock: internal oscillator, the crystal did not start")),
+        },
+        6 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
         _ => return AnswerLine::End,
     })
 }
 
 /// A line for each counter that is not 0.
-#[inline(never)]
 fn counter_line(health: &Health, index: usize) -> AnswerLine {
     let counters = [
         ("bursts", health.bursts),

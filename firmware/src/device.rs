@@ -121,9 +121,6 @@ impl DeviceState {
 
     /// Probes the sensor when that is due, and stops using one that is in trouble. Returns true if the microcontroller is to
     /// be restarted, as the last step of recovery.
-    ///
-    /// Not inlined: its frame would otherwise be part of that of every model fit.
-    #[inline(never)]
     pub(crate) fn supervise_sensor(&mut self, board: &mut impl Board) -> bool {
         let now_us = board.now_us();
         match self.sensor {
@@ -209,7 +206,7 @@ impl DeviceState {
         // The sensor may be in low-power mode until it is configured.
         board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let result = probe(board.sensor_bus(), self.config, scope).map_err(|error| text_line(format_args!("{error}")));
-        self.set_clock(clock_limit_hz(self.config), board);
+        self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {
             Ok(identity) => {
                 self.product_id = identity.product.prod_id();
@@ -234,26 +231,18 @@ impl DeviceState {
         }
     }
 
-    /// Sets the serial clock of the sensor's bus, unless the board cannot.
-    fn set_clock(&mut self, limit_hz: u32, board: &mut impl Board) {
-        let clock_hz = board.set_clock_limit(limit_hz);
-        if clock_hz > 0 {
-            self.spi_clock_hz = clock_hz;
-        }
-    }
-
     /// Disables sampling and sets a serial clock that the sensor takes with `config`; the probe that follows sets it again.
     ///
     /// # Errors
     /// The clock in Hz, if the board has none that is slow enough; sampling goes on.
     pub(crate) fn prepare_clock(&mut self, config: Config, board: &mut impl Board) -> Result<(), u32> {
         board.set_sampling(false);
-        self.set_clock(clock_limit_hz(config), board);
-        if self.spi_clock_hz <= clock_limit_hz(config) {
+        let clock_hz = board.set_clock_limit(clock_limit_hz(config));
+        if clock_hz <= clock_limit_hz(config) {
+            self.spi_clock_hz = clock_hz;
             return Ok(());
         }
-        let clock_hz = self.spi_clock_hz;
-        self.set_clock(clock_limit_hz(self.config), board);
+        self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         board.set_sampling(self.is_sampled());
         Err(clock_hz)
     }

@@ -5,7 +5,6 @@
 //! `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`, so that no second estimator is needed.
 
 use crate::estimators::Estimators;
-use crate::retained::{ChannelRecords, RetainedRam};
 use crate::statistics::{
     AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
 };
@@ -16,50 +15,45 @@ use heapless::Vec;
 use link::{MAX_COVARIATES, ReportedShift};
 
 /// The statistics of a finished epoch.
-///
-/// The sums of its channels are not copied: they stay in the retained RAM where the epoch's end has written them. As long as
-/// they are needed, no further checkpoint may be written.
-#[derive(Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FinishedEpoch {
     /// Number of the epoch: epochs finished before it.
     pub number: u32,
-    records: ChannelRecords,
-    covariances: AllanCovariances,
+    /// The sums of [`CHANNELS`].
+    pub(crate) sums: [ChannelSums; CHANNELS.len()],
+    pub(crate) covariances: AllanCovariances,
 }
 
 impl FinishedEpoch {
     /// An epoch of no samples.
-    pub const EMPTY: Self = Self { number: 0, records: ChannelRecords::EMPTY, covariances: AllanCovariances::EMPTY };
+    pub const EMPTY: Self =
+        Self { number: 0, sums: [const { ChannelSums::EMPTY }; CHANNELS.len()], covariances: AllanCovariances::EMPTY };
 
     /// Ends the running epoch of `estimators` and overwrites this value with its statistics.
-    pub fn fill(&mut self, estimators: &mut Estimators<'_>, retained: &mut RetainedRam) {
+    pub fn fill(&mut self, estimators: &mut Estimators<'_>) {
         estimators.end_epoch(|statistics| {
-            for (index, estimator) in statistics.estimators.iter().enumerate() {
-                retained.checkpoint(index, &ChannelSums::from_estimator(estimator));
+            for (sums, estimator) in self.sums.iter_mut().zip(&statistics.estimators) {
+                *sums = ChannelSums::from_estimator(estimator);
             }
-            self.records = retained.channel_records();
             self.covariances.fill(&statistics.cross_sums);
         });
     }
 
-    /// The sums of [`CHANNELS`]`[index]`.
+    /// The sums of [`CHANNELS`]`[index]`; `None` if there is no such channel.
     #[must_use]
-    pub fn sums(&self, index: usize) -> ChannelSums {
-        self.records.sums(index)
+    pub fn sums(&self, index: usize) -> Option<&ChannelSums> {
+        self.sums.get(index)
     }
 
-    /// Samples of [`CHANNELS`]`[index]`.
+    /// Samples of [`CHANNELS`]`[index]`; 0 if there is no such channel.
     #[must_use]
     pub fn samples(&self, index: usize) -> u64 {
-        self.records.samples(index)
+        self.sums(index).map_or(0, |sums| sums.samples)
     }
 
     /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
-    ///
-    /// Not inlined: its frame of 0.6 kB (the sums) would otherwise be part of every caller's.
-    #[inline(never)]
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, config: Config) {
-        self.sums(index).rebuild_curve(curve, CHANNELS[index], config);
+        self.sums[index].rebuild_curve(curve, CHANNELS[index], config);
     }
 
     /// The covariances of the channels; `None` if they do not cover all samples of the channels, as after a restart.
@@ -92,10 +86,7 @@ type Candidates = Vec<usize, MAX_COVARIATES>;
 /// also if the epoch has no [covariances](FinishedEpoch::covariances).
 ///
 /// Calls `keep_on` before every fit; `None` if that returned false.
-///
-/// Not inlined: its frame of 3.9 kB (curve, covariates) would otherwise be part of every caller's.
 #[must_use]
-#[inline(never)]
 pub fn estimate_regressors(
     epoch: &FinishedEpoch,
     index: usize,
@@ -153,9 +144,7 @@ pub(crate) fn rebuild_compensated_curve(
     if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, config, regressors) }
 }
 
-/// Not inlined: its frame of 5.3 kB (two curves, covariates) would otherwise be part of every caller's; those of `covariate`
-/// and `degrades` take 1.9 and 2.4 kB.
-#[inline(never)]
+/// Subtracts the regressors' share from the curve of the stream itself; `None` without covariances.
 fn subtract(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
@@ -217,7 +206,6 @@ fn scaled_covariance(covariances: &AllanCovariances, (a, b): (usize, usize), n: 
 
 /// The covariate [`CHANNELS`]`[index]` at the octaves of the cross sums, with its own noise modelled (`modelled`, for an
 /// estimate) or as measured (for a subtraction).
-#[inline(never)]
 fn covariate(epoch: &FinishedEpoch, index: usize, config: Config, modelled: bool) -> Covariate<CROSS_OCTAVES> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, config);
@@ -236,7 +224,6 @@ fn lsb(index: usize, config: Config) -> f64 {
 ///
 /// A chance correlation with a covariate that hardly varies has a large sensitivity, which would add the covariate's noise
 /// to the stream. At octaves without covariances that noise is all that the subtraction adds.
-#[inline(never)]
 fn degrades(
     epoch: &FinishedEpoch,
     candidates: &Candidates,

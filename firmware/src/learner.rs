@@ -115,8 +115,7 @@ impl EpochFit {
         done
     }
 
-    /// Not inlined, here and below: frames of 2.0 to 3.3 kB (curves, models) would otherwise be part of every caller's.
-    #[inline(never)]
+    /// Traces what N, B and K lack in the compensated stream. Returns false if it was cancelled.
     fn search(
         &mut self,
         epoch: &FinishedEpoch,
@@ -154,7 +153,6 @@ impl EpochFit {
     }
 }
 
-#[inline(never)]
 fn refit_baseline(epoch: &FinishedEpoch, index: usize, config: Config) -> Option<BaselineCoefficients> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, config);
@@ -184,7 +182,6 @@ pub fn validate(
 }
 
 /// Error of N, B and K on the stream itself; the outer `None` before the first fit.
-#[inline(never)]
 fn baseline_error(
     model: &EpochModel,
     epoch: &FinishedEpoch,
@@ -197,7 +194,6 @@ fn baseline_error(
 }
 
 /// Fills in the error of the full model on the compensated stream, and the Allan deviations of both streams.
-#[inline(never)]
 fn fill_compensated(
     model: &EpochModel,
     epoch: &FinishedEpoch,

@@ -22,7 +22,7 @@
 //! | `report`, [`console`] | reports in frames, answers in text |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
-//! | [`retained`], `crash_record` | what survives a warm reset |
+//! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
 //!
 //! Sampling has a higher priority than the estimators, and these a higher one than the main loop. While a lower priority
 //! holds the lock of a shared resource, the interrupts that share it wait; locks are short.
@@ -41,6 +41,7 @@ mod crash_record;
 mod cross_sums;
 mod device;
 pub mod epoch;
+mod epoch_record;
 mod estimators;
 pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
@@ -57,7 +58,7 @@ mod transmit;
 
 pub use acquisition::{BurstQueue, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
-pub use board::{Board, BoardContext, BoardMeters, Chip, Locks, Uptime};
+pub use board::{Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, SensorBus, Uptime, WatchdogExtension};
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;

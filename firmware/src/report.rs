@@ -46,22 +46,16 @@ impl DeviceState {
         }
     }
 
-    // None of the following is inlined: a message and its sums take 1.2 to 2.5 kB of stack, and only the one that is being
-    // made shall take it.
-
-    #[inline(never)]
     pub(crate) fn send_hello(&self, ends_epoch: bool, board: &mut impl Board) {
         let hello = self.hello(ends_epoch, board);
         send(board, MessageRef::Hello(&hello));
     }
 
-    #[inline(never)]
     pub(crate) fn send_health(&self, board: &mut impl Board) {
         let health = self.health(board);
         send(board, MessageRef::Health(&health));
     }
 
-    #[inline(never)]
     pub(crate) fn send_channel(&self, index: usize, ends_epoch: bool, board: &mut impl Board) {
         let (channel, sums) = (CHANNELS[index], &self.reported_sums(index, ends_epoch, board));
         let model = self.learner.models.get(index);
@@ -72,22 +66,19 @@ impl DeviceState {
         send_channel_message(board, channel, sums, lost, baseline.as_ref(), unseen_error);
     }
 
-    #[inline(never)]
     fn reported_sums(&self, index: usize, ends_epoch: bool, board: &mut impl Board) -> ChannelSums {
         match self.learner.finished().filter(|_| ends_epoch) {
-            Some(epoch) => epoch.sums(index),
+            Some(epoch) => epoch.sums(index).cloned().unwrap_or(ChannelSums::EMPTY),
             None => running_sums(board, index),
         }
     }
 
     /// Error of the previous epoch's N, B and K on the sums.
-    #[inline(never)]
     fn unseen_error(&self, model: &EpochModel, channel: Channel, sums: &ChannelSums) -> Option<ReportedModelError> {
         sums.error_of(&model.baseline(self.config)?, channel, self.config)
     }
 
     /// Validates the model of an inertial channel on the finished epoch and sends the result, if there is one.
-    #[inline(never)]
     pub(crate) fn send_validation(&mut self, index: usize, board: &mut impl Board) {
         if let Some(message) = self.learner.validate(index, self.config) {
             send(board, MessageRef::Validation(&message));
@@ -95,7 +86,6 @@ impl DeviceState {
     }
 }
 
-#[inline(never)]
 fn send_channel_message(
     board: &mut impl Board,
     channel: Channel,
@@ -109,14 +99,12 @@ fn send_channel_message(
     send(board, MessageRef::Channel(&report));
 }
 
-/// The sums of [`CHANNELS`]`[index]` of the running epoch. Not inlined: they take 0.6 kB of stack.
-#[inline(never)]
+/// The sums of [`CHANNELS`]`[index]` of the running epoch.
 pub(crate) fn running_sums(board: &mut impl Board, index: usize) -> ChannelSums {
     board.estimators(|estimators| estimators.channel(index).map_or(ChannelSums::EMPTY, ChannelSums::from_estimator))
 }
 
 /// Queues a message. If there is no room it is dropped, and the receiver counts it as missing.
-#[inline(never)]
 pub(crate) fn send(board: &mut impl Board, message: MessageRef<'_>) {
     board.transmit_queue(|queue| queue.send(message));
 }

@@ -4,31 +4,30 @@
 //! there are records. A record is always written into a slot that is not the newest version of any record, so that a reset
 //! during the write loses that version and not the one before.
 
-use crate::statistics::{CHANNELS, ChannelSums, OCTAVES};
+use crate::epoch::FinishedEpoch;
+use crate::epoch_record::{EpochRecord, SUMS_WORDS, checksum, sums_from_words, sums_words};
+use crate::statistics::{CHANNELS, ChannelSums};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Payload words of a record: the samples, the missing ones, and for every octave a sum of 96 and a count of 64 bits.
-const PAYLOAD: usize = 4 + OCTAVES * OCTAVE_WORDS;
-const OCTAVE_WORDS: usize = 5;
 /// Words of a slot: kind, version, generation, payload, checksum.
-const SLOT_WORDS: usize = PAYLOAD + 4;
-/// Largest sum that a record holds.
-const MAX_SUM: u128 = (1 << 96) - 1;
+const SLOT_WORDS: usize = SUMS_WORDS + 4;
 /// Kinds of records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
 /// Marks a record, in the upper half of a slot's first word. Changes with the layout.
 const MAGIC: u32 = 0xAD17_0000;
 
-const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-
 /// The memory, to be placed in a linker section that is not initialised at the start.
-pub type RetainedMemory = [Slot; KINDS + 1];
+pub struct RetainedMemory {
+    slots: [Slot; KINDS + 1],
+    epoch: EpochRecord,
+}
 
 /// A [`RetainedMemory`] without records.
 #[must_use]
 pub const fn blank_memory() -> RetainedMemory {
-    [const { [const { AtomicU32::new(0) }; SLOT_WORDS] }; KINDS + 1]
+    let slots = [const { [const { AtomicU32::new(0) }; SLOT_WORDS] }; KINDS + 1];
+    RetainedMemory { slots, epoch: EpochRecord::blank() }
 }
 
 /// The settings of the application.
@@ -64,15 +63,15 @@ impl RetainedRam {
     #[must_use]
     pub fn open(memory: &'static RetainedMemory) -> Self {
         let mut retained = Self { memory, generation: 0, version: 0, newest: [None; KINDS], settings: None };
-        for (index, slot) in memory.iter().enumerate() {
+        for (index, slot) in memory.slots.iter().enumerate() {
             let Some((kind, version)) = valid_record(slot) else { continue };
-            let newer = retained.newest[kind].is_none_or(|other| word(&memory[other], 1) < version);
+            let newer = retained.newest[kind].is_none_or(|other| word(&memory.slots[other], 1) < version);
             if newer {
                 retained.newest[kind] = Some(index);
             }
             retained.version = retained.version.max(version);
         }
-        if let Some(slot) = retained.newest[SETTINGS].map(|index| &memory[index]) {
+        if let Some(slot) = retained.newest[SETTINGS].map(|index| &memory.slots[index]) {
             retained.generation = word(slot, 2);
             let at = |index: usize| word(slot, 3 + index);
             retained.settings = Some(RetainedSettings {
@@ -89,9 +88,10 @@ impl RetainedRam {
 
     /// Erases all records, as after power-on.
     pub fn clear(&mut self) {
-        for slot in self.memory {
+        for slot in &self.memory.slots {
             slot[0].store(0, Relaxed);
         }
+        self.memory.epoch.clear();
         *self = Self::open(self.memory);
     }
 
@@ -104,14 +104,25 @@ impl RetainedRam {
     /// The sums of [`CHANNELS`]`[index]`; `None` without a record of the present generation.
     #[must_use]
     pub fn restore(&self, index: usize) -> Option<ChannelSums> {
-        let slot = &self.memory[self.newest.get(1 + index).copied()??];
-        (word(slot, 2) == self.generation).then(|| sums(slot))
+        let slot = &self.memory.slots[self.newest.get(1 + index).copied()??];
+        let words = slot[3..].iter().map(|cell| cell.load(Relaxed));
+        (word(slot, 2) == self.generation).then(|| sums_from_words(words))
     }
 
-    /// The records of all channels, of any generation. They are valid until further ones are written.
+    /// Writes a finished epoch in the place of the one before. A reset during the write loses it.
+    pub fn write_epoch(&mut self, epoch: &FinishedEpoch) {
+        self.memory.epoch.write(epoch);
+    }
+
+    /// Overwrites `epoch` with the finished epoch. Returns false, and leaves `epoch` alone, if there is none.
     #[must_use]
-    pub fn channel_records(&self) -> ChannelRecords {
-        ChannelRecords(core::array::from_fn(|index| self.newest[1 + index].map(|slot| &self.memory[slot])))
+    pub fn restore_epoch(&self, epoch: &mut FinishedEpoch) -> bool {
+        self.memory.epoch.restore(epoch)
+    }
+
+    /// Erases the finished epoch: nothing is left to be learned from it.
+    pub fn clear_epoch(&mut self) {
+        self.memory.epoch.clear();
     }
 
     /// Writes the settings; with `new_generation` the channel records written before are out of date.
@@ -124,26 +135,18 @@ impl RetainedRam {
     }
 
     /// Writes the sums of [`CHANNELS`]`[index]`.
-    ///
-    /// Differences of counts of 14 bits are within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum of squares
-    /// exceeds 2⁷¹·n ≤ 2⁹⁴.
     pub fn checkpoint(&mut self, index: usize, sums: &ChannelSums) {
-        let halves = |wide: u64| [wide as u32, (wide >> 32) as u32];
-        let octave = |&(squares, count): &(u128, u64)| {
-            let squares = squares.min(MAX_SUM);
-            let [[a, b], [d, e]] = [squares as u64, count].map(halves);
-            [a, b, (squares >> 64) as u32, d, e]
-        };
-        let samples = [sums.samples, sums.missing].into_iter().flat_map(halves);
         if index < CHANNELS.len() {
-            self.write(1 + index, samples.chain(sums.octaves.iter().flat_map(octave)));
+            self.write(1 + index, sums_words(sums));
         }
     }
 
     fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
         // There is one slot more than kinds, so at least one holds no newest version.
-        let Some(free) = (0..self.memory.len()).find(|index| !self.newest.contains(&Some(*index))) else { return };
-        let slot = &self.memory[free];
+        let Some(free) = (0..self.memory.slots.len()).find(|index| !self.newest.contains(&Some(*index))) else {
+            return;
+        };
+        let slot = &self.memory.slots[free];
         self.version = self.version.wrapping_add(1);
         slot[0].store(MAGIC | kind as u32, Relaxed);
         slot[1].store(self.version, Relaxed);
@@ -157,56 +160,10 @@ impl RetainedRam {
     }
 }
 
-/// References to the records of all channels at one time.
-#[derive(Clone)]
-pub struct ChannelRecords([Option<&'static Slot>; CHANNELS.len()]);
-
-impl ChannelRecords {
-    /// No records.
-    pub const EMPTY: Self = Self([None; CHANNELS.len()]);
-
-    /// The sums of [`CHANNELS`]`[index]`; empty without a record.
-    #[must_use]
-    pub fn sums(&self, index: usize) -> ChannelSums {
-        self.slot(index).map_or(ChannelSums::EMPTY, sums)
-    }
-
-    /// Samples of [`CHANNELS`]`[index]`; 0 without a record.
-    #[must_use]
-    pub fn samples(&self, index: usize) -> u64 {
-        self.slot(index).map_or(0, |slot| wide(slot, 0))
-    }
-
-    fn slot(&self, index: usize) -> Option<&'static Slot> {
-        self.0.get(index).copied().flatten()
-    }
-}
-
 type Slot = [AtomicU32; SLOT_WORDS];
-
-/// Two payload words as a number of 64 bits.
-fn wide(slot: &Slot, at: usize) -> u64 {
-    u64::from(word(slot, 3 + at)) | u64::from(word(slot, 4 + at)) << 32
-}
-
-fn sums(slot: &Slot) -> ChannelSums {
-    let octaves = core::array::from_fn(|octave| {
-        let at = 4 + OCTAVE_WORDS * octave;
-        (u128::from(wide(slot, at)) | u128::from(word(slot, 5 + at)) << 64, wide(slot, at + 3))
-    });
-    ChannelSums { samples: wide(slot, 0), missing: wide(slot, 2), octaves }
-}
 
 fn word(slot: &[AtomicU32], index: usize) -> u32 {
     slot[index].load(Relaxed)
-}
-
-fn checksum(words: &[AtomicU32]) -> u32 {
-    let mut digest = CRC.digest();
-    for word in words {
-        digest.update(&word.load(Relaxed).to_le_bytes());
-    }
-    digest.finalize()
 }
 
 /// The kind and version of the record in a slot, if its checksum is right.
@@ -221,7 +178,9 @@ mod tests {
     extern crate std;
 
     use super::*;
-    use crate::statistics::ChannelEstimator;
+    use crate::epoch_record::MAX_SUM;
+    use crate::statistics::{ChannelEstimator, OCTAVES};
+    use allan_core::Interpolation;
     use std::boxed::Box;
 
     const SETTINGS_WRITTEN: RetainedSettings =
@@ -262,7 +221,8 @@ mod tests {
         let mut retained = RetainedRam::open(memory);
         retained.write_settings(SETTINGS_WRITTEN, true);
         let octaves = core::array::from_fn(|octave| (MAX_SUM - octave as u128, u64::MAX - octave as u64));
-        let wide = ChannelSums { samples: u64::MAX, missing: 1 << 33, octaves };
+        let gaps = core::array::from_fn(|octave| Interpolation::new(u32::MAX - octave as u32, octave as u32, MAX_SUM));
+        let wide = ChannelSums { samples: u64::MAX, missing: 1 << 33, octaves, gaps };
         retained.checkpoint(3, &wide);
         assert_eq!(RetainedRam::open(memory).restore(3).unwrap(), wide);
         retained.checkpoint(3, &ChannelSums { octaves: [(u128::MAX, 1); OCTAVES], ..wide.clone() });
@@ -293,7 +253,7 @@ mod tests {
             retained.checkpoint(2, &sums(100));
             retained.checkpoint(2, &sums(200));
             let slot = retained.newest[3].unwrap();
-            memory[slot][word].fetch_xor(0x10, Relaxed);
+            memory.slots[slot][word].fetch_xor(0x10, Relaxed);
             assert_eq!(RetainedRam::open(memory).restore(2).map(|sums| sums.samples), Some(100), "word {word}");
         }
     }
@@ -307,8 +267,8 @@ mod tests {
         retained.checkpoint(0, &sums(100));
         retained.checkpoint(0, &sums(200));
         let newest = retained.newest[1].unwrap();
-        let free = (0..memory.len()).find(|index| !retained.newest.contains(&Some(*index))).unwrap();
-        for (written, (to, from)) in memory[free].iter().zip(&memory[newest]).enumerate() {
+        let free = (0..memory.slots.len()).find(|index| !retained.newest.contains(&Some(*index))).unwrap();
+        for (written, (to, from)) in memory.slots[free].iter().zip(&memory.slots[newest]).enumerate() {
             assert_eq!(RetainedRam::open(memory).restore(0).map(|sums| sums.samples), Some(200), "{written} words");
             to.store(!from.load(Relaxed), Relaxed);
         }

@@ -122,7 +122,9 @@ pub fn auto_null<SPI: SpiDevice<u8>>(
     (bus, delay): (SPI, impl DelayNs),
     config: Config,
 ) -> Result<(), Error<SPI::Error>> {
-    Adis16405::new(bus, delay, config).auto_null().map(|_offsets| ())
+    // The sensor may be in low-power mode.
+    let stall_ns = Timing::DEFAULT.stall_ns.low_power;
+    Adis16405::new(bus, delay, config).with_stall_ns(stall_ns).auto_null().map(|_offsets| ())
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ pub(crate) use crate::cross_sums::{AllanCovariances, CROSS_OCTAVES, ChannelMeans
 use crate::channels::ChannelSet;
 use crate::cross_sums::CrossSums;
 use adis16405_driver::{Channel, Config};
-use allan_core::{Cascade, Curve, Model, NoiseTerm, OctaveSums, fit::fit, model};
+use allan_core::{Cascade, Curve, Interpolation, Model, NoiseTerm, OctaveSums, fit::fit, model};
 use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
 
@@ -115,17 +115,24 @@ pub struct ChannelSums {
     pub missing: u64,
     /// For every octave the sum of the squared second differences in counts², and their number.
     pub octaves: [(u128, u64); OCTAVES],
+    /// For every octave the gaps that it bridges and the octave before does not.
+    pub gaps: [Interpolation; OCTAVES],
 }
 
 impl ChannelSums {
     /// Sums of no samples.
-    pub const EMPTY: Self = Self { samples: 0, missing: 0, octaves: [(0, 0); OCTAVES] };
+    pub const EMPTY: Self =
+        Self { samples: 0, missing: 0, octaves: [(0, 0); OCTAVES], gaps: [Interpolation::NONE; OCTAVES] };
 
     /// Copies the sums of an estimator.
     #[must_use]
     pub fn from_estimator(estimator: &ChannelEstimator) -> Self {
-        let octaves = core::array::from_fn(|octave| estimator.sum_of_squares(octave).unwrap_or_default());
-        Self { samples: estimator.len(), missing: estimator.missing(), octaves }
+        let mut sums = Self { samples: estimator.len(), missing: estimator.missing(), ..Self::EMPTY };
+        for octave in 0..OCTAVES {
+            let OctaveSums { squares, count, interpolation, .. } = estimator.octave_sums(octave).unwrap_or_default();
+            (sums.octaves[octave], sums.gaps[octave]) = ((squares, count), interpolation);
+        }
+        sums
     }
 
     /// Has an estimator continue from these sums, as after a gap.
@@ -134,9 +141,6 @@ impl ChannelSums {
     }
 
     /// Rebuilds the Allan variance curve of a channel in its unit.
-    ///
-    /// Not inlined, here and below: frames of 0.7 to 1.9 kB (curve, sums) would otherwise be part of every caller's.
-    #[inline(never)]
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, config: Config) {
         let period = 1.0 / config.sample_period().hz();
         ChannelEstimator::rebuild_curve(curve, period, self.samples, |octave| self.octave(octave));
@@ -145,7 +149,6 @@ impl ChannelSums {
 
     /// Fits the baseline model (N, B and K) to the curve of a channel, in its unit.
     #[must_use]
-    #[inline(never)]
     pub fn fit_baseline(&self, channel: Channel, config: Config) -> Model {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, config);
@@ -154,7 +157,6 @@ impl ChannelSums {
 
     /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
     #[must_use]
-    #[inline(never)]
     pub(crate) fn error_of(&self, model: &Model, channel: Channel, config: Config) -> Option<ReportedModelError> {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, config);
@@ -178,9 +180,14 @@ impl ChannelSums {
             unseen_error,
             lost: 0,
             refused: 0,
+            replaced: self.gaps.iter().map(|gaps| u64::from(gaps.replaced())).sum(),
         };
-        let octaves = self.octaves.iter().enumerate().filter(|(_, (_, count))| *count > 0);
-        let octaves = octaves.map(|(octave, &(sum, count))| ReportedOctave { n: 1 << octave, sum, count });
+        let mut curve = Curve::empty();
+        ChannelEstimator::rebuild_curve(&mut curve, 1.0, self.samples, |octave| self.octave(octave));
+        let octaves = curve.points().iter().map(|point| {
+            let (sum, count) = self.octaves[point.n.trailing_zeros() as usize];
+            ReportedOctave { n: point.n, sum, count, interpolation: point.interpolation as f32 }
+        });
         report.octaves.extend(octaves.take(link::MAX_OCTAVES));
         let coefficient = |term: &model::FittedTerm| {
             let (value, low, high) = (term.value, term.low, term.high);
@@ -193,7 +200,7 @@ impl ChannelSums {
 
     fn octave(&self, octave: usize) -> OctaveSums {
         let (squares, count) = self.octaves[octave];
-        OctaveSums { squares, count, ..OctaveSums::default() }
+        OctaveSums { squares, count, fourths: 0, interpolation: self.gaps[octave] }
     }
 }
 

@@ -2,8 +2,9 @@
 
 use adis16405_driver::{Channel, GyroRange, OutputWord};
 use link::{
-    BootCause, ChannelMessage, DecoderCounters, Health, Hello, LearnedMessage, Message, RawBurst, RawMessage, Received,
-    ReportedAddedTerm, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedTerm, ValidationMessage,
+    BootCause, ChannelMessage, ClockSource, DecoderCounters, Health, Hello, LearnedMessage, Message, RawBurst,
+    RawMessage, Received, ReportedAddedTerm, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedTerm,
+    ValidationMessage,
 };
 use recordings::serial::SerialLink;
 use std::collections::BTreeMap;
@@ -131,6 +132,9 @@ fn hello(report: &Hello) -> Vec<String> {
             report.epoch,
         ),
     ];
+    if report.boot.clock == ClockSource::Internal {
+        lines.push("   the crystal did not start: times and rates are those of the internal oscillator".to_owned());
+    }
     if !report.boot.crash_record.is_empty() {
         lines.push(format!("   crash record: {}", report.boot.crash_record));
     }

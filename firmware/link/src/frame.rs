@@ -12,8 +12,8 @@ pub const VERSION: u8 = 4;
 /// Longest frame in bytes, both zero bytes included.
 ///
 /// A channel message with [`MAX_OCTAVES`](crate::MAX_OCTAVES) octaves and [`MAX_COEFFICIENTS`](crate::MAX_COEFFICIENTS)
-/// coefficients, every integer in its longest encoding, takes 1417 bytes before COBS, which adds one byte in 254.
-pub const MAX_FRAME: usize = 1428;
+/// coefficients, every integer in its longest encoding, takes 1539 bytes before COBS, which adds one byte in 254.
+pub const MAX_FRAME: usize = 1551;
 
 /// Longest frame of a raw or log message in bytes: [`MAX_RAW_BURSTS`](crate::MAX_RAW_BURSTS) bursts, every integer in its
 /// longest encoding.

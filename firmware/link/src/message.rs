@@ -95,6 +95,16 @@ pub struct Hello {
     pub boot: Boot,
 }
 
+/// What a microcontroller's clocks are derived from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ClockSource {
+    /// The crystal of the board: within some 50 ppm.
+    #[default]
+    Crystal,
+    /// The internal oscillator, within some percent, since the crystal did not start.
+    Internal,
+}
+
 /// How the application was started.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Boot {
@@ -106,6 +116,8 @@ pub struct Boot {
     pub restored_channels: u8,
     /// Text of the panic or fault that ended the previous run; empty if there was none.
     pub crash_record: String<MAX_TEXT>,
+    /// What the microcontroller's clocks, and with them all times and rates of the report, are derived from.
+    pub clock: ClockSource,
 }
 
 /// Why the microcontroller started.
@@ -146,12 +158,14 @@ pub struct ChannelMessage {
     pub lost: u64,
     /// Missing samples that arrived and were refused in this channel, counted likewise. [`Health`] has the causes.
     pub refused: u64,
+    /// Missing samples that the curve replaces: those in gaps that its longer octaves bridge.
+    pub replaced: u64,
 }
 
 /// Sums of one averaging factor of one channel, as exact integers.
 ///
-/// The Allan variance in counts² is `sum / (2 · n² · count)`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The Allan variance in counts² is `sum / (2 · n² · count) − interpolation`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReportedOctave {
     /// Averaging factor in samples.
     pub n: u64,
@@ -159,6 +173,8 @@ pub struct ReportedOctave {
     pub sum: u128,
     /// Number of second differences in the sum.
     pub count: u64,
+    /// Variance that replacing missing samples has added, counts².
+    pub interpolation: f32,
 }
 
 /// Error of a model on a curve to which it was not fitted, over the octaves with enough data; `v` is the measured, `m` the

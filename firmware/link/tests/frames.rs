@@ -36,7 +36,7 @@ fn sequences(found: &[Received]) -> Vec<u16> {
 
 /// The longest channel message: every list full, every integer in its longest encoding.
 fn longest_channel() -> Message {
-    let point = ReportedOctave { n: u64::MAX, sum: u128::MAX, count: u64::MAX };
+    let point = ReportedOctave { n: u64::MAX, sum: u128::MAX, count: u64::MAX, interpolation: f32::MAX };
     let coefficient = ReportedCoefficient {
         term: ReportedTerm::RateRandomWalk,
         value: f64::MIN_POSITIVE,
@@ -52,6 +52,7 @@ fn longest_channel() -> Message {
         unseen_error: Some(ReportedModelError { deviance_per_point: f64::MAX, rms_percent: f64::MAX }),
         lost: u64::MAX,
         refused: u64::MAX,
+        replaced: u64::MAX,
     })
 }
 

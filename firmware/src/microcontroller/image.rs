@@ -4,7 +4,7 @@ use crate::crash_record::CrashRecord;
 use crate::retained::{RetainedMemory, RetainedRam, blank_memory};
 use core::panic::PanicInfo;
 use cortex_m_rt::ExceptionFrame;
-use link::{Boot, BootCause};
+use link::{Boot, BootCause, ClockSource};
 
 // Sections of RAM that the start-up code does not initialise.
 
@@ -15,19 +15,24 @@ static RETAINED: RetainedMemory = blank_memory();
 static CRASH_RECORD: CrashRecord = CrashRecord::blank();
 
 /// The cause of the start with the crash record, and the retained RAM, which is erased after power-on.
-pub fn restore(cause: BootCause) -> (Boot, RetainedRam) {
+pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
     let mut retained = RetainedRam::open(&RETAINED);
     if cause == BootCause::PowerOn {
         retained.clear();
     }
-    (Boot { cause, crash_record: CRASH_RECORD.take(), ..Boot::default() }, retained)
+    let boot = Boot { cause, crash_record: CRASH_RECORD.take(), clock, ..Boot::default() };
+    let (crystal, record) = (clock == ClockSource::Crystal, boot.crash_record.as_str());
+    defmt::info!("start {=u8}, crystal {=bool}, crash record: {=str}", cause as u8, crystal, record);
+    (boot, retained)
 }
 
-/// Writes the place of a panic into the crash record.
+/// Writes the place and the message of a panic into the crash record.
 pub fn record_panic(info: &PanicInfo<'_>) {
-    let (file, line) = info.location().map_or(("?", 0), |at| (at.file(), at.line()));
-    CRASH_RECORD.write(format_args!("panic at {file}:{line}"));
-    defmt::error!("panic at {=str}:{=u32}", file, line);
+    let (path, line) = info.location().map_or(("?", 0), |at| (at.file(), at.line()));
+    // The paths of dependencies are longer than the record.
+    let file = path.rsplit('/').next().unwrap_or(path);
+    CRASH_RECORD.write(format_args!("panic at {file}:{line}: {}", info.message()));
+    defmt::error!("panic at {=str}:{=u32}: {}", path, line, defmt::Display2Format(&info.message()));
 }
 
 /// Writes the place of a fault into the crash record; there is no frame if the stack has overflowed.
@@ -51,7 +56,7 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
 /// | 4 | serial port: short, so that no received byte is lost |
 /// | 3 | data ready, end of a burst |
 /// | 2 | estimators |
-/// | 1 | SysTick: empty, wakes the main loop |
+/// | 1 | SysTick: blinks the LED, wakes the main loop |
 /// | 0 | main loop: commands, probing, reports, learning |
 #[macro_export]
 macro_rules! observatory {
@@ -62,6 +67,7 @@ macro_rules! observatory {
         data_ready: $data_ready:ty, $edge:ident;
         bus: $bus:ty, $burst_end:ident;
         port: $port:ty, $serial:ident;
+        led: $led:ty;
         estimators: $free:ident;
     ) => {
         #[rtic::app(device = $($device)::+, peripherals = true)]
@@ -71,15 +77,14 @@ macro_rules! observatory {
             use heapless::spsc::Consumer;
             use $crate::microcontroller::image::restore;
             use $crate::microcontroller::processor::{
-                ESTIMATOR_CYCLES, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
+                Blinker, ESTIMATOR_CYCLES, Interrupts, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
             };
             use $crate::microcontroller::{
-                BoardParts, BurstBus as _, DataReadyPin as _, Microcontroller, ReceiveBuffer, UartPort as _, UartQueues,
+                BoardParts, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer, UartPort as _, UartQueues,
             };
-            use $crate::sensor::BURST_LIMIT_HZ;
             use $crate::{
                 BoardContext, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, Sampler, Start, Statistics,
-                TimedBurst, TransmitBuffer, TransmitQueue, Uptime, estimate, run,
+                TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
             };
 
             #[shared]
@@ -97,6 +102,7 @@ macro_rules! observatory {
                 bursts: Consumer<'static, TimedBurst>,
                 port: $port,
                 processor: Processor<$microcontroller>,
+                blinker: Blinker<$led>,
                 received: Consumer<'static, u8>,
                 start: Option<Start>,
             }
@@ -112,13 +118,14 @@ macro_rules! observatory {
                 let (to_port, transmit) = context.local.transmit_buffer.split();
                 let (receive, received) = context.local.receive_buffer.split();
                 let (to_estimators, bursts) = context.local.burst_queue.split();
-                let BoardParts { cause, core_hz, spi_clock_hz, microcontroller, data_ready, bus, port } =
+                let BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, port, led } =
                     $start(context.device, UartQueues { transmit, receive });
-                assert!(spi_clock_hz <= BURST_LIMIT_HZ, "serial clock above the burst limit");
-                defmt::info!("{=u32} Hz, SCK {=u32} Hz", core_hz, spi_clock_hz);
-                let transmit = || rtic::pend(Interrupt::$serial);
-                let processor = Processor::new(microcontroller, core_hz, context.core.SYST, transmit);
-                let (boot, retained) = restore(cause);
+                let interrupts = Interrupts {
+                    transmit: || rtic::pend(Interrupt::$serial),
+                    end_burst: || rtic::pend(Interrupt::$burst_end),
+                };
+                let processor = Processor::new(microcontroller, core_hz, context.core.SYST, interrupts);
+                let (boot, retained) = restore(cause, clock);
                 let shared = Shared {
                     uptime: Uptime::new(<$microcontroller>::counter()),
                     bus,
@@ -126,8 +133,8 @@ macro_rules! observatory {
                     estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
                     transmit_queue: TransmitQueue::new(to_port),
                 };
-                let start = Some(Start { spi_clock_hz, boot, retained, finished: context.local.finished });
-                (shared, Local { data_ready, bursts, port, processor, received, start })
+                let start = Some(Start { boot, retained, finished: context.local.finished });
+                (shared, Local { data_ready, bursts, port, processor, blinker: Blinker::new(led, clock), received, start })
             }
 
             #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, estimators, transmit_queue])]
@@ -163,7 +170,11 @@ macro_rules! observatory {
             fn transfer_ended(context: transfer_ended::Context) {
                 measure(&SAMPLING_CYCLES, || {
                     let transfer_ended::SharedResources { bus, sampler, .. } = context.shared;
-                    (bus, sampler).lock(|bus, sampler| sampler.transfer_ended(bus.end_burst()));
+                    (bus, sampler).lock(|bus, sampler| match bus.end_burst() {
+                        BurstEnd::MoreWords => {}
+                        BurstEnd::Complete(received) => sampler.transfer_ended(Some(received)),
+                        BurstEnd::Failed => sampler.transfer_ended(None),
+                    });
                 });
                 rtic::pend(Interrupt::$free);
             }
@@ -184,8 +195,11 @@ macro_rules! observatory {
                 count_lost_bytes(context.local.port.serve());
             }
 
-            #[task(binds = SysTick, priority = 1)]
-            fn wake(_: wake::Context) {}
+            #[task(binds = SysTick, priority = 1, local = [blinker, extension: WatchdogExtension = WatchdogExtension::START])]
+            fn wake(context: wake::Context) {
+                context.local.blinker.tick();
+                <$microcontroller>::extend_watchdog(context.local.extension);
+            }
         }
 
         #[panic_handler]

@@ -1,10 +1,12 @@
-//! The Cortex-M core: sleep, SysTick as the cycle counter, and load figures.
+//! The Cortex-M core: sleep, SysTick as the cycle counter, load figures, and the LED, which SysTick blinks.
 
 use super::Microcontroller;
 use crate::board::{BoardMeters, Chip};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
+use embedded_hal::digital::OutputPin;
+use link::ClockSource;
 
 /// Longest sampling interrupt in cycles; written by the sampling interrupts only.
 pub static SAMPLING_CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -14,7 +16,7 @@ pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
 static SERIAL_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
 /// Rate in Hz at which SysTick wakes the main loop, also without a sensor. At 168 MHz the reload value fits SysTick's 24 bits.
-const WAKE_HZ: u32 = 16;
+pub const WAKE_HZ: u32 = 16;
 
 /// Runs `work` and stores the cycles that it took in `longest` if they are the most so far. `work` must take less than one
 /// period of SysTick, which counts down.
@@ -33,22 +35,56 @@ pub fn count_lost_bytes(lost: u32) {
     SERIAL_OVERRUNS.store(SERIAL_OVERRUNS.load(Relaxed).saturating_add(lost), Relaxed);
 }
 
+/// An LED that blinks once a second while the clocks come from the crystal, and eight times a second while they come from the
+/// internal oscillator.
+pub struct Blinker<L> {
+    led: L,
+    /// Ticks of SysTick for which the LED is on, and then off.
+    half_period: u32,
+    ticks: u32,
+}
+
+impl<L: OutputPin> Blinker<L> {
+    /// Blinks `led`, whichever of its levels is the bright one.
+    pub fn new(led: L, clock: ClockSource) -> Self {
+        let half_period = match clock {
+            ClockSource::Crystal => WAKE_HZ / 2,
+            ClockSource::Internal => WAKE_HZ / 16,
+        };
+        Self { led, half_period, ticks: 0 }
+    }
+
+    /// To be called at every interrupt of SysTick.
+    pub fn tick(&mut self) {
+        let high = (self.ticks / self.half_period).is_multiple_of(2);
+        let _infallible_on_these_pins = if high { self.led.set_high() } else { self.led.set_low() };
+        self.ticks = self.ticks.wrapping_add(1);
+    }
+}
+
+/// Requests of interrupts.
+pub struct Interrupts {
+    /// That of the serial port, which transmits what is queued.
+    pub transmit: fn(),
+    /// That of the end of a burst.
+    pub end_burst: fn(),
+}
+
 /// The processor of a microcontroller.
 pub struct Processor<M> {
     microcontroller: M,
-    /// Requests the serial port's interrupt, which transmits what is queued.
-    transmit: fn(),
+    interrupts: Interrupts,
 }
 
 impl<M: Microcontroller> Processor<M> {
     /// Starts SysTick.
-    pub fn new(microcontroller: M, core_hz: u32, mut systick: SYST, transmit: fn()) -> Self {
+    pub fn new(microcontroller: M, core_hz: u32, mut systick: SYST, interrupts: Interrupts) -> Self {
         systick.set_clock_source(SystClkSource::Core);
         systick.set_reload(core_hz / WAKE_HZ - 1);
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        Self { microcontroller, transmit }
+        Self { microcontroller, interrupts }
     }
 }
 
@@ -66,7 +102,11 @@ impl<M: Microcontroller> Chip for &mut Processor<M> {
     }
 
     fn transmit(&mut self) {
-        (self.transmit)();
+        (self.interrupts.transmit)();
+    }
+
+    fn abandon_burst(&mut self) {
+        (self.interrupts.end_burst)();
     }
 
     fn feed(&mut self) {

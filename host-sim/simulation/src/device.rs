@@ -188,7 +188,6 @@ impl SimulatedBoard {
         let Self { restarts, fixed_clock, reset_line, usable_us, .. } = *self;
         *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, ..fresh };
         let start = Start {
-            spi_clock_hz: SCK_HZ,
             boot: Boot { cause, ..Boot::default() },
             retained: RetainedRam::open(memory),
             finished: Box::leak(Box::new(FinishedEpoch::EMPTY)),
@@ -243,21 +242,18 @@ impl Board for SimulatedBoard {
         (self.bus.clone(), self.bus.bus().delay())
     }
 
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        let sck_hz = if self.fixed_clock { SCK_HZ } else { limit_hz.min(SCK_HZ) };
+        self.bus.bus().part_mut().set_sck_hz(Some(sck_hz));
+        sck_hz
+    }
+
     fn set_sampling(&mut self, enabled: bool) {
         self.sampler.set_enabled(enabled);
         if !enabled {
             let stalled_us = self.now_us() + STALL_US;
             self.advance_to(stalled_us);
         }
-    }
-
-    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
-        if self.fixed_clock {
-            return 0;
-        }
-        let clock_hz = limit_hz.min(SCK_HZ);
-        self.bus.bus().part_mut().set_sck_hz(Some(clock_hz));
-        clock_hz
     }
 
     fn reset_sensor(&mut self) -> bool {

@@ -115,7 +115,6 @@ fn rate_range_and_filter_are_set_or_refused_with_the_reason() {
     assert!((hello.measured_rate_hz.unwrap() / 819.2 - 1.0).abs() < 1e-4, "{hello:?}");
     for (keys, answer) in [
         ("n 2\r", "filter taps 2^2 are outside 2^4 to 2^6"),
-        ("f 50\r", "below 182 SPS the sensor takes a serial clock of 300000 Hz, not 1000000 Hz"),
         ("f 0\r", "the sample rate must be a finite number above 0"),
         ("g 100\r", "no such g command; ? lists them"),
         ("autonull\r", "not armed"),
@@ -128,6 +127,24 @@ fn rate_range_and_filter_are_set_or_refused_with_the_reason() {
     assert_eq!(device.bus().part().violations(), []);
     let until = (device.bus().part().now() / 1000) + SECOND / 10;
     assert_eq!(after(&mut device, "\rr", until).health().bad_commands, 2);
+}
+
+/// Rates of low-power mode need a serial clock of 300 kHz at most, and a longer stall until the sensor has left that mode.
+#[test]
+fn the_serial_clock_follows_the_rate() {
+    let mut device = device();
+    after(&mut device, "i 0\r", SECOND);
+    for (at, rate_hz, clock_hz) in [(1, 51.2, 300_000), (4, 163.84, 300_000), (7, 182.0, 1_000_000), (10, 0.8, 300_000)]
+    {
+        after(&mut device, &format!("f {rate_hz}\r"), (at + 2) * SECOND);
+        let heard = after(&mut device, "r", (at + 3) * SECOND);
+        let (hello, health) = (heard.hellos()[0], heard.health());
+        assert_eq!(hello.spi_clock_hz, clock_hz, "{rate_hz} Hz");
+        assert!((hello.sample_rate_hz / rate_hz - 1.0).abs() < 0.02 && hello.sampling, "{hello:?}");
+        assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{rate_hz} Hz: {health:?}");
+        assert!(f64::from(health.used) > rate_hz, "{rate_hz} Hz: {health:?}");
+    }
+    assert_eq!(device.bus().part().violations(), []);
 }
 
 /// The table has the numbers of the frames.

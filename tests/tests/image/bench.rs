@@ -1,7 +1,7 @@
-//! The image on an emulated STM32F427 with a crystal, a sensor and a terminal.
+//! The image on an emulated STM32F427, which has what the STM32F405 has and more, with a crystal, a sensor and a terminal.
 
 use crate::images;
-use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise};
+use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise, read, write};
 use crate::peripherals::{Sensor, Terminal};
 use link::Health;
 use rigless::cpu::armv7m as cpu;
@@ -16,63 +16,96 @@ use rigless::soc::Error;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::peripherals::{gpio::Pin, spi::Select};
 use rigless::time::VirtualNanos;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::num::{NonZeroU32, NonZeroU64};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-const CRYSTAL_HZ: u64 = 8_000_000;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
 const SUPPLY_MV: u32 = 3300;
 const CHIP_SELECT: u8 = 4; // PA4
-const DATA_READY: u8 = 0; // PB0
-const PORT_B: usize = 1;
 const SPI1: usize = 0;
-const USART2: usize = 1;
 const TIM2: std::ops::Range<u64> = 0x4000_0000..0x4000_0400;
+/// Reset register of the bus of TIM2, and the bit that holds it in reset (RM0090 section 6.3.8).
+const RCC_APB1RSTR: u64 = 0x4002_3820;
+const TIM2RST: u64 = 1;
 /// Control register of the DMA stream that receives bursts, and its bit that enables the interrupt at the end of a
 /// transfer (RM0090 section 10.5.5).
 const DMA2_S0CR: u64 = 0x4002_6410;
 const TCIE: u64 = 1 << 4;
+/// Its bit that lets the stream run.
+const EN: u64 = 1;
+/// Option bytes (RM0090 section 3.9.10).
+pub(crate) const FLASH_OPTCR: u64 = 0x4002_3C14;
 /// Longest time that the emulator runs between two looks at the sensor's clock and the events.
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
 const PULSE_NS: u64 = 100_000;
-/// Upper bound on the stack that interrupts add to the deepest use measured, in bytes: four, nested, each with the 104
-/// bytes that the processor stacks (with floating point) and the frames of its functions. By disassembly these are 1.1
-/// kB for the estimators, which frame a full message of the raw stream, and 160 bytes for the other three together.
-pub(crate) const INTERRUPTS_STACK: u32 = 4 * 104 + 1280 + 256;
+/// A board as its documents describe it: crystal, and what the image's pins are connected to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wiring {
+    crystal_hz: u64,
+    /// Port (0 for A) and pin of the data-ready line.
+    pub(crate) data_ready: (usize, u8),
+    /// Index of the USART that is connected to the host: 1 for USART2.
+    usart: usize,
+    /// Port and pin of the LED.
+    led: (usize, u8),
+}
 
-/// The image for the STM32F405, built at most once a run; `OBSERVATORY_IMAGE` names another.
+/// Olimex STM32-H405: 8 MHz, PB0, USART2, PC12.
+pub(crate) const H405: Wiring = Wiring { crystal_hz: 8_000_000, data_ready: (1, 0), usart: 1, led: (2, 12) };
+/// Adafruit Feather STM32F405 Express: 12 MHz, PC4 (A4), USART3 (TX, RX), PC1 (D13).
+pub(crate) const FEATHER: Wiring = Wiring { crystal_hz: 12_000_000, data_ready: (2, 4), usart: 2, led: (2, 1) };
+
+/// The image for the Olimex STM32-H405, built at most once a run; `OBSERVATORY_IMAGE` names another.
 pub(crate) fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    let build = || images::build("f405", "thumbv7em-none-eabihf");
+    let build = || images::build("h405", "thumbv7em-none-eabihf", &[]);
     IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
 }
 
-/// Asserts that the part of the stack that was never used has room for interrupts.
+/// The image for the Adafruit Feather STM32F405, built at most once a run.
+pub(crate) fn feather_image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| images::build("feather", "thumbv7em-none-eabihf", &[]))
+}
+
+/// Address of the register at `offset` of a GPIO port.
+pub(crate) const fn gpio(port: usize, offset: u64) -> u64 {
+    0x4002_0000 + 0x400 * port as u64 + offset
+}
+/// Offsets of GPIOx_PUPDR and GPIOx_ODR (RM0090 section 8.4).
+pub(crate) const PUPDR: u64 = 0x0C;
+const ODR: u64 = 0x14;
+
+/// Asserts that a quarter of the stack was never used, and prints the figure.
 pub(crate) fn assert_stack_suffices(health: &Health) {
-    assert!(health.stack_bytes + INTERRUPTS_STACK <= health.stack_size, "{health:?}");
+    let Health { stack_bytes, stack_size, .. } = *health;
+    let free_percent = 100 * (stack_size - stack_bytes) / stack_size;
+    println!("stack: {stack_bytes} of {stack_size} B used, {free_percent} % free");
+    assert!(free_percent >= 25, "{health:?}");
 }
 
 #[derive(Debug)]
 struct Bench {
     microcontroller: Microcontroller,
+    wiring: Wiring,
 }
 
 impl Store for Bench {}
 
 impl Bench {
-    fn new(sensor: Option<Sensor>, terminal: Terminal) -> Result<Self, Error> {
+    fn new(wiring: Wiring, sensor: Option<Sensor>, terminal: Terminal) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
-        part.rcc.attach_crystals(CRYSTAL_HZ, 0);
+        part.rcc.attach_crystals(wiring.crystal_hz, 0);
         part.set_supply(SUPPLY_MV);
         if let Some(sensor) = sensor {
             let select = Select { port: "GPIOA", pin: Pin::new(CHIP_SELECT).unwrap(), active: Level::Low };
             part.spi[SPI1].attach_selected(sensor, select);
         }
-        part.usart[USART2].attach(terminal);
-        Ok(Self { microcontroller: Microcontroller::new(part)? })
+        part.usart[wiring.usart].attach(terminal);
+        Ok(Self { microcontroller: Microcontroller::new(part)?, wiring })
     }
 
     fn sensor(&mut self) -> Option<&mut Sensor> {
@@ -82,7 +115,7 @@ impl Bench {
 
 impl Board for Bench {
     fn name(&self) -> &'static str {
-        "observatory-f405"
+        "observatory"
     }
 
     fn target_names(&self) -> Vec<&'static str> {
@@ -127,6 +160,10 @@ pub(crate) enum Event {
     BrownOut,
     /// The end of the next burst raises no interrupt, as if a bit of the DMA's control register had flipped.
     LoseBurstEnd,
+    /// The stream that receives the next burst stops within it, as after an error on the bus.
+    StopReceiving,
+    /// The microsecond counter stops.
+    StopCounter,
     /// The next access to the timer is answered with a bus error.
     BusError,
     /// Every aligned word pair of memory that holds this value becomes 0.
@@ -142,7 +179,11 @@ struct Plant {
     samples: u64,
     /// Data-ready edges still to be withheld from the processor.
     edges_to_lose: u64,
-    lose_burst_end: bool,
+    /// Bits of the DMA stream's control register to be cleared within the next burst.
+    burst_fault: u64,
+    led_level: u64,
+    led_changes: u32,
+    registers: BTreeMap<u64, u64>,
     events: VecDeque<(u64, Event)>,
     work: Vec<Work>,
 }
@@ -184,7 +225,9 @@ impl Plant {
                 session.board_mut().microcontroller.brown_out = true;
                 session.reset_by_pin(stop.at, stop.instruction_count, host);
             }
-            Event::LoseBurstEnd => self.lose_burst_end = true,
+            Event::LoseBurstEnd => self.burst_fault = TCIE,
+            Event::StopReceiving => self.burst_fault = EN,
+            Event::StopCounter => write(session, host, RCC_APB1RSTR, TIM2RST),
             Event::BusError => session.fail_next(TIM2.start, TIM2.end),
             Event::ClearInMemory(value) => clear_in_memory(host, value),
         }
@@ -198,7 +241,13 @@ impl Driver<Bench> for Plant {
         if self.work.last().is_none_or(|last| now >= last.at + 1_000_000_000) || now >= self.end {
             self.work.push(Work { at: now, instructions: stop.instruction_count, samples });
         }
+        let (port, pin) = session.board_mut().wiring.led;
+        let led_level = read(session, host, gpio(port, ODR)) >> pin & 1;
+        self.led_changes += u32::from(std::mem::replace(&mut self.led_level, led_level) != led_level);
         if now >= self.end {
+            for address in [gpio(0, PUPDR), gpio(1, PUPDR), gpio(2, PUPDR), FLASH_OPTCR] {
+                self.registers.insert(address, read(session, host, address));
+            }
             return None;
         }
         // Events wait for the end of a frame, as some of them send the sensor a frame of their own.
@@ -210,13 +259,14 @@ impl Driver<Bench> for Plant {
             self.carry_out(event, session, stop, host);
         }
         let pulse_ended = self.pulse_end.take_if(|end| now >= *end).is_some();
-        if pulse_ended && std::mem::take(&mut self.lose_burst_end) {
+        if pulse_ended && self.burst_fault != 0 {
             // The burst is still under way: it lasts longer than the pulse.
-            clear_bits(session, host, DMA2_S0CR, TCIE);
+            clear_bits(session, host, DMA2_S0CR, std::mem::take(&mut self.burst_fault));
         }
         let bench = session.board_mut();
+        let (port, pin) = bench.wiring.data_ready;
         if pulse_ended {
-            bench.microcontroller.drive_pin(stop.at, PORT_B, DATA_READY, false);
+            bench.microcontroller.drive_pin(stop.at, port, pin, false);
         }
         let samples = bench.sensor().map_or(0, |sensor| {
             sensor.advance_to(now);
@@ -228,7 +278,7 @@ impl Driver<Bench> for Plant {
                 self.edges_to_lose -= 1;
             } else {
                 self.pulse_end = Some(now + PULSE_NS);
-                bench.microcontroller.drive_pin(stop.at, PORT_B, DATA_READY, true);
+                bench.microcontroller.drive_pin(stop.at, port, pin, true);
             }
         }
         Some(self.next_stop(bench, now))
@@ -236,14 +286,22 @@ impl Driver<Bench> for Plant {
 }
 
 /// What a run consists of.
-#[derive(Default)]
 pub(crate) struct Scenario {
+    pub(crate) wiring: Wiring,
+    /// The crystal does not start.
+    pub(crate) crystal_fails: bool,
     pub(crate) sensor: Option<Sensor>,
     /// Keys sent over the serial port, by rising time in s.
     pub(crate) keys: Vec<(f64, Vec<u8>)>,
     /// By rising time in s.
     pub(crate) events: Vec<(f64, Event)>,
     pub(crate) seconds: f64,
+}
+
+impl Default for Scenario {
+    fn default() -> Self {
+        Self { wiring: H405, crystal_fails: false, sensor: None, keys: vec![], events: vec![], seconds: 0.0 }
+    }
 }
 
 /// The results of a run.
@@ -255,6 +313,10 @@ pub(crate) struct Outcome {
     pub(crate) diagnostics: Vec<String>,
     /// One value per virtual second, and one at the end.
     pub(crate) work: Vec<Work>,
+    /// Changes of the LED's level.
+    pub(crate) led_changes: u32,
+    /// Registers at the end, by address: pulls of ports A to C, option bytes.
+    pub(crate) registers: BTreeMap<u64, u64>,
 }
 
 /// Boots the image and runs it.
@@ -262,25 +324,31 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
     let ns = |seconds: f64| (seconds * 1e9) as u64;
     let keys = scenario.keys.iter().flat_map(|(at, keys)| keys.iter().map(move |&key| (ns(*at), key)));
     let terminal = Terminal { keys: keys.collect(), ..Terminal::default() };
-    let bench = Bench::new(scenario.sensor, terminal).expect("the emulator knows the part");
+    let mut bench = Bench::new(scenario.wiring, scenario.sensor, terminal).expect("the emulator knows the part");
+    bench.microcontroller.crystal_fails = scenario.crystal_fails;
     let plant = Plant {
         end: ns(scenario.seconds),
         pulse_end: None,
         samples: 0,
         edges_to_lose: 0,
-        lose_burst_end: false,
+        burst_fault: 0,
+        led_level: 0,
+        led_changes: 0,
+        registers: BTreeMap::new(),
         events: scenario.events.into_iter().map(|(at, event)| (ns(at), event)).collect(),
         work: Vec::new(),
     };
     let session = Session::new(Box::new(bench), 0, VirtualNanos(STRIDE_NS)).expect("the emulator takes the board");
     let images = [Image::read(image, None).expect("the image is an ELF")];
     let finished = emulator::run(session, &Start::new(&images), plant).expect("the emulator runs to the end");
-    let (mut session, work) = (finished.session, finished.driver.work);
+    let Plant { work, led_changes, registers, .. } = finished.driver;
+    let mut session = finished.session;
     let diagnostics = diagnostics(&session);
     let part = &mut session.board_mut().microcontroller.part;
-    let received = part.usart[USART2].chip_mut::<Terminal>().map(|terminal| std::mem::take(&mut terminal.received));
+    let received =
+        part.usart[scenario.wiring.usart].chip_mut::<Terminal>().map(|terminal| std::mem::take(&mut terminal.received));
     let sensor = part.spi[SPI1].chip_mut::<Sensor>(0).cloned();
-    Outcome { sensor, received: received.unwrap_or_default(), diagnostics, work }
+    Outcome { sensor, received: received.unwrap_or_default(), diagnostics, work, led_changes, registers }
 }
 
 fn diagnostics(session: &Session<Bench>) -> Vec<String> {

@@ -1,17 +1,16 @@
 //! Learning on the device: the model of one epoch is fitted, its covariates are subtracted, and the next epoch shows
 //! the drift with and without the subtraction.
 
-use crate::bench::{INTERRUPTS_STACK, Outcome, Scenario, image, run};
+use crate::bench::{Event, Outcome, Scenario, assert_stack_suffices, image, run};
 use crate::decoded::Decoded;
 use crate::peripherals::Sensor;
 use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
 use firmware::epoch::estimate_regressors;
 use firmware::learner::{EpochFit, validate};
-use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Statistics, TimedBurst};
+use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, Statistics, TimedBurst};
 use link::{
     Decoder, LearnedMessage, Message, Received, ReportedDeviations, ReportedParameter, ReportedTerm, ValidationMessage,
 };
-use simulation::Device;
 use virtual_sensor::{
     Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario, TemperatureProfile, VirtualAdis16405,
 };
@@ -60,8 +59,7 @@ fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
     // No sample was lost during the fit.
     let health = **decoded.healths().first().expect("the first epoch's report");
     assert_eq!((health.used, health.queue_full, health.lost_edges), (health.bursts, 0, 0), "{health:?}");
-    assert!(health.stack_bytes + INTERRUPTS_STACK < health.stack_size, "{health:?}");
-    println!("stack {} of {} B", health.stack_bytes, health.stack_size);
+    assert_stack_suffices(&health);
     let samples: Vec<u64> = decoded.channels().iter().map(|report| report.samples).collect();
     let samples = &samples[..2 * CHANNELS.len()];
 
@@ -88,7 +86,7 @@ fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
     Epochs { learned, validated, fit_s, longest_channel_s, response_s }
 }
 
-/// The same messages, computed on the host from the bursts that the sensor sent. `samples` are those of both epochs,
+/// The same messages, computed on the host from the bursts that the sensor sent. `samples` are those of one epoch or two,
 /// channel by channel.
 fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
     assert_eq!(FIRST_CONFIG.sample_period(), SamplePeriod::nearest(RATE_HZ).expect("a rate"));
@@ -109,17 +107,17 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learned
         }
         let mut epoch = FinishedEpoch::EMPTY;
         epoch.number = number;
-        epoch.fill(&mut estimators, &mut RetainedRam::open(Device::blank_memory()));
+        epoch.fill(&mut estimators);
         epochs.push(epoch);
     }
-    let [first, second] = &epochs[..] else { panic!("two epochs") };
+    let (first, second) = (&epochs[0], epochs.get(1));
     let means = first.covariances().expect("no restart").means;
     let fit = |index: usize| {
         let mut fit = EpochFit::new(estimate_regressors(first, index, FIRST_CONFIG, &mut || true)?);
         fit.run(first, index, FIRST_CONFIG, &mut || true).then_some(fit)
     };
     let fits: Vec<EpochFit> = (0..6).map(|index| fit(index).expect("a fit that is not cancelled")).collect();
-    let validation = |index: usize| validate(&fits[index].model(), Some(&means), second, index, FIRST_CONFIG);
+    let validation = |index: usize| validate(&fits[index].model(), Some(&means), second?, index, FIRST_CONFIG);
     let learned = fits.iter().enumerate().map(|(index, fit)| fit.message(index, first.number)).collect();
     (learned, (0..6).filter_map(validation).collect())
 }
@@ -183,4 +181,31 @@ fn without_an_effect_nothing_is_subtracted() {
     assert!(learned.iter().all(|learned| learned.regressors.is_empty()), "{learned:?}");
     let mut drifts = validated.iter().flat_map(|validated| &validated.drift);
     assert!(drifts.all(|drift| drift.raw == drift.compensated), "{validated:?}");
+}
+
+/// The reset comes while the models are fitted to the finished epoch. Afterwards all of them are fitted, as without a reset,
+/// and of the running epoch no more is lost than the second since its last checkpoint.
+#[test]
+fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
+    const RESET_S: f64 = EPOCH_S + 6.0;
+    let keys = vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (RESET_S + 25.0, b"r".to_vec())];
+    let events = vec![(RESET_S, Event::ResetPin)];
+    let sensor = Some(warming_sensor(vec![]));
+    let scenario = Scenario { sensor, keys, events, seconds: RESET_S + 28.0, ..Scenario::default() };
+    let Outcome { sensor, received, .. } = run(image(), scenario);
+    let bursts = sensor.expect("the sensor on the bus").bursts;
+    let (before, after): (Vec<_>, Vec<_>) = received.into_iter().partition(|(at, _)| *at as f64 <= RESET_S * 1e9);
+    let (before, after) = (Decoded::decode(&before), Decoded::decode(&after));
+    let samples: Vec<u64> = before.channels().iter().map(|report| report.samples).collect();
+    let learned = |decoded: &Decoded| -> Vec<LearnedMessage> {
+        let learned = decoded.messages.iter();
+        learned.filter_map(|m| if let Message::Learned(m) = m { Some(m.clone()) } else { None }).collect()
+    };
+    assert!(learned(&before).len() < 6, "the reset came too late");
+    assert_eq!(learned(&after), on_host(&bursts, &samples).0, "bit for bit");
+
+    let running = after.channels()[after.channels().len() - CHANNELS.len()].samples as f64;
+    let sampled_s = running / RATE_HZ;
+    println!("{sampled_s:.2} s of samples, 31 s after the start of the epoch");
+    assert!((29.3..31.1).contains(&sampled_s), "{sampled_s} s of samples");
 }

@@ -38,7 +38,7 @@ fn assert_no_sample_lost_in(seconds: f64) {
     keys.push((seconds - 3.5, b"w 0\r".to_vec()));
     keys.push((seconds - 3.0, b"r".to_vec()));
     let scenario = Scenario { sensor: Some(Sensor::published(2)), keys, seconds, ..Scenario::default() };
-    let Outcome { sensor, received, diagnostics, work } = run(image(), scenario);
+    let Outcome { sensor, received, diagnostics, work, .. } = run(image(), scenario);
     let sensor = sensor.expect("the sensor on the bus");
     assert_eq!(diagnostics, [""; 0]);
     assert_eq!(sensor.part.violations(), []);

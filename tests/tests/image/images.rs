@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Mutex;
 
 pub(crate) fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
@@ -13,9 +14,13 @@ pub(crate) fn folder() -> PathBuf {
     workspace().join(target).join("image")
 }
 
-/// Builds the image `observatory-{board}` for a target and returns the path of its ELF.
-pub(crate) fn build(board: &str, target: &str) -> PathBuf {
-    let (bin, feature) = (format!("observatory-{board}"), format!("board-{board}"));
+/// Builds the image `observatory-{board}` for a target, with further features, and returns the path of its ELF: a copy, since
+/// cargo overwrites the image when it builds it with other features.
+pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
+    static BUILD: Mutex<()> = Mutex::new(());
+    let _one_at_a_time = BUILD.lock();
+    let bin = format!("observatory-{board}");
+    let feature = [&[format!("board-{board}").as_str()], further].concat().join(",");
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace())
         .args(["build", "--package", "firmware", "--bin", &bin, "--features", &feature, "--target", target])
@@ -24,10 +29,18 @@ pub(crate) fn build(board: &str, target: &str) -> PathBuf {
         .status()
         .expect("cargo starts");
     assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    folder().join(target).join("image").join(bin)
+    let copy = folder().join([&[bin.as_str()], further].concat().join("-")).with_extension("elf");
+    // Renamed when it is whole: another run of the tests may be reading the one before.
+    let partial = copy.with_extension(std::process::id().to_string());
+    std::fs::copy(folder().join(target).join("image").join(bin), &partial).expect("room");
+    std::fs::rename(partial, &copy).expect("the same folder");
+    copy
 }
 
+/// Vector table of the STM32F405, and the start of its core-coupled memory, which is the stack (RM0090 section 2.3).
 const FLASH_START: u32 = 0x0800_0000;
+const STACK_START: u32 = 0x1000_0000;
+/// Where every Cortex-M has its RAM.
 const RAM: std::ops::Range<u32> = 0x2000_0000..0x3000_0000;
 
 /// An ELF of 32 bits, little-endian.
@@ -51,23 +64,20 @@ impl Elf {
 #[derive(Debug)]
 pub(crate) struct Size {
     pub(crate) flash: u32,
-    /// Static variables, that is without the stack.
+    /// Static variables, retained memory among them; without the stack.
     pub(crate) statics: u32,
-    /// From the start of memory, where the stack is, to the end of the last static variable.
-    pub(crate) ram: u32,
 }
 
 /// The size of an image by the section headers of its ELF.
 pub(crate) fn size(image: &Path) -> Size {
     let elf = Elf::read(image);
-    let mut size = Size { flash: 0, statics: 0, ram: 0 };
+    let mut size = Size { flash: 0, statics: 0 };
     for section in 0..elf.half(48) {
         let header = elf.word(32) as usize + section * elf.half(46);
         let [kind, flags, address, bytes] = [4, 8, 12, 20].map(|field| elf.word(header + field));
         let (allocated, without_bits) = (flags & 2 != 0, kind == 8);
         if allocated && RAM.contains(&address) {
             size.statics += bytes;
-            size.ram = size.ram.max(address + bytes - RAM.start);
         }
         if allocated && !without_bits {
             size.flash += bytes;
@@ -84,9 +94,9 @@ pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
     let mut headers = (0..elf.half(44)).map(|segment| elf.word(28) as usize + 32 * segment);
     let vectors = headers.find(|&header| elf.word(header + 12) == FLASH_START && elf.word(header + 16) > 0);
     let at = elf.word(vectors.expect("a vector table") + 4) as usize;
-    elf.0[at..at + 4].copy_from_slice(&(RAM.start + bytes).to_le_bytes());
+    elf.0[at..at + 4].copy_from_slice(&(STACK_START + bytes).to_le_bytes());
     std::fs::create_dir_all(folder()).expect("a folder");
-    let copy = folder().join(format!("observatory-f405-stack-{bytes}"));
+    let copy = folder().join(format!("observatory-h405-stack-{bytes}.elf"));
     std::fs::write(&copy, elf.0).expect("room");
     copy
 }

@@ -12,8 +12,9 @@ use rigless::soc::stm32f427::{Stm32f427, peripherals::gpio::Pin};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
-/// RM0090 section 2.3.1: SRAM1 and SRAM2.
+/// RM0090 section 2.3.1: SRAM1 and SRAM2, and the core-coupled memory.
 const RAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
+const CORE_COUPLED: std::ops::Range<u64> = 0x1000_0000..0x1001_0000;
 const LINES: usize = 5;
 /// Position of EXTI0 among the interrupts that the emulator's table gives the instance; EXTI1 and so on follow it.
 const FIRST_INTERRUPT: usize = 1;
@@ -26,12 +27,14 @@ pub(crate) struct Microcontroller {
     rcc_slot: usize,
     /// Whether the next reset is reported as one by the supply.
     pub(crate) brown_out: bool,
+    /// Whether the crystal oscillator never becomes ready.
+    pub(crate) crystal_fails: bool,
 }
 
 impl Microcontroller {
     pub(crate) fn new(part: Stm32f427) -> Result<Self, Error> {
         let (exti_slot, rcc_slot) = (part.bus().slot("EXTI")?, part.bus().slot("RCC")?);
-        Ok(Self { part, exti: Exti::default(), exti_slot, rcc_slot, brown_out: false })
+        Ok(Self { part, exti: Exti::default(), exti_slot, rcc_slot, brown_out: false, crystal_fails: false })
     }
 
     /// Sets the level of a pin of a port, and of the interrupt line of its number.
@@ -66,6 +69,11 @@ impl Mcu for Microcontroller {
 
     fn poll(&mut self, now: VirtualNanos) {
         self.part.poll(now);
+        if self.crystal_fails {
+            let (registers, _) = self.part.bus_mut().drive(now, self.rcc_slot);
+            let control = registers.get(rcc::Register::Cr);
+            registers.set(rcc::Register::Cr, rcc::cr::HSERDY.set(control, 0));
+        }
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
@@ -118,7 +126,7 @@ impl Device for Exti {
 /// Fills the memory with the output of a linear congruential generator (Knuth's MMIX constants).
 pub(crate) fn fill_memory_with_noise(host: &mut dyn Host) {
     let mut state = 1_u64;
-    for address in RAM.step_by(4) {
+    for address in RAM.chain(CORE_COUPLED).step_by(4) {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         host.write(address, Width::W32, state >> 32).expect("memory");
     }
@@ -138,8 +146,18 @@ pub(crate) fn clear_in_memory(host: &mut dyn Host, value: u64) {
     assert!(cleared > 0, "{value} is not in memory");
 }
 
+/// Reads a peripheral's register, as a debugger would.
+pub(crate) fn read<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64) -> u64 {
+    session.access(Access::new(AccessKind::Read, address, Width::W32, 0), host).0
+}
+
+/// Writes a peripheral's register, as a debugger would.
+pub(crate) fn write<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64, value: u64) {
+    session.access(Access::new(AccessKind::Write, address, Width::W32, value), host);
+}
+
 /// Clears bits of a peripheral's register, as a debugger would.
 pub(crate) fn clear_bits<D: Board>(session: &mut Session<D>, host: &mut dyn Host, address: u64, bits: u64) {
-    let (value, _) = session.access(Access::new(AccessKind::Read, address, Width::W32, 0), host);
-    session.access(Access::new(AccessKind::Write, address, Width::W32, value & !bits), host);
+    let value = read(session, host, address);
+    write(session, host, address, value & !bits);
 }

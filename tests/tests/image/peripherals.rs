@@ -8,8 +8,11 @@ use rigless::time::VirtualNanos;
 use std::collections::VecDeque;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// The bus clock of the board (84 MHz) divided by the first power of two that brings it to 1 MHz or less.
-pub(crate) const SCK_HZ: u32 = 84_000_000 / 128;
+/// Clock of the peripheral bus of the boards.
+const BUS_HZ: u32 = 42_000_000;
+/// The bus clock divided by the first power of two that brings it to 1 MHz or less, and to 300 kHz or less.
+pub(crate) const SCK_HZ: u32 = BUS_HZ / 64;
+const SLOW_SCK_HZ: u32 = BUS_HZ / 256;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Sensor {
@@ -18,11 +21,17 @@ pub(crate) struct Sensor {
     pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
     /// Shortest time from one byte to the next within a frame, in ns.
     pub(crate) shortest_byte_ns: u64,
+    /// Shortest time between the last SCK edge of a word of a burst and the first of the next, in ns.
+    pub(crate) shortest_gap_ns: u64,
+    /// Shortest time for which chip select was high between two frames, in ns.
+    pub(crate) shortest_high_ns: u64,
     /// Byte at which the data line to the processor is held.
     pub(crate) stuck_at: Option<u8>,
     /// Words of another width than eight bits.
     pub(crate) odd_words: u64,
     byte_ns: u64,
+    selected_at: u64,
+    deselected_at: Option<u64>,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
     /// Whether a frame is under way.
@@ -31,14 +40,19 @@ pub(crate) struct Sensor {
 
 impl Sensor {
     /// The emulator reports a byte at its end, while the part is told when it began: it is taken to have lasted eight
-    /// periods of [`SCK_HZ`]. [`shortest_byte_ns`](Self::shortest_byte_ns) shows how long it really lasted.
+    /// periods of [`SCK_HZ`] or, by the time of the first byte of its frame, of [`SLOW_SCK_HZ`].
+    /// [`shortest_byte_ns`](Self::shortest_byte_ns) shows how long it really lasted.
     pub(crate) fn new(mut part: VirtualAdis16405) -> Self {
         part.set_sck_hz(Some(SCK_HZ));
         Self {
             part,
-            byte_ns: 8_000_000_000 / u64::from(SCK_HZ),
+            byte_ns: byte_ns(SCK_HZ),
+            selected_at: 0,
             bursts: Vec::new(),
             shortest_byte_ns: u64::MAX,
+            shortest_gap_ns: u64::MAX,
+            shortest_high_ns: u64::MAX,
+            deselected_at: None,
             stuck_at: None,
             odd_words: 0,
             frame: Vec::new(),
@@ -58,6 +72,11 @@ impl Sensor {
     }
 }
 
+/// Time of eight periods of a serial clock.
+fn byte_ns(sck_hz: u32) -> u64 {
+    8_000_000_000 / u64::from(sck_hz)
+}
+
 impl Store for Sensor {}
 
 impl spi::Peer for Sensor {
@@ -65,8 +84,16 @@ impl spi::Peer for Sensor {
         let now = context.now().0;
         if let Some(last) = self.last_byte.replace(now) {
             self.shortest_byte_ns = self.shortest_byte_ns.min(now - last);
+            if self.frame.len().is_multiple_of(2) {
+                self.shortest_gap_ns = self.shortest_gap_ns.min((now - last).saturating_sub(self.byte_ns));
+            }
         }
         self.odd_words += u64::from(bits != 8);
+        if self.frame.is_empty() {
+            let sck_hz = if now - self.selected_at < byte_ns(SLOW_SCK_HZ) { SCK_HZ } else { SLOW_SCK_HZ };
+            self.byte_ns = byte_ns(sck_hz);
+            self.part.set_sck_hz(Some(sck_hz));
+        }
         self.part.advance_to(now.saturating_sub(self.byte_ns));
         let answer = self.part.transfer_byte(mosi as u8);
         let miso = self.stuck_at.unwrap_or(answer);
@@ -78,6 +105,10 @@ impl spi::Peer for Sensor {
         self.part.advance_to(context.now().0);
         self.part.select();
         self.selected = true;
+        self.selected_at = context.now().0;
+        if let Some(deselected_at) = self.deselected_at {
+            self.shortest_high_ns = self.shortest_high_ns.min(self.selected_at - deselected_at);
+        }
         self.frame.clear();
         self.last_byte = None;
     }
@@ -86,6 +117,7 @@ impl spi::Peer for Sensor {
         self.part.advance_to(context.now().0);
         self.part.deselect();
         self.selected = false;
+        self.deselected_at = Some(context.now().0);
         let burst_requested = self.frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
         let answers: Vec<u8> = self.frame.iter().map(|&(_, miso)| miso).collect();
         if burst_requested && let Ok(burst) = answers.try_into() {

@@ -5,7 +5,7 @@ use adis16405_driver::BURST_BYTES;
 use host_sim::uf2;
 use std::collections::VecDeque;
 use std::io::{Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use virtual_sensor::VirtualAdis16405;
@@ -17,13 +17,14 @@ struct Bench {
     uf2: PathBuf,
 }
 
-/// Built at most once a run.
+/// Built at most once a run; `OBSERVATORY_PICO_IMAGE` names another image.
 fn bench() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
-        let elf = images::build("pico", "thumbv6m-none-eabi");
+        let build = || images::build("pico", "thumbv6m-none-eabi", &[]);
+        let elf = std::env::var_os("OBSERVATORY_PICO_IMAGE").map_or_else(build, PathBuf::from);
         let blocks = uf2::from_elf(&std::fs::read(&elf).expect("the image")).expect("an image for the Pico");
-        let uf2 = elf.with_extension("uf2");
+        let uf2 = images::folder().join("observatory-pico.uf2");
         std::fs::write(&uf2, blocks).expect("room");
         Bench { emulator: emulator(), elf, uf2 }
     })
@@ -65,13 +66,38 @@ pub(crate) struct Outcome {
     /// Bytes from the serial port, each with its time in ns.
     pub(crate) received: Vec<(u64, u8)>,
     pub(crate) instructions: u64,
+    /// Changes of the LED's level.
+    pub(crate) led_changes: u64,
+    /// Longest time for which the watchdog was not fed, in s.
+    pub(crate) longest_unfed_s: f64,
     /// Warnings and errors of the emulator, one a line.
     pub(crate) diagnostics: String,
 }
 
+/// The board: whether its crystal starts, and when its DMA fails once, in s.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pico {
+    pub(crate) crystal_starts: bool,
+    pub(crate) dma_error_at: f64,
+}
+
+/// A board without a fault.
+pub(crate) const SOUND: Pico = Pico { crystal_starts: true, dma_error_at: f64::INFINITY };
+
+/// The path of the image.
+pub(crate) fn image() -> &'static Path {
+    &bench().elf
+}
+
 /// Boots the image from its UF2 and runs it. A key is given as `TIME=TEXT`; `events` are in order of time. Times are in
 /// s.
-pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], events: &[(f64, Event)]) -> Outcome {
+pub(crate) fn run(
+    board: Pico,
+    mut part: VirtualAdis16405,
+    seconds: f64,
+    keys: &[&str],
+    events: &[(f64, Event)],
+) -> Outcome {
     let Bench { emulator, elf, uf2 } = bench();
     let mut events: VecDeque<(u64, Event)> = events.iter().map(|&(at, event)| ((at * 1e9) as u64, event)).collect();
     let (mut stuck_at, mut edges_lost) = (None, false);
@@ -80,6 +106,8 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
         .arg(images::workspace().join("tests/tests/pico/emulator.mjs"))
         .args([emulator, uf2, elf])
         .arg(seconds.to_string())
+        .arg(if board.crystal_starts { "ok" } else { "dead" })
+        .arg(if board.dma_error_at.is_finite() { board.dma_error_at.to_string() } else { "Infinity".to_owned() })
         .args(keys)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -88,7 +116,7 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
         .expect("Node.js 18 or later starts");
     let (mut answers, mut questions) = (node.stdin.take().expect("a pipe"), node.stdout.take().expect("a pipe"));
     let (mut bursts, mut received, mut frame) = (Vec::new(), Vec::new(), Vec::new());
-    let mut instructions = 0;
+    let (mut instructions, mut led_changes, mut longest_unfed_s) = (0, 0, 0.0);
     let mut question = [0; 9];
     while questions.read_exact(&mut question).is_ok() {
         let [kind, value @ ..] = question;
@@ -97,8 +125,13 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
         if matches!(kind, b'b' | b'u') {
             questions.read_exact(&mut byte).expect("a byte");
         }
-        if kind == b'e' {
-            instructions = value as u64;
+        match kind {
+            b'e' => instructions = value as u64,
+            b'l' => led_changes = value as u64,
+            b'w' => longest_unfed_s = value * 1e-9,
+            _ => {}
+        }
+        if matches!(kind, b'e' | b'l' | b'w') {
             continue;
         }
         part.advance_to(value as u64);
@@ -151,5 +184,5 @@ pub(crate) fn run(mut part: VirtualAdis16405, seconds: f64, keys: &[&str], event
     let output = node.wait_with_output().expect("the emulator ends");
     let diagnostics = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{diagnostics}");
-    Outcome { part, bursts, received, instructions, diagnostics }
+    Outcome { part, bursts, received, instructions, led_changes, longest_unfed_s, diagnostics }
 }

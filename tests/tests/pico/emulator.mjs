@@ -1,21 +1,23 @@
 // Runs an RP2040 image in rp2040js. The sensor is simulated by the parent process, to which questions go over standard
 // output, and from which answers come over standard input. Arguments: the folder of rp2040js, the image as UF2 and as
-// ELF, which must agree, the time to run in s, and keys as TIME=TEXT.
+// ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, the time in s of an error of the DMA channel
+// that receives a burst, and keys as TIME=TEXT.
 //
 // A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `s` and `d` are
 // the falling and the rising edge of chip select, `b` and a further byte a transfer over SPI, `u` and a further byte an
-// output of the serial port. `e` with the number of instructions instead of the time is the end. The answer to `n` is
+// output of the serial port. At the end follow, in the place of the time, `l` with the number of changes of the LED, `w` with
+// the longest time in ns for which the watchdog was not fed, and `e` with the number of instructions. The answer to `n` is
 // the number of samples and the time of the next one (two f64), that to `b` a byte; the others have none.
 import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const [folder, uf2File, elfFile, seconds, ...keyArguments] = process.argv.slice(2);
+const [folder, uf2File, elfFile, seconds, crystal, dmaError, ...keyArguments] = process.argv.slice(2);
 const load = (file) => import(pathToFileURL(path.join(folder, 'node_modules/rp2040js/dist/esm', file)));
 const { RP2040, GPIOPinState } = await load('index.js');
 const { SimulationClock } = await load('clock/simulation-clock.js');
 
-const PIN_SELECT = 17, PIN_DATA_READY = 20, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
+const PIN_SELECT = 17, PIN_DATA_READY = 20, PIN_LED = 25, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
 const keys = keyArguments.map((key) => [parseFloat(key) * 1e9, key.slice(key.indexOf('=') + 1)]);
 
 const clock = new SimulationClock();
@@ -54,6 +56,22 @@ mcu.peripherals[0x40064] = {
   writeUint32Atomic() {},
 };
 
+if (crystal === 'dead') {
+  // XOSC STATUS (offset 4) never says that the oscillator is stable.
+  mcu.peripherals[0x40024] = { readUint32: () => 0, writeUint32() {}, writeUint32Atomic() {} };
+}
+// A write to WATCHDOG LOAD (offset 4) feeds the watchdog.
+let fed = 0, longestUnfed = 0;
+const watchdog = mcu.peripherals[0x40058];
+const writeWatchdog = watchdog.writeUint32.bind(watchdog);
+watchdog.writeUint32 = (offset, value) => {
+  if (offset === 4) {
+    longestUnfed = Math.max(longestUnfed, clock.nanos - fed);
+    fed = clock.nanos;
+  }
+  writeWatchdog(offset, value);
+};
+
 const ask = (kind, value, byte, answerLength) => {
   const question = Buffer.alloc(byte === undefined ? 9 : 10);
   question.write(kind);
@@ -70,14 +88,27 @@ const ask = (kind, value, byte, answerLength) => {
 };
 
 const spi = mcu.spi[0];
+// The error is one of the bus: the channel halts and raises no interrupt (RP2040 data sheet, section 2.5.7).
+let dmaErrorAt = parseFloat(dmaError) * 1e9;
+const failReceiving = () => {
+  const channel = mcu.dma.channels[0];
+  if (clock.nanos < dmaErrorAt || !(channel.ctrl & (1 << 24)) || channel.transCount > 13) return;
+  dmaErrorAt = Infinity;
+  channel.ctrl = (channel.ctrl | (1 << 30)) & ~(1 << 24);
+  channel.transferAlarm.cancel();
+};
 spi.onTransmit = (value) => {
   const answer = ask('b', clock.nanos, value & 0xff, 1)[0];
+  failReceiving();
   clock.createAlarm(() => spi.completeTransmit(answer)).schedule((spi.dataBits * 1e9) / spi.clockFrequency);
 };
 mcu.gpio[PIN_SELECT].addListener((state) => {
   if (state === GPIOPinState.Low) ask('s', clock.nanos, undefined, 0);
   else if (state === GPIOPinState.High) ask('d', clock.nanos, undefined, 0);
 });
+let ledChanges = 0;
+const isDriven = (state) => state === GPIOPinState.Low || state === GPIOPinState.High;
+mcu.gpio[PIN_LED].addListener((state, before) => (ledChanges += isDriven(state) && isDriven(before) ? 1 : 0));
 mcu.uart[0].onByte = (byte) => ask('u', clock.nanos, byte, 0);
 
 // Data ready: a pulse at every sample. The time of the next one is asked for at least every STRIDE_NS, as settings may
@@ -110,5 +141,7 @@ while (clock.nanos < end) {
   }
 }
 for (const diagnostic of diagnostics.keys()) console.error(diagnostic);
+ask('l', ledChanges, undefined, 0);
+ask('w', longestUnfed, undefined, 0);
 ask('e', instructions, undefined, 0);
 process.exit(0);

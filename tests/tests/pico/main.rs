@@ -2,6 +2,8 @@
 //! against the virtual sensor. Its core has no floating-point unit, and reports the same numbers.
 
 mod bench;
+#[path = "../image/costs.rs"]
+mod costs;
 #[allow(dead_code, reason = "the test of the other image uses the rest")]
 #[path = "../image/decoded.rs"]
 mod decoded;
@@ -10,7 +12,8 @@ mod decoded;
 mod images;
 
 use adis16405_driver::Burst;
-use bench::{Event, Outcome, run};
+use bench::{Event, Outcome, Pico, SOUND, image, run};
+use costs::{Costs, Memory, assert_within_budget, counter};
 use decoded::{Decoded, on_host};
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
@@ -24,7 +27,7 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
 #[ignore = "long: 20 emulated seconds with software floating point take half a minute; run with --long"]
 fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     const SECONDS: f64 = 20.0;
-    let outcome = run(sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
+    let outcome = run(SOUND, sensor(6), SECONDS, &["1.0=i 0\r", "2.0=r"], &[]);
     println!("{} instructions in {SECONDS} s; {}", outcome.instructions, outcome.diagnostics);
     let (bursts, part) = (&outcome.bursts, &outcome.part);
     // The sensor checks the 16 us between frames. It is not told the clock, which the firmware reports (below).
@@ -60,7 +63,7 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
         (7.5, Event::EdgesLost(true)),
         (7.6, Event::EdgesLost(false)),
     ];
-    let Outcome { part, bursts, received, .. } = run(sensor(9), 9.2, &keys, &events);
+    let Outcome { part, bursts, received, .. } = run(SOUND, sensor(9), 9.2, &keys, &events);
     let decoded = Decoded::decode(&received);
     println!("{:#?}", decoded.logs());
     assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
@@ -75,10 +78,7 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
 
     // The counters are printed as text, as a report takes seconds on this core.
     println!("{:#?}", decoded.lines);
-    let counter = |name: &str| {
-        let number = |line: &String| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok();
-        decoded.lines.iter().find_map(number).unwrap_or(0_u32)
-    };
+    let counter = |name: &str| counter(&decoded.lines, name).unwrap_or(0);
     assert_eq!((counter("stuck_low"), counter("recoveries")), (16, 3));
     assert_eq!((counter("queue_full"), counter("raw_dropped"), counter("serial_overruns")), (0, 0, 0));
     // Sampling continues while the lines are printed one after the other.
@@ -87,4 +87,52 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert!(decoded.lines.iter().any(|line| line.contains("sensor sampled")), "{:?}", decoded.lines);
     assert!(decoded.lines.iter().any(|line| line.starts_with("start 1: PowerOn")), "{:?}", decoded.lines);
     assert_eq!(part.violations(), []);
+}
+
+/// An error of the DMA costs the burst and what comes until the transfer is abandoned, 25 ms later; then no byte of it is left
+/// and the channel works.
+#[test]
+fn a_failed_transfer_is_recovered_from() {
+    let board = Pico { dma_error_at: 1.0, ..SOUND };
+    let Outcome { received, led_changes, .. } = run(board, sensor(12), 2.6, &["0.1=i 0\r", "2.2=k"], &[]);
+    let decoded = Decoded::decode(&received);
+    let counter = |name: &str| counter(&decoded.lines, name).unwrap_or(0);
+    println!("{:#?}", decoded.lines);
+    assert_eq!((counter("bus_errors"), counter("recoveries"), counter("shifted")), (1, 1, 0));
+    assert!(counter("bursts").abs_diff(counter("used")) <= 1 && f64::from(counter("used")) > 1.9 * RATE_HZ);
+    assert!((4..=6).contains(&led_changes), "{led_changes} changes of the LED in 2.6 s");
+}
+
+/// Without the crystal there is no serial port; the LED changes its level 80 times and the next attempt follows.
+#[test]
+fn without_a_crystal_the_led_blinks_fast() {
+    let board = Pico { crystal_starts: false, ..SOUND };
+    let Outcome { received, led_changes, .. } = run(board, sensor(13), 0.4, &[], &[]);
+    assert_eq!(received, []);
+    assert!((30..=80).contains(&led_changes), "{led_changes} changes of the LED in 0.4 s");
+}
+
+/// A whole epoch: its report, the models of all channels, and a quarter of the stack never used. The watchdog, whose time is
+/// 8.3 s, is fed during the longest step too.
+#[test]
+#[ignore = "long: 150 emulated seconds with software floating point take some minutes; run with --long"]
+fn the_pico_learns_from_an_epoch() {
+    const SECONDS: f64 = 150.0;
+    let keys = ["0.1=i 0\rf 819.2\re 10\r", "8.0=k", "11.0=e 0\r"];
+    let outcome = run(SOUND, sensor(14), SECONDS, &keys, &[]);
+    let decoded = Decoded::decode(&outcome.received);
+    println!("{:#?}", decoded.lines);
+    println!("the watchdog was not fed for {:.2} s at most", outcome.longest_unfed_s);
+    let learned = decoded.messages.iter().filter(|message| matches!(message, link::Message::Learned(_))).count();
+    let health = **decoded.healths().last().expect("the report of an epoch");
+    println!("{health:?}");
+    assert_eq!((decoded.channels().len() % 8, learned % 6), (0, 0));
+    assert!(learned >= 6);
+    assert!(outcome.longest_unfed_s < 0.5, "{} s", outcome.longest_unfed_s);
+    assert_eq!((health.used, health.lost_edges, health.queue_full), (health.bursts, 0, 0), "{health:?}");
+    // RP2040 data sheet, section 2.6.2; the stack is the rest of 264 KiB.
+    let memory = Memory { flash: 2 << 20, ram: 200 << 10 };
+    let awake_percent = f64::from(counter(&decoded.lines, "awake_permille").expect("the counters")) / 10.0;
+    let (board, image) = ("Raspberry Pi Pico", image());
+    assert_within_budget(&Costs { board, memory, image, core_mhz: 125.0, awake_percent, health });
 }

@@ -1,0 +1,57 @@
+//! The image for an Adafruit Feather STM32F405 Express: STM32F405RG, 12 MHz crystal, red LED on PC1 (D13).
+//!
+//! | board | pin | signal | at the sensor |
+//! |---|---|---|---|
+//! | A0 | PA4 | chip select, active low | CS |
+//! | A1, A2, A3 | PA5, PA6, PA7 | SPI1 SCK, MISO, MOSI, mode 3 | SCLK, DOUT, DIN |
+//! | A4 | PC4 | data ready, rising edge | DIO1 |
+//! | TX, RX | PB10, PB11 | USART3, 460 800 Bd 8N1 | to the host |
+//!
+//! SCK, MO and MI of the board are SPI2 and not used. The sensor runs from 5 V, which USB gives; its outputs are connected to
+//! 5 V tolerant pins without a pull, and its inputs accept 3.3 V.
+#![no_std]
+#![no_main]
+
+use firmware::BusTiming;
+use firmware::microcontroller::stm32f4::bus::{Spi1Bus, spi1_bus};
+use firmware::microcontroller::stm32f4::port::{BAUD, UsartPort};
+use firmware::microcontroller::stm32f4::start::{Started, Stm32f4, data_ready_input};
+use firmware::microcontroller::{BoardParts, UartQueues};
+use stm32f4xx_hal::gpio::{Input, Output, PA4, PC1, PC4};
+use stm32f4xx_hal::pac::{self, USART3};
+use stm32f4xx_hal::{prelude::*, serial};
+
+const CRYSTAL_HZ: u32 = 12_000_000;
+
+type DataReady = PC4<Input>;
+type Bus = Spi1Bus<PA4<Output>>;
+type Port = UsartPort<USART3>;
+type Led = PC1<Output>;
+
+fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Stm32f4, DataReady, Bus, Port, Led> {
+    let Started { cause, clock, mut rcc, microcontroller } =
+        Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
+    let (gpioa, gpiob, gpioc) =
+        (device.GPIOA.split(&mut rcc), device.GPIOB.split(&mut rcc), device.GPIOC.split(&mut rcc));
+
+    let settings = serial::Config::default().baudrate(BAUD.bps());
+    let usart = device.USART3.serial((gpiob.pb10, gpiob.pb11), settings, &mut rcc).expect("the baud rate is in range");
+    let wires = (gpioa.pa4, gpioa.pa5, gpioa.pa6, gpioa.pa7);
+    let bus = spi1_bus((device.SPI1, device.DMA2), wires, &mut rcc, BusTiming::CONFIGURED);
+    let data_ready = data_ready_input(gpioc.pc4, (device.EXTI, device.SYSCFG), &mut rcc);
+    let led = gpioc.pc1.into_push_pull_output();
+
+    let (core_hz, port) = (rcc.clocks.hclk().raw(), UsartPort::new(usart, queues));
+    BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, port, led }
+}
+
+firmware::observatory! {
+    device: stm32f4xx_hal::pac;
+    start: start;
+    microcontroller: Stm32f4;
+    data_ready: DataReady, EXTI4;
+    bus: Bus, DMA2_STREAM0;
+    port: Port, USART3;
+    led: Led;
+    estimators: CAN1_TX; // software-triggered: the interrupt of CAN1, a peripheral that is not used
+}

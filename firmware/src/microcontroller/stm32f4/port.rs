@@ -1,0 +1,46 @@
+//! The serial port to the host on a USART.
+
+use crate::microcontroller::{UartPort, UartQueues};
+use stm32f4xx_hal::nb;
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::serial::{Instance, Rx, RxListen, Serial, Tx, TxISR, TxListen};
+
+/// Baud rate of the serial port, 8N1.
+pub const BAUD: u32 = 460_800;
+
+/// A USART, served in its interrupt.
+pub struct UsartPort<U: Instance> {
+    tx: Tx<U>,
+    rx: Rx<U>,
+    queues: UartQueues,
+}
+
+impl<U: Instance> UsartPort<U> {
+    /// Enables the receive interrupt.
+    pub fn new(usart: Serial<U>, queues: UartQueues) -> Self {
+        let (tx, mut rx) = usart.split();
+        rx.listen();
+        Self { tx, rx, queues }
+    }
+}
+
+impl<U: Instance> UartPort for UsartPort<U> {
+    fn serve(&mut self) -> u32 {
+        // Read regardless of the flags: an overrun raises the interrupt too, and only a read clears it.
+        let lost = match self.rx.read() {
+            Ok(byte) => self.queues.receive.enqueue(byte).is_err(),
+            Err(nb::Error::Other(_)) => true,
+            Err(nb::Error::WouldBlock) => false,
+        };
+        if self.tx.is_tx_empty() {
+            match self.queues.transmit.dequeue() {
+                Some(byte) => {
+                    let _empty_was_checked = self.tx.write(byte);
+                    self.tx.listen();
+                }
+                None => self.tx.unlisten(),
+            }
+        }
+        u32::from(lost)
+    }
+}

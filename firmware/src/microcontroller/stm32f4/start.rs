@@ -1,0 +1,156 @@
+//! Start of an STM32F4: cause, watchdog, brown-out level, clocks; and the data-ready input.
+
+use crate::microcontroller::{DataReadyPin, Microcontroller, wait_for};
+use cortex_m::peripheral::SCB;
+use link::{BootCause, ClockSource};
+use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Pin};
+use stm32f4xx_hal::pac::{EXTI, FLASH, IWDG, RCC, SYSCFG, TIM2};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+/// Time without feeding after which the watchdog restarts; a report of all channels takes less.
+const WATCHDOG_MS: u32 = 8_000;
+/// Clock of the processor, from the crystal as from the internal oscillator.
+const CORE_HZ: u32 = 168_000_000;
+/// Clock of both peripheral buses. From it the prescalers of SPI1, 2 to 256, make 656 kHz for normal and 164 kHz for low-power
+/// mode; from 84 MHz the slowest one would be 328 kHz, more than low-power mode takes.
+const PERIPHERAL_HZ: u32 = 42_000_000;
+/// Readings of the flag of the crystal, each of at least three cycles of 16 MHz: 100 ms. Crystals start within some ms.
+const CRYSTAL_READINGS: u32 = 550_000;
+/// BOR_LEV of level 3, 2.7 V (RM0090 section 3.9.10). The names in the register definitions have the order reversed.
+const BROWN_OUT_LEVEL_3: u8 = 0b00;
+/// Keys that unlock the option bytes (RM0090 section 3.7.2).
+const OPTION_KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
+
+/// Reads the cause of the start and clears the reset flags (RM0090 section 6.3.21).
+pub fn boot_cause(rcc: &RCC) -> BootCause {
+    let flags = rcc.csr().read();
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    // Power-on also sets the brown-out flag, and every reset sets the flag of the pin.
+    if flags.porrstf().bit_is_set() {
+        BootCause::PowerOn
+    } else if flags.wdgrstf().bit_is_set() {
+        BootCause::Watchdog
+    } else if flags.sftrstf().bit_is_set() {
+        BootCause::Software
+    } else if flags.borrstf().bit_is_set() {
+        BootCause::BrownOut
+    } else if flags.padrstf().bit_is_set() {
+        BootCause::Pin
+    } else {
+        BootCause::Unknown
+    }
+}
+
+/// An STM32F4 with running clock and watchdog.
+pub struct Stm32f4 {
+    watchdog: IndependentWatchdog,
+}
+
+/// What a start gives.
+pub struct Started {
+    /// Why the microcontroller started.
+    pub cause: BootCause,
+    /// What the clocks are derived from.
+    pub clock: ClockSource,
+    /// The clocks.
+    pub rcc: Rcc,
+    /// The microcontroller.
+    pub microcontroller: Stm32f4,
+}
+
+impl Stm32f4 {
+    /// Starts the watchdog, before anything that could wait without end, the clocks and the microsecond counter. A crystal
+    /// that does not start is replaced by the internal oscillator.
+    pub fn start((rcc, flash, timer, watchdog): (RCC, FLASH, TIM2, IWDG), crystal_hz: u32) -> Started {
+        let cause = boot_cause(&rcc);
+        let mut watchdog = IndependentWatchdog::new(watchdog);
+        watchdog.start(WATCHDOG_MS.millis());
+        set_brown_out_level(&flash);
+        let clock = start_crystal(&rcc);
+        let source = match clock {
+            ClockSource::Crystal => Config::hse(crystal_hz.Hz()),
+            ClockSource::Internal => Config::hsi(),
+        };
+        let config = source.sysclk(CORE_HZ.Hz()).pclk1(PERIPHERAL_HZ.Hz()).pclk2(PERIPHERAL_HZ.Hz());
+        let mut rcc = rcc.freeze(config);
+        TIM2::enable(&mut rcc);
+        TIM2::reset(&mut rcc);
+        let timer_hz = rcc.clocks.timclk1().raw();
+        timer.psc().write(|w| w.psc().set((timer_hz / 1_000_000 - 1) as u16));
+        timer.egr().write(|w| w.ug().set_bit()); // loads the prescaler; the counter still wraps at 2³²
+        timer.cr1().write(|w| w.cen().set_bit());
+        Started { cause, clock, rcc, microcontroller: Self { watchdog } }
+    }
+}
+
+/// Switches the crystal oscillator on; off again if it does not start.
+fn start_crystal(rcc: &RCC) -> ClockSource {
+    rcc.cr().modify(|_, w| w.hseon().on());
+    if (0..CRYSTAL_READINGS).any(|_| rcc.cr().read().hserdy().is_ready()) {
+        ClockSource::Crystal
+    } else {
+        rcc.cr().modify(|_, w| w.hseon().off());
+        ClockSource::Internal
+    }
+}
+
+/// Has a supply below 2.7 V reset the microcontroller, which at 168 MHz needs that much: brown-out level 3. The option bytes
+/// keep it, so that it is programmed at the first start only (RM0090 sections 3.7.2 and 3.7.3).
+fn set_brown_out_level(flash: &FLASH) {
+    if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 {
+        return;
+    }
+    for key in OPTION_KEYS {
+        // SAFETY: the values that unlock the option bytes.
+        flash.optkeyr().write(|w| unsafe { w.bits(key) });
+    }
+    let ready = || flash.sr().read().bsy().bit_is_clear();
+    if wait_for(ready) {
+        // SAFETY: one of the four levels.
+        flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(BROWN_OUT_LEVEL_3) });
+        flash.optcr().modify(|_, w| w.optstrt().set_bit());
+        // The watchdog ends a wait without end.
+        while !wait_for(ready) {}
+    }
+    flash.optcr().modify(|_, w| w.optlock().set_bit());
+}
+
+impl Microcontroller for Stm32f4 {
+    fn counter() -> u32 {
+        // SAFETY: a read without side effects.
+        unsafe { (*TIM2::ptr()).cnt().read().cnt().bits() }
+    }
+
+    fn feed(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn restart() -> ! {
+        SCB::sys_reset()
+    }
+}
+
+/// Makes a pin the data-ready input. It floats: the sensor drives it with up to 5 V, which a pin tolerates only without a
+/// pull-up or pull-down (STM32F405 data sheet, table 7, FT).
+pub fn data_ready_input<const P: char, const N: u8>(
+    pin: Pin<P, N>,
+    (mut exti, syscfg): (EXTI, SYSCFG),
+    rcc: &mut Rcc,
+) -> Pin<P, N, Input>
+where
+    Pin<P, N, Input>: ExtiPin,
+{
+    let mut pin = pin.into_floating_input();
+    pin.make_interrupt_source(&mut syscfg.constrain(rcc));
+    pin.trigger_on_edge(&mut exti, Edge::Rising);
+    pin.enable_interrupt(&mut exti);
+    pin
+}
+
+impl<const P: char, const N: u8> DataReadyPin for Pin<P, N, Input> {
+    fn clear(&mut self) {
+        self.clear_interrupt_pending_bit();
+    }
+}
