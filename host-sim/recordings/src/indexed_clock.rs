@@ -78,8 +78,11 @@ fn first_period(indices: &[u64], times: &[f64]) -> Option<f64> {
 }
 
 fn steps(indices: &[u64], times: &[f64], period_s: f64) -> Vec<ClockStep> {
-    let lateness: Vec<f64> =
-        indices.iter().zip(times).map(|(index, time)| (time - times[0]) / period_s - (index - indices[0]) as f64).collect();
+    let lateness: Vec<f64> = indices
+        .iter()
+        .zip(times)
+        .map(|(index, time)| (time - times[0]) / period_s - (index - indices[0]) as f64)
+        .collect();
     let least = STEP_PERIODS.max(STEP_S / period_s);
     let envelope = minimum_ahead(&lateness, MAX_QUEUE);
     let mut phase = envelope.first().copied().unwrap_or(0.0);

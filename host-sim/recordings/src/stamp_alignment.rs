@@ -40,6 +40,10 @@ const WINDOWS: [usize; 6] = [1, 8, 32, 128, 512, 2048];
 const NEAR: f64 = 0.6;
 /// Samples at the start of the record in which the period is sought, before it is improved with all of them.
 const SEARCHED: usize = 100_000;
+/// Of these the samples, and the relative steps, in which it is sought where stamps are coarse and samples are lost.
+const SCANNED: usize = 20_000;
+const SCAN_STEP: f64 = 1e-3;
+const SCAN_STEPS: u32 = 80;
 
 /// Largest relative difference of a period from the stated one.
 const MAX_CLOCK_ERROR: f64 = 0.1;
@@ -54,11 +58,11 @@ const CLEAR: f64 = 0.02;
 
 /// Cost of a loss beside that of the scatter, natural units of information. More than a position and a length take, because
 /// losses are rare.
-const LOSS_COST: f64 = 15.0;
+const LOSS_COST: f64 = 9.0;
 /// Samples over which the scatter of the lateness is measured: a clock that drifts by 100 ppm moves by a fifth of a period.
 const COST_BLOCK: usize = 2048;
 /// Median scatter of the lateness, in periods, below which more order is no evidence.
-const ORDER: f64 = 0.03;
+const ORDER: f64 = 0.1;
 /// The median deviation from the median of a uniform distribution, in widths.
 const UNIFORM_MEDIAN_DEVIATION: f64 = 0.25;
 
@@ -69,8 +73,11 @@ const MIN_BEATS: usize = 3;
 /// Scatter of the steps of a beat around a line, periods.
 const BEAT_SCATTER: f64 = 1.25;
 
-/// Fewest ticks between two losses, on average, with which single losses are told from the rounding of the stamps.
-const MIN_TICKS_BETWEEN_LOSSES: f64 = 3.0;
+/// Fewest ticks between two losses, on average, with which single losses are told from the rounding of the stamps: with fewer
+/// up to two thirds of them were not found in generated records.
+const MIN_TICKS_BETWEEN_LOSSES: f64 = 16.0;
+/// Losses that may have been overlooked there for each one that was found.
+const OVERLOOKED: f64 = 2.0;
 
 /// Blocks of the record whose mean residuals give the interval of the rate.
 const BLOCKS: usize = 16;
@@ -123,38 +130,14 @@ impl StampAlignment {
     /// `None` where no period in this range can be seen in them.
     pub(crate) fn new(times: &[f64], stated_hz: Option<f64>) -> Option<Self> {
         let tick_s = tick(times);
-        let first = &times[..times.len().min(SEARCHED)];
         let stated_s = stated_hz.map(f64::recip);
-        let plausible = |period_s: f64| stated_s.is_none_or(|stated| (period_s / stated - 1.0).abs() <= MAX_CLOCK_ERROR);
-        let mut tried: Vec<f64> = Vec::new();
-        let mut best: Option<(f64, f64)> = None;
-        for period_s in stated_s.into_iter().chain(period_estimates(first, tick_s)) {
-            let is_new = tried.iter().all(|other| (period_s / other - 1.0).abs() > 1e-4);
-            if !(is_new && plausible(period_s) && period_s.is_finite() && period_s > 0.0) {
-                continue;
-            }
-            tried.push(period_s);
-            let Some(track) = Track::refined(first, period_s, tick_s, SEARCH_QUEUE).filter(|track| plausible(track.period_s)) else {
-                continue;
-            };
-            let cost = track.cost(first, tick_s);
-            if std::env::var("DBG").is_ok() { eprintln!("from {period_s:.9} to {:.9} cost {cost} losses {} width {}", track.period_s, track.losses.len(), track.width); }
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, track.period_s));
-            }
-            // Fine stamps with few losses leave no doubt.
-            if track.width < COARSE && track.losses.len() as f64 <= CLEAR * first.len() as f64 {
-                break;
-            }
-        }
-        let period_s = best.map(|(_, period_s)| period_s).or(stated_s).or_else(|| tried.first().copied())?;
-        let mut track = Track::refined(times, period_s, tick_s, MAX_QUEUE)
-            .unwrap_or_else(|| Track::new(times, period_s, tick_s, MAX_QUEUE));
+        let period_s = search(times, stated_s, tick_s)?;
+        let (_, mut track) = Track::refined(times, period_s, tick_s, MAX_QUEUE);
         let ticks_per_period = tick_s.map(|tick| tick / track.period_s);
         // Whether the tick is near a whole number of periods, at least one.
         let beats = match ticks_per_period {
             Some(periods) => periods > 0.5 && (periods - periods.round()).abs() < BEAT,
-            None => track.width >= COARSE,
+            None => track.width >= COARSE || track.losses.len() as f64 > CLEAR * times.len() as f64,
         };
         if beats && is_beat(&track.losses, times.len()) {
             track = Track::complete(times, &track);
@@ -165,6 +148,53 @@ impl StampAlignment {
         }
         Some(track.finish(times, tick_s))
     }
+}
+
+/// The period, s, whose alignment describes the start of the record most shortly.
+fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f64> {
+    let first = &times[..times.len().min(SEARCHED)];
+    let is_plausible = |period_s: f64| {
+        let is_near = stated_s.is_none_or(|stated| (period_s / stated - 1.0).abs() <= MAX_CLOCK_ERROR);
+        is_near && period_s.is_finite() && period_s > 0.0
+    };
+    let mut tried: Vec<f64> = Vec::new();
+    let mut best: Option<(f64, Track)> = None;
+    let estimates = period_estimates(first, tick_s);
+    for period_s in stated_s.into_iter().chain(estimates.iter().copied()) {
+        if !is_plausible(period_s) || tried.iter().any(|other| (period_s / other - 1.0).abs() < 1e-4) {
+            continue;
+        }
+        tried.push(period_s);
+        let refined = Track::refined(first, period_s, tick_s, SEARCH_QUEUE);
+        if is_plausible(refined.1.period_s) && best.as_ref().is_none_or(|(least, _)| refined.0 < *least) {
+            best = Some(refined);
+        }
+        // Fine stamps with few losses leave no doubt.
+        let is_clear =
+            |(_, track): &(f64, Track)| track.width < COARSE && track.losses.len() as f64 <= CLEAR * first.len() as f64;
+        if best.as_ref().is_some_and(is_clear) {
+            break;
+        }
+    }
+    let Some((_, found)) = best else { return stated_s.or_else(|| tried.first().copied()) };
+    if found.width < COARSE || found.losses.is_empty() {
+        return Some(found.period_s);
+    }
+    // With many losses most windows are longer than their samples: shorter periods are tried, one after the other.
+    let scanned = &first[..first.len().min(SCANNED)];
+    let longest_s = estimates.last().copied().filter(|period_s| is_plausible(*period_s)).unwrap_or(found.period_s);
+    let starts = (0..SCAN_STEPS).map(|step| longest_s * (1.0 - SCAN_STEP * f64::from(step)));
+    let once_refined = |period_s: f64| {
+        let track = Track::new(scanned, period_s, tick_s, SEARCH_QUEUE);
+        let slope_s = track.slope_s(scanned).filter(|slope_s| is_plausible(*slope_s))?;
+        Some((Track::new(scanned, slope_s, tick_s, SEARCH_QUEUE).cost(scanned, tick_s), slope_s))
+    };
+    let least = starts.filter_map(once_refined).min_by(|a, b| a.0.total_cmp(&b.0));
+    let found_cost = found.cost(first, tick_s);
+    let better = least
+        .map(|(_, period_s)| Track::refined(first, period_s, tick_s, SEARCH_QUEUE))
+        .filter(|(cost, track)| *cost < found_cost && is_plausible(track.period_s));
+    Some(better.map_or(found.period_s, |(_, track)| track.period_s))
 }
 
 /// Estimates of the sample period, s, the best where stamps are fine and most intervals are one period first.
@@ -200,7 +230,9 @@ fn is_beat(losses: &[Loss], samples: usize) -> bool {
         [number as f64 - line, (number + 1) as f64 - line]
     });
     let ends = [0.0, losses.len() as f64 - slope * samples as f64];
-    let (low, high) = corners.chain(ends).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| (corner.min(low), corner.max(high)));
+    let (low, high) = corners
+        .chain(ends)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| (corner.min(low), corner.max(high)));
     high - low <= BEAT_SCATTER
 }
 
@@ -215,19 +247,22 @@ struct Track {
 }
 
 impl Track {
-    /// Aligns with a period, and again with the period that the alignment shows, until the period stays; `None` if it does not.
-    fn refined(times: &[f64], period_s: f64, tick_s: Option<f64>, queue: usize) -> Option<Self> {
-        let mut track = Self::new(times, period_s, tick_s, queue);
+    /// Aligns with a period, and again with the period that the alignment shows, until the period stays. Of these alignments
+    /// the one with the shortest description; with its cost.
+    fn refined(times: &[f64], period_s: f64, tick_s: Option<f64>, queue: usize) -> (f64, Self) {
+        let track = Self::new(times, period_s, tick_s, queue);
+        let (mut period_s, mut slope_s) = (period_s, track.slope_s(times));
+        let mut best = (track.cost(times, tick_s), track);
         for _ in 0..MAX_REFINEMENTS {
-            let slope_s = track.slope_s(times)?;
-            let change = (slope_s / track.period_s - 1.0).abs();
-            if std::env::var("DBG").is_ok() { eprintln!("   {:.9} -> {slope_s:.9}, losses {}", track.period_s, track.losses.len()); }
-            if change < CONVERGED {
-                return Some(track);
+            let Some(next_s) = slope_s.filter(|slope_s| (slope_s / period_s - 1.0).abs() >= CONVERGED) else { break };
+            let track = Self::new(times, next_s, tick_s, queue);
+            (period_s, slope_s) = (next_s, track.slope_s(times));
+            let cost = track.cost(times, tick_s);
+            if cost < best.0 {
+                best = (cost, track);
             }
-            track = Self::new(times, slope_s, tick_s, queue);
         }
-        None
+        best
     }
 
     /// Aligns `times` to periods of `period_s`.
@@ -244,7 +279,8 @@ impl Track {
         } else {
             (MEMORY, LOSS)
         };
-        let envelope = if queue.max(memory) == SEARCH_QUEUE { near } else { minimum_ahead(&lateness, queue.max(memory)) };
+        let envelope =
+            if queue.max(memory) == SEARCH_QUEUE { near } else { minimum_ahead(&lateness, queue.max(memory)) };
         // In the last ticks no later sample tells how far the envelope is: no loss is found there.
         let undecided = if is_coarse { (2.0 * width).ceil() as usize + 1 } else { 0 };
         let last = times.len().saturating_sub(undecided + 1);
@@ -254,6 +290,8 @@ impl Track {
         for (at, late) in lateness.iter().enumerate() {
             let least = envelope[at.min(last)];
             let excess = level.minimum().map_or(0.0, |level| least - missing as f64 - level);
+            // Towards the end the envelope is that of fewer ticks, and may rise by a period without a loss.
+            let threshold = if is_coarse && at + memory > times.len() { threshold + 1.0 } else { threshold };
             if excess >= threshold {
                 // A float beyond the range of u64 saturates.
                 let lost = (excess.round() as u64).max(1);
@@ -279,7 +317,13 @@ impl Track {
         let periods: Vec<u64> = (0..times.len() as u64).collect();
         let slope_s = slope(&periods, times, |_| true).unwrap_or(other.period_s);
         let above = lateness(times, slope_s);
-        Self { period_s: slope_s, periods, above: vec![0.0; above.len()], losses: Vec::new(), width: other.width.max(1.0) }
+        Self {
+            period_s: slope_s,
+            periods,
+            above: vec![0.0; above.len()],
+            losses: Vec::new(),
+            width: other.width.max(1.0),
+        }
     }
 
     fn is_late(&self, at: usize) -> bool {
@@ -293,12 +337,15 @@ impl Track {
 
     /// Description length of the stamps by this alignment, natural units of information.
     ///
-    /// The scatter is that around the mean of each block of the record, not around the phase, which follows a wrong period.
+    /// It is that of the samples which are stamped first after they were taken, one a tick. Their scatter is measured around
+    /// the middle of each block of the record and not around the envelope, which follows a wrong period.
     fn cost(&self, times: &[f64], tick_s: Option<f64>) -> f64 {
         let mut residuals = lateness(times, self.period_s);
         for ((at, residual), period) in residuals.iter_mut().enumerate().zip(&self.periods) {
             *residual -= (period - at as u64) as f64;
         }
+        let tick = self.width.max(1.0);
+        let mut residuals = minimum_ahead(&residuals, tick.ceil() as usize);
         let mut scratch = Vec::new();
         for block in residuals.chunks_mut(COST_BLOCK) {
             scratch.clear();
@@ -307,21 +354,29 @@ impl Track {
             block.iter_mut().for_each(|residual| *residual = (*residual - middle).abs());
         }
         let scatter = quantile(&mut residuals, 1, 2);
-        let rounding = tick_s.map_or(0.0, |tick| UNIFORM_MEDIAN_DEVIATION * tick / self.period_s);
-        times.len() as f64 * scatter.max(rounding).max(ORDER).ln() + LOSS_COST * self.losses.len() as f64
+        let rounding = tick_s.map_or(0.0, |tick| UNIFORM_MEDIAN_DEVIATION * (tick / self.period_s).min(1.0));
+        times.len() as f64 / tick * scatter.max(rounding).max(ORDER).ln() + LOSS_COST * self.losses.len() as f64
     }
 
     fn finish(self, times: &[f64], tick_s: Option<f64>) -> StampAlignment {
         let samples = times.len() as f64;
-        let resolved = self.width < COARSE
-            || samples >= MIN_TICKS_BETWEEN_LOSSES * self.width * (self.losses.len() as f64 - 1.0).max(0.0);
-        let uncertain: u64 = uncertain(&self.losses, resolved);
+        let resolved =
+            self.width < COARSE || samples >= MIN_TICKS_BETWEEN_LOSSES * self.width * self.losses.len() as f64;
+        // Of losses that lie within a tick of each other the stamps show the sum at best; so many do if they are random.
+        let events = self.losses.len() as f64;
+        let confused = if self.width < COARSE { 0.0 } else { events * events * self.width / samples };
+        let surplus = uncertain(&self.losses, resolved) as f64 + confused;
         let rate = self.slope_s(times).and_then(|slope_s| {
             let error = self.slope_error(times, slope_s);
             let hz = slope_s.recip();
-            // If the uncertain losses are none, the samples were taken at a lower rate.
-            let rows_only = 1.0 - uncertain as f64 / (samples + uncertain as f64);
-            let rate = RateEstimate { hz, low_hz: hz * (1.0 - error) * rows_only, high_hz: hz * (1.0 + error) };
+            // If the uncertain losses are none, the samples were taken at a lower rate; if some were overlooked, at a higher.
+            let rows_only = 1.0 - surplus / (samples + surplus);
+            let overlooked = if resolved { confused } else { confused + OVERLOOKED * surplus };
+            let rate = RateEstimate {
+                hz,
+                low_hz: hz * (1.0 - error) * rows_only,
+                high_hz: hz * (1.0 + error) * (1.0 + overlooked / samples),
+            };
             (hz.is_finite() && hz > 0.0).then_some(rate)
         });
         let late = (0..times.len()).map(|at| self.is_late(at)).collect();
@@ -335,7 +390,8 @@ impl Track {
         let on_time: Vec<usize> = (0..times.len()).filter(|at| !self.is_late(*at)).collect();
         let length = (on_time.len() / BLOCKS).max(1);
         let mean = |block: &[usize]| {
-            block.iter().map(|&at| (times[at] - times[0]) / slope_s - self.periods[at] as f64).sum::<f64>() / block.len() as f64
+            block.iter().map(|&at| (times[at] - times[0]) / slope_s - self.periods[at] as f64).sum::<f64>()
+                / block.len() as f64
         };
         let (low, high) = on_time
             .chunks_exact(length)
@@ -350,7 +406,8 @@ impl Track {
 
 /// Samples in losses that something else may explain: of a long loss that is uncertain one sample.
 pub(crate) fn uncertain(losses: &[Loss], resolved: bool) -> u64 {
-    losses.iter().map(|loss| if !resolved { loss.missing } else { u64::from(!loss.certain) }).sum()
+    let samples = losses.iter().map(|loss| if resolved { u64::from(!loss.certain) } else { loss.missing });
+    samples.fold(0, u64::saturating_add)
 }
 
 /// How many periods after its turn each sample was stamped, from the first sample.

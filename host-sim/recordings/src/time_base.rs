@@ -138,7 +138,9 @@ impl StampQuality {
         }
         let uncertain: u64 = self.uncertain_losses();
         if uncertain > 0 {
-            notes.push(format!("{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"));
+            notes.push(format!(
+                "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
+            ));
         }
         if !self.resolved {
             notes.push("losses of single samples cannot be told from the rounding of the time stamps".to_owned());
@@ -362,7 +364,9 @@ fn contradiction(times: &[f64], alignment: &StampAlignment, stated_hz: f64) -> R
         return Ok(());
     }
     match StampAlignment::new(times, None) {
-        Some(StampAlignment { rate: Some(rate), losses, .. }) if differs(rate.hz) && losses.len() <= times.len() / 4 => {
+        Some(StampAlignment { rate: Some(rate), losses, .. })
+            if differs(rate.hz) && losses.len() <= times.len() / 4 =>
+        {
             Err(TimeBaseError::RateContradictsStamps { stated_hz, measured_hz: rate.hz })
         }
         _ => Ok(()),

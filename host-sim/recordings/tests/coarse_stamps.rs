@@ -47,7 +47,8 @@ fn record(host: Host, seed: u64) -> (Recording, u64) {
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
     let phase: f64 = rng.random();
     let every = |seconds: f64| (seconds * host.rate_hz) as u64;
-    let (mut busy_until, mut last, mut outage_until, mut first, mut kept, mut newest) = (0.0f64, f64::MIN, 0, None, 0, 0);
+    let (mut busy_until, mut last, mut outage_until, mut first, mut kept, mut newest) =
+        (0.0f64, f64::MIN, 0, None, 0, 0);
     for sample in 0..host.samples {
         let taken = (sample as f64 + phase) / host.rate_hz;
         if host.outage_every_s > 0.0 && sample % every(host.outage_every_s) == every(host.outage_every_s) / 2 {
@@ -106,9 +107,11 @@ fn check(host: Host, seed: u64) -> (f64, u64, u64) {
     let found = examine(&recording);
     let error = found.rate_hz / host.rate_hz - 1.0;
     let rate = found.quality.rate.expect("a rate");
-    if !(rate.low_hz..=rate.high_hz).contains(&host.rate_hz) {
-        println!("BAD {host:?}, seed {seed}: {rate:?}, {} of {lost} lost, width {} tick {:?}", found.lost, found.quality.width, found.quality.tick_s);
-    }
+    assert!(
+        (rate.low_hz..=rate.high_hz).contains(&host.rate_hz),
+        "{host:?}, seed {seed}: {rate:?}, {} of {lost} lost",
+        found.lost
+    );
     (error, found.lost, lost)
 }
 
@@ -127,8 +130,9 @@ fn complete_records_of_any_rate_and_tick_show_no_loss() {
         for periods in [0.1, 0.37, 0.7, 0.93, 1.22, 1.5, 2.45, 4.1, 8.19, 20.3] {
             for jitter in [0.0, 0.2] {
                 let host = Host { rate_hz, tick_s: periods / rate_hz, jitter_s: jitter / rate_hz, ..HOST };
-                let (error, found, lost) = check(host, 1);
-                if (found, lost) != (0, 0) || error.abs() > 1e-5 { println!("FALSE {found}, {error}: {host:?}") }
+                let (error, found, lost) = check(host, seed(1));
+                assert_eq!((found, lost), (0, 0), "{host:?}");
+                assert!(error.abs() < 1e-5, "{host:?}: {error}");
             }
         }
     }
@@ -139,51 +143,82 @@ fn usual_ticks_show_no_loss() {
     for rate_hz in [50.0, 100.0, 200.0, 400.0, 700.0, 750.0, 800.0, 819.2, 900.0, 950.0, 1000.0, 1600.0, 2000.0] {
         for tick_s in [1e-6, 1e-4, 1e-3, 1.0 / 128.0, 0.01] {
             let host = Host { rate_hz: rate_hz * 1.000_05, tick_s, samples: 120_000, ..HOST };
-            let (error, found, lost) = check(host, 2);
-            if (found, lost) != (0, 0) || error.abs() > 1e-5 { println!("FALSE usual {found}, {error}: {host:?}") }
-
+            let (error, found, lost) = check(host, seed(2));
+            assert_eq!((found, lost), (0, 0), "{host:?}");
+            assert!(error.abs() < 1e-5, "{host:?}: {error}");
         }
     }
 }
 
+/// The share of the losses that is found depends on how many ticks of the stamps lie between two of them. With ten or more
+/// it is all but a few in a hundred; with fewer the report says that losses and rounding are not told apart. The rate lies in
+/// its interval in any case.
 #[test]
 fn losses_are_found_and_none_is_invented() {
-    for rate_hz in [50.0, 204.8, 819.2, 2000.0] {
+    for rate_hz in [50.0, 819.2] {
         for periods in [0.0, 0.1, 0.37, 0.7, 1.22, 2.45, 4.1, 8.19, 20.3] {
             for loss in [0.0005, 0.005, 0.02, 0.05] {
                 let host = Host { rate_hz, tick_s: periods / rate_hz, jitter_s: 0.1 / rate_hz, loss, ..HOST };
-                let (error, found, lost) = check(host, 3);
-                if error.abs() > 1e-4 || found.abs_diff(lost) > 3 + lost / 20 { println!("LOSS {rate_hz} {periods} {loss}: {error:.1e} {found}/{lost}"); }
+                let (recording, lost) = record(host, seed(3));
+                let found = examine(&recording);
+                let rate = found.quality.rate.expect("a rate");
+                let context = format!("{host:?}: {rate:?}, {} of {lost} lost", found.lost);
+                assert!((rate.low_hz..=rate.high_hz).contains(&rate_hz), "{context}");
+                let error = (found.rate_hz / rate_hz - 1.0).abs();
+                let off = found.lost.abs_diff(lost);
+                if periods < 0.6 {
+                    // Every interval is that of whole periods.
+                    assert!(off == 0 && error < 1e-6 && found.quality.resolved, "{context}");
+                } else if periods * loss < 0.03 {
+                    assert!(off <= 1 + lost / 50 && error < 5e-4 && found.quality.resolved, "{context}");
+                } else if periods * loss < 0.11 {
+                    assert!(off <= 3 + lost / 15 && error < 2e-3, "{context}");
+                } else {
+                    assert!(!found.quality.resolved, "{context}");
+                }
             }
         }
     }
 }
 
+/// A clock that is wrong by up to 100 ppm, stalls, outages and rows that repeat, alone and together.
 #[test]
 fn bursts_stalls_repeats_and_a_drifting_clock_are_told_apart() {
     for periods in [0.0, 0.1, 0.82, 1.22, 4.1, 8.19, 20.3] {
-        for (name, faults) in [
-            ("outages", Host { outage_every_s: 7.0, ..HOST }),
-            ("stalls", Host { stall_every_s: 3.0, ..HOST }),
-            ("repeats", Host { repeats: 0.003, ..HOST }),
-            ("drift", Host { drift: 1e-4, samples: 200_000, ..HOST }),
-            ("all", Host { outage_every_s: 7.0, stall_every_s: 3.0, repeats: 0.001, loss: 0.0005, drift: 1e-4, ..HOST }),
+        let host = Host { tick_s: periods / HOST.rate_hz, jitter_s: 0.1 / HOST.rate_hz, ..HOST };
+        for (name, host) in [
+            ("outages", Host { outage_every_s: 7.0, ..host }),
+            ("stalls", Host { stall_every_s: 3.0, ..host }),
+            ("repeats", Host { repeats: 0.003, ..host }),
+            ("drift", Host { drift: 1e-4, samples: 200_000, ..host }),
+            (
+                "all",
+                Host { outage_every_s: 7.0, stall_every_s: 3.0, repeats: 0.001, loss: 0.0005, drift: 1e-4, ..host },
+            ),
         ] {
-            let host = Host { tick_s: periods / HOST.rate_hz, jitter_s: 0.1 / HOST.rate_hz, ..faults };
-            let (recording, lost) = record(host, 4);
+            let (recording, lost) = record(host, seed(4));
+            let rows = recording.samples.len() as u64;
+            let repeats = rows - (host.samples - lost);
             let found = examine(&recording);
-            println!("{name} {periods}: {:.1e} {}/{lost}, repeats {}, {:?}", found.rate_hz / host.rate_hz - 1.0, found.lost, found.repeated, found.quality);
+            let context =
+                format!("{name}, {periods}: {} of {lost} lost, {} of {repeats} repeats", found.lost, found.repeated);
+            if name == "all" {
+                // A repeated row beside a loss hides both where stamps are coarse.
+                let off = if periods < 1.0 { 0 } else { 4 };
+                assert!(found.lost.abs_diff(lost) <= off && found.repeated.abs_diff(repeats) <= off, "{context}");
+            } else {
+                assert_eq!((found.lost, found.repeated), (lost, repeats), "{context}");
+            }
+            // Over a part of the clock's sine the mean rate is off by its share.
+            let error = found.rate_hz / host.rate_hz - 1.0;
+            assert!(error.abs() < if name == "all" { 2e-4 } else { 1e-6 }, "{context}: {error}");
+            let stalls = if host.stall_every_s > 0.0 { 500 } else { 0 };
+            assert!(found.quality.late >= stalls, "{context}: {} late", found.quality.late);
+            if host.stall_every_s == 0.0 {
+                assert_eq!(found.quality.late, 0, "{context}");
+            }
         }
     }
 }
 
-#[test]
-fn dbg() {
-    let Ok(v) = std::env::var("DBG") else { return };
-    let v: Vec<f64> = v.split(',').map(|x| x.parse().unwrap()).collect();
-    let host = Host { rate_hz: 1000.0, tick_s: v[0] / 1000.0, jitter_s: 0.1 / 1000.0, loss: v[1], ..HOST };
-    let (recording, lost) = record(host, 3);
-    let found = time_base(&recording, if v[2] > 0.0 { Some(v[2]) } else { None }).unwrap();
-    let q = found.stamps.unwrap();
-    println!("{:?} {}/{lost} {:?}", q.rate, found.measurement.dropped["gap"], &q.losses[..q.losses.len().min(20)]);
-}
+fn seed(s: u64) -> u64 { s + std::env::var("SEED").map_or(0, |t| t.parse().unwrap()) }
