@@ -77,7 +77,7 @@ const BEAT_SCATTER: f64 = 1.25;
 /// up to two thirds of them were not found in generated records.
 const MIN_TICKS_BETWEEN_LOSSES: f64 = 16.0;
 /// Losses that may have been overlooked there for each one that was found.
-const OVERLOOKED: f64 = 2.0;
+const OVERLOOKED: f64 = 4.0;
 
 /// Blocks of the record whose mean residuals give the interval of the rate.
 const BLOCKS: usize = 16;
