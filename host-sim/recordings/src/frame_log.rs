@@ -15,6 +15,12 @@ use std::time::{Duration, Instant};
 /// First line of every log.
 pub const HEADER: &str = "time_s,mosi,miso";
 
+/// Longest time that a line stays in memory while others follow, and most bytes of them.
+const MAX_DELAY: Duration = Duration::from_secs(1);
+const MAX_BUFFERED: usize = 1 << 22;
+/// Bytes between two looks at the clock.
+const CLOCK_BYTES: usize = 1 << 12;
+
 const TIME: &str = "time_s";
 const MOSI: &str = "mosi";
 const MISO: &str = "miso";
@@ -124,12 +130,6 @@ pub struct FrameLogWriter {
     text: String,
     written: Instant,
 }
-
-/// Longest time that a line stays in memory while others follow, and most bytes of them.
-const MAX_DELAY: Duration = Duration::from_secs(1);
-const MAX_BUFFERED: usize = 1 << 22;
-/// Bytes between two looks at the clock.
-const CLOCK_BYTES: usize = 1 << 12;
 
 impl FrameLogWriter {
     /// Creates `file` and writes the header.
