@@ -243,7 +243,7 @@ fn names_with_control_characters_are_escaped() {
 #[test]
 fn figures_of_recordings_with_like_names_do_not_overwrite_each_other() {
     let dir = tempdir().expect("a folder");
-    let rows = table("time_s,gyro_x_counts", 3000, |i| format!("{},", i as f64 / 100.0));
+    let rows = table("time_s,gyro_x_counts", 50_000, |i| format!("{},", i as f64 / 100.0));
     std::fs::create_dir(dir.path().join("other")).expect("a folder");
     let files = ["run.1.csv", "run.2.csv", "other/run.1.csv"].map(|file| write(&dir, file, &rows));
     let pictures = dir.path().join("pictures");
@@ -252,6 +252,6 @@ fn figures_of_recordings_with_like_names_do_not_overwrite_each_other() {
     );
     assert!(output.status.success(), "{}", text(&output.stderr));
     for figure in ["run.1-gyro_x.svg", "run.2-gyro_x.svg", "run.1-2-gyro_x.svg"] {
-        assert!(pictures.join(figure).exists(), "{figure}");
+        assert!(pictures.join(figure).exists(), "{figure}: {}", text(&output.stdout));
     }
 }

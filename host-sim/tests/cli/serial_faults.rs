@@ -1,4 +1,4 @@
-//! Recordings over a serial port that end early: an interrupt, a device that hangs up, restarts or is silent.
+//! Recordings over a serial port that end early, and a device that is silent.
 
 use crate::program::host_sim;
 use serialport::{SerialPort, TTYPort};
@@ -15,8 +15,6 @@ use virtual_sensor::{NoiseModel, VirtualAdis16405};
 enum Fault {
     /// It is interrupted on the host.
     Interrupt,
-    HangUp,
-    Restart,
     Silence,
 }
 
@@ -30,14 +28,12 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
     near.set_timeout(Duration::from_millis(1)).expect("a timeout");
     let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
         .args(["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", "20"])
-        .stdout(Stdio::piped())
+        .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    let new_device = || Device::new(VirtualAdis16405::new(NoiseModel::paper(), 5), Device::blank_memory());
-    let mut device = new_device();
-    let (mut now_us, mut restarted, mut keys, mut received) = (0, false, [0; 64], Vec::new());
-    let mut far = Some(far);
+    let mut device = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 5), Device::blank_memory());
+    let (mut now_us, mut interrupted, mut keys, mut received) = (0, false, [0; 64], Vec::new());
     let started = Instant::now();
     while program.try_wait().expect("a status").is_none() {
         assert!(started.elapsed() < Duration::from_secs(60), "{fault:?}: the program does not end");
@@ -50,27 +46,11 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
         if fault != Fault::Silence {
             let _ = near.write_all(&sent);
         }
-        if now_us < FAULT_AFTER_US || restarted {
-            continue;
+        if fault == Fault::Interrupt && now_us >= FAULT_AFTER_US && !interrupted {
+            let id = program.id().to_string();
+            assert!(Command::new("kill").args(["-INT", &id]).status().expect("a shell").success());
+            interrupted = true;
         }
-        match fault {
-            Fault::Interrupt => {
-                let id = program.id().to_string();
-                assert!(Command::new("kill").args(["-INT", &id]).status().expect("a shell").success());
-                restarted = true;
-            }
-            Fault::HangUp => {
-                far = None;
-                break;
-            }
-            Fault::Restart => {
-                (device, now_us, restarted) = (new_device(), 0, true);
-            }
-            Fault::Silence => {}
-        }
-    }
-    if fault == Fault::HangUp {
-        drop(near);
     }
     let output = program.wait_with_output().expect("an end");
     drop(far);
@@ -95,30 +75,6 @@ fn an_interrupted_recording_is_finished_and_the_device_is_told() {
     assert!(commands.ends_with("w 0\r"), "{commands:?}");
     // 5 s at 204.8 samples per second, and what came before the interrupt was seen.
     assert!((900..3000).contains(&samples(&log)), "{}", samples(&log));
-}
-
-#[test]
-fn a_device_that_hangs_up_is_named_and_its_bursts_are_kept() {
-    let dir = tempdir().expect("a folder");
-    let log = dir.path().join("device.csv.gz");
-    let started = Instant::now();
-    let (output, _) = record(&log, Fault::HangUp);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(!output.status.success() && errors.contains("hung up"), "{errors}");
-    assert!(started.elapsed() < Duration::from_secs(9), "the silence of 10 s is not waited for");
-    assert!(samples(&log) > 500);
-}
-
-#[test]
-fn time_goes_on_where_the_device_restarts() {
-    let dir = tempdir().expect("a folder");
-    let log = dir.path().join("device.csv");
-    let (output, commands) = record(&log, Fault::Restart);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.contains("restarted 1 times"), "{errors}");
-    assert!(commands.matches("w 1\r").count() >= 2, "{commands:?}");
-    // About 5 s before the restart, and the rest of the 20 s after it less the silence of at least 2 s.
-    assert!((2000..4000).contains(&samples(&log)), "{}", samples(&log));
 }
 
 #[test]
