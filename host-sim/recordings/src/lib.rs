@@ -10,6 +10,7 @@ pub mod frame_log;
 mod gzip_members;
 mod indexed_clock;
 mod input_error;
+mod lateness_track;
 mod lower_envelope;
 pub mod recorded_file;
 pub mod recording;

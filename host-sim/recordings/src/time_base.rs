@@ -4,6 +4,7 @@
 //! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
 
 use crate::indexed_clock::IndexedClock;
+use crate::lateness_track::COARSE;
 use crate::recording::{RecordedSample, Recording};
 use crate::stamp_alignment::{StampAlignment, uncertain};
 use adis16405_driver::{Channel, Faults};
@@ -11,7 +12,8 @@ use measurement::{MeasuredChannel, Measurement, adis16405};
 use std::collections::BTreeMap;
 
 pub use crate::indexed_clock::ClockStep;
-pub use crate::stamp_alignment::{Loss, RateEstimate};
+pub use crate::lateness_track::Loss;
+pub use crate::stamp_alignment::RateEstimate;
 
 /// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
 const MIN_SAMPLES: u64 = 4;
@@ -26,10 +28,6 @@ const MAX_REPEATED_READ_INTERVAL: f64 = 0.75;
 
 /// Samples whose median duration tells which interval is shorter than a period.
 const REPEATED_READ_WINDOW: usize = 32;
-
-/// Width of the lateness, in periods, from which time stamps do not tell a sample that was read twice from one that equals
-/// the one before by chance; then the number of samples tells.
-const COARSE: f64 = 0.6;
 
 /// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
 const SEARCHED_WIDTHS: f64 = 4.0;
@@ -338,6 +336,8 @@ fn sample_periods(
         }
         (None, Some(mut stamps)) => {
             let mut alignment = StampAlignment::new(&stamps, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
+            // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number
+            // of samples does.
             if alignment.width >= COARSE && usable.take_back(samples, &alignment) {
                 stamps = times(usable).unwrap_or_default();
                 alignment = StampAlignment::new(&stamps, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
