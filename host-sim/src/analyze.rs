@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use noise_analysis::report::Report;
 use recordings::count_table;
 use recordings::recording::Recording;
-use recordings::time_base::measurement;
+use recordings::time_base::{StampQuality, time_base};
 
 /// Analyses a table of register counts.
 pub(crate) fn analyze_table(arguments: &RecordingArguments) -> Result<Report> {
@@ -25,7 +25,11 @@ pub(crate) fn analyze_replay(arguments: &RecordingArguments) -> Result<Report> {
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
 pub(crate) fn analyze_recording(recording: &Recording, rate_hz: Option<f64>) -> Result<Report> {
-    Ok(noise_analysis::analysis::analyze(&measurement(recording, rate_hz)?))
+    let base = time_base(recording, rate_hz)?;
+    for sentence in base.stamps.iter().flat_map(StampQuality::notes) {
+        note(format_args!("{sentence}"));
+    }
+    Ok(noise_analysis::analysis::analyze(&base.measurement))
 }
 
 fn analyze_file(recording: &Recording, arguments: &RecordingArguments) -> Result<Report> {

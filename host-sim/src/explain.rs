@@ -1,11 +1,13 @@
 //! `explain`: tables, and on demand figures, of what the analysis finds in recordings of hours.
 
 use crate::cli::{ExplainArguments, OutputArguments};
-use crate::output::print;
+use crate::output::{note, print};
 use anyhow::{Context, Result, bail};
 use noise_analysis::nonstationarity::{Explanation, explain};
+use recordings::Printable;
 use recordings::count_table;
-use recordings::time_base::measurement;
+use recordings::time_base::{StampQuality, time_base};
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -15,27 +17,40 @@ pub(crate) fn run(arguments: &ExplainArguments, output: &OutputArguments) -> Res
     if output.page.is_some() || output.json.is_some() || output.kalibr.is_some() {
         bail!("explain writes tables only: leave out --page, --json and --kalibr");
     }
+    let mut stems = BTreeSet::new();
     for path in &arguments.recordings {
         for file in count_table::tables_in(path)? {
             let recording = count_table::read(&file, arguments.range.into())?;
-            let measurement = measurement(&recording, arguments.rate).with_context(|| file.display().to_string())?;
-            let explanation = explain(&measurement);
+            let base = time_base(&recording, arguments.rate).with_context(|| file.display().to_string())?;
+            for sentence in base.stamps.iter().flat_map(StampQuality::notes) {
+                note(format_args!("{}: {sentence}", file.display()));
+            }
+            let explanation = explain(&base.measurement);
             print(|out| {
-                writeln!(out, "\n══ {}", file.display())?;
+                writeln!(out, "\n══ {}", Printable(&file.display().to_string()))?;
                 reports::explanation::write(&explanation, out)
             })?;
             if let Some(folder) = &arguments.pictures {
-                write_figures(&explanation, &file, folder)?;
+                write_figures(&explanation, &distinct_stem(&file, &mut stems), folder)?;
             }
         }
     }
     Ok(())
 }
 
-/// Writes one SVG a channel into `folder`, named after the recording and the channel.
-fn write_figures(explanation: &Explanation, recording: &Path, folder: &Path) -> Result<()> {
+/// The name of `recording` without the ending of a table, and with a number where `stems` has it already.
+fn distinct_stem(recording: &Path, stems: &mut BTreeSet<String>) -> String {
     let name = recording.file_name().unwrap_or_default().to_string_lossy();
-    let stem = name.split('.').next().unwrap_or_default();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let stem = name.strip_suffix(".csv").unwrap_or(name).to_owned();
+    let numbered = (2..).map(|number| format!("{stem}-{number}"));
+    let distinct = std::iter::once(stem.clone()).chain(numbered).find(|name| !stems.contains(name)).unwrap_or(stem);
+    stems.insert(distinct.clone());
+    distinct
+}
+
+/// Writes one SVG a channel into `folder`, named after the recording and the channel.
+fn write_figures(explanation: &Explanation, stem: &str, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for channel in &explanation.channels {
         let file = folder.join(format!("{stem}-{}.svg", channel.channel.name));

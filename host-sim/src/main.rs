@@ -13,6 +13,7 @@ use anyhow::{Context, Result};
 use clap::Parser;
 use cli::{Cli, Command};
 use host_sim::{monitor, uf2};
+use recordings::Printable;
 use recordings::serial::{self, SerialLink};
 use std::fs;
 use std::io::{self, Write};
@@ -31,21 +32,28 @@ fn main() -> ExitCode {
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             // Where standard error is closed too, the exit code alone shows the error.
-            let _ = writeln!(io::stderr(), "error: {error:#}");
+            let _ = writeln!(io::stderr(), "error: {}", Printable(&format!("{error:#}")));
             ExitCode::FAILURE
         }
     }
 }
 
 fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
+    if command.is_none() {
+        output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
+    }
+    let inputs: Vec<&Path> = match &command {
+        Some(Command::Analyze(arguments) | Command::Replay(arguments)) => vec![&arguments.file],
+        Some(Command::Record { out, .. }) => vec![out],
+        _ => Vec::new(),
+    };
+    output::check(&output, &inputs)?;
     let report = match command {
-        None => {
-            output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
-            record::simulate(&simulate.simulation(3600.0))?
-        }
+        None => record::simulate(&simulate.simulation(3600.0))?,
         Some(Command::Analyze(arguments)) => analyze::analyze_table(&arguments)?,
         Some(Command::Replay(arguments)) => analyze::analyze_replay(&arguments)?,
         Some(Command::Record { out, port: Some(port), baud, simulate }) => {
+            output::check_file(&out, &[]).with_context(|| out.display().to_string())?;
             record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?
         }
         Some(Command::Record { out, simulate, .. }) => {
@@ -64,7 +72,13 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
 }
 
 fn show_messages(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Result<()> {
-    let deadline = seconds.map(Duration::try_from_secs_f64).transpose()?.map(|time| Instant::now() + time);
+    let deadline = seconds
+        .map(|seconds| {
+            let duration = Duration::try_from_secs_f64(seconds).ok();
+            let deadline = duration.and_then(|duration| Instant::now().checked_add(duration));
+            deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
+        })
+        .transpose()?;
     let mut link = SerialLink::new(serial::open(port, baud)?);
     for command in commands {
         link.send_command(command)?;

@@ -6,6 +6,7 @@ use link::{
     RawMessage, Received, ReportedAddedTerm, ReportedModelError, ReportedParameter, ReportedRegressor, ReportedTerm,
     ValidationMessage,
 };
+use recordings::Printable;
 use recordings::serial::SerialLink;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
@@ -23,7 +24,7 @@ pub fn show<P: Read + Write>(
     let mut formatter = MessageFormatter::default();
     while let Some(received) = cable.next(deadline)? {
         for line in formatter.lines(&received) {
-            writeln!(out, "{line}")?;
+            writeln!(out, "{}", Printable(&line))?;
         }
         out.flush()?;
     }

@@ -10,6 +10,8 @@ use recordings::recording::Recording;
 use recordings::serial::{self, SerialLink};
 use simulation::Simulation;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Length of a recording if none is given, s.
 pub(crate) const DEFAULT_S: f64 = 60.0;
@@ -39,7 +41,23 @@ fn run(simulation: &Simulation, log: Option<&Path>) -> Result<Recording> {
 /// Writes `seconds` of the raw bursts of the device on `port` to the frame log `log` and reports on them.
 pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> Result<Report> {
     let mut link = SerialLink::new(serial::open(port, baud).with_context(|| port.to_owned())?);
-    let recorded = serial::record(&mut link, log, seconds).with_context(|| port.to_owned())?;
+    // At an interrupt the recording ends and what came until then is analysed; a second interrupt ends the program.
+    let is_interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&is_interrupted);
+    let handler = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(handler).context("the interrupt of the terminal")?;
+    let recorded = serial::record(&mut link, log, seconds, || is_interrupted.load(Ordering::Relaxed))
+        .with_context(|| format!("{port}, {}", log.display()))?;
+    if recorded.interrupted {
+        note(format_args!("interrupted; the recording until then is analysed"));
+    }
+    if recorded.restarts > 0 {
+        note(format_args!("the device restarted {} times; time goes on by the host's clock", recorded.restarts));
+    }
     note(format_args!(
         "{} bursts, {} missing between them; {}",
         recorded.bursts,

@@ -3,12 +3,15 @@
 use crate::delimited_text::{self, Lines};
 use crate::frame_log;
 use crate::input_error::{InputError, Reason};
-use crate::recording::{NOT_RECORDED, Recorder, Recording, TimeStamp};
+use crate::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use std::path::{Path, PathBuf};
 
 /// Endings of the names of tables.
 const ENDINGS: [&str; 2] = [".csv", ".csv.gz"];
+
+/// Separators of tables from programs of other countries, which are named in the error.
+const OTHER_SEPARATORS: [char; 3] = [';', '\t', ' '];
 
 /// Suffix of every column that holds counts.
 const COUNTS: &str = "_counts";
@@ -70,6 +73,7 @@ pub struct CountTable {
     lines: Lines,
     columns: Vec<Column>,
     line: u64,
+    rows: u64,
     last: Option<TimeStamp>,
 }
 
@@ -79,12 +83,16 @@ impl CountTable {
     /// # Errors
     /// As [`read`].
     pub fn open(file: &Path) -> Result<Self, InputError> {
-        let mut lines = Lines::open(file)?;
+        Self::new(file, Lines::open(file)?)
+    }
+
+    /// As [`open`](Self::open), of a file that was opened before.
+    pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
         let Some((line, header)) = lines.next()? else {
             return Err(InputError::file(file, Reason::Empty));
         };
         let columns = columns(file, line, header)?;
-        Ok(Self { file: file.to_owned(), lines, columns, line, last: None })
+        Ok(Self { file: file.to_owned(), lines, columns, line, rows: 0, last: None })
     }
 
     /// The channels that the table has, in the order of the burst.
@@ -113,6 +121,10 @@ impl CountTable {
         };
         let checked =
             row(&self.columns, text).and_then(|row| order(self.last.unwrap_or_default(), row.time_stamp).map(|()| row));
+        self.rows += 1;
+        if self.rows > MAX_SAMPLES {
+            return Err(InputError::line(&self.file, line, Reason::TooManySamples));
+        }
         match checked {
             Ok(row) => {
                 self.line = line;
@@ -161,8 +173,14 @@ fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputErr
         return Err(InputError::line(file, line, Reason::FrameLog));
     }
     let names: Vec<&str> = header.split(',').map(delimited_text::field).collect();
+    let is_known = |name: &str| Column::from_name(name.trim()).is_some();
     if !names.iter().any(|name| Column::from_name(name).is_some_and(|c| c.channel().is_some())) {
-        return Err(InputError::line(file, line, Reason::NoChannel));
+        let separator = OTHER_SEPARATORS.into_iter().find(|separator| header.split(*separator).any(is_known));
+        let reason = separator.map_or(Reason::NoChannel, |separator| Reason::Separator(separator));
+        return Err(InputError::line(file, line, reason));
+    }
+    if names.last() == Some(&"") {
+        return Err(InputError::line(file, line, Reason::TrailingComma));
     }
     let mut columns = Vec::with_capacity(names.len());
     for name in names {

@@ -3,14 +3,11 @@
 //! The crate `csv` is not used because the line number that it reports is wrong after a blank line and in files with CR LF
 //! line ends.
 
+use crate::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input_error::{InputError, Reason};
-use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
-
-/// First two bytes of every gzip member (RFC 1952, section 2.3.1).
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// Longest line that is read, bytes.
 const MAX_LINE_BYTES: u64 = 1 << 16;
@@ -24,6 +21,8 @@ pub(crate) struct Lines {
     input: BufReader<Box<dyn Read>>,
     line: u64,
     bytes: Vec<u8>,
+    /// Whether the line in `bytes` is read once more.
+    again: bool,
 }
 
 impl Lines {
@@ -45,9 +44,9 @@ impl Lines {
         }
         let compressed = start == GZIP_MAGIC;
         let whole = BufReader::with_capacity(BUFFER_BYTES, Cursor::new(start).chain(raw));
-        let bytes: Box<dyn Read> = if compressed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) };
+        let bytes: Box<dyn Read> = if compressed { Box::new(GzipMembers::new(whole)) } else { Box::new(whole) };
         let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
-        Ok(Self { file: file.to_owned(), input, line: 0, bytes: Vec::new() })
+        Ok(Self { file: file.to_owned(), input, line: 0, bytes: Vec::new(), again: false })
     }
 
     /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file.
@@ -55,7 +54,7 @@ impl Lines {
     /// # Errors
     /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or not UTF-8.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
-        loop {
+        while !std::mem::take(&mut self.again) {
             self.line += 1;
             self.bytes.clear();
             let read = (&mut self.input)
@@ -72,25 +71,27 @@ impl Lines {
                 break;
             }
         }
-        match std::str::from_utf8(&self.bytes) {
-            Ok(text) => Ok(Some((self.line, text.trim_start_matches('\u{feff}').trim()))),
+        match text(&self.bytes) {
+            Ok(text) => Ok(Some((self.line, text))),
             Err(_) => Err(InputError::line(&self.file, self.line, Reason::NotText)),
         }
     }
 
-    /// Whether the file begins with the line `header`; more than its length is not read.
+    /// The header without consuming it: what [`next`](Self::next) returns now, and will return once more. `None` for a file of
+    /// blank lines.
     ///
     /// # Errors
-    /// The file cannot be read or decompressed.
-    pub(crate) fn begin_with(mut self, header: &str) -> Result<bool, InputError> {
-        let mut first = Vec::new();
-        self.input
-            .by_ref()
-            .take(header.len() as u64 + 2)
-            .read_until(b'\n', &mut first)
-            .map_err(|e| InputError::line(&self.file, 1, read_failure(e)))?;
-        Ok(first.trim_ascii() == header.as_bytes())
+    /// As [`next`](Self::next).
+    pub(crate) fn header(&mut self) -> Result<Option<&str>, InputError> {
+        let found = self.next()?.is_some();
+        self.again = found;
+        Ok(found.then(|| text(&self.bytes)).and_then(Result::ok))
     }
+}
+
+/// The text of a line without the blanks around it.
+fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
+    std::str::from_utf8(bytes).map(|text| text.trim_start_matches('\u{feff}').trim())
 }
 
 /// Tells damaged compression from a failing disk.
@@ -98,6 +99,7 @@ fn read_failure(error: io::Error) -> Reason {
     match error.kind() {
         io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
         io::ErrorKind::InvalidInput => Reason::DamagedGzip(error),
+        io::ErrorKind::InvalidData => Reason::TrailingBytes,
         _ => Reason::Io(error),
     }
 }

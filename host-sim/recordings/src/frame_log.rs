@@ -8,11 +8,18 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// First line of every log.
 pub const HEADER: &str = "time_s,mosi,miso";
+
+/// Longest time that a line stays in memory while others follow, and most bytes of them.
+const MAX_DELAY: Duration = Duration::from_secs(1);
+const MAX_BUFFERED: usize = 1 << 22;
+/// Bytes between two looks at the clock.
+const CLOCK_BYTES: usize = 1 << 12;
 
 const TIME: &str = "time_s";
 const MOSI: &str = "mosi";
@@ -29,14 +36,6 @@ pub struct Frame {
     pub miso: Vec<u8>,
 }
 
-/// Whether the first line of `file` is that of a frame log.
-///
-/// # Errors
-/// The file cannot be opened, or its first line cannot be read.
-pub fn is_frame_log(file: &Path) -> Result<bool, InputError> {
-    Lines::open(file)?.begin_with(HEADER)
-}
-
 /// An open log, read frame by frame.
 pub struct FrameLogReader {
     file: PathBuf,
@@ -51,7 +50,11 @@ impl FrameLogReader {
     /// # Errors
     /// The file cannot be read or does not start with [`HEADER`].
     pub fn open(file: &Path) -> Result<Self, InputError> {
-        let mut lines = Lines::open(file)?;
+        Self::new(file, Lines::open(file)?)
+    }
+
+    /// As [`open`](Self::open), of a file that was opened before.
+    pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
         match lines.next()? {
             None => Err(InputError::file(file, Reason::Empty)),
             Some((_, HEADER)) => Ok(Self { file: file.to_owned(), lines, line: 1, last_s: f64::NEG_INFINITY }),
@@ -116,16 +119,16 @@ fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
 }
 
 /// A log that is being written; gzip if the name ends in `.gz`.
+///
+/// What was written before the last second is in the file, also where the program ends without [`finish`](Self::finish): a
+/// gzip log is a row of members, each of which is written at once.
 #[derive(Debug)]
 pub struct FrameLogWriter {
-    sink: Sink,
-    line: String,
-}
-
-#[derive(Debug)]
-enum Sink {
-    Plain(BufWriter<File>),
-    Gzip(GzEncoder<BufWriter<File>>),
+    file: File,
+    is_gzip: bool,
+    /// Lines that are not in the file yet.
+    text: String,
+    written: Instant,
 }
 
 impl FrameLogWriter {
@@ -134,15 +137,9 @@ impl FrameLogWriter {
     /// # Errors
     /// The file cannot be created or written.
     pub fn create(file: &Path) -> io::Result<Self> {
-        let plain = BufWriter::new(File::create(file)?);
-        let sink = if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz")) {
-            Sink::Gzip(GzEncoder::new(plain, Compression::default()))
-        } else {
-            Sink::Plain(plain)
-        };
-        let mut log = Self { sink, line: String::from(HEADER) };
-        log.write_line()?;
-        Ok(log)
+        let is_gzip = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
+        let text = format!("{HEADER}\n");
+        Ok(Self { file: File::create(file)?, is_gzip, text, written: Instant::now() })
     }
 
     /// Adds one frame.
@@ -150,35 +147,43 @@ impl FrameLogWriter {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
-        self.line.clear();
+        let (before, text) = (self.text.len(), &mut self.text);
         // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
-        let _ = write!(self.line, "{},", frame.time_s);
+        let _ = write!(text, "{},", frame.time_s);
         for byte in &frame.mosi {
-            let _ = write!(self.line, "{byte:02X}");
+            let _ = write!(text, "{byte:02X}");
         }
-        self.line.push(',');
+        text.push(',');
         for byte in &frame.miso {
-            let _ = write!(self.line, "{byte:02X}");
+            let _ = write!(text, "{byte:02X}");
         }
-        self.write_line()
+        text.push('\n');
+        let looks = before / CLOCK_BYTES != self.text.len() / CLOCK_BYTES;
+        if self.text.len() >= MAX_BUFFERED || looks && self.written.elapsed() >= MAX_DELAY {
+            self.flush()
+        } else {
+            Ok(())
+        }
     }
 
-    /// Writes what is buffered and closes the file; without it a gzip log is truncated.
+    /// Writes what is buffered and closes the file.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn finish(self) -> io::Result<()> {
-        match self.sink {
-            Sink::Plain(mut plain) => plain.flush(),
-            Sink::Gzip(gzip) => gzip.finish()?.flush(),
-        }
+    pub fn finish(mut self) -> io::Result<()> {
+        self.flush()
     }
 
-    fn write_line(&mut self) -> io::Result<()> {
-        self.line.push('\n');
-        match &mut self.sink {
-            Sink::Plain(plain) => plain.write_all(self.line.as_bytes()),
-            Sink::Gzip(gzip) => gzip.write_all(self.line.as_bytes()),
+    fn flush(&mut self) -> io::Result<()> {
+        if self.is_gzip {
+            let mut member = GzEncoder::new(Vec::new(), Compression::default());
+            member.write_all(self.text.as_bytes())?;
+            self.file.write_all(&member.finish()?)?;
+        } else {
+            self.file.write_all(self.text.as_bytes())?;
         }
+        self.text.clear();
+        self.written = Instant::now();
+        Ok(())
     }
 }

@@ -42,6 +42,12 @@ pub enum Reason {
     /// The gzip stream is damaged.
     #[error("damaged gzip: {0}")]
     DamagedGzip(io::Error),
+    /// Bytes after a gzip stream that are none.
+    #[error("bytes after the end of the gzip data that are no gzip data")]
+    TrailingBytes,
+    /// More samples than are held in memory.
+    #[error("more than 33554432 samples: give the recording in parts")]
+    TooManySamples,
     /// Bytes that are not UTF-8.
     #[error("not UTF-8 text")]
     NotText,
@@ -51,6 +57,12 @@ pub enum Reason {
     /// The header names no channel of the part.
     #[error("no known column; expected names such as gyro_x_counts")]
     NoChannel,
+    /// Columns that are not separated by commas.
+    #[error("the columns are separated by {0:?}; expected commas")]
+    Separator(char),
+    /// A comma after the last name.
+    #[error("a comma after the last column; leave it out, here and in every row")]
+    TrailingComma,
     /// A frame log where a table of counts is expected.
     #[error("this is an SPI frame log; read it with `replay`")]
     FrameLog,
@@ -123,6 +135,14 @@ pub enum Reason {
     /// A frame log without one burst in it.
     #[error("no burst transaction (26 bytes that start with 3E00)")]
     NoBurst,
+    /// A burst that was taken in another range of the gyroscopes than those before it.
+    #[error("the gyro range changes from {before} to {now} deg/s between bursts; give each range its own log")]
+    MixedRange {
+        /// Of the bursts above, deg/s.
+        before: u16,
+        /// Of this burst, deg/s.
+        now: u16,
+    },
     /// The driver refused the replayed transaction.
     #[error("replay over the bus: {0}")]
     Bus(String),
@@ -147,12 +167,12 @@ impl InputError {
 
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", OneLine(&self.file.display().to_string()))?;
+        write!(f, "{}", Printable(&self.file.display().to_string()))?;
         if let Some(line) = self.line {
             write!(f, ": line {line}")?;
         }
         if let Some(column) = &self.column {
-            write!(f, ": column {}", OneLine(column))?;
+            write!(f, ": column {}", Printable(column))?;
         }
         write!(f, ": {}", self.reason)
     }
@@ -160,12 +180,13 @@ impl fmt::Display for InputError {
 
 impl std::error::Error for InputError {}
 
-/// Text from outside, with its control characters escaped and cut to a length that fits a line.
-struct OneLine<'a>(&'a str);
+/// Text from outside, with its control characters escaped so that a terminal does not obey them.
+#[derive(Debug, Clone, Copy)]
+pub struct Printable<'a>(pub &'a str);
 
-impl fmt::Display for OneLine<'_> {
+impl fmt::Display for Printable<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for c in self.0.chars().take(200) {
+        for c in self.0.chars() {
             if c.is_control() {
                 write!(f, "{}", c.escape_default())?;
             } else {

@@ -7,9 +7,16 @@
 pub mod count_table;
 mod delimited_text;
 pub mod frame_log;
+mod gzip_members;
+mod indexed_clock;
 mod input_error;
+mod lateness_track;
+mod lower_envelope;
+pub mod recorded_file;
 pub mod recording;
 pub mod serial;
+mod stamp_alignment;
+mod stamp_tick;
 pub mod time_base;
 
-pub use input_error::{InputError, Reason};
+pub use input_error::{InputError, Printable, Reason};

@@ -12,6 +12,9 @@ pub const NOT_RECORDED: [i16; 12] = {
     counts
 };
 
+/// Most samples of a recording that is read from a file: they take 2 GiB. A longer one is given in parts.
+pub const MAX_SAMPLES: u64 = 1 << 25;
+
 /// When a sample was taken, as far as the recording says it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TimeStamp {

@@ -17,6 +17,9 @@ const READ_TIMEOUT: Duration = Duration::from_millis(50);
 /// Longest time without a burst during a recording.
 const MAX_SILENCE: Duration = Duration::from_secs(10);
 
+/// Silence during a recording after which the device is asked again for its raw stream.
+const ASK_AGAIN: Duration = Duration::from_secs(2);
+
 /// Opens the serial port `port`, a device file or a pseudo-terminal, at `baud` Bd.
 ///
 /// # Errors
@@ -30,12 +33,13 @@ pub struct SerialLink<P> {
     port: P,
     decoder: Decoder,
     received: VecDeque<Received>,
+    disconnected: bool,
 }
 
 impl<P: Read + Write> SerialLink<P> {
     /// A link over `port`. Its reads must time out, or [`next`](Self::next) does not return at its deadline.
     pub fn new(port: P) -> Self {
-        Self { port, decoder: Decoder::new(), received: VecDeque::new() }
+        Self { port, decoder: Decoder::new(), received: VecDeque::new(), disconnected: false }
     }
 
     /// Sends a command line, ended by a carriage return.
@@ -58,14 +62,25 @@ impl<P: Read + Write> SerialLink<P> {
                 return Ok(None);
             }
             match self.port.read(&mut bytes) {
-                Ok(0) => return Ok(None),
+                Ok(0) => {
+                    self.disconnected = true;
+                    return Ok(None);
+                }
                 Ok(count) => self.received.extend(bytes[..count].iter().filter_map(|&byte| self.decoder.push(byte))),
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
-                Err(error) if is_disconnected(&error) => return Ok(None),
+                Err(error) if is_hang_up(&error) => {
+                    self.disconnected = true;
+                    return Ok(None);
+                }
                 Err(error) => return Err(error),
             }
         }
         Ok(self.received.pop_front())
+    }
+
+    /// Whether the device has closed the port.
+    pub fn is_disconnected(&self) -> bool {
+        self.disconnected
     }
 
     /// Numbers of messages received, missing and damaged so far.
@@ -75,7 +90,7 @@ impl<P: Read + Write> SerialLink<P> {
 }
 
 /// Whether the other end has closed the port: a pseudo-terminal then answers EIO.
-fn is_disconnected(error: &io::Error) -> bool {
+fn is_hang_up(error: &io::Error) -> bool {
     const EIO: i32 = 5;
     error.kind() == ErrorKind::BrokenPipe || error.raw_os_error() == Some(EIO)
 }
@@ -90,9 +105,15 @@ pub enum SerialRecordingError {
     /// The log could not be written.
     #[error("recording: {0}")]
     Log(io::Error),
-    /// No burst came for 10 s, or the device disconnected.
+    /// No burst came for 10 s.
     #[error("the device sent no bursts for 10 s, after {0} of them")]
     Silent(u64),
+    /// The device closed the port.
+    #[error("the device hung up, after {0} bursts")]
+    Disconnected(u64),
+    /// The length of the recording is not positive and finite.
+    #[error("a duration of {0} s: it must be positive and finite")]
+    Duration(f64),
 }
 
 /// Counts of a recording over the serial link.
@@ -100,38 +121,85 @@ pub enum SerialRecordingError {
 pub struct SerialRecordingSummary {
     /// Bursts in the log.
     pub bursts: u64,
-    /// Sample periods between the first and the last burst of which no burst came: lost on the device or on the link.
+    /// Sample periods between the first and the last burst of which no burst came: lost on the device or on the link. While
+    /// the device restarted none are counted.
     pub missing: u64,
+    /// Restarts of the device.
+    pub restarts: u64,
+    /// Whether the recording was ended before its time.
+    pub interrupted: bool,
     /// Of the link.
     pub counters: DecoderCounters,
 }
 
-/// Turns the raw stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off.
+/// Turns the raw stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off. It ends
+/// early, with what came until then, as soon as `is_interrupted` returns true. The file is created at the first burst.
 ///
 /// # Errors
-/// The device is silent, or the port or the file fails. The bursts that came until then are in the file.
+/// The device is silent or hangs up, or the port or the file fails. The bursts that came until then are in the file.
 pub fn record<P: Read + Write>(
     link: &mut SerialLink<P>,
     file: &Path,
     seconds: f64,
+    is_interrupted: impl Fn() -> bool,
 ) -> Result<SerialRecordingSummary, SerialRecordingError> {
-    let mut recorder = RawStreamRecorder::create(file).map_err(SerialRecordingError::Log)?;
+    if !(seconds.is_finite() && seconds > 0.0) {
+        return Err(SerialRecordingError::Duration(seconds));
+    }
+    let mut recorder: Option<RawStreamRecorder> = None;
+    let bursts = |recorder: &Option<RawStreamRecorder>| recorder.as_ref().map_or(0, RawStreamRecorder::bursts);
     link.send_command("w 1").map_err(SerialRecordingError::Port)?;
+    let mut silent_since = Instant::now();
+    let mut asked = silent_since;
     let outcome = loop {
-        if recorder.seconds() >= seconds {
-            break Ok(());
+        if recorder.as_ref().is_some_and(|recorder| recorder.seconds() >= seconds) {
+            break Ok(false);
         }
-        match next_raw(link, Instant::now() + MAX_SILENCE) {
-            Ok(Some(raw)) => recorder.write(&raw).map_err(SerialRecordingError::Log)?,
-            Ok(None) => break Err(SerialRecordingError::Silent(recorder.bursts)),
+        if is_interrupted() {
+            break Ok(true);
+        }
+        match next_raw(link, Instant::now() + READ_TIMEOUT) {
+            Ok(Some(raw)) => {
+                silent_since = Instant::now();
+                if let Err(error) = write(&mut recorder, file, &raw) {
+                    break Err(SerialRecordingError::Log(error));
+                }
+            }
+            Ok(None) if link.is_disconnected() => break Err(SerialRecordingError::Disconnected(bursts(&recorder))),
+            Ok(None) if silent_since.elapsed() >= MAX_SILENCE => {
+                break Err(SerialRecordingError::Silent(bursts(&recorder)));
+            }
+            Ok(None) => {
+                // A device that has restarted has forgotten the command; if it cannot be sent, the silence is reported.
+                if asked.elapsed() >= ASK_AGAIN && silent_since.elapsed() >= ASK_AGAIN {
+                    let _ = link.send_command("w 1");
+                    asked = Instant::now();
+                }
+            }
             Err(error) => break Err(SerialRecordingError::Port(error)),
         }
     };
     // A device that has disconnected cannot be told; the outcome says so already.
     let _ = link.send_command("w 0");
-    let (bursts, missing) = (recorder.bursts, recorder.missing());
-    recorder.finish().map_err(SerialRecordingError::Log)?;
-    outcome.map(|()| SerialRecordingSummary { bursts, missing, counters: link.counters() })
+    let mut summary =
+        SerialRecordingSummary { bursts: 0, missing: 0, restarts: 0, interrupted: false, counters: link.counters() };
+    let mut finished = Ok(());
+    if let Some(recorder) = recorder {
+        (summary.bursts, summary.missing, summary.restarts) =
+            (recorder.bursts(), recorder.missing(), recorder.restarts());
+        finished = recorder.finish().map_err(SerialRecordingError::Log);
+    }
+    summary.interrupted = outcome?;
+    finished?;
+    Ok(summary)
+}
+
+/// Adds a message to the log, which is created before the first burst.
+fn write(recorder: &mut Option<RawStreamRecorder>, file: &Path, raw: &RawMessage) -> io::Result<()> {
+    if recorder.is_none() && !raw.bursts.is_empty() {
+        *recorder = Some(RawStreamRecorder::create(file)?);
+    }
+    recorder.as_mut().map_or(Ok(()), |recorder| recorder.write(raw))
 }
 
 fn next_raw<P: Read + Write>(link: &mut SerialLink<P>, deadline: Instant) -> io::Result<Option<RawMessage>> {
@@ -144,13 +212,33 @@ fn next_raw<P: Read + Write>(link: &mut SerialLink<P>, deadline: Instant) -> io:
 }
 
 /// Writes the raw stream of a device to a frame log.
+///
+/// Time goes on where the device restarts and its clock begins at 0 again: by as much as has passed on the host since the last
+/// message.
 pub struct RawStreamRecorder {
     log: FrameLogWriter,
     /// Register SENS_AVG as last written to the log.
     sens_avg: Option<u16>,
     bursts: u64,
-    /// Sample number and time in µs of the first and the last burst.
-    span: Option<[(u64, u64); 2]>,
+    missing: u64,
+    restarts: u64,
+    /// Time in the log of the first burst, µs.
+    first_us: Option<u64>,
+    /// The newest burst.
+    last: Option<LastBurst>,
+    /// Time in the log less the device's time, µs.
+    offset_us: i128,
+}
+
+/// The newest burst in a log.
+struct LastBurst {
+    /// By the device's counter and clock.
+    number: u64,
+    at_us: u64,
+    /// In the log, µs.
+    logged_us: u64,
+    /// By the host.
+    received: Instant,
 }
 
 impl RawStreamRecorder {
@@ -159,7 +247,16 @@ impl RawStreamRecorder {
     /// # Errors
     /// The file cannot be created.
     pub fn create(file: &Path) -> io::Result<Self> {
-        Ok(Self { log: FrameLogWriter::create(file)?, sens_avg: None, bursts: 0, span: None })
+        Ok(Self {
+            log: FrameLogWriter::create(file)?,
+            sens_avg: None,
+            bursts: 0,
+            missing: 0,
+            restarts: 0,
+            first_us: None,
+            last: None,
+            offset_us: 0,
+        })
     }
 
     /// Adds the bursts of one message, each at the time of its data-ready edge. At the start and where SENS_AVG changes, a
@@ -168,20 +265,40 @@ impl RawStreamRecorder {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
+        if raw.bursts.is_empty() {
+            return Ok(());
+        }
+        let received = Instant::now();
         let (mut number, mut at_us) = (raw.first, raw.at_us);
+        // With new settings the device counts from the start, without a restart.
+        if let Some(last) = self.last.as_mut().filter(|last| number < last.number) {
+            last.number = number.saturating_sub(1);
+        }
+        if let Some(last) = self.last.take_if(|last| at_us < last.at_us) {
+            self.restarts += 1;
+            let passed_us = (received - last.received).as_micros().max(1) as i128;
+            self.offset_us = i128::from(last.logged_us) + passed_us - i128::from(at_us);
+        }
+        let logged = |at_us: u64, offset_us: i128| u64::try_from(i128::from(at_us) + offset_us).unwrap_or(u64::MAX);
         if self.sens_avg.replace(raw.sens_avg) != Some(raw.sens_avg) {
             let mosi = Register::SensAvg.write_high_frame(raw.sens_avg).to_vec();
-            self.log.write(&Frame { time_s: seconds(at_us), miso: vec![0; mosi.len()], mosi })?;
+            self.log.write(&Frame {
+                time_s: seconds(logged(at_us, self.offset_us)),
+                miso: vec![0; mosi.len()],
+                mosi,
+            })?;
         }
         for burst in &raw.bursts {
-            number += u64::from(burst.periods);
-            at_us += u64::from(burst.after_us);
+            number = number.saturating_add(u64::from(burst.periods));
+            at_us = at_us.saturating_add(u64::from(burst.after_us));
+            let logged_us = logged(at_us, self.offset_us);
             let mut miso = vec![0; 2];
             miso.extend_from_slice(burst.words.as_flattened());
-            self.log.write(&Frame { time_s: seconds(at_us), mosi: BURST_REQUEST.to_vec(), miso })?;
+            self.log.write(&Frame { time_s: seconds(logged_us), mosi: BURST_REQUEST.to_vec(), miso })?;
             self.bursts += 1;
-            let first = self.span.map_or((number, at_us), |[first, _]| first);
-            self.span = Some([first, (number, at_us)]);
+            self.first_us.get_or_insert(logged_us);
+            let before = self.last.replace(LastBurst { number, at_us, logged_us, received });
+            self.missing += before.map_or(0, |before| number.saturating_sub(before.number).saturating_sub(1));
         }
         Ok(())
     }
@@ -196,12 +313,23 @@ impl RawStreamRecorder {
 
     /// Time from the first burst to the last, s.
     pub fn seconds(&self) -> f64 {
-        self.span.map_or(0.0, |[(_, first), (_, last)]| seconds(last.saturating_sub(first)))
+        let last_us = self.last.as_ref().map(|last| last.logged_us);
+        self.first_us.zip(last_us).map_or(0.0, |(first, last)| seconds(last.saturating_sub(first)))
     }
 
-    /// Sample periods between the first and the last burst of which no burst came.
+    /// Bursts in the log.
+    pub fn bursts(&self) -> u64 {
+        self.bursts
+    }
+
+    /// Sample periods between the first and the last burst of which no burst came, those of restarts left out.
     pub fn missing(&self) -> u64 {
-        self.span.map_or(0, |[(first, _), (last, _)]| (last.saturating_sub(first) + 1).saturating_sub(self.bursts))
+        self.missing
+    }
+
+    /// Restarts of the device.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
     }
 }
 

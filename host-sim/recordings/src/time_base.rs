@@ -1,14 +1,19 @@
 //! Time base of a recording: its sample rate, and the sample period in which each sample was taken.
 //!
-//! A sample that was read late is not a lost sample. A host that stalls reads the samples that have queued up one right after
-//! the other, so that their time stamps show one long interval and then several short ones. Such samples are aligned to
-//! periods of their own; a gap is only what they do not fill. Time stamps that are coarser than the sample period look like
-//! losses: then the rate must be given.
+//! A sample that was read late is not a lost sample, and stamps that are coarser than the sample period are no losses:
+//! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
 
+use crate::indexed_clock::IndexedClock;
+use crate::lateness_track::COARSE;
 use crate::recording::{RecordedSample, Recording};
+use crate::stamp_alignment::{StampAlignment, uncertain};
 use adis16405_driver::{Channel, Faults};
 use measurement::{MeasuredChannel, Measurement, adis16405};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
+
+pub use crate::indexed_clock::ClockStep;
+pub use crate::lateness_track::Loss;
+pub use crate::stamp_alignment::RateEstimate;
 
 /// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
 const MIN_SAMPLES: u64 = 4;
@@ -21,20 +26,26 @@ const REFUSED: Faults =
 /// farther apart are chance: a filtered output of few counts repeats about once in a thousand samples.
 const MAX_REPEATED_READ_INTERVAL: f64 = 0.75;
 
-/// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is distinguished from a loss.
-/// The last samples of a record have fewer after them, so there a late delivery may count as a loss.
-const MAX_QUEUE: usize = 64;
+/// Samples whose median duration tells which interval is shorter than a period.
+const REPEATED_READ_WINDOW: usize = 32;
 
-/// Share of the envelope's change that its phase follows at each sample: a sample period that is wrong by a fraction `ε` makes
-/// the phase lag by `ε/PHASE_TRACKING` periods, so that an error of up to 3 % causes no false loss.
-const PHASE_TRACKING: f64 = 1.0 / 16.0;
+/// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
+const SEARCHED_WIDTHS: f64 = 4.0;
 
-/// Intervals that are taken for one sample period with jitter, in units of the median interval. Those of samples that have
-/// queued up are shorter, those across gaps and stalls longer.
-const ONE_PERIOD: std::ops::Range<f64> = 0.4..1.6;
+/// Largest relative difference between the stated and the measured rate: a wrong nominal rate and a clock on a breadboard,
+/// not another rate.
+const MAX_RATE_CONTRADICTION: f64 = 0.1;
+
+/// Share of samples that follow their neighbour below which the stated rate is doubted.
+const MIN_NEIGHBOURS: f64 = 0.75;
+
+/// Most sample periods of a recording for each of its samples, and beside them. The gaps of a series of this length fit into
+/// memory.
+const MAX_PERIODS_PER_SAMPLE: u64 = 64;
+const MAX_PERIODS: u64 = 1 << 22;
 
 /// Why a recording has no time base.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TimeBaseError {
     /// No rate was given and none can be measured.
     #[error("no sample rate: give --rate HZ, or a recording with a time_s column")]
@@ -45,43 +56,158 @@ pub enum TimeBaseError {
     /// Most time stamps are equal, or they span no time.
     #[error("the time stamps show no sample period: give --rate HZ")]
     NoPeriod,
+    /// The time stamps show another rate than the given one.
+    #[error("--rate {stated_hz} contradicts the time stamps: by them it is {measured_hz:.4} Hz")]
+    RateContradictsStamps {
+        /// As given, Hz.
+        stated_hz: f64,
+        /// By the time stamps, Hz.
+        measured_hz: f64,
+    },
+    /// No sample follows another one by one sample period.
+    #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
+    NoNeighbours(u64),
+    /// The gaps are so long that their periods do not fit into memory.
+    #[error(
+        "{samples} samples in {periods} sample periods: the gaps are longer than this analysis holds; give each stretch its \
+         own file"
+    )]
+    TooSparse {
+        /// Usable samples.
+        samples: u64,
+        /// Sample periods from the first to the last.
+        periods: u64,
+    },
     /// Too few samples for one octave of the Allan deviation.
-    #[error("record too short: {used} usable samples, one octave needs {MIN_SAMPLES}")]
+    #[error("record too short: {used} usable samples, one octave needs {MIN_SAMPLES}{}", list(.dropped))]
     TooShort {
         /// Samples without a fault for which they are left out.
         used: u64,
+        /// Samples that were left out, by cause.
+        dropped: BTreeMap<&'static str, u64>,
     },
 }
 
-/// The usable samples of `recording` on their time base.
+/// The causes for which samples were left out, as the end of a sentence.
+fn list(dropped: &BTreeMap<&'static str, u64>) -> String {
+    let causes: Vec<String> = dropped.iter().map(|(cause, count)| format!("{cause} {count}")).collect();
+    if causes.is_empty() { String::new() } else { format!("; left out: {}", causes.join(", ")) }
+}
+
+/// A recording on its time base.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeBase {
+    /// The usable samples.
+    pub measurement: Measurement,
+    /// What the time stamps show; `None` where the samples have none.
+    pub stamps: Option<StampQuality>,
+}
+
+/// What the time stamps of a recording show, and what they cannot show.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StampQuality {
+    /// The rate by the clock that stamped the samples, whatever rate was stated.
+    pub rate: Option<RateEstimate>,
+    /// Tick of that clock, s: the step that all stamps are multiples of. `None` where it is less than a twentieth of a period.
+    pub tick_s: Option<f64>,
+    /// Width of the lateness of ordinary samples, sample periods: the tick and the jitter. 0 where the samples have an index.
+    pub width: f64,
+    /// Losses that the stamps show, refused samples included; none where the samples have an index.
+    pub losses: Vec<Loss>,
+    /// Whether losses of single samples are told from the rounding of the stamps.
+    pub resolved: bool,
+    /// Samples that were read at least a period later than the others.
+    pub late: u64,
+    /// Where the index and the stamps contradict each other.
+    pub clock_steps: Vec<ClockStep>,
+}
+
+impl StampQuality {
+    /// What a reader of the analysis has to know, one sentence each; none for stamps that leave no doubt.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let (Some(rate), true) = (self.rate, self.width >= COARSE) {
+            let tick = self.tick_s.map_or_else(String::new, |tick| format!(", ticks of {:.4} ms", 1e3 * tick));
+            notes.push(format!(
+                "the time stamps are coarser than the sample period ({:.2} periods{tick}): {:.4} Hz ({:.4} to {:.4}); a loss \
+                 is located to {:.0} samples",
+                self.width, rate.hz, rate.low_hz, rate.high_hz, self.width.ceil(),
+            ));
+        }
+        let uncertain: u64 = self.uncertain_losses();
+        if uncertain > 0 {
+            notes.push(format!(
+                "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
+            ));
+        }
+        if !self.resolved {
+            notes.push("losses of single samples cannot be told from the rounding of the time stamps".to_owned());
+        }
+        if let Some(step) = self.clock_steps.first() {
+            notes.push(format!(
+                "index and time contradict each other at {} places, first before sample {} by {:+.3} s; the index is believed",
+                self.clock_steps.len(),
+                step.before,
+                step.seconds
+            ));
+        }
+        notes
+    }
+
+    /// Samples in losses that something else may explain.
+    pub fn uncertain_losses(&self) -> u64 {
+        uncertain(&self.losses, self.resolved)
+    }
+}
+
+/// The usable samples of `recording` on their time base, as [`time_base`] gives them.
+///
+/// # Errors
+/// As [`time_base`].
+pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measurement, TimeBaseError> {
+    time_base(recording, rate_hz).map(|base| base.measurement)
+}
+
+/// The usable samples of `recording` on their time base, and what the time stamps show.
 ///
 /// `rate_hz` overrides the rate that the time stamps show. Gaps are read from the sample index where there is one, else from
 /// the time stamps; without either only samples that are left out for a fault are missing.
 ///
 /// # Errors
-/// There is no usable rate, or there are fewer than 4 usable samples.
-pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measurement, TimeBaseError> {
+/// There is no usable rate or the given one contradicts the stamps, there are fewer than 4 usable samples, no two of them
+/// are neighbours, or the gaps are more than 64 times as long as the samples.
+pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<TimeBase, TimeBaseError> {
     if let Some(rate) = rate_hz
         && !(rate.is_finite() && rate > 0.0)
     {
         return Err(TimeBaseError::InvalidRate(rate));
     }
     let samples = &recording.samples;
-    let Usable { positions, mut dropped, flagged } = Usable::select(samples, rate_hz);
-    if (positions.len() as u64) < MIN_SAMPLES {
-        return Err(TimeBaseError::TooShort { used: positions.len() as u64 });
+    let mut usable = Usable::select(samples, rate_hz);
+    if (usable.positions.len() as u64) < MIN_SAMPLES {
+        return Err(TimeBaseError::TooShort { used: usable.positions.len() as u64, dropped: usable.dropped });
     }
-    let (periods, measured_hz) = sample_periods(samples, &positions, rate_hz)?;
-    let (slots, never_arrived) = slots(&positions, &periods);
-    dropped.insert("gap", never_arrived);
+    let (periods, stamps) = sample_periods(samples, &mut usable, rate_hz)?;
+    let Usable { positions, mut dropped, mut flagged, .. } = usable;
+    let measured_hz = stamps.as_ref().and_then(|stamps| stamps.rate).map(|rate| rate.hz);
     let sample_rate_hz = rate_hz.or(measured_hz).ok_or(TimeBaseError::NoRate)?;
+    let (slots, never_arrived) = slots(&positions, &periods)?;
+    dropped.insert("gap", never_arrived);
+    if let Some(stamps) = &stamps {
+        let warnings = [
+            ("late_delivery", stamps.late),
+            ("uncertain_loss", stamps.uncertain_losses()),
+            ("clock_step", stamps.clock_steps.len() as u64),
+        ];
+        flagged.extend(warnings.into_iter().filter(|(_, count)| *count > 0));
+    }
 
     let profile = adis16405::profile(recording.range.lsb());
     let channel = |channel: &Channel| MeasuredChannel {
         profile: profile.channels[*channel as usize],
         counts: positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect(),
     };
-    Ok(Measurement {
+    let measurement = Measurement {
         channels: recording.channels.iter().map(channel).collect(),
         profile,
         sample_rate_hz,
@@ -90,7 +216,8 @@ pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measur
         slots,
         dropped,
         flagged,
-    })
+    };
+    Ok(TimeBase { measurement, stamps })
 }
 
 /// The samples of a recording that can be used.
@@ -101,12 +228,14 @@ struct Usable {
     dropped: BTreeMap<&'static str, u64>,
     /// Samples that are used although a warning was raised, by cause.
     flagged: BTreeMap<&'static str, u64>,
+    /// Of the samples that are left out those that were read twice and have no other fault, in their order.
+    read_twice: Vec<usize>,
 }
 
 impl Usable {
     fn select(samples: &[RecordedSample], rate_hz: Option<f64>) -> Self {
         let times: Option<Vec<f64>> = samples.iter().map(|sample| sample.time_stamp.time_s).collect();
-        let period_s = times.and_then(|times| sample_period(&times, rate_hz));
+        let period_s = rate_hz.map(f64::recip).or_else(|| usual_interval(&times.unwrap_or_default()));
         // 0 without times: then no sample is taken to be read twice.
         let shortest_s = MAX_REPEATED_READ_INTERVAL * period_s.unwrap_or(0.0);
         let time = |position: usize| samples[position].time_stamp.time_s;
@@ -114,12 +243,22 @@ impl Usable {
             (Some(previous), Some(now)) => now - previous < shortest_s,
             _ => false,
         };
-        let mut usable =
-            Self { positions: Vec::with_capacity(samples.len()), dropped: BTreeMap::new(), flagged: BTreeMap::new() };
+        let mut usable = Self {
+            positions: Vec::with_capacity(samples.len()),
+            dropped: BTreeMap::new(),
+            flagged: BTreeMap::new(),
+            read_twice: Vec::new(),
+        };
         for (position, sample) in samples.iter().enumerate() {
             let refused = if read_twice(position) { REFUSED | Faults::REPEATED } else { REFUSED };
-            match (sample.faults & refused).cause() {
-                Some(cause) => *usable.dropped.entry(cause).or_insert(0) += 1,
+            let faults = sample.faults & refused;
+            match faults.cause() {
+                Some(cause) => {
+                    *usable.dropped.entry(cause).or_insert(0) += 1;
+                    if faults == Faults::REPEATED {
+                        usable.read_twice.push(position);
+                    }
+                }
                 None => {
                     usable.positions.push(position);
                     for cause in sample.faults.causes() {
@@ -130,151 +269,126 @@ impl Usable {
         }
         usable
     }
+
+    /// Takes samples back that equal the one before by chance: where the coarse stamps of the others show that as many
+    /// samples are missing. Returns whether there are any.
+    fn take_back(&mut self, samples: &[RecordedSample], alignment: &StampAlignment) -> bool {
+        let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
+        let mut taken = Vec::new();
+        let mut left_out = self.read_twice.iter().copied().peekable();
+        for loss in &alignment.losses {
+            let first = self.positions[loss.before.saturating_sub(reach)];
+            let last = self.positions[(loss.before + reach / 4).min(self.positions.len() - 1)];
+            let mut missing = loss.missing;
+            while let Some(position) = left_out.next_if(|&position| position < last) {
+                if position > first && missing > 0 {
+                    taken.push(position);
+                    missing -= 1;
+                }
+            }
+        }
+        for &position in &taken {
+            for cause in samples[position].faults.causes() {
+                *self.flagged.entry(cause).or_insert(0) += 1;
+            }
+            if let Some(count) = Faults::REPEATED.cause().and_then(|cause| self.dropped.get_mut(cause)) {
+                *count -= 1;
+            }
+        }
+        self.dropped.retain(|_, count| *count > 0);
+        self.read_twice.retain(|position| taken.binary_search(position).is_err());
+        self.positions.extend_from_slice(&taken);
+        self.positions.sort_unstable();
+        !taken.is_empty()
+    }
 }
 
-/// The sample period in which each usable sample was taken, counted from any origin, and the rate in Hz where the recording
-/// shows it.
+/// The mean interval of the window of samples that lasts as long as half of the others, s.
+fn usual_interval(times: &[f64]) -> Option<f64> {
+    let window = if times.len() > 4 * REPEATED_READ_WINDOW { REPEATED_READ_WINDOW } else { 1 };
+    let mut durations: Vec<f64> = times.windows(window + 1).map(|row| row[window] - row[0]).collect();
+    let middle = durations.len() / 2;
+    let duration = (!durations.is_empty()).then(|| *durations.select_nth_unstable_by(middle, f64::total_cmp).1)?;
+    (duration > 0.0 && duration.is_finite()).then_some(duration / window as f64)
+}
+
+/// The sample period in which each usable sample was taken, counted from any origin, and what the time stamps show.
 fn sample_periods(
     samples: &[RecordedSample],
-    positions: &[usize],
+    usable: &mut Usable,
     rate_hz: Option<f64>,
-) -> Result<(Vec<u64>, Option<f64>), TimeBaseError> {
-    let indices: Option<Vec<u64>> = positions.iter().map(|&p| samples[p].time_stamp.index).collect();
-    let times: Option<Vec<f64>> = positions.iter().map(|&p| samples[p].time_stamp.time_s).collect();
-    match (indices, times) {
+) -> Result<(Vec<u64>, Option<StampQuality>), TimeBaseError> {
+    let indices: Option<Vec<u64>> = usable.positions.iter().map(|&p| samples[p].time_stamp.index).collect();
+    let times = |usable: &Usable| -> Option<Vec<f64>> {
+        usable.positions.iter().map(|&p| samples[p].time_stamp.time_s).collect()
+    };
+    match (indices, times(usable)) {
         (Some(indices), times) => {
-            let measured_hz = times.and_then(|times| fit_rate(&indices, &times, |_| true));
-            Ok((indices, measured_hz))
-        }
-        (None, Some(times)) => {
-            let period_s = sample_period(&times, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
-            let Alignment { periods, on_time } = Alignment::new(&times, period_s);
-            let measured_hz = fit_rate(&periods, &times, |at| on_time[at]);
-            if rate_hz.is_none() && measured_hz.is_none() {
-                return Err(TimeBaseError::NoPeriod);
+            let least = indices.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
+            if least > 1 {
+                return Err(TimeBaseError::NoNeighbours(least));
             }
-            Ok((periods, measured_hz))
+            let stamps = times.map(|times| {
+                let IndexedClock { rate, steps } = IndexedClock::new(&indices, &times);
+                StampQuality { rate, clock_steps: steps, resolved: true, ..StampQuality::default() }
+            });
+            Ok((indices, stamps))
+        }
+        (None, Some(mut stamps)) => {
+            let mut alignment = StampAlignment::new(&stamps, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
+            // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number
+            // of samples does.
+            if alignment.width >= COARSE && usable.take_back(samples, &alignment) {
+                stamps = times(usable).unwrap_or_default();
+                alignment = StampAlignment::new(&stamps, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
+            }
+            match rate_hz {
+                Some(stated_hz) => contradiction(&stamps, &alignment, stated_hz)?,
+                None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
+                None => {}
+            }
+            let StampAlignment { periods, late, losses, rate, tick_s, width, resolved } = alignment;
+            let late = late.into_iter().filter(|late| *late).count() as u64;
+            Ok((periods, Some(StampQuality { rate, tick_s, width, losses, resolved, late, clock_steps: Vec::new() })))
         }
         // Without time stamps a sample that is left out leaves its own period empty, and nothing else is missing.
-        (None, None) => Ok((positions.iter().map(|&p| p as u64).collect(), None)),
+        (None, None) => Ok((usable.positions.iter().map(|&p| p as u64).collect(), None)),
+    }
+}
+
+/// Checks a stated rate against the stamps.
+fn contradiction(times: &[f64], alignment: &StampAlignment, stated_hz: f64) -> Result<(), TimeBaseError> {
+    let differs = |measured_hz: f64| (measured_hz / stated_hz - 1.0).abs() > MAX_RATE_CONTRADICTION;
+    let few_neighbours = (alignment.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
+    if !few_neighbours && !alignment.rate.is_some_and(|rate| differs(rate.hz)) {
+        return Ok(());
+    }
+    match StampAlignment::new(times, None) {
+        Some(StampAlignment { rate: Some(rate), losses, .. })
+            if differs(rate.hz) && losses.len() <= times.len() / 4 =>
+        {
+            Err(TimeBaseError::RateContradictsStamps { stated_hz, measured_hz: rate.hz })
+        }
+        _ => Ok(()),
     }
 }
 
 /// The periods counted from the first sample, strictly increasing, and the number of missing samples that are not samples
-/// left out for a fault. One gap has at most `u32::MAX` periods.
-fn slots(positions: &[usize], periods: &[u64]) -> (Vec<u64>, u64) {
+/// left out for a fault.
+fn slots(positions: &[usize], periods: &[u64]) -> Result<(Vec<u64>, u64), TimeBaseError> {
     let (mut slots, mut slot, mut never_arrived) = (Vec::with_capacity(positions.len()), 0_u64, 0_u64);
     for at in 0..positions.len() {
         if let Some(before) = at.checked_sub(1) {
             let missing = periods[at].saturating_sub(periods[before]).saturating_sub(1);
             let left_out = (positions[at] - positions[before] - 1) as u64;
             never_arrived = never_arrived.saturating_add(missing.saturating_sub(left_out));
-            slot = slot.saturating_add(missing.min(u64::from(u32::MAX))).saturating_add(1);
+            slot = slot.saturating_add(missing).saturating_add(1);
         }
         slots.push(slot);
     }
-    (slots, never_arrived)
-}
-
-/// Time stamps aligned to sample periods.
-///
-/// A sample is read after it was taken, never before. The lateness `c_i = t_i/T − i`, in periods `T`, therefore has a lower
-/// envelope: the number of samples lost before sample `i`. A stall of the host lifts `c` above the envelope until the queue is
-/// empty; a lost sample lifts the envelope itself by one for the rest of the record.
-struct Alignment {
-    /// Period of each sample, counted from the first; grows by at least one a sample.
-    periods: Vec<u64>,
-    /// Whether the sample was read less than a period after the envelope, so that its time stamp tells when it was taken.
-    on_time: Vec<bool>,
-}
-
-impl Alignment {
-    /// Aligns `times` (s, not decreasing) to periods of `period_s`.
-    fn new(times: &[f64], period_s: f64) -> Self {
-        let Some(&origin) = times.first() else {
-            return Self { periods: Vec::new(), on_time: Vec::new() };
-        };
-        let lateness: Vec<f64> =
-            times.iter().enumerate().map(|(at, time)| (time - origin) / period_s - at as f64).collect();
-        let envelope = minimum_ahead(&lateness, MAX_QUEUE);
-        let mut phase = envelope[0];
-        let mut missing = 0u64;
-        let mut periods = Vec::with_capacity(times.len());
-        let mut on_time = Vec::with_capacity(times.len());
-        for (at, (late, least)) in lateness.iter().zip(envelope).enumerate() {
-            let excess = least - missing as f64 - phase;
-            if excess >= 0.5 {
-                // A float beyond the range of u64 saturates.
-                missing = missing.saturating_add(excess.round() as u64);
-            }
-            let rest = least - missing as f64 - phase;
-            if rest.is_finite() {
-                phase += rest * PHASE_TRACKING;
-            }
-            periods.push(missing.saturating_add(at as u64));
-            on_time.push(late - missing as f64 - phase < 1.0);
-        }
-        Self { periods, on_time }
+    let samples = positions.len() as u64;
+    if slot / MAX_PERIODS_PER_SAMPLE > samples && slot > MAX_PERIODS {
+        return Err(TimeBaseError::TooSparse { samples, periods: slot.saturating_add(1) });
     }
-}
-
-/// The sample period in s: of `rate_hz`, or else as the `times` show it.
-///
-/// From times it is the mean of the intervals near the median; the median alone is biased when jitter is skewed. `None` if
-/// most intervals are 0.
-fn sample_period(times: &[f64], rate_hz: Option<f64>) -> Option<f64> {
-    if let Some(rate) = rate_hz {
-        return Some(rate.recip());
-    }
-    let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if intervals.is_empty() {
-        return None;
-    }
-    let middle = intervals.len() / 2;
-    let median = *intervals.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let of_one_period = || intervals.iter().filter(|interval| ONE_PERIOD.contains(&(*interval / median)));
-    let period = of_one_period().sum::<f64>() / of_one_period().count() as f64;
-    (period > 0.0 && period.is_finite()).then_some(period)
-}
-
-/// For each value the minimum of it and the `window − 1` values after it.
-fn minimum_ahead(values: &[f64], window: usize) -> Vec<f64> {
-    let mut least = vec![0.0; values.len()];
-    // Positions ahead whose values decrease with their distance; the back is the minimum of the window.
-    let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window);
-    for at in (0..values.len()).rev() {
-        while candidates.front().is_some_and(|&ahead| values[ahead] >= values[at]) {
-            candidates.pop_front();
-        }
-        candidates.push_front(at);
-        while candidates.back().is_some_and(|&ahead| ahead >= at + window) {
-            candidates.pop_back();
-        }
-        least[at] = candidates.back().map_or(values[at], |&ahead| values[ahead]);
-    }
-    least
-}
-
-/// Sample rate in Hz: one over the slope of the least-squares line of time over period, for the samples that `admitted`
-/// selects. `None` if they span no time.
-fn fit_rate(periods: &[u64], times: &[f64], admitted: impl Fn(usize) -> bool) -> Option<f64> {
-    let (&first_period, &first_time) = (periods.first()?, times.first()?);
-    // Relative to the first sample: a late origin would cost digits.
-    let points = || {
-        periods
-            .iter()
-            .zip(times)
-            .enumerate()
-            .filter(|(at, _)| admitted(*at))
-            .map(|(_, (period, time))| ((period - first_period) as f64, time - first_time))
-    };
-    let n = points().count() as f64;
-    let (sum_x, sum_y) = points().fold((0.0, 0.0), |(x, y), (period, time)| (x + period, y + time));
-    let (mean_x, mean_y) = (sum_x / n, sum_y / n);
-    let (xx, xy) = points().fold((0.0, 0.0), |(xx, xy), (period, time)| {
-        let x = period - mean_x;
-        (xx + x * x, xy + x * (time - mean_y))
-    });
-    let rate = xx / xy;
-    (rate.is_finite() && rate > 0.0).then_some(rate)
+    Ok((slots, never_arrived))
 }

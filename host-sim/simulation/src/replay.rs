@@ -8,7 +8,8 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::count_table::CountTable;
 use recordings::frame_log::{Frame, FrameLogReader};
-use recordings::recording::{Recorder, Recording, TimeStamp};
+use recordings::recorded_file::RecordedFile;
+use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
 use recordings::{InputError, Reason};
 use std::cell::RefCell;
 use std::path::Path;
@@ -28,7 +29,10 @@ pub struct Replay {
 /// # Errors
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
 pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    if recordings::frame_log::is_frame_log(file)? { replay_log(file, range) } else { replay_table(file, range) }
+    match RecordedFile::open(file)? {
+        RecordedFile::FrameLog(frames) => replay_frames(file, frames, range),
+        RecordedFile::Table(rows) => replay_rows(file, rows, range),
+    }
 }
 
 /// Replays a table of counts: every row as the burst that the part would have sent.
@@ -36,7 +40,10 @@ pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
 /// # Errors
 /// As [`replay`].
 pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    let mut rows = CountTable::open(file)?;
+    replay_rows(file, CountTable::open(file)?, range)
+}
+
+fn replay_rows(file: &Path, mut rows: CountTable, range: GyroRange) -> Result<Replay, InputError> {
     let mut recorder = Recorder::new(rows.channels(), range);
     let mut player = Player::new();
     while let Some(row) = rows.next()? {
@@ -48,18 +55,33 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
     Ok(Replay { recording: recorder.finish(), other_transactions: 0 })
 }
 
-/// Replays a frame log. The range is `range` until a write to SENS_AVG in the log selects another.
+/// Replays a frame log. The range is `range` unless a write to SENS_AVG before the first burst selects another.
 ///
 /// # Errors
-/// As [`replay`], or the log has no burst.
+/// As [`replay`], or the log has no burst, or bursts of two ranges.
 pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    let mut frames = FrameLogReader::open(file)?;
+    replay_frames(file, FrameLogReader::open(file)?, range)
+}
+
+fn replay_frames(file: &Path, mut frames: FrameLogReader, range: GyroRange) -> Result<Replay, InputError> {
+    // As the log last selected it, and of the bursts so far.
+    let (mut selected, mut taken_in) = (range, range);
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
     let mut player = Player::new();
     let mut bursts = 0u64;
     let mut other_transactions = 0;
     while let Some(frame) = frames.next()? {
         if is_burst(&frame) {
+            if bursts == 0 {
+                recorder.set_range(selected);
+                taken_in = selected;
+            } else if selected != taken_in {
+                let reason = Reason::MixedRange { before: full_scale(taken_in), now: full_scale(selected) };
+                return Err(InputError::line(file, frames.line(), reason));
+            }
+            if bursts == MAX_SAMPLES {
+                return Err(InputError::line(file, frames.line(), Reason::TooManySamples));
+            }
             let burst = player
                 .burst(&frame.mosi, &frame.miso)
                 .map_err(|reason| InputError::line(file, frames.line(), reason))?;
@@ -67,9 +89,7 @@ pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
             bursts += 1;
         } else {
             other_transactions += 1;
-            if let Some(range) = range_written(&frame) {
-                recorder.set_range(range);
-            }
+            selected = range_written(&frame).unwrap_or(selected);
         }
     }
     if bursts == 0 {
@@ -121,6 +141,15 @@ fn range_written(frame: &Frame) -> Option<GyroRange> {
         0x02 => Some(GyroRange::Dps150),
         0x01 => Some(GyroRange::Dps75),
         _ => None,
+    }
+}
+
+/// Full scale of a range, deg/s.
+fn full_scale(range: GyroRange) -> u16 {
+    match range {
+        GyroRange::Dps300 => 300,
+        GyroRange::Dps150 => 150,
+        GyroRange::Dps75 => 75,
     }
 }
 

@@ -1,0 +1,111 @@
+//! Recordings over a serial port that end early, and a device that is silent.
+
+use crate::program::host_sim;
+use serialport::{SerialPort, TTYPort};
+use simulation::Device;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::tempdir;
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
+
+/// What happens to the device after so much of its own time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    /// It is interrupted on the host.
+    Interrupt,
+    Silence,
+}
+
+const FAULT_AFTER_US: u64 = 5_000_000;
+
+/// Records 20 s of a simulated device, which runs in real time or faster, into `log`. Returns the output of the program and the
+/// commands that the device received.
+fn record(log: &Path, fault: Fault) -> (Output, String) {
+    let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
+    let port = far.name().expect("a name");
+    near.set_timeout(Duration::from_millis(1)).expect("a timeout");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", "20"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut device = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 5), Device::blank_memory());
+    let (mut now_us, mut interrupted, mut keys, mut received) = (0, false, [0; 64], Vec::new());
+    let started = Instant::now();
+    while program.try_wait().expect("a status").is_none() {
+        assert!(started.elapsed() < Duration::from_secs(60), "{fault:?}: the program does not end");
+        if let Ok(count) = near.read(&mut keys) {
+            received.extend_from_slice(&keys[..count]);
+            device.press(&keys[..count]);
+        }
+        now_us += 10_000;
+        let sent = device.run_until(now_us);
+        if fault != Fault::Silence {
+            let _ = near.write_all(&sent);
+        }
+        if fault == Fault::Interrupt && now_us >= FAULT_AFTER_US && !interrupted {
+            let id = program.id().to_string();
+            assert!(Command::new("kill").args(["-INT", &id]).status().expect("a shell").success());
+            interrupted = true;
+        }
+    }
+    let output = program.wait_with_output().expect("an end");
+    drop(far);
+    (output, String::from_utf8_lossy(&received).into_owned())
+}
+
+fn samples(log: &Path) -> u64 {
+    let json = log.with_extension("json");
+    let output = host_sim(&["replay", log.to_str().expect("UTF-8"), "--json", json.to_str().expect("UTF-8")]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).expect("a report")).expect("JSON");
+    report["samples"].as_u64().expect("a number")
+}
+
+#[test]
+fn an_interrupted_recording_is_finished_and_the_device_is_told() {
+    let dir = tempdir().expect("a folder");
+    let log = dir.path().join("device.csv.gz");
+    let (output, commands) = record(&log, Fault::Interrupt);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && errors.contains("interrupted"), "{errors}");
+    assert!(commands.ends_with("w 0\r"), "{commands:?}");
+    // 5 s at 204.8 samples per second, and what came before the interrupt was seen.
+    assert!((900..3000).contains(&samples(&log)), "{}", samples(&log));
+}
+
+#[test]
+fn a_file_is_kept_where_the_device_is_silent() {
+    let dir = tempdir().expect("a folder");
+    let log = dir.path().join("old.csv");
+    std::fs::write(&log, "an older recording").expect("written");
+    let (output, _) = record(&log, Fault::Silence);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && errors.contains("no bursts for 10 s"), "{errors}");
+    assert_eq!(std::fs::read_to_string(&log).expect("the file"), "an older recording");
+}
+
+#[test]
+fn impossible_durations_are_refused() {
+    let (_near, far) = TTYPort::pair().expect("a pseudo-terminal");
+    let port = far.name().expect("a name");
+    for seconds in ["nan", "inf", "0"] {
+        let output = host_sim(&["record", "/nonexistent/x.csv", "--port", &port, "--seconds", seconds]);
+        assert!(!output.status.success(), "{seconds}");
+    }
+    let dir = tempdir().expect("a folder");
+    let log = dir.path().join("x.csv");
+    for seconds in ["nan", "inf", "0"] {
+        let output = host_sim(&["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", seconds]);
+        assert!(String::from_utf8_lossy(&output.stderr).contains("must be positive and finite"), "{seconds}");
+    }
+    for seconds in ["1e19", "nan", "-1"] {
+        let output = host_sim(&["monitor", &port, &format!("--seconds={seconds}")]);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{seconds}: {errors}");
+        assert!(errors.contains("duration"), "{seconds}: {errors}");
+    }
+}
