@@ -177,7 +177,7 @@ fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputErr
     if !names.iter().any(|name| Column::from_name(name).is_some_and(|c| c.channel().is_some())) {
         let names_columns = |separator: &char| header.contains(*separator) && header.split(*separator).any(is_known);
         let separator = OTHER_SEPARATORS.into_iter().find(names_columns);
-        let reason = separator.map_or(Reason::NoChannel, |separator| Reason::Separator(separator));
+        let reason = separator.map_or(Reason::NoChannel, Reason::Separator);
         return Err(InputError::line(file, line, reason));
     }
     if names.last() == Some(&"") {
