@@ -175,8 +175,9 @@ fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputErr
     let names: Vec<&str> = header.split(',').map(delimited_text::field).collect();
     let is_known = |name: &str| Column::from_name(name.trim()).is_some();
     if !names.iter().any(|name| Column::from_name(name).is_some_and(|c| c.channel().is_some())) {
-        let separator = OTHER_SEPARATORS.into_iter().find(|separator| header.split(*separator).any(is_known));
-        let reason = separator.map_or(Reason::NoChannel, |separator| Reason::Separator(separator));
+        let names_columns = |separator: &char| header.contains(*separator) && header.split(*separator).any(is_known);
+        let separator = OTHER_SEPARATORS.into_iter().find(names_columns);
+        let reason = separator.map_or(Reason::NoChannel, Reason::Separator);
         return Err(InputError::line(file, line, reason));
     }
     if names.last() == Some(&"") {

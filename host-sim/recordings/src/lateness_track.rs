@@ -37,7 +37,7 @@ const MIN_RATE_ERROR: f64 = 1e-9;
 /// Samples that were lost between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loss {
-    /// Position of the sample after the loss. With coarse stamps the loss may be some ticks before.
+    /// Position in the recording of the sample after the loss. With coarse stamps the loss may be some ticks before.
     pub before: usize,
     /// Sample periods without a sample.
     pub missing: u64,

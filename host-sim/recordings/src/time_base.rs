@@ -187,11 +187,11 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<TimeBase
     if (usable.positions.len() as u64) < MIN_SAMPLES {
         return Err(TimeBaseError::TooShort { used: usable.positions.len() as u64, dropped: usable.dropped });
     }
-    let (periods, stamps) = sample_periods(samples, &mut usable, rate_hz)?;
+    let SamplePeriods { periods, never_arrived, stamps } = sample_periods(samples, &mut usable, rate_hz)?;
     let Usable { positions, mut dropped, mut flagged, .. } = usable;
     let measured_hz = stamps.as_ref().and_then(|stamps| stamps.rate).map(|rate| rate.hz);
     let sample_rate_hz = rate_hz.or(measured_hz).ok_or(TimeBaseError::NoRate)?;
-    let (slots, never_arrived) = slots(&positions, &periods)?;
+    let slots = slots(&periods)?;
     dropped.insert("gap", never_arrived);
     if let Some(stamps) = &stamps {
         let warnings = [
@@ -228,7 +228,7 @@ struct Usable {
     dropped: BTreeMap<&'static str, u64>,
     /// Samples that are used although a warning was raised, by cause.
     flagged: BTreeMap<&'static str, u64>,
-    /// Of the samples that are left out those that were read twice and have no other fault, in their order.
+    /// Samples that were read twice, whatever other faults they have, in their order.
     read_twice: Vec<usize>,
 }
 
@@ -255,7 +255,7 @@ impl Usable {
             match faults.cause() {
                 Some(cause) => {
                     *usable.dropped.entry(cause).or_insert(0) += 1;
-                    if faults == Faults::REPEATED {
+                    if faults.contains(Faults::REPEATED) {
                         usable.read_twice.push(position);
                     }
                 }
@@ -270,34 +270,43 @@ impl Usable {
         usable
     }
 
-    /// Takes samples back that equal the one before by chance: where the coarse stamps of the others show that as many
-    /// samples are missing. Returns whether there are any.
-    fn take_back(&mut self, samples: &[RecordedSample], alignment: &StampAlignment) -> bool {
+    /// All samples but those that were read twice: a sample that is left out for another fault arrived at its time.
+    fn arrived(&self, samples: usize) -> Vec<usize> {
+        (0..samples).filter(|position| self.read_twice.binary_search(position).is_err()).collect()
+    }
+
+    /// Takes samples back that equal the one before by chance: where the coarse stamps of the others, `arrived`, show that as
+    /// many samples are missing. Returns whether there are any.
+    fn take_back(&mut self, samples: &[RecordedSample], arrived: &[usize], alignment: &StampAlignment) -> bool {
         let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
         let mut taken = Vec::new();
-        let mut left_out = self.read_twice.iter().copied().peekable();
+        let mut read_twice = self.read_twice.iter().copied().peekable();
         for loss in &alignment.losses {
-            let first = self.positions[loss.before.saturating_sub(reach)];
-            let last = self.positions[(loss.before + reach / 4).min(self.positions.len() - 1)];
+            let first = arrived[loss.before.saturating_sub(reach)];
+            let last = arrived[(loss.before + reach / 4).min(arrived.len() - 1)];
             let mut missing = loss.missing;
-            while let Some(position) = left_out.next_if(|&position| position < last) {
+            while let Some(position) = read_twice.next_if(|&position| position < last) {
                 if position > first && missing > 0 {
                     taken.push(position);
                     missing -= 1;
                 }
             }
         }
+        self.read_twice.retain(|position| taken.binary_search(position).is_err());
         for &position in &taken {
-            for cause in samples[position].faults.causes() {
-                *self.flagged.entry(cause).or_insert(0) += 1;
-            }
-            if let Some(count) = Faults::REPEATED.cause().and_then(|cause| self.dropped.get_mut(cause)) {
-                *count -= 1;
+            let faults = samples[position].faults;
+            // It stays left out for another fault.
+            if (faults & REFUSED).cause().is_none() {
+                if let Some(count) = Faults::REPEATED.cause().and_then(|cause| self.dropped.get_mut(cause)) {
+                    *count -= 1;
+                }
+                for cause in faults.causes() {
+                    *self.flagged.entry(cause).or_insert(0) += 1;
+                }
+                self.positions.push(position);
             }
         }
         self.dropped.retain(|_, count| *count > 0);
-        self.read_twice.retain(|position| taken.binary_search(position).is_err());
-        self.positions.extend_from_slice(&taken);
         self.positions.sort_unstable();
         !taken.is_empty()
     }
@@ -312,48 +321,76 @@ fn usual_interval(times: &[f64]) -> Option<f64> {
     (duration > 0.0 && duration.is_finite()).then_some(duration / window as f64)
 }
 
-/// The sample period in which each usable sample was taken, counted from any origin, and what the time stamps show.
+/// Where the usable samples lie in time.
+struct SamplePeriods {
+    /// The sample period in which each was taken, counted from any origin.
+    periods: Vec<u64>,
+    /// Samples between them that never arrived.
+    never_arrived: u64,
+    /// What the time stamps show.
+    stamps: Option<StampQuality>,
+}
+
 fn sample_periods(
     samples: &[RecordedSample],
     usable: &mut Usable,
     rate_hz: Option<f64>,
-) -> Result<(Vec<u64>, Option<StampQuality>), TimeBaseError> {
+) -> Result<SamplePeriods, TimeBaseError> {
     let indices: Option<Vec<u64>> = usable.positions.iter().map(|&p| samples[p].time_stamp.index).collect();
-    let times = |usable: &Usable| -> Option<Vec<f64>> {
-        usable.positions.iter().map(|&p| samples[p].time_stamp.time_s).collect()
+    let times_of = |positions: &[usize]| -> Option<Vec<f64>> {
+        positions.iter().map(|&position| samples[position].time_stamp.time_s).collect()
     };
-    match (indices, times(usable)) {
-        (Some(indices), times) => {
-            let least = indices.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
-            if least > 1 {
-                return Err(TimeBaseError::NoNeighbours(least));
-            }
-            let stamps = times.map(|times| {
-                let IndexedClock { rate, steps } = IndexedClock::new(&indices, &times);
-                StampQuality { rate, clock_steps: steps, resolved: true, ..StampQuality::default() }
-            });
-            Ok((indices, stamps))
+    if let Some(indices) = indices {
+        let least = indices.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
+        if least > 1 {
+            return Err(TimeBaseError::NoNeighbours(least));
         }
-        (None, Some(mut stamps)) => {
-            let mut alignment = StampAlignment::new(&stamps, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
-            // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number
-            // of samples does.
-            if alignment.width >= COARSE && usable.take_back(samples, &alignment) {
-                stamps = times(usable).unwrap_or_default();
-                alignment = StampAlignment::new(&stamps, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
-            }
-            match rate_hz {
-                Some(stated_hz) => contradiction(&stamps, &alignment, stated_hz)?,
-                None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
-                None => {}
-            }
-            let StampAlignment { periods, late, losses, rate, tick_s, width, resolved } = alignment;
-            let late = late.into_iter().filter(|late| *late).count() as u64;
-            Ok((periods, Some(StampQuality { rate, tick_s, width, losses, resolved, late, clock_steps: Vec::new() })))
-        }
-        // Without time stamps a sample that is left out leaves its own period empty, and nothing else is missing.
-        (None, None) => Ok((usable.positions.iter().map(|&p| p as u64).collect(), None)),
+        let stamps = times_of(&usable.positions).map(|times| {
+            let IndexedClock { rate, steps } = IndexedClock::new(&indices, &times);
+            StampQuality { rate, clock_steps: steps, resolved: true, ..StampQuality::default() }
+        });
+        let never_arrived = indices.windows(2).zip(usable.positions.windows(2)).map(|(indices, positions)| {
+            let left_out = (positions[1] - positions[0] - 1) as u64;
+            (indices[1] - indices[0] - 1).saturating_sub(left_out)
+        });
+        let never_arrived = never_arrived.fold(0, u64::saturating_add);
+        return Ok(SamplePeriods { periods: indices, never_arrived, stamps });
     }
+    let mut arrived = usable.arrived(samples.len());
+    let Some(mut times) = times_of(&arrived) else {
+        // Without time stamps a sample that is left out leaves its own period empty, and nothing else is missing.
+        let periods = usable.positions.iter().map(|&position| position as u64).collect();
+        return Ok(SamplePeriods { periods, never_arrived: 0, stamps: None });
+    };
+    let mut alignment = StampAlignment::new(&times, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
+    // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number of
+    // samples does.
+    if alignment.width >= COARSE && usable.take_back(samples, &arrived, &alignment) {
+        arrived = usable.arrived(samples.len());
+        times = times_of(&arrived).unwrap_or_default();
+        alignment = StampAlignment::new(&times, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
+    }
+    match rate_hz {
+        Some(stated_hz) => contradiction(&times, &alignment, stated_hz)?,
+        None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
+        None => {}
+    }
+    let StampAlignment { periods, late, mut losses, rate, tick_s, width, resolved } = alignment;
+    losses.iter_mut().for_each(|loss| loss.before = arrived[loss.before]);
+    let usable_range = usable.positions.first().zip(usable.positions.last());
+    let between = |loss: &&Loss| usable_range.is_some_and(|(first, last)| loss.before > *first && loss.before <= *last);
+    let never_arrived = losses.iter().filter(between).map(|loss| loss.missing).fold(0, u64::saturating_add);
+    let late = late.into_iter().filter(|late| *late).count() as u64;
+    // Both lists of positions increase, and the usable samples have arrived.
+    let mut usable_positions = usable.positions.iter().peekable();
+    let periods = arrived
+        .iter()
+        .zip(periods)
+        .filter(|(position, _)| usable_positions.next_if(|usable| usable == position).is_some())
+        .map(|(_, period)| period)
+        .collect();
+    let stamps = StampQuality { rate, tick_s, width, losses, resolved, late, clock_steps: Vec::new() };
+    Ok(SamplePeriods { periods, never_arrived, stamps: Some(stamps) })
 }
 
 /// Checks a stated rate against the stamps.
@@ -373,22 +410,15 @@ fn contradiction(times: &[f64], alignment: &StampAlignment, stated_hz: f64) -> R
     }
 }
 
-/// The periods counted from the first sample, strictly increasing, and the number of missing samples that are not samples
-/// left out for a fault.
-fn slots(positions: &[usize], periods: &[u64]) -> Result<(Vec<u64>, u64), TimeBaseError> {
-    let (mut slots, mut slot, mut never_arrived) = (Vec::with_capacity(positions.len()), 0_u64, 0_u64);
-    for at in 0..positions.len() {
-        if let Some(before) = at.checked_sub(1) {
-            let missing = periods[at].saturating_sub(periods[before]).saturating_sub(1);
-            let left_out = (positions[at] - positions[before] - 1) as u64;
-            never_arrived = never_arrived.saturating_add(missing.saturating_sub(left_out));
-            slot = slot.saturating_add(missing).saturating_add(1);
-        }
-        slots.push(slot);
+/// The periods counted from the first sample, strictly increasing.
+fn slots(periods: &[u64]) -> Result<Vec<u64>, TimeBaseError> {
+    let first = periods.first().copied().unwrap_or(0);
+    let slots: Vec<u64> = periods.iter().map(|period| period.saturating_sub(first)).collect();
+    // Periods beyond the range of u64 are all the same.
+    let is_increasing = slots.is_sorted_by(|one, next| one < next);
+    let (samples, span) = (slots.len() as u64, slots.last().copied().unwrap_or(0));
+    if !is_increasing || (span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS) {
+        return Err(TimeBaseError::TooSparse { samples, periods: span.saturating_add(1) });
     }
-    let samples = positions.len() as u64;
-    if slot / MAX_PERIODS_PER_SAMPLE > samples && slot > MAX_PERIODS {
-        return Err(TimeBaseError::TooSparse { samples, periods: slot.saturating_add(1) });
-    }
-    Ok((slots, never_arrived))
+    Ok(slots)
 }

@@ -225,3 +225,29 @@ fn the_measured_long_recording_is_complete() {
     assert_eq!(measured.len(), 1_000_000);
     assert_eq!(measured.gaps(), 0);
 }
+
+/// Samples that the sensor refused arrived at their times: however many they are, they are no losses, and the rate is seen.
+#[test]
+fn many_refused_samples_hide_neither_the_rate_nor_the_losses() {
+    let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
+    let taken = (0..3000_u32).filter(|at| *at != 1000);
+    for at in taken {
+        let mut bytes = [0xFF; 26];
+        // Bits 16 to 17 of a multiplicative hash: three of four samples are stuck high.
+        if at.wrapping_mul(2_654_435_761) >> 16 & 3 == 0 {
+            for (word, pair) in bytes[2..].chunks_exact_mut(2).enumerate() {
+                let value = if word == 0 { 0x814 } else { (at % 1000) as u16 };
+                pair.copy_from_slice(&(value | 0x8000).to_be_bytes());
+            }
+        }
+        recorder.push(TimeStamp::from_time(f64::from(at) * PERIOD), &Burst::from_bytes(&bytes));
+    }
+    let recording = recorder.finish();
+    for stated in [None, Some(98.0)] {
+        let base = recordings::time_base::time_base(&recording, stated).expect("a time base");
+        let rate = base.stamps.and_then(|stamps| stamps.rate).expect("a rate").hz;
+        assert!((rate - 100.0).abs() < 1e-6, "{stated:?}: {rate}");
+        assert_eq!(base.measurement.dropped["gap"], 1);
+        assert!((700..800).contains(&base.measurement.len()), "{}", base.measurement.len());
+    }
+}
