@@ -6,22 +6,18 @@
 //!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► ratios, degrees of freedom, intervals ─► table
 //! ```
 
-mod loss;
+mod estimate;
+mod loss_pattern;
 mod noise;
 mod table;
 
-pub use loss::Loss;
-pub use noise::TestNoise;
-pub use table::{LossComparison, LossTable, OctaveRatio};
+pub use estimate::EstimatedRecord;
+pub use loss_pattern::LossPattern;
+pub use noise::{RATE_HZ, TestNoise};
+pub use table::{CoefficientComparison, LossComparison, LossTable, OctaveRatio};
 
-use allan_core::{Cascade, Curve, Model, fit::fit};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
-
-/// Samples per second of the simulated records.
-pub const RATE_HZ: f64 = 204.8;
-/// Octaves of the estimators, of which a record fills those up to half its length.
-const OCTAVES: usize = 24;
 
 /// How many records to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,17 +30,6 @@ pub struct LossPlan {
     pub first_seed: u64,
     /// Number of threads.
     pub jobs: usize,
-}
-
-/// What the estimator makes of one record.
-#[derive(Debug, Clone)]
-pub struct EstimatedRecord {
-    /// Allan variances in counts².
-    pub curve: Curve<OCTAVES>,
-    /// The terms of the noise, fitted to the curve; N, B and K in counts and seconds.
-    pub model: Model,
-    /// Samples that the estimator has seen.
-    pub samples: u64,
 }
 
 impl LossPlan {
@@ -77,39 +62,20 @@ impl LossPlan {
         let comparisons = TestNoise::ALL.into_iter().flat_map(|noise| {
             let of_noise: Vec<&[EstimatedRecord]> =
                 results.iter().filter(|(_, of, _)| *of == noise).map(|(.., records)| records.as_slice()).collect();
-            (0..Loss::ALL.len())
+            (0..LossPattern::ALL.len())
                 .map(|index| {
                     let pairs: Vec<_> = of_noise.iter().map(|records| (&records[0], &records[index + 1])).collect();
-                    LossComparison::new(noise, Loss::ALL[index], &pairs)
+                    LossComparison::new(noise, LossPattern::ALL[index], &pairs)
                 })
                 .collect::<Vec<_>>()
         });
-        LossTable { plan: *self, comparisons: comparisons.collect() }
+        LossTable { records: self.records, samples: self.samples, comparisons: comparisons.collect() }
     }
 
     /// The record of a seed, complete and with each of the losses.
     fn record(&self, noise: TestNoise, seed: u64) -> Vec<EstimatedRecord> {
         let record = noise.record(self.samples, seed);
-        let mut complete = Cascade::<OCTAVES, 8>::new();
-        complete.push_slice(&record);
-        let losses = Loss::ALL.into_iter().map(|loss| {
-            let mut cascade = Cascade::<OCTAVES, 8>::new();
-            let mut next = 0;
-            for gap in loss.gaps(self.samples, seed) {
-                cascade.push_slice(&record[next..gap.start]);
-                cascade.gap(gap.len() as u32);
-                next = gap.end;
-            }
-            cascade.push_slice(&record[next..]);
-            cascade
-        });
-        let estimate = |cascade: &Cascade<OCTAVES, 8>| {
-            let curve = cascade.curve(1.0 / RATE_HZ);
-            let mut fitted = curve.clone();
-            fitted.retain(|point| point.n >= noise.shortest_fitted());
-            let model = fit(&fitted, noise.terms());
-            EstimatedRecord { curve, model, samples: cascade.len() }
-        };
-        std::iter::once(estimate(&complete)).chain(losses.map(|cascade| estimate(&cascade))).collect()
+        let losses = LossPattern::ALL.into_iter().map(|pattern| pattern.gaps(self.samples, seed));
+        std::iter::once(Vec::new()).chain(losses).map(|gaps| EstimatedRecord::new(noise, &record, &gaps)).collect()
     }
 }

@@ -1,13 +1,13 @@
 //! The benchmark of lost samples on few and short records: the longest averaging time is kept, variances and coefficients
 //! agree with those of the complete records.
 
-use benchmarks::losses::{Loss, LossPlan, TestNoise};
+use benchmarks::losses::{LossPattern, LossPlan, TestNoise};
 
 #[test]
 fn lost_samples_bias_neither_variance_nor_coefficients_and_keep_the_longest_averaging_time() {
     const RECORDS: u64 = 24;
     let table = LossPlan { records: RECORDS, samples: 1 << 17, first_seed: 5_000, jobs: 2 }.run(|_, _| ());
-    assert_eq!(table.comparisons.len(), TestNoise::ALL.len() * Loss::ALL.len());
+    assert_eq!(table.comparisons.len(), TestNoise::ALL.len() * LossPattern::ALL.len());
     for comparison in &table.comparisons {
         let name = format!("{}, {}", comparison.noise, comparison.loss);
         assert_eq!(comparison.same_longest, RECORDS as usize, "{name}");
@@ -28,7 +28,8 @@ fn lost_samples_bias_neither_variance_nor_coefficients_and_keep_the_longest_aver
 #[test]
 fn without_the_correction_the_benchmark_would_see_the_bias() {
     let table = LossPlan { records: 8, samples: 1 << 16, first_seed: 9_000, jobs: 2 }.run(|_, _| ());
-    let white = table.comparisons.iter().find(|comparison| comparison.loss == Loss::Random(0.05)).expect("white, 5 %");
+    let white =
+        table.comparisons.iter().find(|comparison| comparison.loss == LossPattern::Random(0.05)).expect("white, 5 %");
     let octave = white.octaves.iter().find(|octave| octave.n == 64).expect("n = 64");
     // 1.5 · 5 % · (1 − 2/64) for white noise.
     assert!((octave.uncorrected - 0.0727).abs() < 4.5 * octave.standard_error + 0.003, "{octave:?}");

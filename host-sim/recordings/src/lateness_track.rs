@@ -36,7 +36,7 @@ const MIN_RATE_ERROR: f64 = 1e-9;
 
 /// Samples that were lost between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Loss {
+pub struct LostStretch {
     /// Position in the recording of the sample after the loss. With coarse stamps the loss may be some ticks before.
     pub before: usize,
     /// Sample periods without a sample.
@@ -51,7 +51,7 @@ pub(crate) struct Track {
     pub(crate) periods: Vec<u64>,
     /// Lateness above the envelope's phase, periods.
     above: Vec<f64>,
-    pub(crate) losses: Vec<Loss>,
+    pub(crate) losses: Vec<LostStretch>,
     pub(crate) width: f64,
 }
 
@@ -109,9 +109,9 @@ impl Track {
                 // Stamps within a tick or two do not tell one loss from two.
                 match track.losses.last_mut().filter(|last| at - last.before <= undecided) {
                     Some(last) => {
-                        *last = Loss { missing: last.missing.saturating_add(lost), certain: true, ..*last };
+                        *last = LostStretch { missing: last.missing.saturating_add(lost), certain: true, ..*last };
                     }
-                    None => track.losses.push(Loss { before: at, missing: lost, certain }),
+                    None => track.losses.push(LostStretch { before: at, missing: lost, certain }),
                 }
             }
             level.push(least - missing as f64);

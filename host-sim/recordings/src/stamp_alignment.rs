@@ -10,7 +10,7 @@
 //! one that needs the shortest description wins: the scatter of the lateness, no part of it below the tick of the stamps
 //! being worth anything, and the losses.
 
-use crate::lateness_track::{COARSE, Loss, SEARCH_QUEUE, Track, quantile};
+use crate::lateness_track::{COARSE, LostStretch, SEARCH_QUEUE, Track, quantile};
 use crate::stamp_tick::tick;
 
 /// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is distinguished
@@ -66,7 +66,7 @@ pub(crate) struct StampAlignment {
     /// Samples that were read a period or more after the others.
     pub(crate) late: Vec<bool>,
     /// The losses, in their order.
-    pub(crate) losses: Vec<Loss>,
+    pub(crate) losses: Vec<LostStretch>,
     /// The rate; `None` if the samples span no time.
     pub(crate) rate: Option<RateEstimate>,
     /// Smallest step of the stamps that all of them are multiples of, s; `None` where it is far below the period.
@@ -131,7 +131,7 @@ impl StampAlignment {
 }
 
 /// Samples in losses that something else may explain: of a long loss that is uncertain one sample.
-pub(crate) fn uncertain(losses: &[Loss], resolved: bool) -> u64 {
+pub(crate) fn uncertain(losses: &[LostStretch], resolved: bool) -> u64 {
     let samples = losses.iter().map(|loss| if resolved { u64::from(!loss.certain) } else { loss.missing });
     samples.fold(0, u64::saturating_add)
 }
@@ -204,7 +204,7 @@ fn period_estimates(times: &[f64], tick_s: Option<f64>) -> Vec<f64> {
 }
 
 /// Whether single losses lie so regularly in a record of `samples` that a slightly longer period explains all of them.
-fn is_beat(losses: &[Loss], samples: usize) -> bool {
+fn is_beat(losses: &[LostStretch], samples: usize) -> bool {
     let (Some(first), Some(last)) = (losses.first(), losses.last()) else { return false };
     if losses.len() < MIN_BEATS || losses.iter().any(|loss| loss.missing != 1) {
         return false;

@@ -12,7 +12,7 @@ use measurement::{MeasuredChannel, Measurement, adis16405};
 use std::collections::BTreeMap;
 
 pub use crate::indexed_clock::ClockStep;
-pub use crate::lateness_track::Loss;
+pub use crate::lateness_track::LostStretch;
 pub use crate::stamp_alignment::RateEstimate;
 
 /// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
@@ -96,7 +96,7 @@ fn list(dropped: &BTreeMap<&'static str, u64>) -> String {
 
 /// A recording on its time base.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TimeBase {
+pub struct EstimatedTimeBase {
     /// The usable samples.
     pub measurement: Measurement,
     /// What the time stamps show; `None` where the samples have none.
@@ -113,7 +113,7 @@ pub struct StampQuality {
     /// Width of the lateness of ordinary samples, sample periods: the tick and the jitter. 0 where the samples have an index.
     pub width: f64,
     /// Losses that the stamps show, refused samples included; none where the samples have an index.
-    pub losses: Vec<Loss>,
+    pub losses: Vec<LostStretch>,
     /// Whether losses of single samples are told from the rounding of the stamps.
     pub resolved: bool,
     /// Samples that were read at least a period later than the others.
@@ -176,7 +176,7 @@ pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measur
 /// # Errors
 /// There is no usable rate or the given one contradicts the stamps, there are fewer than 4 usable samples, no two of them
 /// are neighbours, or the gaps are more than 64 times as long as the samples.
-pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<TimeBase, TimeBaseError> {
+pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
     if let Some(rate) = rate_hz
         && !(rate.is_finite() && rate > 0.0)
     {
@@ -217,7 +217,7 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<TimeBase
         dropped,
         flagged,
     };
-    Ok(TimeBase { measurement, stamps })
+    Ok(EstimatedTimeBase { measurement, stamps })
 }
 
 /// The samples of a recording that can be used.
@@ -378,7 +378,8 @@ fn sample_periods(
     let StampAlignment { periods, late, mut losses, rate, tick_s, width, resolved } = alignment;
     losses.iter_mut().for_each(|loss| loss.before = arrived[loss.before]);
     let usable_range = usable.positions.first().zip(usable.positions.last());
-    let between = |loss: &&Loss| usable_range.is_some_and(|(first, last)| loss.before > *first && loss.before <= *last);
+    let between =
+        |loss: &&LostStretch| usable_range.is_some_and(|(first, last)| loss.before > *first && loss.before <= *last);
     let never_arrived = losses.iter().filter(between).map(|loss| loss.missing).fold(0, u64::saturating_add);
     let late = late.into_iter().filter(|late| *late).count() as u64;
     // Both lists of positions increase, and the usable samples have arrived.

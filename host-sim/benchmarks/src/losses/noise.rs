@@ -1,7 +1,6 @@
 //! The noises of the benchmark, generated from their definitions: white noise and a walk sample by sample, flicker noise
 //! by its spectrum.
 
-use super::RATE_HZ;
 use allan_core::NoiseTerm;
 use allan_core::term::MovingAverageFilter;
 use rand::{Rng, SeedableRng};
@@ -12,6 +11,8 @@ use realfft::num_complex::Complex;
 use std::f64::consts::PI;
 use std::fmt;
 
+/// Samples per second of the simulated records.
+pub const RATE_HZ: f64 = 204.8;
 /// Moving averages of the filtered noises: two over eight values each, as in the part with SENS_AVG = 3.
 const TAPS: u16 = 8;
 

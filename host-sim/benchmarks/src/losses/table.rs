@@ -1,6 +1,8 @@
 //! Comparison of the complete records with those that have lost samples.
 
-use super::{EstimatedRecord, Loss, LossPlan, RATE_HZ, TestNoise};
+use super::estimate::EstimatedRecord;
+use super::loss_pattern::LossPattern;
+use super::noise::{RATE_HZ, TestNoise};
 use reports::formatting::{TextTable, number};
 use serde::{Serialize, Serializer};
 use statrs::statistics::Statistics;
@@ -9,9 +11,10 @@ use std::io::{self, Write};
 /// The results for every noise and every loss.
 #[derive(Debug, Clone, Serialize)]
 pub struct LossTable {
-    /// How many records were simulated.
-    #[serde(skip)]
-    pub plan: LossPlan,
+    /// Records of each noise.
+    pub records: u64,
+    /// Samples of each record.
+    pub samples: usize,
     /// One for each noise and loss.
     pub comparisons: Vec<LossComparison>,
 }
@@ -24,7 +27,7 @@ pub struct LossComparison {
     pub noise: TestNoise,
     /// The loss.
     #[serde(serialize_with = "as_text")]
-    pub loss: Loss,
+    pub loss: LossPattern,
     /// Share of the samples that was lost, of all records.
     pub lost: f64,
     /// Records in which the longest averaging time is that of the complete record.
@@ -77,7 +80,7 @@ fn as_text<S: Serializer>(value: &impl ToString, serializer: S) -> Result<S::Ok,
 impl LossComparison {
     /// Compares pairs of a complete record and the same record with losses.
     #[must_use]
-    pub fn new(noise: TestNoise, loss: Loss, pairs: &[(&EstimatedRecord, &EstimatedRecord)]) -> Self {
+    pub fn new(noise: TestNoise, loss: LossPattern, pairs: &[(&EstimatedRecord, &EstimatedRecord)]) -> Self {
         let total = |of: fn(&(&EstimatedRecord, &EstimatedRecord)) -> u64| pairs.iter().map(of).sum::<u64>() as f64;
         let longest = |record: &EstimatedRecord| record.curve.points().last().map(|point| point.n);
         let octaves = pairs.first().map_or(0, |(complete, _)| complete.curve.points().len());
@@ -152,8 +155,8 @@ impl LossTable {
     /// # Errors
     /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let hours = self.plan.samples as f64 / RATE_HZ / 3600.0;
-        writeln!(out, "{} records of {hours:.2} h at {RATE_HZ} SPS for each noise\n", self.plan.records)?;
+        let hours = self.samples as f64 / RATE_HZ / 3600.0;
+        writeln!(out, "{} records of {hours:.2} h at {RATE_HZ} SPS for each noise\n", self.records)?;
         writeln!(
             out,
             "variance over that of the complete record, minus 1, in %: the octave that is farthest from 0, and its"

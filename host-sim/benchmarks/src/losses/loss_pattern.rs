@@ -1,6 +1,6 @@
 //! Which samples of a record are lost.
 
-use super::RATE_HZ;
+use super::noise::RATE_HZ;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt;
@@ -8,14 +8,14 @@ use std::ops::Range;
 
 /// A pattern of lost samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Loss {
+pub enum LossPattern {
     /// Each sample is lost with this probability.
     Random(f64),
     /// 5 to 200 samples in a row every 1 to 5 minutes, both uniformly distributed.
     Bursts,
 }
 
-impl Loss {
+impl LossPattern {
     /// The patterns of the benchmark.
     pub const ALL: [Self; 5] =
         [Self::Random(0.0005), Self::Random(0.005), Self::Random(0.02), Self::Random(0.05), Self::Bursts];
@@ -54,7 +54,7 @@ impl Loss {
     }
 }
 
-impl fmt::Display for Loss {
+impl fmt::Display for LossPattern {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Random(probability) => write!(f, "{} % at random", 100.0 * probability),
