@@ -37,8 +37,11 @@ pub struct ChannelReport {
     pub name: String,
     /// Unit of every deviation of the channel, such as `deg/s`.
     pub unit: String,
-    /// Samples used.
+    /// Samples that arrived and were used as a whole, in every channel.
     pub samples: u64,
+    /// Samples that the channel's model lacks.
+    #[serde(flatten)]
+    pub missing: MissingSamples,
     /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
     /// The coefficients by the slope method.
@@ -52,6 +55,18 @@ pub struct ChannelReport {
     /// Assessment of the model for use in navigation.
     #[serde(rename = "practice")]
     pub assessment: Assessment,
+}
+
+/// Samples that are missing in a channel, counted apart: lost on the way, refused by cause, replaced by the estimator.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct MissingSamples {
+    /// Samples that never arrived.
+    pub lost: u64,
+    /// Samples that arrived and are not used, by cause: those that the reader refused in all channels or in this one, and
+    /// what the analysis keeps out of the coefficients (`repeated`, `spikes`, `knock`).
+    pub refused: BTreeMap<String, u64>,
+    /// Of all these, samples that the estimator replaced from their neighbours; the others cut the record.
+    pub replaced: u64,
 }
 
 /// One octave of the measured Allan deviation.
@@ -122,8 +137,12 @@ pub struct ModelReport {
     pub adev: Vec<f64>,
     /// Against the first half of the record, which the model was fitted to.
     pub fitted: ModelErrorReport,
-    /// Against the second half of the record, which was not used in the fit.
+    /// Against the second half of the record as it was recorded, which was not used in the fit.
     pub unseen: ModelErrorReport,
+    /// Against the second half without what the rules for spikes and knocks exclude that were fitted to the first half;
+    /// absent where they exclude nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unseen_excluding: Option<ModelErrorReport>,
 }
 
 /// One term of a noise model.

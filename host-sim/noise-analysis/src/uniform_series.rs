@@ -16,16 +16,16 @@ impl UniformSeries {
         Self { sample_period, values }
     }
 
-    /// The samples of a channel, with a `NaN` for each missing one.
+    /// The samples of a channel over the whole span of its record, with a `NaN` for each missing one.
     ///
-    /// A gap of more samples than the record holds splits it, and only the longest part is returned: the result would
+    /// A gap of more samples than the channel has splits it, and only the longest part is returned: the result would
     /// otherwise be mostly `NaN`.
     #[must_use]
     pub fn from_series(series: &Series) -> Self {
         let longest_gap = series.values.len() as u64;
         let mut values = Vec::with_capacity(series.values.len());
         let mut longest = Vec::new();
-        let mut next = series.slots.first().copied().unwrap_or(0);
+        let mut next = series.span.start;
         for (&slot, &value) in series.slots.iter().zip(&series.values) {
             let missing = slot - next;
             if missing > longest_gap {
@@ -38,6 +38,10 @@ impl UniformSeries {
             }
             values.push(value);
             next = slot + 1;
+        }
+        let missing = series.span.end.saturating_sub(next);
+        if !values.is_empty() && missing <= longest_gap {
+            values.resize(values.len() + missing as usize, f64::NAN);
         }
         let values = if values.len() >= longest.len() { values } else { longest };
         Self::new(series.period_s, values)
@@ -112,7 +116,14 @@ impl UniformSeries {
         if size == 1 {
             return self;
         }
-        let average = |chunk: &[f64]| chunk.iter().sum::<f64>() / size as f64;
+        // Of the samples that are there, where at least half are.
+        let average = |chunk: &[f64]| {
+            let (sum, count) = chunk
+                .iter()
+                .filter(|value| value.is_finite())
+                .fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+            if 2 * count >= size { sum / count as f64 } else { f64::NAN }
+        };
         Self {
             sample_period: self.sample_period * size as f64,
             values: self.values.chunks_exact(size).map(average).collect(),
@@ -156,6 +167,7 @@ mod tests {
         let slots = [3, 4, 7];
         let series = |slots: Vec<u64>| Series {
             values: (1..=slots.len()).map(|value| value as f64).collect(),
+            span: slots.first().copied().unwrap_or(0)..slots.last().map_or(0, |last| last + 1),
             slots,
             period_s: 0.1,
             resolution: 1.0,

@@ -77,9 +77,9 @@ pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measur
     let sample_rate_hz = rate_hz.or(measured_hz).ok_or(TimeBaseError::NoRate)?;
 
     let profile = adis16405::profile(recording.range.lsb());
-    let channel = |channel: &Channel| MeasuredChannel {
-        profile: profile.channels[*channel as usize],
-        counts: positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect(),
+    let channel = |channel: &Channel| {
+        let counts = positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect();
+        MeasuredChannel::new(profile.channels[*channel as usize], counts)
     };
     Ok(Measurement {
         channels: recording.channels.iter().map(channel).collect(),
