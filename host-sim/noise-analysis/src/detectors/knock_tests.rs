@@ -168,7 +168,7 @@ fn noise_below_a_count_has_no_knock() {
 }
 
 /// Length in s and level of knocks that are found for certain.
-const KNOCKS: [(f64, f64); 5] = [(1.0, 5.0), (3.0, 3.0), (10.0, 2.0), (30.0, 1.5), (60.0, 1.3)];
+const KNOCKS: [(f64, f64); 5] = [(1.0, 5.0), (3.0, 3.0), (10.0, 2.0), (30.0, 1.5), (40.0, 1.3)];
 
 #[test]
 fn knocks_of_seconds_to_minutes_are_found_measured_and_excluded() {

@@ -6,8 +6,8 @@
 //! others are tested in that stretch alone.
 
 use super::noise_levels::{
-    DIFFERENCES, NeighbouringLevel, SquaredDifferences, TRIMMED_MEAN, averaging_factors, doublings, exceedance,
-    freedom_by_scatter, longer_levels, median, neighbouring_level,
+    DIFFERENCES, HALF_EFFICIENCY, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, averaging_factors, doublings,
+    exceedance, freedom_by_scatter, longer_levels, median, neighbouring_level, neighbours_freedom,
 };
 use crate::distributions::NORMAL_975;
 use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
@@ -16,6 +16,8 @@ use std::ops::Range;
 
 /// Highest probability by which chance shows a knock in a channel at a time when another channel has one.
 const SIGNIFICANCE_AT_A_KNOWN_TIME: f64 = 1e-3;
+/// Highest probability by which chance raises the smaller half of the squares of a block that is too loud.
+const SIGNIFICANCE_THROUGHOUT: f64 = 1e-3;
 /// A channel that would lose more than this part of its samples has no knocks: its noise level changes all the time, and the
 /// levels between are no better known than those of the supposed knocks.
 const LARGEST_SHARE: f64 = 0.1;
@@ -61,8 +63,15 @@ pub(crate) struct KnockRule {
 #[derive(Debug, Clone)]
 struct Scale {
     n: usize,
-    /// Degrees of freedom of a block, for each doubling of its length.
-    freedoms: Vec<f64>,
+    /// For each doubling of the length of a block.
+    freedoms: Vec<BlockFreedom>,
+}
+
+/// Degrees of freedom of the level of a block, and of that of its neighbours.
+#[derive(Debug, Clone, Copy)]
+struct BlockFreedom {
+    block: f64,
+    neighbours: f64,
 }
 
 /// A block that is too loud.
@@ -70,9 +79,10 @@ struct LoudBlock {
     scale: usize,
     /// Differences of the block.
     differences: Range<usize>,
-    neighbours: NeighbouringLevel,
+    /// Level of its neighbours.
+    quiet: f64,
     ratio: f64,
-    freedom: f64,
+    freedom: BlockFreedom,
     p_value: f64,
 }
 
@@ -106,11 +116,12 @@ impl KnockRule {
         for n in averaging_factors(series.period_s) {
             let differences = SquaredDifferences::new(series, n);
             let levels = differences.levels();
-            let mut freedoms: Vec<f64> = Vec::new();
+            let mut freedoms: Vec<BlockFreedom> = Vec::new();
             for doublings in doublings(&differences, series.period_s) {
                 let longer = longer_levels(&levels, doublings);
-                let by_length = freedoms.last().map_or(differences.freedom(), |freedom| 2.0 * freedom);
-                freedoms.push(freedom_by_scatter(&longer).map_or(by_length, |freedom| freedom.min(by_length)));
+                let by_length = freedoms.last().map_or(differences.freedom(), |freedom| 2.0 * freedom.block);
+                let block = freedom_by_scatter(&longer).map_or(by_length, |freedom| freedom.min(by_length));
+                freedoms.push(BlockFreedom { block, neighbours: neighbours_freedom(&longer, block) });
             }
             let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
@@ -157,7 +168,7 @@ impl KnockRule {
             tests += tested;
         }
         let limit = SIGNIFICANCE / tests.max(1) as f64;
-        blocks.retain(|block| block.p_value < limit);
+        blocks.retain(|block| block.p_value < limit && self.is_loud_throughout(block, &scales[block.scale]));
         blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         let mut knocks: Vec<Knock> = Vec::new();
         for block in blocks {
@@ -185,17 +196,34 @@ impl KnockRule {
             let Some(&freedom) = freedoms.get(doublings as usize).or(freedoms.last()) else { continue };
             let size = DIFFERENCES << doublings;
             for (at, level) in longer.iter().enumerate() {
-                let (Some(level), Some(neighbours)) = (level, neighbouring_level(&longer, at, freedom)) else { continue };
+                let (Some(level), Some(quiet)) = (level, neighbouring_level(&longer, at, freedom.block)) else { continue };
                 tested += 1;
-                let ratio = level / neighbours.level.max(self.floor);
+                let quiet = quiet.max(self.floor);
+                let ratio = level / quiet;
                 if ratio > 1.0 && ratio.is_finite() {
-                    let p_value = exceedance(ratio, freedom, neighbours.blocks * freedom);
+                    let p_value = exceedance(ratio, freedom.block, freedom.neighbours);
                     let differences = at * size..(at + 1) * size;
-                    loud.push(LoudBlock { scale, differences, neighbours, ratio, freedom, p_value });
+                    loud.push(LoudBlock { scale, differences, quiet, ratio, freedom, p_value });
                 }
             }
         }
         (loud, tested)
+    }
+
+    /// Whether the smaller half of the squares of a block is larger than that of its neighbours too. Where the bias jumps
+    /// several times in a block, some of its squares are large and the others are as elsewhere.
+    fn is_loud_throughout(&self, block: &LoudBlock, differences: &SquaredDifferences) -> bool {
+        let size = block.differences.len();
+        let at = block.differences.start / size;
+        let first = at.saturating_sub(NEIGHBOURS + 1);
+        let blocks = first..(at + NEIGHBOURS + 2).min(differences.squares.len() / size);
+        let levels: Vec<Option<f64>> =
+            blocks.map(|block| differences.half_level(block * size..(block + 1) * size)).collect();
+        let freedom = HALF_EFFICIENCY * block.freedom.block;
+        let Some(quiet) = neighbouring_level(&levels, at - first, freedom) else { return false };
+        let Some(level) = levels[at - first] else { return false };
+        let others = HALF_EFFICIENCY * block.freedom.neighbours;
+        exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
     }
 
     /// A knock at the time of one in another channel.
@@ -209,7 +237,7 @@ impl KnockRule {
                 return None;
             }
             let level = differences.trimmed_level(from..from + length)?;
-            let freedom = scale.freedoms.first()? * length as f64 / DIFFERENCES as f64;
+            let freedom = scale.freedoms.first()?.block * length as f64 / DIFFERENCES as f64;
             let beside = (2..2 + SIDE).flat_map(|distance| [-distance, distance]).filter_map(|distance| {
                 let start = from as i64 + distance * length as i64;
                 let start = usize::try_from(start).ok()?;
@@ -260,11 +288,11 @@ fn join(knocks: &mut Vec<Knock>, knock: Knock) {
 ///
 /// The level is tried at the square root of the block's ratio, so that the stretch includes the rise and the decay.
 fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f64) -> Knock {
-    let quiet = block.neighbours.level / TRIMMED_MEAN;
+    let quiet = block.quiet / TRIMMED_MEAN;
     let tried = block.ratio.sqrt();
     let length = block.differences.len();
     // ln likelihood ratio of each difference; correlated differences count as fewer.
-    let weight = 0.5 * block.freedom / length as f64;
+    let weight = 0.5 * block.freedom.block / length as f64;
     let window = block.differences.start.saturating_sub(4 * length)
         ..(block.differences.end + 4 * length).min(differences.squares.len());
     let gain = |square: f64| {
@@ -295,8 +323,8 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
         .filter(|square| square.is_finite())
         .fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
     let ratio = sum / f64::max(count, 1.0) / quiet;
-    let freedom = block.freedom * count / length as f64;
-    let half = NORMAL_975 * (2.0 / freedom + 2.0 / (block.neighbours.blocks * block.freedom)).sqrt();
+    let freedom = block.freedom.block * count / length as f64;
+    let half = NORMAL_975 * (2.0 / freedom + 2.0 / block.freedom.neighbours).sqrt();
     // One average more on either side, and what is possible in addition: a sample too many is cheap.
     let at = |number: usize| differences.slots(window.start + number..window.start + number);
     let (first, last) = (at(start_low.saturating_sub(1)).start, at(end_high).end + differences.n as u64);

@@ -20,11 +20,14 @@ const LONGEST_BLOCK_S: f64 = 128.0;
 const TRIMMED: f64 = 0.1;
 /// Mean of the squares of standard normal numbers without the largest tenth: P(χ²₃ < q)/0.9 with P(χ²₁ < q) = 0.9.
 pub(super) const TRIMMED_MEAN: f64 = 0.6231;
+/// The same without the larger half has degrees of freedom that are smaller by this factor: its relative variance is
+/// 0.0330/0.5²/0.1427² = 6.49, that without the largest tenth 2.56.
+pub(super) const HALF_EFFICIENCY: f64 = 2.56 / 6.49;
 /// Variance of that mean over that of the mean of all squares, each relative to its expectation (the winsorised variance,
 /// 0.806/0.9², over 0.6231²·2).
 const EFFICIENCY: f64 = 1.0 / 1.282;
 /// Blocks on either side that a block is compared with, beyond the one next to it, and how many of them there must be.
-const NEIGHBOURS: usize = 12;
+pub(super) const NEIGHBOURS: usize = 12;
 const FEWEST_NEIGHBOURS: usize = 6;
 /// Variance of the median of normal numbers over that of their mean: π/2.
 const MEDIAN_LOSS: f64 = std::f64::consts::FRAC_PI_2;
@@ -87,15 +90,24 @@ impl SquaredDifferences {
         at(differences.start)..at(differences.end + 1)
     }
 
-    /// Mean of the squares of some differences without the largest; `None` where half of them are missing.
+    /// Mean of the squares of some differences without the largest tenth; `None` where half of them are missing.
     pub(super) fn trimmed_level(&self, differences: Range<usize>) -> Option<f64> {
+        self.level_without(TRIMMED, differences)
+    }
+
+    /// The same without the larger half.
+    pub(super) fn half_level(&self, differences: Range<usize>) -> Option<f64> {
+        self.level_without(0.5, differences)
+    }
+
+    fn level_without(&self, left_out: f64, differences: Range<usize>) -> Option<f64> {
         let all = differences.len();
         let mut present: Vec<f64> =
             self.squares.get(differences)?.iter().copied().filter(|square| square.is_finite()).collect();
         if present.is_empty() || 2 * present.len() < all {
             return None;
         }
-        let kept = (present.len() as f64 * (1.0 - TRIMMED)).ceil() as usize;
+        let kept = (present.len() as f64 * (1.0 - left_out)).ceil() as usize;
         if kept < present.len() {
             present.select_nth_unstable_by(kept, f64::total_cmp);
         }
@@ -155,28 +167,41 @@ pub(super) fn doublings(differences: &SquaredDifferences, period_s: f64) -> impl
     (0..24).take_while(is_examined)
 }
 
-/// The level that the neighbours of a block show, with its degrees of freedom.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct NeighbouringLevel {
-    /// Expected level of the block.
-    pub(super) level: f64,
-    /// In units of the degrees of freedom of one block.
-    pub(super) blocks: f64,
+/// The level that the neighbours of a block show.
+///
+/// It is the larger of the medians of the blocks on either side, with at most [`NEIGHBOURS`] each. At an end of the record,
+/// where one side has too few blocks, it is that of the other side.
+pub(super) fn neighbouring_level(levels: &[Option<f64>], at: usize, freedom: f64) -> Option<f64> {
+    let level = side_levels(levels, at).into_iter().flatten().max_by(f64::total_cmp)?;
+    // Median of χ²/ν by Wilson and Hilferty.
+    Some(level / (1.0 - 2.0 / (9.0 * freedom)).max(0.3).powi(3))
 }
 
-/// The larger of the medians of the blocks on either side, with at most [`NEIGHBOURS`] each. At an end of the record, where
-/// one side has too few blocks, that of the other side.
-pub(super) fn neighbouring_level(levels: &[Option<f64>], at: usize, freedom: f64) -> Option<NeighbouringLevel> {
+/// Medians of the blocks before and after a block, without the next one on either side.
+fn side_levels(levels: &[Option<f64>], at: usize) -> [Option<f64>; 2] {
     let after = levels[(at + 2).min(levels.len())..].iter().flatten().take(NEIGHBOURS);
     let before = levels[..at.saturating_sub(1)].iter().rev().flatten().take(NEIGHBOURS);
-    let side = |levels: Vec<f64>| {
-        let count = levels.len();
-        (count >= FEWEST_NEIGHBOURS).then(|| (median(levels), count as f64 / MEDIAN_LOSS))
+    let side = |levels: Vec<f64>| (levels.len() >= FEWEST_NEIGHBOURS).then(|| median(levels));
+    [side(before.copied().collect()), side(after.copied().collect())]
+}
+
+/// Degrees of freedom of the level of the neighbours, for blocks of `freedom` each: those of the median of as many
+/// independent blocks, and no more than the medians of both sides of the blocks differ from each other.
+pub(super) fn neighbours_freedom(levels: &[Option<f64>], freedom: f64) -> f64 {
+    let independent = freedom * NEIGHBOURS as f64 / MEDIAN_LOSS;
+    let change = |at: usize| match side_levels(levels, at) {
+        [Some(before), Some(after)] => Some((after / before).ln()).filter(|change| change.is_finite()),
+        _ => None,
     };
-    let sides = [side(before.copied().collect()), side(after.copied().collect())];
-    let (level, blocks) = sides.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // Median of χ²/ν by Wilson and Hilferty.
-    Some(NeighbouringLevel { level: level / (1.0 - 2.0 / (9.0 * freedom)).max(0.3).powi(3), blocks })
+    let mut changes: Vec<f64> = (0..levels.len()).filter_map(change).collect();
+    if changes.len() < FEWEST_FOR_SCATTER {
+        return independent;
+    }
+    changes.sort_by(f64::total_cmp);
+    let quantile = |part: f64| changes[((changes.len() - 1) as f64 * part).round() as usize];
+    let deviation = (quantile(0.9) - quantile(0.1)) / (2.0 * NORMAL_90);
+    // The logarithm of a mean square of ν degrees of freedom has the variance 2/ν, and there are two sides.
+    independent.min(4.0 / (deviation * deviation))
 }
 
 /// Degrees of freedom of blocks by the scatter of their levels: by the distance of the 90 % quantile from the median of the
