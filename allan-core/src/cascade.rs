@@ -2,7 +2,9 @@
 
 mod block;
 pub(crate) mod checkpoint;
+mod gap;
 
+use crate::interpolation::Interpolation;
 use crate::moments::{Moments, ROUNDED};
 use core::mem::replace;
 
@@ -13,6 +15,16 @@ use core::mem::replace;
 /// `2n` samples ago, of which a second difference with `n = OVERLAP·2^j` consists, are therefore available every `2^j`
 /// samples: an `OVERLAP`-fold overlap for `OVERLAP` words a level. The first line also serves `n < OVERLAP`, fully
 /// overlapping. A sample costs `log2(OVERLAP) + 2` differences on average, independent of the length of the record.
+///
+/// # Gaps
+/// Time goes on through a gap of `m` samples. They are replaced by the mean of the `2m` samples around the gap, of which
+/// the last one follows it and the others, as far as they go back to the gap before, precede it. Octaves with
+/// `n ≥ 8m` (`n ≥ 16m` with an `OVERLAP` of 16) keep their differences over the gap; shorter ones leave out those that it
+/// touches. A gap that is too long for the longest octave is cut out: no difference contains it.
+///
+/// Replacing samples adds variance. How much is measured on the samples before each gap, by replacing as many of them as
+/// were lost and comparing the result with what was there; [`curve`](Self::curve) subtracts it. A gap costs a bounded
+/// number of operations, whatever its length.
 ///
 /// # Range
 /// Running sums wrap modulo 2⁶⁴, but their second differences do not: `|d| ≤ n·2³²` stays below `2⁶³` for `n ≤ 2³⁰`.
@@ -25,17 +37,26 @@ use core::mem::replace;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[repr(C)] // the fields that every sample touches come first, within reach of one base register
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
-    /// Samples since the start or the last gap.
+    /// Sample periods since the start, those of missing samples included.
     elapsed: u64,
-    /// Running sum of these samples, modulo 2⁶⁴.
+    /// From this time on no octave below [`ROUNDED`] has to leave out differences. `u64::MAX` before the first sample after
+    /// a gap.
+    settled: u64,
+    /// Running sum of the samples since the start, or since the last gap that was cut out, modulo 2⁶⁴.
     sum: i64,
     /// The last `OVERLAP` running sums. The sum up to sample `k` is in slot `k mod OVERLAP`; the lines below use the
     /// same rule with the step of their level.
     recent: [i64; OVERLAP],
     octaves: [Octave<OVERLAP>; OCTAVES],
-    /// Samples before the last gap.
+    /// End of the last gap.
+    resumed: u64,
+    /// Missing samples among the elapsed ones.
+    absent: u64,
+    /// Samples reported missing since the last sample.
+    pending: u64,
+    /// Samples before the start: those of merged and restored stretches.
     ended: u64,
-    /// Samples reported missing.
+    /// Samples missing before the start.
     missing: u64,
 }
 
@@ -48,12 +69,23 @@ struct Octave<const OVERLAP: usize> {
     oldest: i64,
     /// The `OVERLAP` sums, at the level's own stride, before those that the line above holds.
     line: [i64; OVERLAP],
-    /// Number of differences in the stretches before the last gap.
+    /// End of the last gap that this octave does not bridge.
+    resumed: u64,
+    /// Number of differences before that gap.
     differences: u64,
+    /// The gaps that this octave bridges and the one before does not.
+    interpolation: Interpolation,
 }
 
 impl<const OVERLAP: usize> Octave<OVERLAP> {
-    const NEW: Self = Self { moments: Moments::ZERO, oldest: 0, line: [0; OVERLAP], differences: 0 };
+    const NEW: Self = Self {
+        moments: Moments::ZERO,
+        oldest: 0,
+        line: [0; OVERLAP],
+        resumed: 0,
+        differences: 0,
+        interpolation: Interpolation::NONE,
+    };
 
     /// Puts the sum of `step` into the line and returns the one of `OVERLAP` strides before.
     #[inline]
@@ -95,7 +127,18 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             assert!(OVERLAP.is_power_of_two() && OVERLAP <= 16, "OVERLAP must be 1, 2, 4, 8 or 16");
             assert!(OCTAVES > Self::FINE && OCTAVES <= 31, "OCTAVES must be in log2(OVERLAP)+1 ..= 31");
         }
-        Self { elapsed: 0, sum: 0, recent: [0; OVERLAP], octaves: [Octave::NEW; OCTAVES], ended: 0, missing: 0 }
+        Self {
+            elapsed: 0,
+            settled: Self::WARM - 1,
+            sum: 0,
+            recent: [0; OVERLAP],
+            octaves: [Octave::NEW; OCTAVES],
+            resumed: 0,
+            absent: 0,
+            pending: 0,
+            ended: 0,
+            missing: 0,
+        }
     }
 
     /// Size of an estimator in bytes.
@@ -106,17 +149,22 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Adds the next sample, in counts.
     ///
-    /// The first 2048 samples after a gap take more time, as they test which octaves are complete.
+    /// The first 2048 samples, and those after a gap until the shortest octaves have left it behind, take more time.
     #[inline]
     pub fn push(&mut self, sample: i32) {
+        if self.elapsed < self.settled {
+            return self.push_unsettled(sample);
+        }
         let previous = self.sum;
         self.elapsed += 1;
         self.sum = previous.wrapping_add(i64::from(sample));
-        if self.elapsed < Self::WARM {
-            return self.push_early(previous);
-        }
-        self.add_fine(Self::FINE, previous);
         let newest = self.sum;
+        let mut middle = previous;
+        for (k, octave) in self.octaves[..Self::FINE].iter_mut().enumerate() {
+            let oldest = self.recent[Self::slot(self.elapsed.wrapping_sub(2 << k))];
+            octave.moments.add_unrounded(second_difference(newest, middle, oldest));
+            middle = oldest;
+        }
         let mut step = self.elapsed as u32;
         let mut middle = replace(&mut self.recent[Self::slot(self.elapsed)], newest);
         for octave in &mut self.octaves[Self::FINE..Self::FINE + Self::SHORT] {
@@ -130,23 +178,24 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(Self::SHORT, middle);
     }
 
-    /// [`push`](Self::push) while some levels have no differences yet.
+    /// [`push`](Self::push) where a gap lies before the sample or an octave must leave out differences.
     #[inline(never)]
-    fn push_early(&mut self, previous: i64) {
-        self.add_fine((self.elapsed.ilog2() as usize).min(Self::FINE), previous);
-        let middle = replace(&mut self.recent[Self::slot(self.elapsed)], self.sum);
-        self.advance(0, middle);
-    }
-
-    /// Adds the differences of the first `octaves` octaves, at `n < OVERLAP`.
-    #[inline(always)]
-    fn add_fine(&mut self, octaves: usize, previous: i64) {
-        let mut middle = previous;
-        for (k, octave) in self.octaves[..Self::FINE].iter_mut().enumerate().take(octaves) {
+    fn push_unsettled(&mut self, sample: i32) {
+        if self.pending > 0 {
+            self.close_gap(sample);
+        }
+        let mut middle = self.sum;
+        self.elapsed += 1;
+        self.sum = middle.wrapping_add(i64::from(sample));
+        for (k, octave) in self.octaves[..Self::FINE].iter_mut().enumerate() {
             let oldest = self.recent[Self::slot(self.elapsed.wrapping_sub(2 << k))];
-            octave.moments.add_unrounded(second_difference(self.sum, middle, oldest));
+            if self.elapsed - octave.resumed >= 2 << k {
+                octave.moments.add_unrounded(second_difference(self.sum, middle, oldest));
+            }
             middle = oldest;
         }
+        let middle = replace(&mut self.recent[Self::slot(self.elapsed)], self.sum);
+        self.advance(0, middle);
     }
 
     /// Passes `middle`, the sum that left the line above `level`, down all lines of which the newest sample ends a stride.
@@ -154,47 +203,30 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     fn advance(&mut self, level: usize, mut middle: i64) {
         let due = (self.elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
         for level in level..due {
-            let step = self.elapsed >> level;
             let octave = &mut self.octaves[level + Self::FINE];
-            let oldest = octave.exchange(step, middle);
-            if step >= 2 * OVERLAP as u64 {
+            let oldest = octave.exchange(self.elapsed >> level, middle);
+            if self.elapsed - octave.resumed >= 2 << (level + Self::FINE) {
                 octave.moments.add(level + Self::FINE, second_difference(self.sum, middle, oldest));
             }
             middle = oldest;
         }
     }
 
-    /// Records that `missing` samples were lost before the next one: no difference will include samples from both sides.
-    ///
-    /// The sums are kept. A gap of 0 samples has no effect.
-    pub fn gap(&mut self, missing: u32) {
-        if missing > 0 {
-            self.missing = self.missing.saturating_add(u64::from(missing));
-            for k in 0..OCTAVES {
-                let differences = self.count(k);
-                self.octaves[k] = Octave { moments: self.octaves[k].moments, differences, ..Octave::NEW };
-            }
-            self.ended = self.len();
-            self.elapsed = 0;
-            self.sum = 0;
-            self.recent = [0; OVERLAP];
-        }
-    }
-
     /// Adds the sums of another estimator, which has seen a later stretch of the same channel; further samples continue
     /// that stretch.
     ///
-    /// The result is that of one estimator with a gap of no missing samples between the two stretches.
+    /// No difference contains samples of both stretches.
     pub fn merge(&mut self, later: &Self) {
         for k in 0..OCTAVES {
             let differences = self.count(k).saturating_add(later.octaves[k].differences);
-            let mut moments = self.octaves[k].moments;
+            let Octave { mut moments, mut interpolation, .. } = self.octaves[k];
             moments.merge(&later.octaves[k].moments);
-            self.octaves[k] = Octave { moments, differences, ..later.octaves[k] };
+            interpolation.merge(&later.octaves[k].interpolation);
+            self.octaves[k] = Octave { moments, interpolation, differences, ..later.octaves[k] };
         }
         *self = Self {
             ended: self.len().saturating_add(later.ended),
-            missing: self.missing.saturating_add(later.missing),
+            missing: self.missing().saturating_add(later.missing),
             octaves: self.octaves,
             ..*later
         };
@@ -205,13 +237,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         // In place: a new estimator would be built on the stack first.
         self.recent.fill(0);
         self.octaves.fill(Octave::NEW);
-        (self.elapsed, self.sum, self.ended, self.missing) = (0, 0, 0, 0);
+        (self.elapsed, self.settled, self.sum) = (0, Self::WARM - 1, 0);
+        (self.resumed, self.absent, self.pending) = (0, 0, 0);
+        (self.ended, self.missing) = (0, 0);
     }
 
     /// Samples taken.
     #[must_use]
     pub const fn len(&self) -> u64 {
-        self.ended.saturating_add(self.elapsed)
+        self.ended.saturating_add(self.elapsed - self.absent)
     }
 
     /// Whether no sample was taken.
@@ -223,7 +257,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Samples reported missing through [`gap`](Self::gap).
     #[must_use]
     pub const fn missing(&self) -> u64 {
-        self.missing
+        self.missing.saturating_add(self.absent).saturating_add(self.pending)
     }
 
     /// Whether a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
@@ -245,14 +279,31 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.octaves[octave].differences.saturating_add(self.open_differences(octave))
     }
 
-    /// Differences since the last gap.
+    /// Differences since the last gap that the octave does not bridge: one at each multiple of its stride from `2n` samples
+    /// after the end of the gap on.
     fn open_differences(&self, octave: usize) -> u64 {
         let level = octave.saturating_sub(Self::FINE);
-        let reach = 2 * (1 << (octave - level));
-        ((self.elapsed >> level) + 1).saturating_sub(reach)
+        let incomplete = (self.octaves[octave].resumed + (2 << octave) - 1) >> level;
+        (self.elapsed >> level).saturating_sub(incomplete)
     }
 
-    /// The second difference of sums of `2^octave` samples that the newest sample completed, if it completed one.
+    /// Number of octaves of which the newest sample ends a stride: those at which
+    /// [`newest_difference`](Self::newest_difference) may be `Some`.
+    #[inline]
+    #[must_use]
+    pub const fn octaves_due(&self) -> usize {
+        let levels = self.elapsed.trailing_zeros() as usize + 1;
+        if self.elapsed == 0 {
+            0
+        } else if levels < Self::LEVELS {
+            Self::FINE + levels
+        } else {
+            OCTAVES
+        }
+    }
+
+    /// The second difference of sums of `2^octave` samples that the newest sample completed, if it completed one and no
+    /// gap is in it that the octave does not bridge.
     ///
     /// [`Coupling`](crate::Coupling) multiplies these of two channels. `octave` must be below `OCTAVES`.
     #[inline]
@@ -260,14 +311,20 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     pub fn newest_difference(&self, octave: usize) -> Option<i64> {
         let level = octave.saturating_sub(Self::FINE);
         let n = 1 << (octave - level);
-        (self.has(level, 2 * n))
+        (self.ends_stride(level) && self.spans(octave, 2 << octave))
             .then(|| second_difference(self.sum, self.sum_before(level, n), self.sum_before(level, 2 * n)))
     }
 
-    /// Whether the newest sample ends a stride of `level` and the sum of `back` strides before it exists.
+    /// Whether the newest sample ends a stride of `level`.
     #[inline]
-    pub(crate) fn has(&self, level: usize, back: u64) -> bool {
-        self.elapsed.trailing_zeros() as usize >= level && self.elapsed >> level >= back && self.elapsed > 0
+    pub(crate) const fn ends_stride(&self, level: usize) -> bool {
+        self.elapsed.trailing_zeros() as usize >= level
+    }
+
+    /// Whether `samples` samples were taken since the last gap that `octave` does not bridge.
+    #[inline]
+    pub(crate) const fn spans(&self, octave: usize, samples: u64) -> bool {
+        self.elapsed - self.octaves[octave].resumed >= samples
     }
 
     /// The running sum of `back ≤ 2·OVERLAP` strides of `level` before the newest sample, which ends a stride.
@@ -285,9 +342,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Samples since the start or the last gap.
-    pub(crate) const fn elapsed(&self) -> u64 {
-        self.elapsed
+    /// Sample periods since the start, those of missing samples included, and the samples reported missing since.
+    pub(crate) const fn now(&self) -> (u64, u64) {
+        (self.elapsed, self.pending)
     }
 
     /// Where the sum of a step of a level is kept in its line.

@@ -40,9 +40,12 @@ pub struct Covariance {
 /// assert!((at_16.covariance / variance - 3.0).abs() < 1e-3);
 /// ```
 ///
-/// Every gap of one channel must be reported to both estimators, so that both leave out the same differences. Where they
-/// have seen different numbers of samples since their last gaps, nothing is added and
-/// [`out_of_step`](Self::out_of_step) counts the sample. Slices are not supported.
+/// Each channel has gaps of its own: products are taken after samples that both have, at the octaves at which neither leaves
+/// out its difference. Both estimators must have started together and go through the same time, missing samples included.
+/// Where they do not, nothing is added and [`out_of_step`](Self::out_of_step) counts the sample. Slices are not supported.
+///
+/// Where a sample is missing in both channels, both are interpolated, and noise that they share gains up to 1.5 times the
+/// share of the missing samples. This is not subtracted.
 ///
 /// # Range
 /// Exact for 2⁴⁰ samples within ±2²³. An octave whose sum overflows 128 bits has no covariance from then on.
@@ -67,15 +70,14 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
     /// each pair of samples.
     #[inline]
     pub fn observe<const OVERLAP: usize>(&mut self, a: &Cascade<OCTAVES, OVERLAP>, b: &Cascade<OCTAVES, OVERLAP>) {
-        if a.elapsed() != b.elapsed() {
+        if a.now() != b.now() {
             self.out_of_step += 1;
             return;
         }
-        for octave in 0..OCTAVES {
-            let (Some(a), Some(b)) = (a.newest_difference(octave), b.newest_difference(octave)) else {
-                return; // those of longer averaging times are not complete either
-            };
-            self.add(octave, i128::from(a) * i128::from(b), 1);
+        for octave in 0..a.octaves_due() {
+            if let (Some(a), Some(b)) = (a.newest_difference(octave), b.newest_difference(octave)) {
+                self.add(octave, i128::from(a) * i128::from(b), 1);
+            }
         }
     }
 
@@ -108,8 +110,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         points.collect()
     }
 
-    /// Number of samples that were left out because the two estimators had seen different numbers of samples since their
-    /// last gaps.
+    /// Number of samples that were left out because the two estimators were not at the same time: one has seen more sample
+    /// periods than the other, or has a gap before its next sample.
     #[must_use]
     pub const fn out_of_step(&self) -> u64 {
         self.out_of_step

@@ -1,6 +1,7 @@
 //! The measured Allan variance curve with its confidence and noise types.
 
 use crate::confidence::{ChiSquareApproximation, Difference};
+use crate::interpolation::{AddedVariance, LARGEST_SUBTRACTION, subtraction_factor};
 use crate::math::log2;
 use crate::moments::Moments;
 use crate::noise_type::{OctaveVariance, PowerLaw, VarianceFractions, classify};
@@ -13,8 +14,14 @@ pub struct AllanPoint {
     pub n: u64,
     /// Averaging time, s.
     pub tau: f64,
-    /// Allan variance, in the square of the unit of the samples.
+    /// Allan variance, in the square of the unit of the samples, without [`interpolation`](Self::interpolation).
     pub avar: f64,
+    /// Variance that was subtracted from the measured one because replacing missing samples had added it. At most nine
+    /// tenths of the measured variance.
+    pub interpolation: f64,
+    /// Share of the samples that was replaced because it was missing, 0 to 1. Where differences with missing samples are
+    /// left out it is 0.
+    pub replaced: f64,
     /// Squared differences that `avar` is the mean of.
     pub count: u64,
     /// Differences per averaging time: one is taken every `n/overlap` samples.
@@ -47,6 +54,8 @@ impl AllanPoint {
             n,
             tau: n as f64 * sample_period,
             avar: moments.squares.get() as f64 / (2.0 * count as f64 * n as f64 * n as f64),
+            interpolation: 0.0,
+            replaced: 0.0,
             count,
             overlap,
             edf: 0.0,
@@ -55,6 +64,19 @@ impl AllanPoint {
             kurtosis: moments.excess_kurtosis(octave, count),
             power_law,
         }
+    }
+
+    /// The point without the variance that replacing missing samples has added.
+    pub(crate) fn without(mut self, added: AddedVariance) -> Self {
+        self.interpolation = added.variance.min(LARGEST_SUBTRACTION * self.avar);
+        self.avar -= self.interpolation;
+        self.replaced = added.replaced;
+        self
+    }
+
+    /// Factor on the degrees of freedom of the measured variance.
+    pub(crate) fn subtraction_factor(&self) -> f64 {
+        subtraction_factor(self.avar, self.interpolation)
     }
 
     fn octave_variance(&self) -> OctaveVariance {
@@ -105,8 +127,9 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// Sets the degrees of freedom and bounds of each point for its variance fractions.
     fn set_confidence(&mut self, fractions: &mut dyn FnMut(&AllanPoint) -> VarianceFractions) {
         for point in &mut self.points {
-            let approximation =
+            let mut approximation =
                 ChiSquareApproximation::new(Difference::Second, point.n, point.count, point.overlap, fractions(point));
+            approximation.edf *= point.subtraction_factor();
             point.edf = approximation.edf;
             (point.low, point.high) = approximation.bounds(point.avar);
         }
@@ -142,6 +165,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         let square = lsb * lsb;
         for point in &mut self.points {
             point.avar *= square;
+            point.interpolation *= square;
             point.low *= square;
             point.high *= square;
         }
@@ -160,6 +184,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
             let ratio = avar(point) / point.avar;
             point.avar *= ratio;
+            point.interpolation *= ratio;
             point.low *= ratio;
             point.high *= ratio;
         }

@@ -2,9 +2,9 @@
 //! between octaves.
 
 use crate::cascade::{Cascade, second_difference};
+use crate::confidence::Difference;
 use crate::curve::{AllanPoint, Curve};
 use crate::moments::Moments;
-use crate::noise_type::PowerLaw;
 #[cfg(feature = "serde")]
 use crate::serialized::{StateWords, serde_by_words};
 use heapless::Vec;
@@ -54,8 +54,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
         for doubling in 0..OCTAVES.saturating_sub(3) {
             for (k, factor) in FACTORS.into_iter().enumerate() {
                 let (level, n) = place::<OVERLAP>(doubling, factor);
-                if !cascade.has(level, 2 * n) {
-                    return; // those of longer averaging times are not complete either
+                if !cascade.ends_stride(level) {
+                    return; // nor of longer averaging times
+                }
+                // A gap is bridged where the octave below bridges it.
+                if !cascade.spans(doubling + 2, (2 * factor) << doubling) {
+                    continue;
                 }
                 let [newest, middle, oldest] = [0, n, 2 * n].map(|back| cascade.sum_before(level, back));
                 self.moments[doubling][k].add(doubling + 2, second_difference(newest, middle, oldest));
@@ -97,18 +101,27 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
         for point in octaves.points() {
             let doubling = (point.n.ilog2() as usize).checked_sub(2);
             let between = doubling.into_iter().flat_map(|doubling| {
-                (0..FACTORS.len()).filter_map(move |k| self.point(doubling, k, point.power_law, sample_period))
+                (0..FACTORS.len()).filter_map(move |k| self.point(doubling, k, point, cascade, sample_period))
             });
             points.extend(core::iter::once(*point).chain(between));
         }
         Curve::from_classified(sample_period, cascade.len(), points)
     }
 
-    fn point(&self, doubling: usize, k: usize, power_law: PowerLaw, sample_period: f64) -> Option<AllanPoint> {
+    fn point(
+        &self,
+        doubling: usize,
+        k: usize,
+        octave: &AllanPoint,
+        cascade: &Cascade<OCTAVES, OVERLAP>,
+        sample_period: f64,
+    ) -> Option<AllanPoint> {
         let (moments, count) = (&self.moments[doubling][k], self.counts[doubling][k]);
         let n = FACTORS[k] << doubling;
         let overlap = place::<OVERLAP>(doubling, FACTORS[k]).1 as u32;
-        (count > 0).then(|| AllanPoint::new(n, sample_period, moments, doubling + 2, count, overlap, power_law))
+        let point = || AllanPoint::new(n, sample_period, moments, doubling + 2, count, overlap, octave.power_law);
+        let added = || cascade.bridged_gaps(octave.n).added_variance(Difference::Second, n, cascade.len());
+        (count > 0).then(|| point().without(added()))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::cascade::Cascade;
 use crate::confidence::{ChiSquareApproximation, Difference};
+use crate::interpolation::{LARGEST_SUBTRACTION, subtraction_factor};
 use crate::noise_type::{OctaveVariance, VarianceFractions, classify};
 #[cfg(feature = "serde")]
 use crate::serialized::{StateWords, serde_by_words, visit_wide};
@@ -14,8 +15,14 @@ pub struct HadamardPoint {
     pub n: u64,
     /// Averaging time, s.
     pub tau: f64,
-    /// Hadamard variance `⟨(ȳ₂ − 2ȳ₁ + ȳ₀)²⟩/6`, in the square of the unit of the samples.
+    /// Hadamard variance `⟨(ȳ₂ − 2ȳ₁ + ȳ₀)²⟩/6`, in the square of the unit of the samples, without
+    /// [`interpolation`](Self::interpolation).
     pub hvar: f64,
+    /// Variance that was subtracted from the measured one because replacing missing samples had added it. At most nine
+    /// tenths of the measured variance.
+    pub interpolation: f64,
+    /// Share of the samples that was replaced because it was missing, 0 to 1.
+    pub replaced: f64,
     /// Number of squared differences that `hvar` is the mean of.
     pub count: u64,
     /// Differences per averaging time: one is taken every `n/overlap` samples.
@@ -35,7 +42,9 @@ impl HadamardPoint {
     }
 
     fn set_confidence(&mut self, fractions: VarianceFractions) {
-        let approximation = ChiSquareApproximation::new(Difference::Third, self.n, self.count, self.overlap, fractions);
+        let mut approximation =
+            ChiSquareApproximation::new(Difference::Third, self.n, self.count, self.overlap, fractions);
+        approximation.edf *= subtraction_factor(self.hvar, self.interpolation);
         self.edf = approximation.edf;
         (self.low, self.high) = approximation.bounds(self.hvar);
     }
@@ -54,7 +63,7 @@ impl HadamardPoint {
 ///     cascade.push(k % 2 + 5 * k); // an alternation on a steep drift
 ///     hadamard.observe(&cascade); // after every sample
 /// }
-/// let drift_free = hadamard.points(1.0);
+/// let drift_free = hadamard.points(&cascade, 1.0);
 /// assert_eq!(drift_free[0].hvar, 4.0 / 6.0);
 /// assert_eq!(drift_free[10].hvar, 0.0);
 /// ```
@@ -87,8 +96,11 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
     pub fn observe(&mut self, cascade: &Cascade<OCTAVES, OVERLAP>) {
         for octave in 0..OCTAVES - 1 {
             let (level, n) = place::<OVERLAP>(octave);
-            if !cascade.has(level, 3 * n) {
-                return; // those of longer averaging times are not complete either
+            if !cascade.ends_stride(level) {
+                return; // nor of longer averaging times
+            }
+            if !cascade.spans(octave, 3 << octave) {
+                continue;
             }
             let sum = |back| cascade.sum_before(level, back);
             let steps = [sum(0), sum(n), sum(2 * n), sum(3 * n)];
@@ -115,10 +127,10 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
 
     /// The Hadamard variance, in counts², of every octave that has at least one difference, shortest first.
     ///
-    /// `sample_period` in seconds. The confidence is that of the power law that the local slope suggests.
+    /// `cascade` must be the observed one, `sample_period` is in seconds. The confidence is that of the power law that the local slope suggests.
     #[must_use]
-    pub fn points(&self, sample_period: f64) -> Vec<HadamardPoint, OCTAVES> {
-        let mut points = self.points_with(sample_period, |_| VarianceFractions::WHITE);
+    pub fn points(&self, cascade: &Cascade<OCTAVES, OVERLAP>, sample_period: f64) -> Vec<HadamardPoint, OCTAVES> {
+        let mut points = self.points_with(cascade, sample_period, |_| VarianceFractions::WHITE);
         let octaves: Vec<OctaveVariance, OCTAVES> = points.iter().map(HadamardPoint::octave_variance).collect();
         for (at, point) in points.iter_mut().enumerate() {
             point.set_confidence(classify(&octaves, at).variance_fractions());
@@ -131,6 +143,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
     #[must_use]
     pub fn points_with(
         &self,
+        cascade: &Cascade<OCTAVES, OVERLAP>,
         sample_period: f64,
         fractions: impl Fn(u64) -> VarianceFractions,
     ) -> Vec<HadamardPoint, OCTAVES> {
@@ -140,10 +153,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
                 return None;
             }
             let n = 1_u64 << octave;
+            let measured = square as f64 / (6.0 * count as f64 * n as f64 * n as f64);
+            let added = cascade.bridged_gaps(n).added_variance(Difference::Third, n, cascade.len());
+            let interpolation = added.variance.min(LARGEST_SUBTRACTION * measured);
             let mut point = HadamardPoint {
                 n,
                 tau: n as f64 * sample_period,
-                hvar: square as f64 / (6.0 * count as f64 * n as f64 * n as f64),
+                hvar: measured - interpolation,
+                interpolation,
+                replaced: added.replaced,
                 count,
                 overlap: place::<OVERLAP>(octave).1 as u32,
                 edf: 0.0,

@@ -227,7 +227,8 @@ pub(crate) fn degrees_of_freedom(
     let pairs = noise.iter().zip(&deterministic).map(|(noise, fixed)| f64::from(noise * (noise + 2.0 * fixed)));
     let weight = |lag: usize| if lag == 0 { 1.0 } else { 2.0 * (1.0 - lag as f64 / count) };
     let near: f64 = pairs.enumerate().map(|(lag, pair)| if pair == 0.0 { 0.0 } else { weight(lag) * pair }).sum();
-    let edf = |pairs: f64| clamp(count / pairs, 1.0_f64.min(count), 1e18);
+    let factor = point.subtraction_factor();
+    let edf = |pairs: f64| clamp(factor * count / pairs, 1.0_f64.min(count), 1e18);
     (edf(near + far), edf(near))
 }
 

@@ -11,7 +11,7 @@ use serde::de::{self, SeqAccess, Visitor};
 use serde::ser::SerializeTuple;
 use serde::{Deserializer, Serializer};
 
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// An estimator whose state is a fixed number of 64-bit words.

@@ -1,11 +1,7 @@
 //! The sums of the estimator: against their definition, published values, gaps, merging and restoring.
 
-use allan_core::confidence::edf;
-use allan_core::{Cascade, VarianceFractions};
+use allan_core::Cascade;
 use proptest::prelude::*;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 const OCTAVES: usize = 9;
 
@@ -18,24 +14,72 @@ fn sum_of_squares(stretch: &[i32], n: usize, stride: usize) -> (u128, u64) {
     })
 }
 
-fn assert_exact<const OVERLAP: usize>(stretches: &[Vec<i32>]) {
+/// A record with its gaps closed as the documentation of `Cascade` says, sample by sample.
+#[derive(Default)]
+struct Closed {
+    samples: Vec<i128>,
+    /// First and last missing sample of each gap, and the octave from which on it is bridged.
+    gaps: Vec<(usize, usize, usize)>,
+    /// Time of the end of the last gap.
+    resumed: usize,
+}
+
+impl Closed {
+    fn push(&mut self, stretch: &[i32]) {
+        self.samples.extend(stretch.iter().map(|&sample| i128::from(sample)));
+    }
+
+    /// A gap of `missing` samples before a stretch that begins with `next`.
+    fn gap(&mut self, missing: usize, next: i32, overlap: usize) {
+        let start = self.samples.len();
+        let before = (2 * missing - 1).min(start - self.resumed);
+        let around: i128 = self.samples[start - before..].iter().sum::<i128>() + i128::from(next);
+        let sum = (around * missing as i128).div_euclid(before as i128 + 1);
+        let each = sum.div_euclid(missing as i128);
+        let bridging = overlap.max(8).ilog2() + missing.next_power_of_two().ilog2();
+        let bridging = if before == 0 { OCTAVES } else { (bridging as usize).min(OCTAVES) };
+        self.samples.extend(std::iter::repeat_n(each, missing - 1));
+        self.samples.push(sum - each * (missing as i128 - 1));
+        self.gaps.push((start, start + missing - 1, bridging));
+        self.resumed = self.samples.len();
+    }
+
+    /// Sum and number of the squared second differences at an octave that touch no gap that it does not bridge.
+    fn sum_of_squares(&self, octave: usize, overlap: usize) -> (u128, u64) {
+        let n = 1 << octave;
+        let stride = (n / overlap).max(1);
+        let ends = (2 * n..=self.samples.len()).filter(|end| end % stride == 0);
+        let kept = ends.filter(|&end| {
+            self.gaps.iter().all(|&(first, last, bridging)| octave >= bridging || last < end - 2 * n || first >= end)
+        });
+        let block = |start: usize| self.samples[start..start + n].iter().sum::<i128>();
+        kept.map(|end| block(end - n) - block(end - 2 * n)).fold((0, 0), |(sum, count), difference| {
+            (sum + difference.unsigned_abs() * difference.unsigned_abs(), count + 1)
+        })
+    }
+}
+
+/// `stretches` with a gap of the given length before each. The lengths are below the reach of the first delay line, so that
+/// the mean before a gap is that of all samples that it is made of.
+fn assert_exact<const OVERLAP: usize>(stretches: &[(usize, Vec<i32>)]) {
     let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
-    for (k, stretch) in stretches.iter().enumerate() {
-        if k > 0 {
-            cascade.gap(7);
+    let mut closed = Closed::default();
+    let (mut taken, mut missing) = (0, 0);
+    for (gap, stretch) in stretches {
+        let gap = gap % (OVERLAP + 1);
+        cascade.gap(gap as u32);
+        if gap > 0 {
+            closed.gap(gap, stretch[0], OVERLAP);
         }
         cascade.push_slice(stretch);
+        closed.push(stretch);
+        (taken, missing) = (taken + stretch.len(), missing + gap);
     }
     for octave in 0..OCTAVES {
-        let n = 1 << octave;
-        let expected = stretches
-            .iter()
-            .map(|stretch| sum_of_squares(stretch, n, (n / OVERLAP).max(1)))
-            .fold((0, 0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
-        assert_eq!(cascade.sum_of_squares(octave), Some(expected), "P = {OVERLAP}, n = {n}");
+        let expected = closed.sum_of_squares(octave, OVERLAP);
+        assert_eq!(cascade.sum_of_squares(octave), Some(expected), "P = {OVERLAP}, n = 2^{octave}");
     }
-    assert_eq!(cascade.len(), stretches.iter().map(|stretch| stretch.len() as u64).sum::<u64>());
-    assert_eq!(cascade.missing(), 7 * (stretches.len() as u64 - 1));
+    assert_eq!((cascade.len(), cascade.missing()), (taken as u64, missing as u64));
 }
 
 proptest! {
@@ -43,7 +87,8 @@ proptest! {
 
     #[test]
     fn sums_of_24_bit_samples_with_gaps_are_exact(
-        stretches in prop::collection::vec(prop::collection::vec(-(1 << 23)..1_i32 << 23, 1..700), 1..4)
+        stretches in prop::collection::vec(
+            (0..17_usize, prop::collection::vec(-(1 << 23)..1_i32 << 23, 1..300)), 1..8)
     ) {
         assert_exact::<1>(&stretches);
         assert_exact::<2>(&stretches);
@@ -53,19 +98,47 @@ proptest! {
     }
 
     #[test]
-    fn merging_two_stretches_equals_a_gap_between_them(
+    fn sums_with_many_short_gaps_are_exact(
+        stretches in prop::collection::vec(
+            (0..3_usize, prop::collection::vec(-100..100_i32, 1..20)), 1..100)
+    ) {
+        assert_exact::<4>(&stretches);
+        assert_exact::<8>(&stretches);
+    }
+
+    #[test]
+    fn a_gap_too_long_for_every_octave_is_cut_out(
+        first in prop::collection::vec(any::<i32>(), 1..600),
+        second in prop::collection::vec(any::<i32>(), 1..600),
+    ) {
+        // 33 to 64 samples are bridged from n = 512 on, which an estimator with nine octaves does not have. The second
+        // stretch starts at a multiple of all strides.
+        let missing = first.len().next_multiple_of(32) + 64 - first.len();
+        let mut cascade = Cascade::<OCTAVES, 8>::new();
+        cascade.push_slice(&first);
+        cascade.gap(missing as u32);
+        cascade.push_slice(&second);
+        for octave in 0..OCTAVES {
+            let parts = [&first, &second].map(|part| sum_of_squares(part, 1 << octave, ((1 << octave) / 8).max(1)));
+            let expected = (parts[0].0 + parts[1].0, parts[0].1 + parts[1].1);
+            prop_assert_eq!(cascade.sum_of_squares(octave), Some(expected));
+        }
+    }
+
+    #[test]
+    fn merging_two_estimators_adds_their_sums(
         samples in prop::collection::vec(any::<i32>(), 2..600), seam in 0.0..1.0
     ) {
         let (first, second) = samples.split_at((samples.len() as f64 * seam) as usize);
-        let (mut merged, mut later, mut gapped) = (Cascade::<9, 8>::new(), Cascade::<9, 8>::new(), Cascade::<9, 8>::new());
+        let mut merged = Cascade::<9, 8>::new();
+        let mut later = Cascade::<9, 8>::new();
         merged.push_slice(first);
         later.push_slice(second);
         merged.merge(&later);
-        gapped.push_slice(first);
-        gapped.gap(1);
-        gapped.push_slice(second);
         for octave in 0..9 {
-            prop_assert_eq!(merged.sum_of_squares(octave), gapped.sum_of_squares(octave));
+            let parts = [first, second].map(|part| sum_of_squares(part, 1 << octave, ((1 << octave) / 8).max(1)));
+            let expected = (parts[0].0 + parts[1].0, parts[0].1 + parts[1].1);
+            prop_assert_eq!(merged.sum_of_squares(octave), Some(expected));
         }
         prop_assert_eq!(merged.len(), samples.len() as u64);
     }
@@ -89,16 +162,16 @@ fn the_curve_of_no_samples_is_empty() {
 }
 
 #[test]
-fn an_estimator_with_24_octaves_takes_less_than_2_4_kb_at_overlap_4_and_4_kb_at_overlap_8() {
+fn an_estimator_with_24_octaves_takes_at_most_2_9_kb_at_overlap_4_and_3_7_kb_at_overlap_8() {
     let bytes = [Cascade::<24, 4>::memory(), Cascade::<24, 8>::memory(), Cascade::<24, 16>::memory()];
     println!("24 octaves at P = 4, 8, 16: {bytes:?} bytes");
-    assert!(bytes[0] <= 2_400 && bytes[1] <= 4_000, "{bytes:?}");
+    assert!(bytes[0] <= 2_900 && bytes[1] <= 3_700, "{bytes:?}");
 }
 
 proptest! {
     #[test]
     fn slices_and_single_samples_give_the_same_state(
-        slices in prop::collection::vec((prop::collection::vec(any::<i32>(), 0..2_500), 0..3_u32, 0..32_u32), 1..6)
+        slices in prop::collection::vec((prop::collection::vec(any::<i32>(), 0..2_500), 0..700_u32, 0..32_u32), 1..6)
     ) {
         let (mut sliced, mut single) = (Cascade::<13, 8>::new(), Cascade::<13, 8>::new());
         for (slice, missing, shift) in &slices {
@@ -120,19 +193,21 @@ fn sample(k: i64) -> i32 {
 }
 
 #[test]
-fn a_restored_estimator_equals_one_with_a_gap_at_the_restart() {
+fn a_restored_estimator_equals_one_that_is_merged_with_the_later_samples() {
     for split in [0, 1, 2, 7, 16, 100, 4_095, 4_096, 5_000] {
-        let mut unbroken = Estimator::new();
-        let mut before = Estimator::new();
-        (0..split).for_each(|k| unbroken.push(sample(k)));
-        (0..split).for_each(|k| before.push(sample(k)));
-        let mut after = Estimator::new();
-        after.restore(before.len(), before.missing(), |octave| before.octave_sums(octave).unwrap());
-        unbroken.gap(3);
-        after.gap(3);
-        (split..9_000).for_each(|k| unbroken.push(sample(k)));
-        (split..9_000).for_each(|k| after.push(sample(k)));
-        assert_eq!(after, unbroken, "{split}");
+        let (mut before, mut later) = (Estimator::new(), Estimator::new());
+        for k in 0..split {
+            before.push(sample(k));
+            before.gap(u32::from(k % 100 == 50));
+        }
+        let mut restored = Estimator::new();
+        restored.restore(before.len(), before.missing(), |octave| before.octave_sums(octave).unwrap());
+        for k in split..9_000 {
+            restored.push(sample(k));
+            later.push(sample(k));
+        }
+        before.merge(&later);
+        assert_eq!(restored, before, "{split}");
     }
     assert_eq!(Estimator::new().octave_sums(12), None);
 }
@@ -210,46 +285,4 @@ fn nbs14_deviations_with_partial_overlap() {
         &[(32, 469), (64, 219), (128, 94)],
         5e-11,
     );
-}
-
-#[test]
-fn losing_two_percent_of_the_samples_does_not_bias_the_variance() {
-    const OVERLAP: u64 = 8;
-    const SAMPLES: u64 = 1 << 20;
-    const LOST: f64 = 0.02;
-    const DEVIATION: f64 = 1_000.0;
-    let mut rng = ChaCha8Rng::seed_from_u64(4);
-    let mut cascade = Cascade::<8, { OVERLAP as usize }>::new();
-    let mut lost = 0;
-    for _ in 0..SAMPLES {
-        let normal: f64 = StandardNormal.sample(&mut rng);
-        if rng.random_bool(LOST) {
-            cascade.gap(1);
-            lost += 1;
-        } else {
-            cascade.push((7e6 + DEVIATION * normal).round() as i32);
-        }
-    }
-    assert_eq!((cascade.missing(), cascade.len()), (lost, SAMPLES - lost));
-    for point in cascade.curve(1.0).points() {
-        let kept = f64::powf(1.0 - LOST, 2.0 * point.n as f64);
-        let stride = (point.n / OVERLAP).max(1) as f64;
-        // A stretch of L samples has differences that end at 2n, 2n + stride … L; L is geometrically distributed.
-        let expected = SAMPLES as f64 * LOST * kept / (1.0 - f64::powf(1.0 - LOST, stride));
-        // Number of stretches that reach 2n, each with an exponentially distributed number of differences: the variance is
-        // twice their number.
-        let tolerance = 4.0 * (2.0 / (SAMPLES as f64 * LOST * kept)).sqrt();
-        assert!(
-            (point.count as f64 / expected - 1.0).abs() < tolerance,
-            "n = {}: {} of {expected}",
-            point.n,
-            point.count
-        );
-
-        // Four standard deviations. Differences in different stretches are independent, so the true deviation is smaller.
-        let edf = edf(point.n, point.count, point.overlap, VarianceFractions::WHITE);
-        let ratio = point.avar * point.n as f64 / (DEVIATION * DEVIATION);
-        assert!((ratio - 1.0).abs() < 4.0 * (2.0 / edf).sqrt(), "n = {}: {ratio}", point.n);
-    }
-    assert_eq!(cascade.curve(1.0).points().len(), 8);
 }

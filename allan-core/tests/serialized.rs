@@ -94,8 +94,10 @@ proptest! {
     fn merging_two_stretches_equals_a_gap_between_them(samples in samples(300)) {
         for split in 0..=samples.len() {
             let mut gapped = Estimators::from_samples(&samples[..split]);
-            gapped.a.gap(1);
-            gapped.b.gap(1);
+            // Too long for every octave to bridge, and up to a multiple of all strides.
+            let missing = split.next_multiple_of(1 << OCTAVES) - split + (1 << OCTAVES);
+            gapped.a.gap(missing as u32);
+            gapped.b.gap(missing as u32);
             gapped.extend(&samples[split..]);
             let merged = Estimators::from_samples(&samples[..split]).merged(&Estimators::from_samples(&samples[split..]));
             for octave in 0..OCTAVES {
@@ -144,7 +146,7 @@ fn refusal<T: DeserializeOwned>(state: &impl Serialize) -> String {
 fn the_error_states_the_type_and_size_of_another_state() {
     let cascade = Cascade::<7, 8>::new();
     let error = refusal::<Cascade<7, 4>>(&cascade);
-    assert!(error.starts_with("version 1, type 65, 7 octaves, 8-fold overlap where there should be"), "{error}");
+    assert!(error.starts_with("version 2, type 65, 7 octaves, 8-fold overlap where there should be"), "{error}");
     assert!(error.contains("7 octaves, 4-fold overlap"), "{error}");
     assert!(refusal::<Hadamard<7, 8>>(&cascade).contains("type 65"));
 }
@@ -164,19 +166,25 @@ fn forged(words: &[u64], at: usize, word: u64) -> Vec<u64> {
 fn a_state_that_no_samples_lead_to_is_refused_with_the_reason() {
     let cascade = Estimators::from_samples(&[(5, 0), (-3, 0), (9, 0)]).a;
     let words: Vec<u64> = serde_json::from_str(&serde_json::to_string(&cascade).unwrap()).unwrap();
-    assert!(serde_json::from_value::<Cascade<OCTAVES, 8>>(forged(&words, 2, 7).into()).is_ok(), "7 were missing");
+    assert!(serde_json::from_value::<Cascade<OCTAVES, 8>>(forged(&words, 5, 7).into()).is_ok(), "7 were missing");
     let reason = |at: usize, word: u64| {
         let found = serde_json::from_value::<Cascade<OCTAVES, 8>>(forged(&words, at, word).into());
         found.expect_err("no samples lead to this").to_string()
     };
-    // Header, samples before the last gap, missing, elapsed, sum, 8 recent sums, checksum, and for each octave 4 words
-    // of moments, the oldest sum, 8 in the line and the count.
-    assert_eq!(words.len(), 5 + 8 + OCTAVES * 14 + 1);
-    let octave = |k: usize| 5 + 8 + 14 * k;
-    assert!(reason(1, u64::MAX).contains("more samples than can be counted"));
-    assert!(reason(4, 1).contains("the newest running sum is not the running sum"));
+    // Header, three times (now, settled, end of the last gap), four numbers of samples (before the start, missing, absent,
+    // pending), sum, 8 recent sums, checksum, and for each octave 4 words of moments, the oldest sum, 8 in the line, the end
+    // of the last gap, the count before it and 3 words on bridged gaps.
+    assert_eq!(words.len(), 9 + 8 + OCTAVES * 18 + 1);
+    let octave = |k: usize| 9 + 8 + 18 * k;
+    assert!(reason(4, u64::MAX).contains("more samples than can be counted"));
+    assert!(reason(3, 4).contains("a gap after the newest sample"));
+    assert!(reason(6, 1).contains("a gap after the newest sample"));
+    assert!(reason(2, 5).contains("octaves that leave out other differences than the gaps say"));
+    assert!(reason(7, 1).contains("octaves that leave out other differences than the gaps say"));
+    assert!(reason(8, 1).contains("the newest running sum is not the running sum"));
     assert!(reason(octave(4) + 5 + 3, 1).contains("running sums from before the first sample"));
-    assert!(reason(octave(0) + 13, 4).contains("more differences than samples"));
+    assert!(reason(octave(0) + 13, 2).contains("a gap after the newest sample"));
+    assert!(reason(octave(0) + 14, 4).contains("more differences than samples"));
     assert!(reason(octave(5), 1).contains("a sum over no differences that is not 0"));
     let short = serde_json::from_value::<Cascade<OCTAVES, 8>>(words[..20].into()).unwrap_err().to_string();
     assert!(short.contains("invalid length"), "{short}");

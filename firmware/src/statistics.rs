@@ -148,7 +148,7 @@ impl ChannelSums {
 
     fn octave(&self, octave: usize) -> OctaveSums {
         let (squares, count) = self.octaves[octave];
-        OctaveSums { squares, fourths: 0, count }
+        OctaveSums { squares, count, ..OctaveSums::default() }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The arguments of the command line.
 
 use adis16405_driver::GyroRange;
+use benchmarks::losses::LossPlan;
 use benchmarks::undeclared::{self, EffectKind, UndeclaredPlan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recordings::serial;
@@ -81,6 +82,42 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 1)]
         first_seed: u64,
     },
+    /// Take samples out of simulated records and compare variance and coefficients with those of the complete records.
+    Losses(LossArguments),
+}
+
+/// The benchmark of lost samples.
+#[derive(Debug, Args)]
+pub(crate) struct LossArguments {
+    /// Records of each noise.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
+    records: u64,
+    /// Binary logarithm of the number of samples of a record, at 204.8 SPS; 20 is 1.4 hours.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(14..=24))]
+    samples_log2: u32,
+    /// Seed of the first record.
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// Threads [default: as many as the machine has cores].
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+}
+
+impl LossArguments {
+    /// The benchmark that the arguments describe.
+    pub(crate) fn plan(&self) -> LossPlan {
+        LossPlan {
+            records: self.records,
+            samples: 1 << self.samples_log2,
+            first_seed: self.first_seed,
+            jobs: self.jobs.map_or_else(cores, NonZeroUsize::get),
+        }
+    }
+}
+
+/// Cores of the machine, 1 where it does not say.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
 /// The detection benchmark.
@@ -115,7 +152,6 @@ pub(crate) struct UndeclaredArguments {
 impl UndeclaredArguments {
     /// The benchmark that the arguments describe.
     pub(crate) fn plan(&self) -> UndeclaredPlan {
-        let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         UndeclaredPlan {
             kinds: if self.kind.is_empty() { EffectKind::ALL.to_vec() } else { self.kind.clone() },
             per_kind: self.per_kind,

@@ -3,6 +3,7 @@
 mod analyze;
 mod cli;
 mod explain;
+mod losses;
 mod output;
 mod paper;
 mod record;
@@ -53,6 +54,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
         Some(Command::Explain(arguments)) => return explain::run(&arguments, &output),
         Some(Command::Undeclared(arguments)) => return undeclared::run(&arguments.plan(), &output),
         Some(Command::Paper { seeds, first_seed }) => return paper::run(seeds, first_seed, &output),
+        Some(Command::Losses(arguments)) => return losses::run(&arguments.plan(), &output),
         Some(Command::Monitor { port, baud, send, seconds }) => {
             return show_messages(&port, baud, &send, seconds).with_context(|| port.clone());
         }

@@ -5,6 +5,8 @@ use crate::moments::{rounded, unit_bits};
 
 /// Samples of one block.
 const BLOCK: usize = 1024;
+/// Slices with fewer samples are added sample by sample.
+const SHORTEST_BLOCK: usize = 64;
 /// Running sums before a block to which its differences reach back: two averaging times at the largest overlap.
 const HISTORY: usize = 2 * 16;
 
@@ -23,6 +25,13 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     pub fn push_slice(&mut self, samples: &[i32]) {
         if cfg!(target_pointer_width = "32") {
             return samples.iter().for_each(|&sample| self.push(sample));
+        }
+        // A block costs as much as some samples; the first sample after a gap closes it.
+        let single = if samples.len() < SHORTEST_BLOCK { samples.len() } else { usize::from(self.pending > 0) };
+        let (single, samples) = samples.split_at(single);
+        single.iter().for_each(|&sample| self.push(sample));
+        if samples.is_empty() {
+            return;
         }
         let mut narrow = Sums::<i32>::new();
         for block in samples.chunks(BLOCK) {
@@ -89,8 +98,10 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Adds the differences with an averaging time of `reach` steps that end in the block.
     fn accumulate_block<W: Word>(&mut self, octave: usize, reach: usize, sums: &Sums<W>) {
-        // The first difference ends at step 2·reach.
-        let first = (2 * reach as u64).saturating_sub(sums.past + 1);
+        // The first difference ends two averaging times after the gap.
+        let level = octave.saturating_sub(Self::FINE);
+        let complete = self.octaves[octave].resumed + (2 << octave);
+        let first = ((complete + (1 << level) - 1) >> level).saturating_sub(sums.past + 1);
         if first >= sums.new as u64 {
             return;
         }

@@ -1,8 +1,10 @@
 //! The sums of a cascade as plain data: restored into an estimator, turned into a curve, or serialised with the delay
 //! lines.
 
-use super::Cascade;
+use super::{Cascade, Octave};
+use crate::confidence::Difference;
 use crate::curve::{AllanPoint, Curve};
+use crate::interpolation::{BridgedGaps, Interpolation};
 use crate::moments::Moments;
 use crate::noise_type::PowerLaw;
 #[cfg(feature = "serde")]
@@ -17,26 +19,30 @@ pub struct OctaveSums {
     pub fourths: u128,
     /// Number of differences.
     pub count: u64,
+    /// The gaps that this octave bridges and the octave before does not.
+    pub interpolation: Interpolation,
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// The sums of an octave; `None` beyond the last.
     #[must_use]
     pub fn octave_sums(&self, octave: usize) -> Option<OctaveSums> {
-        let Moments { squares, fourths } = self.octaves.get(octave)?.moments;
-        Some(OctaveSums { squares: squares.get(), fourths: fourths.get(), count: self.count(octave) })
+        let Octave { moments, interpolation, .. } = *self.octaves.get(octave)?;
+        let (squares, fourths) = (moments.squares.get(), moments.fourths.get());
+        Some(OctaveSums { squares, fourths, count: self.count(octave), interpolation })
     }
 
-    /// Replaces the state by one with these sums of `samples` samples, of which `missing` more were missing.
+    /// Replaces the state by one with these sums of `samples` samples, beside which `missing` more were missing.
     ///
-    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave. The delay lines are empty, as after a gap.
+    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave. The delay lines are empty: no difference will
+    /// contain samples from before and after.
     pub fn restore(&mut self, samples: u64, missing: u64, sums: impl Fn(usize) -> OctaveSums) {
         self.reset();
         (self.ended, self.missing) = (samples, missing);
         for (index, octave) in self.octaves.iter_mut().enumerate() {
-            let OctaveSums { squares, fourths, count } = sums(index);
+            let OctaveSums { squares, fourths, count, interpolation } = sums(index);
             octave.moments = Moments { squares: squares.into(), fourths: fourths.into() };
-            octave.differences = count;
+            (octave.differences, octave.interpolation) = (count, interpolation);
         }
     }
 
@@ -61,13 +67,31 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         samples: u64,
         sums: impl Fn(usize) -> OctaveSums,
     ) {
-        let octaves = (0..OCTAVES).map(|octave| (octave, sums(octave))).filter(|(_, sums)| sums.count > 0);
-        let point = |(octave, OctaveSums { squares, fourths, count })| {
+        let mut gaps = BridgedGaps::new(0.0);
+        let points = (0..OCTAVES).filter_map(|octave| {
+            let OctaveSums { squares, fourths, count, interpolation } = sums(octave);
             let moments = Moments { squares: squares.into(), fourths: fourths.into() };
             let n = 1_u64 << octave;
-            AllanPoint::new(n, sample_period, &moments, octave, count, n.min(OVERLAP as u64) as u32, PowerLaw::White)
-        };
-        curve.fill(sample_period, samples, octaves.map(point));
+            if octave == 0 && count > 0 {
+                gaps = BridgedGaps::new(squares as f64 / (2.0 * count as f64));
+            }
+            gaps.add(&interpolation, n, 1 << Self::SHORTEST_BRIDGING);
+            let overlap = n.min(OVERLAP as u64) as u32;
+            let added = gaps.added_variance(Difference::Second, n, samples);
+            let point = AllanPoint::new(n, sample_period, &moments, octave, count, overlap, PowerLaw::White);
+            (count > 0).then(|| point.without(added))
+        });
+        curve.fill(sample_period, samples, points);
+    }
+
+    /// The gaps that an averaging factor of `n` samples bridges.
+    pub(crate) fn bridged_gaps(&self, n: u64) -> BridgedGaps {
+        let Moments { squares, .. } = self.octaves[0].moments;
+        let mut gaps = BridgedGaps::new(squares.get() as f64 / (2.0 * self.count(0).max(1) as f64));
+        for (k, octave) in self.octaves.iter().enumerate().take_while(|&(k, _)| 1 << k <= n) {
+            gaps.add(&octave.interpolation, 1 << k, 1 << Self::SHORTEST_BRIDGING);
+        }
+        gaps
     }
 }
 
@@ -80,12 +104,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
     const KIND: u8 = b'A';
     const OCTAVES: usize = OCTAVES;
     const OVERLAP: usize = OVERLAP;
-    const WORDS: usize = 4 + OVERLAP + OCTAVES * (4 + 1 + OVERLAP + 1);
+    const WORDS: usize = 8 + OVERLAP + OCTAVES * (4 + 1 + OVERLAP + 2 + 3);
 
     fn visit_words<E>(&mut self, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
-        visit(&mut self.ended)?;
-        visit(&mut self.missing)?;
-        visit(&mut self.elapsed)?;
+        let times = [&mut self.elapsed, &mut self.settled, &mut self.resumed];
+        let samples = [&mut self.ended, &mut self.missing, &mut self.absent, &mut self.pending];
+        times.into_iter().chain(samples).try_for_each(&mut visit)?;
         for sum in [&mut self.sum].into_iter().chain(&mut self.recent) {
             visit_signed(sum, &mut visit)?;
         }
@@ -95,15 +119,23 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
             for sum in [&mut octave.oldest].into_iter().chain(&mut octave.line) {
                 visit_signed(sum, &mut visit)?;
             }
+            visit(&mut octave.resumed)?;
             visit(&mut octave.differences)?;
+            octave.interpolation.visit_words(&mut visit)?;
         }
         Ok(())
     }
 
     fn inconsistency(&self) -> Option<&'static str> {
-        let Some(samples) = self.ended.checked_add(self.elapsed) else {
+        let Some(periods) = self.ended.checked_add(self.elapsed).filter(|&periods| periods < 1 << 63) else {
             return Some("more samples than can be counted");
         };
+        if self.absent > self.resumed || self.resumed > self.elapsed {
+            return Some("a gap after the newest sample");
+        }
+        if self.settled != self.settled_time() {
+            return Some("octaves that leave out other differences than the gaps say");
+        }
         if self.recent[Self::slot(self.elapsed)] != self.sum {
             return Some("the newest running sum is not the running sum");
         }
@@ -114,8 +146,11 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
             if (OVERLAP as u64..2 * OVERLAP as u64).any(empty) {
                 return Some("running sums from before the first sample");
             }
+            if octave.resumed > self.resumed {
+                return Some("a gap after the newest sample");
+            }
             let count = octave.differences.checked_add(self.open_differences(k));
-            if count.is_none_or(|count| count > samples) {
+            if count.is_none_or(|count| count > periods) {
                 return Some("more differences than samples");
             }
             let no_sum = octave.moments.squares == Moments::ZERO.squares || count == Some(0);

@@ -11,11 +11,14 @@ pub(crate) fn after_constant<const OCTAVES: usize, const OVERLAP: usize>(
     sample: i32,
     samples: u64,
 ) -> Cascade<OCTAVES, OVERLAP> {
-    let header = [1, b'A', OCTAVES as u8, OVERLAP as u8];
-    // Samples before the last gap, missing, since the last gap, their sum and the recent sums; of each octave, 4 words of
-    // moments, the oldest sum, the line and the number of differences before the last gap.
-    let of_octave = 6 + OVERLAP;
-    let words = 4 + OVERLAP + OCTAVES * of_octave;
+    let header = [2, b'A', OCTAVES as u8, OVERLAP as u8];
+    // Three times (now, the time from which on the first eleven octaves are complete, the end of the last gap), four numbers
+    // of samples (before the start, missing, absent, pending), the sum and the recent sums; of each octave, 4 words of
+    // moments, the oldest sum, the line, the end of the last gap, the number of differences before it, and 3 words of gaps.
+    let of_octave = 5 + OVERLAP + 5;
+    let own = 8 + OVERLAP;
+    let words = own + OCTAVES * of_octave;
+    let complete = (2_u64 << (OCTAVES.min(11) - 1)) - 1;
     let sum_at = |step: u64, level: usize| i64::from(sample).wrapping_mul((step << level) as i64) as u64;
     // The sum in a slot of a line that holds the steps from `nearest` before the newest on; 0 before the first sample.
     let in_line = |slot: usize, level: usize, nearest: u64| {
@@ -25,12 +28,13 @@ pub(crate) fn after_constant<const OCTAVES: usize, const OVERLAP: usize>(
     };
     let fine = OVERLAP.trailing_zeros() as usize;
     let word = |at: usize| match at {
-        0 | 1 => 0,
-        2 => samples,
-        3 => sum_at(samples, 0),
-        at if at < 4 + OVERLAP => in_line(at - 4, 0, 0),
+        0 => samples,
+        1 => complete,
+        2..7 => 0,
+        7 => sum_at(samples, 0),
+        at if at < own => in_line(at - 8, 0, 0),
         at => {
-            let (octave, field) = ((at - 4 - OVERLAP) / of_octave, (at - 4 - OVERLAP) % of_octave);
+            let (octave, field) = ((at - own) / of_octave, (at - own) % of_octave);
             let Some(level) = octave.checked_sub(fine) else { return 0 };
             match field {
                 4 => sum_at((samples >> level).saturating_sub(2 * OVERLAP as u64), level),

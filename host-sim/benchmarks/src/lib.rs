@@ -1,4 +1,5 @@
 //! Benchmarks of the noise analysis on simulated recordings, whose true noise and effects are known.
 
+pub mod losses;
 pub mod reproduction;
 pub mod undeclared;

@@ -33,7 +33,7 @@ pub(crate) fn count() {
     worst::<16>("worst_push_p16");
     let mut cascade = black_box(Cascade::<OCTAVES, 8>::new());
     report("push_slice_p8", SAMPLES as u32, || cascade.push_slice(black_box(&sensor)));
-    report("gap_p8", 10, || (0..10).for_each(|_| cascade.gap(black_box(1))));
+    gaps("lossy_push_p8", &sensor);
     additional_estimators(&sensor);
     let curve = late_state::after_constant::<OCTAVES, 8>(0, 1 << 24);
     report("curve_p8", 10, || (0..10).for_each(|_| drop(black_box(black_box(&curve).curve(0.01)))));
@@ -42,16 +42,42 @@ pub(crate) fn count() {
     hprintln!("bytes p16 {}", Cascade::<OCTAVES, 16>::memory());
 }
 
-/// Counts pushes in a long record, and those of the first 2040 samples after a gap.
+/// Counts pushes in a long record, and those of its first 2040 samples.
 fn push<const OVERLAP: usize>(name: &str, samples: &[i32; SAMPLES]) {
     let mut cascade = black_box(late_state::after_constant::<OCTAVES, OVERLAP>(0, 1 << 20));
     samples.iter().for_each(|&sample| cascade.push(sample));
     report(name, SAMPLES as u32, || samples.iter().for_each(|&sample| cascade.push(sample)));
-    cascade.gap(1);
+    black_box(&cascade);
+    cascade.reset();
     let samples = &samples[..2040];
     hprint!("early ");
     report(name, samples.len() as u32, || samples.iter().for_each(|&sample| cascade.push(sample)));
     black_box(&cascade);
+}
+
+/// Counts samples of which every hundredth is missing, and the longest sample after a gap: one at which every line takes
+/// part, with differences of more than 16 bits. An estimator of 24 octaves bridges gaps of at most 2²⁰ samples.
+fn gaps(name: &str, samples: &[i32; SAMPLES]) {
+    let mut cascade = black_box(late_state::after_constant::<OCTAVES, 8>(0, 1 << 20));
+    samples.iter().for_each(|&sample| cascade.push(sample));
+    report(name, SAMPLES as u32, || {
+        for hundred in samples.chunks(100) {
+            hundred[1..].iter().for_each(|&sample| cascade.push(sample));
+            cascade.gap(black_box(1));
+        }
+    });
+    black_box(&cascade);
+    let mut cascades = black_box([const { Cascade::<OCTAVES, 8>::new() }; WORST]);
+    for (name, missing) in [("gap_of_1_p8", 1), ("gap_of_100_p8", 100), ("longest_gap_p8", 1 << 20)] {
+        cascades.fill_with(|| late_state::after_constant::<OCTAVES, 8>(0, (1 << 26) - 1 - u64::from(missing)));
+        report(name, WORST as u32, || {
+            for cascade in &mut cascades {
+                cascade.gap(black_box(missing));
+                cascade.push(black_box(1 << 23));
+            }
+        });
+        black_box(&cascades);
+    }
 }
 
 /// Counts the push that completes a difference at every octave, with differences of more than 16 bits.

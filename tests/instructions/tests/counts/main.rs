@@ -26,19 +26,23 @@ fn assert_counts(counts: &Counts, expected: &[(&str, f64)]) {
 fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m4f() {
     let counts = M4F.counts();
     assert!(counts.number("push_p8") <= 200.0, "a sample takes {} instructions on average", counts.number("push_p8"));
+    assert!(counts.number("lossy_push_p8") <= 250.0, "{} with 1 % of them missing", counts.number("lossy_push_p8"));
     assert_counts(
         counts,
         &[
-            ("push_p4", 161.0),
-            ("push_p8", 191.0),
-            ("push_p16", 217.0),
-            ("early_push_p8", 308.0),
-            ("push_p8_24_bits", 679.0),
-            ("worst_push_p8", 3_633.0),
-            ("gap_p8", 1_584.0),
-            ("coupling_p8", 1_240.0),
-            ("hadamard_p8", 1_146.0),
-            ("fractional_p8", 1_290.0),
+            ("push_p4", 164.0),
+            ("push_p8", 197.0),
+            ("push_p16", 213.0),
+            ("early_push_p8", 347.0),
+            ("push_p8_24_bits", 694.0),
+            ("worst_push_p8", 3_811.0),
+            ("lossy_push_p8", 222.0),
+            ("gap_of_1_p8", 4_900.0),
+            ("gap_of_100_p8", 9_490.0),
+            ("longest_gap_p8", 19_146.0),
+            ("coupling_p8", 1_506.0),
+            ("hadamard_p8", 1_299.0),
+            ("fractional_p8", 579.0),
         ],
     );
 }
@@ -46,15 +50,20 @@ fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m4f() {
 #[test]
 fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m0_plus() {
     let counts = M0_PLUS.counts();
+    assert!(counts.number("lossy_push_p8") <= 650.0, "{} with 1 % of them missing", counts.number("lossy_push_p8"));
     assert_counts(
         counts,
         &[
-            ("push_p4", 462.0),
-            ("push_p8", 509.0),
-            ("push_p16", 612.0),
-            ("early_push_p8", 849.0),
-            ("push_p8_24_bits", 2_312.0),
-            ("worst_push_p8", 12_064.0),
+            ("push_p4", 415.0),
+            ("push_p8", 506.0),
+            ("push_p16", 606.0),
+            ("early_push_p8", 886.0),
+            ("push_p8_24_bits", 2_309.0),
+            ("worst_push_p8", 12_412.0),
+            ("lossy_push_p8", 553.0),
+            ("gap_of_1_p8", 14_133.0),
+            ("gap_of_100_p8", 21_250.0),
+            ("longest_gap_p8", 35_624.0),
         ],
     );
 }
@@ -85,6 +94,6 @@ fn the_estimator_is_within_its_memory_on_both_cores() {
     for target in [M4F, M0_PLUS] {
         let counts = target.counts();
         println!("P = 4, 8, 16: {}, {}, {} bytes", counts.number("p4"), counts.number("p8"), counts.number("p16"));
-        assert!(counts.number("p4") <= 2_400.0 && counts.number("p8") <= 4_000.0);
+        assert!(counts.number("p4") <= 2_900.0 && counts.number("p8") <= 3_700.0);
     }
 }
