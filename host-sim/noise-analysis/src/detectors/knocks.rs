@@ -36,11 +36,11 @@ const LARGEST_SQUARE: f64 = 9.0;
 /// A knock in one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Knock {
-    /// Sample periods.
+    /// Sample periods that are left out: those that may belong to it.
     pub slots: Range<u64>,
-    /// 95 % bounds of its first sample period and of the one after its last.
-    from: Range<u64>,
-    to: Range<u64>,
+    /// Its first sample period and the one after its last.
+    from: BoundedSlot,
+    to: BoundedSlot,
     /// Standard deviation of the differences over that of the neighbours, with 95 % bounds.
     level: f64,
     level_bounds: (f64, f64),
@@ -48,6 +48,14 @@ pub(crate) struct Knock {
     n: usize,
     /// Probability by chance anywhere in the record, or at a time that another channel has given.
     p_value: f64,
+}
+
+/// A sample period with its 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct BoundedSlot {
+    value: u64,
+    low: u64,
+    high: u64,
 }
 
 /// How the noise level of one channel scatters where there is no knock.
@@ -317,7 +325,9 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     };
     let (start_low, start_high) = bounds(&mut starts(), start);
     let (end_low, end_high) = bounds(&mut ends(), end);
-    let inside = &differences.squares[window.start + start..window.start + end];
+    // The level of what belongs to it for certain.
+    let certain = if end_low > start_high + FEWEST_DIFFERENCES { start_high..end_low } else { start..end };
+    let inside = &differences.squares[window.start + certain.start..window.start + certain.end];
     let (sum, count) = inside
         .iter()
         .filter(|square| square.is_finite())
@@ -325,13 +335,15 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     let ratio = sum / f64::max(count, 1.0) / quiet;
     let freedom = block.freedom.block * count / length as f64;
     let half = NORMAL_975 * (2.0 / freedom + 2.0 / block.freedom.neighbours).sqrt();
-    // One average more on either side, and what is possible in addition: a sample too many is cheap.
-    let at = |number: usize| differences.slots(window.start + number..window.start + number);
-    let (first, last) = (at(start_low.saturating_sub(1)).start, at(end_high).end + differences.n as u64);
+    // A difference is that of its average and the next one, so that the first one that is loud begins one average early.
+    let n = differences.n as u64;
+    let at = |number: usize| differences.slots(window.start + number..window.start + number).start;
+    let from = BoundedSlot { value: at(start) + n, low: at(start_low), high: at(start_high) + 2 * n };
+    let to = BoundedSlot { value: at(end), low: at(end_low).saturating_sub(n), high: at(end_high) + n };
     Knock {
-        slots: first..last,
-        from: first..at(start_high).start,
-        to: at(end_low).end..last,
+        slots: from.low..to.high,
+        from,
+        to,
         level: ratio.sqrt(),
         level_bounds: ((ratio.ln() - half).exp().sqrt(), (ratio.ln() + half).exp().sqrt()),
         n: differences.n,
@@ -348,21 +360,21 @@ impl Knock {
     /// The knock as it is reported; `channels` are the names of those that show it, the channel's own included.
     pub(crate) fn detection(&self, series: &Series, channels: &[&str]) -> Detection {
         let time = |slot: u64| slot as f64 * series.period_s;
-        let bounded = |value: u64, of: &Range<u64>| Parameter::new(time(value), time(of.start), time(of.end), "s");
+        let bounded = |of: BoundedSlot| Parameter::new(time(of.value), time(of.low), time(of.high), "s");
         let (low, high) = self.level_bounds;
         let shown = if channels.len() > 1 { format!("{} channels ({})", channels.len(), channels.join(", ")) } else { "this channel alone".to_owned() };
         let evidence = format!(
             "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance {:.0e}, in \
              {shown}; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
-            time(self.slots.start),
-            time(self.slots.end),
+            time(self.from.value),
+            time(self.to.value),
             self.n as f64 * series.period_s,
             self.level,
             self.p_value,
         );
         let parameters = [
-            ("from", bounded(self.slots.start, &self.from)),
-            ("to", bounded(self.slots.end, &self.to)),
+            ("from", bounded(self.from)),
+            ("to", bounded(self.to)),
             ("level", Parameter::new(self.level, low, high, "")),
         ];
         let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
