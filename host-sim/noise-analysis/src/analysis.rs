@@ -56,9 +56,8 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let preprocessing = Preprocessing::detect(measurement, &traced, &noise_grids);
     let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
     let estimators = RecordEstimators::estimate(measurement, &coupled, &preprocessing);
-    let series_without = |exclusion: Exclusion| {
-        in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, exclusion))
-    };
+    let series_without =
+        |exclusion: Exclusion| in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, exclusion));
     let series = series_without(Exclusion::ByWhole);
     let first_half: Vec<Series> =
         series_without(Exclusion::ByFirstHalf).iter().map(|series| series.before(measurement.middle())).collect();
@@ -112,7 +111,7 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
             name: channel.name.to_owned(),
             unit: unit.to_owned(),
             samples: measurement.len() as u64,
-            missing: missing_samples(measurement, &preprocessing, *channel),
+            missing: missing_samples(measurement, &preprocessing, &estimators.both, *channel),
             curve: whole.points().iter().map(|point| CurvePoint::new(point, whole.samples())).collect(),
             read_off: SlopeMethodReport::from_curve(&whole, unit),
             before: analysis.before(&estimators, &preprocessing, *channel, &whole),
@@ -139,17 +138,19 @@ struct Preprocessed<'a> {
 fn missing_samples(
     measurement: &Measurement,
     preprocessing: &Preprocessing,
+    both: &RecordPart,
     channel: ChannelProfile,
 ) -> MissingSamples {
     let lost = measurement.dropped.get("gap").copied().unwrap_or(0);
-    let of_all = measurement.dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
+    let of_all =
+        measurement.dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
     let own = measurement.channel(&channel).into_iter().flat_map(|channel| &channel.refused);
     let own = own.map(|(&cause, positions)| (cause, positions.len() as u64));
     let mut refused: BTreeMap<String, u64> = BTreeMap::new();
     for (cause, count) in of_all.chain(own).chain(preprocessing.refused(channel)).filter(|(_, count)| *count > 0) {
         *refused.entry(cause.to_owned()).or_insert(0) += count;
     }
-    MissingSamples { lost, refused, replaced: 0 }
+    MissingSamples { lost, refused, replaced: both.position(channel).map_or(0, |position| both.replaced(position)) }
 }
 
 /// The fits of a channel to the first half, for the errors on the second, and to both, for the effects.

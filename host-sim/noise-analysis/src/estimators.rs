@@ -231,6 +231,13 @@ impl RecordPart {
         self.estimators.cascade(channel).curve(self.period_s).scaled(self.step_size(channel))
     }
 
+    /// Samples of the channel at a position that were replaced because they are missing.
+    pub(crate) fn replaced(&self, channel: usize) -> u64 {
+        let cascade = self.estimators.cascade(channel);
+        let sums = (0..OCTAVES).filter_map(|octave| cascade.octave_sums(octave));
+        sums.map(|sums| u64::from(sums.interpolation.replaced())).sum()
+    }
+
     /// Smallest distance of two values of the channel at a position, in its unit.
     pub(crate) fn resolution(&self, channel: usize) -> f64 {
         self.resolutions[channel]

@@ -98,7 +98,8 @@ impl Preprocessing {
                 knocks: slots_within(&series[at], &knocks.by_whole[at]),
                 by_first_half: Vec::new(),
             };
-            exclusion.by_first_half = excluded_by_first_half(&series[at], &knocks.by_first_half[at], measurement.middle());
+            exclusion.by_first_half =
+                excluded_by_first_half(&series[at], &knocks.by_first_half[at], measurement.middle());
             let (profiles, others): (Vec<ChannelProfile>, Vec<&Series>) = regressors
                 .iter()
                 .filter(|(regressor, _)| may_depend(traced[at], *regressor))
@@ -240,8 +241,12 @@ impl KnocksInChannels {
     fn detections(&self, series: &Series, at: usize, channels: &[ChannelProfile]) -> Vec<Detection> {
         let detection = |knock: &Knock| {
             let shows = |others: &&Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
-            let shown: Vec<&str> =
-                channels.iter().zip(&self.by_whole).filter(|(_, others)| shows(others)).map(|(of, _)| of.name).collect();
+            let shown: Vec<&str> = channels
+                .iter()
+                .zip(&self.by_whole)
+                .filter(|(_, others)| shows(others))
+                .map(|(of, _)| of.name)
+                .collect();
             knock.detection(series, &shown)
         };
         self.by_whole[at].iter().map(detection).collect()

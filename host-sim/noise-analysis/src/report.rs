@@ -84,6 +84,9 @@ pub struct CurvePoint {
     pub high: f64,
     /// Equivalent degrees of freedom.
     pub edf: f64,
+    /// Share of the samples that were missing and replaced from their neighbours, %. 0 where the differences over gaps are
+    /// left out.
+    pub replaced_percent: f64,
     /// `100/sqrt(2(N/n−1))`: the percentage accuracy of a point in the slope method, for `N` samples.
     pub accuracy_percent: f64,
 }
@@ -99,6 +102,7 @@ impl CurvePoint {
             low: point.low.sqrt(),
             high: point.high.sqrt(),
             edf: point.edf,
+            replaced_percent: 100.0 * point.replaced,
             accuracy_percent: slope_method::percentage_accuracy(samples, point.n),
         }
     }

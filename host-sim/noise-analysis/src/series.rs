@@ -32,9 +32,8 @@ impl Series {
             recorded.iter().flat_map(|channel| channel.refused.values().flatten().copied()).collect();
         refused.sort_unstable();
         let used = (0..counts.len()).filter(|position| refused.binary_search(position).is_err());
-        let (slots, values) = used
-            .map(|position| (measurement.slots[position], f64::from(counts[position]) * channel.lsb))
-            .unzip();
+        let (slots, values) =
+            used.map(|position| (measurement.slots[position], f64::from(counts[position]) * channel.lsb)).unzip();
         Self {
             slots,
             values,

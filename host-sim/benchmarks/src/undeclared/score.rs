@@ -2,6 +2,7 @@
 
 use super::draw::DrawnRecording;
 use super::effect::{EffectKind, parameters};
+use super::sample_loss::lose_samples;
 use super::truth::{detects_known_waveform, true_model_errors};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
@@ -108,19 +109,21 @@ pub struct RecordingScore {
     pub unseen: Option<UnseenErrors>,
 }
 
-/// Simulates a recording, analyses it and compares the report with the truth.
+/// Simulates a recording, of which the share `loss` of the samples is lost at random, analyses it and compares the report
+/// with the truth.
 ///
 /// # Errors
 /// The recording cannot be simulated, or has no timeline.
-pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreError> {
+pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingScore, ScoreError> {
     let seed = drawn.seed;
     let failed = |reason| ScoreError::Record { seed, reason };
     let mut recording = drawn.simulation.run(|_| ()).map_err(failed)?;
     recording.channels.retain(|channel| RECORDED.contains(channel));
-    let measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
+    let mut measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
+    lose_samples(&mut measurement, loss, seed);
     let report = analyze(&measurement);
     let begin_s = recording.samples.first().and_then(|sample| sample.time_stamp.time_s).unwrap_or(0.0);
-    let mut score = compare(drawn, &report, begin_s);
+    let mut score = compare(drawn, &report, begin_s, loss);
     let effects = &drawn.simulation.scenario.effects;
     if let ([answer], [effect]) = (&mut score.answers[..], &effects[..]) {
         answer.shape_known = detects_known_waveform(effect, &measurement, begin_s);
@@ -144,8 +147,9 @@ pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreEr
     Ok(score)
 }
 
-/// Compares a report with the truth. `begin_s` is the time from the start of the sensor to the first sample.
-pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> RecordingScore {
+/// Compares a report with the truth. `begin_s` is the time from the start of the sensor to the first sample, `loss` the share
+/// of the samples that was lost beside the hidden effects.
+pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64, loss: f64) -> RecordingScore {
     let moved = drawn.simulation.scenario.environment.motion.deviation_g > 0.0;
     // Accelerometers are not scored during a motion: its effect on them can resemble any kind.
     let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
@@ -162,8 +166,10 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> 
         .zip(&drawn.strengths)
         .map(|((&kind, effect), &strength)| score_effect(kind, effect, strength, &scored))
         .collect();
-    let is_true =
-        |channel: Channel, kind: &str| effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel));
+    let is_true = |channel: Channel, kind: &str| {
+        let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
+        is_lost || effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel))
+    };
     let false_alarms = scored
         .iter()
         .flat_map(|(channel, report)| report.effects.iter().map(move |effect| (*channel, effect)))
@@ -174,7 +180,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> 
         .kinds
         .iter()
         .zip(effects)
-        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, begin_s))
+        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, begin_s, loss))
         .collect();
     RecordingScore { seed: drawn.seed, answers, false_alarms, estimates, unseen: None }
 }
@@ -213,6 +219,7 @@ fn score_parameters(
     effect: &InjectedEffect,
     scored: &[(Channel, &ChannelReport)],
     begin_s: f64,
+    loss: f64,
 ) -> Vec<ParameterScore> {
     let found = scored
         .iter()
@@ -223,7 +230,12 @@ fn score_parameters(
     let length = parameters.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
     let score = |&(name, truth): &(&'static str, f64)| {
         let estimate = found.parameters.get(name)?;
-        let truth = if kind == EffectKind::BiasStep && name == "time" { truth - begin_s } else { truth };
+        let truth = match kind {
+            EffectKind::BiasStep if name == "time" => truth - begin_s,
+            // What is dropped cannot be lost once more.
+            EffectKind::DroppedSamples => truth + (1.0 - truth) * loss,
+            _ => truth,
+        };
         let scale = if kind == EffectKind::Acceleration { length } else { truth.abs() };
         let relative_error = (estimate.value - truth).abs() / scale;
         let (value, low, high) = (estimate.value, estimate.low, estimate.high);

@@ -67,7 +67,8 @@ pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> Bias
         let series = series.clone().filtered(is_common);
         let regressors: Vec<(usize, Series)> =
             regressors.iter().map(|&(index, regressor)| (index, regressor.clone().filtered(is_common))).collect();
-        let regressors: Vec<(usize, &Series)> = regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
+        let regressors: Vec<(usize, &Series)> =
+            regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
         return find_on_common_samples(&series, &regressors, grids);
     }
     find_on_common_samples(series, &regressors, grids)

@@ -79,7 +79,10 @@ fn resonating(width: f64, deviation: f64) -> impl FnMut(&mut ChaCha8Rng, usize) 
     let (sine, cosine) = (TAU / 20.0).sin_cos();
     move |random, _| {
         let drive = (1.0 - kept * kept).sqrt();
-        (a, b) = (kept * (a * cosine - b * sine) + drive * normal(random), kept * (a * sine + b * cosine) + drive * normal(random));
+        (a, b) = (
+            kept * (a * cosine - b * sine) + drive * normal(random),
+            kept * (a * sine + b * cosine) + drive * normal(random),
+        );
         deviation * a + normal(random)
     }
 }
@@ -219,7 +222,8 @@ fn a_decaying_shock_is_left_out_to_its_end() {
 fn a_shock_is_found_in_every_channel_that_shows_it_and_in_no_other() {
     let inside = |at: usize| (25_000..25_500).contains(&at);
     // By itself, 1.35 times the noise over five seconds would not be a knock anywhere in the record.
-    let channels = [6.0, 1.35, 1.0].map(|level| white((100.0 * level) as u64, |at| if inside(at) { level } else { 1.0 }));
+    let channels =
+        [6.0, 1.35, 1.0].map(|level| white((100.0 * level) as u64, |at| if inside(at) { level } else { 1.0 }));
     assert!(find(&channels[1..], DITHERED).iter().all(Vec::is_empty));
     let found = find(&channels, DITHERED);
     assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 0], "{found:?}");

@@ -204,7 +204,9 @@ impl KnockRule {
             let Some(&freedom) = freedoms.get(doublings as usize).or(freedoms.last()) else { continue };
             let size = DIFFERENCES << doublings;
             for (at, level) in longer.iter().enumerate() {
-                let (Some(level), Some(quiet)) = (level, neighbouring_level(&longer, at, freedom.block)) else { continue };
+                let (Some(level), Some(quiet)) = (level, neighbouring_level(&longer, at, freedom.block)) else {
+                    continue;
+                };
                 tested += 1;
                 let quiet = quiet.max(self.floor);
                 let ratio = level / quiet;
@@ -362,7 +364,11 @@ impl Knock {
         let time = |slot: u64| slot as f64 * series.period_s;
         let bounded = |of: BoundedSlot| Parameter::new(time(of.value), time(of.low), time(of.high), "s");
         let (low, high) = self.level_bounds;
-        let shown = if channels.len() > 1 { format!("{} channels ({})", channels.len(), channels.join(", ")) } else { "this channel alone".to_owned() };
+        let shown = if channels.len() > 1 {
+            format!("{} channels ({})", channels.len(), channels.join(", "))
+        } else {
+            "this channel alone".to_owned()
+        };
         let evidence = format!(
             "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance {:.0e}, in \
              {shown}; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
@@ -378,6 +384,9 @@ impl Knock {
             ("level", Parameter::new(self.level, low, high, "")),
         ];
         let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
-        Detection { effect: Effect::new("knock", parameters, evidence), correction: Some(Correction::Exclude(excluded)) }
+        Detection {
+            effect: Effect::new("knock", parameters, evidence),
+            correction: Some(Correction::Exclude(excluded)),
+        }
     }
 }

@@ -183,9 +183,10 @@ impl Interpolation {
                 neighbours[distance - 1 + if other > position { REACH } else { 0 }] = Some(values[other] - self.mean);
             }
         }
-        let present = neighbours.iter().enumerate().fold(0, |present: Neighbours, (bit, neighbour)| {
-            present | Neighbours::from(neighbour.is_some()) << bit
-        });
+        let present = neighbours
+            .iter()
+            .enumerate()
+            .fold(0, |present: Neighbours, (bit, neighbour)| present | Neighbours::from(neighbour.is_some()) << bit);
         let sides = [present & (ALL_NEIGHBOURS >> REACH), present >> REACH];
         if sides.iter().any(|side| side.count_ones() < FEWEST_ON_A_SIDE) {
             return 0.0;
@@ -283,10 +284,8 @@ impl PartialInterpolation {
         // A little white noise, as in `weights`.
         let white = |a: usize, b: usize| if a == b { 1e-9 * covariance[0] } else { 0.0 };
         let matrix = DMatrix::from_fn(bits.len(), bits.len(), |a, b| between(bits[a], bits[b]) + white(a, b));
-        let with_sample = DVector::from_iterator(
-            bits.len(),
-            bits.iter().map(|&bit| covariance[offset(bit).unsigned_abs() as usize]),
-        );
+        let with_sample =
+            DVector::from_iterator(bits.len(), bits.iter().map(|&bit| covariance[offset(bit).unsigned_abs() as usize]));
         let solved = matrix.cholesky()?.solve(&with_sample);
         let mut weights = [0.0; 2 * REACH];
         bits.iter().zip(solved.iter()).for_each(|(&bit, &weight)| weights[bit] = weight);
