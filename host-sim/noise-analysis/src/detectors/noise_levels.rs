@@ -6,7 +6,7 @@
 //! by itself have the false-alarm rate that is asked for.
 
 use crate::series::Series;
-use statrs::function::beta::beta_reg;
+use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
 /// Differences of the shortest block.
@@ -35,6 +35,8 @@ const MEDIAN_LOSS: f64 = std::f64::consts::FRAC_PI_2;
 const LEAST_FILL: f64 = 0.9;
 /// Blocks from which on their scatter bounds the degrees of freedom.
 const FEWEST_FOR_SCATTER: usize = 40;
+/// Degrees of freedom beyond which a level is taken to be exact.
+const MOST_FREEDOM: f64 = 1e6;
 /// The 90 % quantile of the standard normal distribution.
 const NORMAL_90: f64 = 1.2816;
 
@@ -225,10 +227,8 @@ pub(super) fn freedom_by_scatter(levels: &[Option<f64>]) -> Option<f64> {
 /// Probability that a mean square of `freedom` degrees of freedom exceeds another one of `of_other`, of the same
 /// expectation, by the factor `ratio`: the upper tail of Fisher's F distribution.
 pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
-    if ratio <= 0.0 {
-        return 1.0;
-    }
-    beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio))
+    let (freedom, of_other) = (freedom.min(MOST_FREEDOM), of_other.min(MOST_FREEDOM));
+    checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {

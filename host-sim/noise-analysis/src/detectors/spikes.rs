@@ -6,12 +6,12 @@
 
 use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
 use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::series::Series;
-use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// Neighbours on each side.
-const REACH: usize = 6;
+/// Fewest neighbours that must be there on either side.
+const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
 
 /// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
 /// 7·10⁻⁶.
@@ -238,59 +238,6 @@ fn clipped_deviation(errors: &[f64]) -> f64 {
         limit = CLIP * deviation;
     }
     deviation
-}
-
-/// Autocovariance at lags 0 to 2·[`REACH`].
-type Autocovariance = [f64; 2 * REACH + 1];
-
-/// Which of the 2·[`REACH`] neighbours of a sample are there: bit `k` and bit `REACH + k` for those `k + 1` samples before and
-/// after it.
-type Neighbours = u16;
-
-const ALL_NEIGHBOURS: Neighbours = (1 << (2 * REACH)) - 1;
-/// Fewest neighbours that must be there on either side.
-const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
-
-/// The best linear interpolation from some of the neighbours.
-#[derive(Clone)]
-struct PartialInterpolation {
-    /// In the order of the bits.
-    weights: [f64; 2 * REACH],
-    /// Standard deviation of its error over that with all neighbours.
-    scale: f64,
-}
-
-impl PartialInterpolation {
-    /// The plain mean.
-    fn mean(present: Neighbours) -> Self {
-        let weight = 1.0 / f64::from(present.count_ones());
-        let weights = std::array::from_fn(|bit| if present >> bit & 1 == 1 { weight } else { 0.0 });
-        Self { weights, scale: 1.0 }
-    }
-
-    /// By the autocovariance; `None` where the equations have no solution.
-    fn best(covariance: &Autocovariance, present: Neighbours) -> Option<Self> {
-        let (weights, variance) = Self::solve(covariance, present)?;
-        let (_, complete) = Self::solve(covariance, ALL_NEIGHBOURS)?;
-        let scale = (variance / complete).sqrt();
-        scale.is_finite().then_some(Self { weights, scale })
-    }
-
-    /// Weights, and the variance of the error.
-    fn solve(covariance: &Autocovariance, present: Neighbours) -> Option<([f64; 2 * REACH], f64)> {
-        let bits: Vec<usize> = (0..2 * REACH).filter(|bit| present >> bit & 1 == 1).collect();
-        let offset = |bit: usize| if bit < REACH { -(bit as i64) - 1 } else { (bit - REACH) as i64 + 1 };
-        let between = |a: usize, b: usize| covariance[offset(a).abs_diff(offset(b)) as usize];
-        // A little white noise, as in `weights`.
-        let white = |a: usize, b: usize| if a == b { 1e-9 * covariance[0] } else { 0.0 };
-        let matrix = DMatrix::from_fn(bits.len(), bits.len(), |a, b| between(bits[a], bits[b]) + white(a, b));
-        let with_sample =
-            DVector::from_iterator(bits.len(), bits.iter().map(|&bit| covariance[offset(bit).unsigned_abs() as usize]));
-        let solved = matrix.cholesky()?.solve(&with_sample);
-        let mut weights = [0.0; 2 * REACH];
-        bits.iter().zip(solved.iter()).for_each(|(&bit, &weight)| weights[bit] = weight);
-        Some((weights, covariance[0] - solved.dot(&with_sample)))
-    }
 }
 
 /// Autocovariance at lags 0 to 2·[`REACH`].
