@@ -5,6 +5,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// White noise, as a part of the variance, that keeps the equations solvable for a pure sinusoid.
+const LEAST_WHITE: f64 = 1e-9;
+
 /// Neighbours on each side.
 pub(crate) const REACH: usize = 6;
 
@@ -37,7 +40,9 @@ impl PartialInterpolation {
     pub(crate) fn best(covariance: &Autocovariance, present: Neighbours) -> Option<Self> {
         let (weights, variance) = Self::solve(covariance, present)?;
         let (_, complete) = Self::solve(covariance, ALL_NEIGHBOURS)?;
-        let scale = (variance / complete).sqrt();
+        // Of a pure sinusoid nothing is left but rounding errors of either sign.
+        let least = LEAST_WHITE * covariance[0];
+        let scale = (variance.max(least) / complete.max(least)).sqrt();
         scale.is_finite().then_some(Self { weights, scale })
     }
 
@@ -46,8 +51,7 @@ impl PartialInterpolation {
         let bits: Vec<usize> = (0..2 * REACH).filter(|bit| present >> bit & 1 == 1).collect();
         let offset = |bit: usize| if bit < REACH { -(bit as i64) - 1 } else { (bit - REACH) as i64 + 1 };
         let between = |a: usize, b: usize| covariance[offset(a).abs_diff(offset(b)) as usize];
-        // A little white noise, keeps the equations solvable for a pure sinusoid.
-        let white = |a: usize, b: usize| if a == b { 1e-9 * covariance[0] } else { 0.0 };
+        let white = |a: usize, b: usize| if a == b { LEAST_WHITE * covariance[0] } else { 0.0 };
         let matrix = DMatrix::from_fn(bits.len(), bits.len(), |a, b| between(bits[a], bits[b]) + white(a, b));
         let with_sample =
             DVector::from_iterator(bits.len(), bits.iter().map(|&bit| covariance[offset(bit).unsigned_abs() as usize]));

@@ -6,7 +6,7 @@ use super::sample_loss::lose_samples;
 use super::truth::{detects_known_waveform, true_model_errors};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::{ChannelReport, Report};
+use noise_analysis::report::{ChannelReport, ModelReport, Report};
 use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
 use simulation::SimulationError;
@@ -135,10 +135,12 @@ pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingSco
         let truth = true_model_errors(drawn, channel).map_err(failed)?;
         let of = report.channels.iter().find(|report| report.name == channel.name());
         score.unseen = of.zip(truth).and_then(|(report, truth)| {
-            let before = report.before.unseen.deviance_per_point?;
+            // Without the spikes that the first half's rule excludes: the true model has none either.
+            let error =
+                |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
             Some(UnseenErrors {
-                before,
-                after: report.after.unseen.deviance_per_point?,
+                before: error(&report.before)?,
+                after: error(&report.after)?,
                 truth: truth.model,
                 refitted: truth.fitted,
             })
