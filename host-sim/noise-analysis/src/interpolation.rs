@@ -5,7 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// White noise, as a part of the variance, that keeps the equations solvable for a pure sinusoid.
+/// White noise, as a part of the variance, that keeps the equations solvable for a pure sinusoid: the least that does.
+const WHITE: [f64; 5] = [LEAST_WHITE, 1e-7, 1e-5, 1e-3, 1e-1];
 const LEAST_WHITE: f64 = 1e-9;
 
 /// Neighbours on each side.
@@ -51,11 +52,14 @@ impl PartialInterpolation {
         let bits: Vec<usize> = (0..2 * REACH).filter(|bit| present >> bit & 1 == 1).collect();
         let offset = |bit: usize| if bit < REACH { -(bit as i64) - 1 } else { (bit - REACH) as i64 + 1 };
         let between = |a: usize, b: usize| covariance[offset(a).abs_diff(offset(b)) as usize];
-        let white = |a: usize, b: usize| if a == b { LEAST_WHITE * covariance[0] } else { 0.0 };
-        let matrix = DMatrix::from_fn(bits.len(), bits.len(), |a, b| between(bits[a], bits[b]) + white(a, b));
+        let factor = |white: f64| {
+            let entry =
+                |a: usize, b: usize| between(bits[a], bits[b]) + if a == b { white * covariance[0] } else { 0.0 };
+            DMatrix::from_fn(bits.len(), bits.len(), entry).cholesky()
+        };
         let with_sample =
             DVector::from_iterator(bits.len(), bits.iter().map(|&bit| covariance[offset(bit).unsigned_abs() as usize]));
-        let solved = matrix.cholesky()?.solve(&with_sample);
+        let solved = WHITE.into_iter().find_map(factor)?.solve(&with_sample);
         let mut weights = [0.0; 2 * REACH];
         bits.iter().zip(solved.iter()).for_each(|(&bit, &weight)| weights[bit] = weight);
         Some((weights, covariance[0] - solved.dot(&with_sample)))

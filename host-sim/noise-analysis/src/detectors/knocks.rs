@@ -129,7 +129,9 @@ impl KnockRule {
                 let longer = longer_levels(&levels, doublings);
                 let by_length = freedoms.last().map_or(differences.freedom(), |freedom| 2.0 * freedom.block);
                 let block = freedom_by_scatter(&longer).map_or(by_length, |freedom| freedom.min(by_length));
-                freedoms.push(BlockFreedom { block, neighbours: neighbours_freedom(&longer, block) });
+                // Levels that move together at a short length do so at a longer one, which has too few blocks to show it.
+                let neighbours = freedoms.last().map_or(f64::INFINITY, |freedom| 2.0 * freedom.neighbours);
+                freedoms.push(BlockFreedom { block, neighbours: neighbours_freedom(&longer, block).min(neighbours) });
             }
             let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.

@@ -34,7 +34,7 @@ const MEDIAN_LOSS: f64 = std::f64::consts::FRAC_PI_2;
 /// An average is used if at least this part of its samples is there.
 const LEAST_FILL: f64 = 0.9;
 /// Blocks from which on their scatter bounds the degrees of freedom.
-const FEWEST_FOR_SCATTER: usize = 40;
+const FEWEST_FOR_SCATTER: usize = 24;
 /// Degrees of freedom beyond which a level is taken to be exact.
 const MOST_FREEDOM: f64 = 1e6;
 /// The 90 % quantile of the standard normal distribution.
