@@ -138,6 +138,9 @@ pub(crate) struct UndeclaredArguments {
     /// Length of a recording, s.
     #[arg(long, default_value_t = 1800.0)]
     pub(crate) seconds: f64,
+    /// Samples that are lost at random in every recording, %.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = loss_percent)]
+    pub(crate) loss: f64,
     /// Recordings that are examined at a time [default: one a core].
     #[arg(long)]
     pub(crate) jobs: Option<NonZeroUsize>,
@@ -158,10 +161,19 @@ impl UndeclaredArguments {
             empty: self.nothing,
             pairs: self.pairs,
             seconds: self.seconds,
+            loss_percent: self.loss,
             seed: self.seed,
             sealed: self.sealed,
             jobs: self.jobs.map_or_else(cores, NonZeroUsize::get),
         }
+    }
+}
+
+/// A share of lost samples from 0 to 50 %.
+fn loss_percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
+        _ => Err("not a percentage from 0 to 50".to_owned()),
     }
 }
 

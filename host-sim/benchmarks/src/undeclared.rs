@@ -12,6 +12,7 @@ mod channel_under_test;
 mod detection_limit;
 mod draw;
 mod effect;
+mod sample_loss;
 mod score;
 mod table;
 mod truth;
@@ -46,6 +47,8 @@ pub struct UndeclaredPlan {
     pub pairs: u64,
     /// Length of a recording, s.
     pub seconds: f64,
+    /// Share of the measured samples that are lost at random in every recording, beside the hidden effects, %.
+    pub loss_percent: f64,
     /// First seed of each group; its sum with any number of recordings is below [`SEEDS_PER_GROUP`].
     pub seed: u64,
     /// Whether the sealed seeds are used instead of the open ones.
@@ -81,7 +84,8 @@ impl UndeclaredPlan {
                     while !failed.load(Ordering::Relaxed) {
                         let at = next.fetch_add(1, Ordering::Relaxed);
                         let Some(&(group, seed)) = recordings.get(at) else { break };
-                        let score = score_recording(&DrawnRecording::from_group(group, self.seconds, seed));
+                        let drawn = DrawnRecording::from_group(group, self.seconds, seed);
+                        let score = score_recording(&drawn, self.loss_percent / 100.0);
                         failed.fetch_or(score.is_err(), Ordering::Relaxed);
                         // The list is valid even if a thread panicked: it is only changed by `push`.
                         results.lock().unwrap_or_else(PoisonError::into_inner).push((at, group, score));

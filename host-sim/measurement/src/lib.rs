@@ -38,8 +38,25 @@ pub struct Measurement {
 pub struct MeasuredChannel {
     /// Name, unit and scale.
     pub profile: ChannelProfile,
-    /// One register count for each slot.
+    /// One register count for each slot. That of a refused sample has no meaning.
     pub counts: Vec<i32>,
+    /// Samples of this channel alone that arrived and cannot be used, by cause: their positions in `counts`, in ascending
+    /// order. They are missing in this channel and in no other.
+    pub refused: BTreeMap<&'static str, Vec<usize>>,
+}
+
+impl MeasuredChannel {
+    /// A channel without a refused sample.
+    #[must_use]
+    pub fn new(profile: ChannelProfile, counts: Vec<i32>) -> Self {
+        Self { profile, counts, refused: BTreeMap::new() }
+    }
+
+    /// Whether the sample at `position` was refused for any cause.
+    #[must_use]
+    pub fn is_refused(&self, position: usize) -> bool {
+        self.refused.values().any(|positions| positions.binary_search(&position).is_ok())
+    }
 }
 
 impl Measurement {
@@ -66,6 +83,18 @@ impl Measurement {
     pub fn missing_before(&self, position: usize) -> u32 {
         let previous = position.checked_sub(1).map(|previous| self.slots[previous]);
         previous.map_or(0, |previous| u32::try_from(self.slots[position] - previous - 1).unwrap_or(u32::MAX))
+    }
+
+    /// The sample period that begins the second half of the recording by time; the first half has the periods before it.
+    #[must_use]
+    pub fn middle(&self) -> u64 {
+        self.periods() / 2
+    }
+
+    /// Sample periods from the first sample to the last, both included, with or without a sample.
+    #[must_use]
+    pub fn periods(&self) -> u64 {
+        self.slots.last().map_or(0, |&last| last + 1)
     }
 
     /// Number of gaps between the samples.

@@ -1,7 +1,8 @@
 //! The pipeline from a recording to its report.
 //!
 //! Effects are named on the whole record. The errors before and after come from models of the first half alone, compared
-//! with the second half.
+//! with the second half, both by time: as it was recorded, and without what the rules for spikes and knocks exclude that were
+//! fitted to the first half.
 
 use crate::OCTAVES;
 use crate::assessment::Assessment;
@@ -12,9 +13,10 @@ use crate::detectors::{bias, random_telegraph};
 use crate::estimators::{RecordEstimators, RecordPart};
 use crate::findings::{Detection, Effect};
 use crate::naming::{ChannelFindings, name_effects};
-use crate::preprocessing::{Preprocessing, in_parallel};
+use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
 use crate::report::{
-    ChannelReport, CurvePoint, ModelErrorReport, ModelReport, Report, SCHEMA, SlopeMethodReport, TermReport,
+    ChannelReport, CurvePoint, MissingSamples, ModelErrorReport, ModelReport, Report, SCHEMA, SlopeMethodReport,
+    TermReport,
 };
 use crate::series::Series;
 use crate::slow_drift::{ChannelsInCommon, common_mode};
@@ -54,16 +56,28 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let preprocessing = Preprocessing::detect(measurement, &traced, &noise_grids);
     let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
     let estimators = RecordEstimators::estimate(measurement, &coupled, &preprocessing);
-    let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel));
-    let preprocessed =
-        Preprocessed { profile, estimators: &estimators, preprocessing: &preprocessing, series: &series };
+    let series_without =
+        |exclusion: Exclusion| in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, exclusion));
+    let series = series_without(Exclusion::ByWhole);
+    let first_half: Vec<Series> =
+        series_without(Exclusion::ByFirstHalf).iter().map(|series| series.before(measurement.middle())).collect();
+    let preprocessed = Preprocessed {
+        profile,
+        estimators: &estimators,
+        preprocessing: &preprocessing,
+        series: &series,
+        first_half: &first_half,
+    };
     let analyses = in_parallel(&recorded, |&channel| {
-        let traced = traced.iter().position(|of| *of == channel).map(|position| &series[position]);
+        let traced = traced.iter().position(|of| *of == channel);
         let analysis = match traced {
-            Some(own) => ChannelAnalysis::trace(&preprocessed, channel, own, &noise_grids),
+            Some(position) => ChannelAnalysis::trace(&preprocessed, channel, position, &noise_grids),
             None => ChannelAnalysis::baseline(&preprocessed, channel),
         };
-        let own = traced.map_or_else(|| Cow::Owned(Series::from_measurement(measurement, &channel)), Cow::Borrowed);
+        let own = match traced {
+            Some(position) => Cow::Borrowed(&series[position]),
+            None => Cow::Owned(Series::from_measurement(measurement, &channel)),
+        };
         // The series still holds the share of the covariates, which the model with added terms does not describe.
         let trace = &analysis.first.trace;
         let model = if analysis.first.covariates.is_empty() { &trace.after } else { &trace.before };
@@ -97,10 +111,11 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
             name: channel.name.to_owned(),
             unit: unit.to_owned(),
             samples: measurement.len() as u64,
+            missing: missing_samples(measurement, &preprocessing, &estimators.both, *channel),
             curve: whole.points().iter().map(|point| CurvePoint::new(point, whole.samples())).collect(),
             read_off: SlopeMethodReport::from_curve(&whole, unit),
-            before: analysis.before(&estimators, *channel, &whole),
-            after: analysis.after(&estimators, *channel, &whole),
+            before: analysis.before(&estimators, &preprocessing, *channel, &whole),
+            after: analysis.after(&estimators, &preprocessing, *channel, &whole),
             effects,
             assessment,
         }
@@ -115,10 +130,33 @@ struct Preprocessed<'a> {
     preprocessing: &'a Preprocessing,
     /// Of the coupled channels, in their order.
     series: &'a [Series],
+    /// Their first half, without what its own rules exclude.
+    first_half: &'a [Series],
+}
+
+/// Samples of a channel that are missing in its model.
+fn missing_samples(
+    measurement: &Measurement,
+    preprocessing: &Preprocessing,
+    both: &RecordPart,
+    channel: ChannelProfile,
+) -> MissingSamples {
+    let lost = measurement.dropped.get("gap").copied().unwrap_or(0);
+    let of_all =
+        measurement.dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
+    let own = measurement.channel(&channel).into_iter().flat_map(|channel| &channel.refused);
+    let own = own.map(|(&cause, positions)| (cause, positions.len() as u64));
+    let mut refused: BTreeMap<String, u64> = BTreeMap::new();
+    for (cause, count) in of_all.chain(own).chain(preprocessing.refused(channel)).filter(|(_, count)| *count > 0) {
+        *refused.entry(cause.to_owned()).or_insert(0) += count;
+    }
+    MissingSamples { lost, refused, replaced: both.position(channel).map_or(0, |position| both.replaced(position)) }
 }
 
 /// The fits of a channel to the first half, for the errors on the second, and to both, for the effects.
 struct ChannelAnalysis {
+    /// The baseline model of the first half as it was recorded, with its spikes and knocks.
+    raw: Model,
     first: ChannelFit,
     both: ChannelFit,
     /// Lines in the spectrum of the whole record.
@@ -134,43 +172,48 @@ impl ChannelAnalysis {
     fn baseline(record: &Preprocessed, channel: ChannelProfile) -> Self {
         let estimators = record.estimators;
         let position = estimators.both.position(channel).unwrap_or_default();
-        let [first, both] = [&estimators.first, &estimators.both]
+        let [first, both] = [&estimators.ruled[0], &estimators.both]
             .map(|part| ChannelFit::fit_baseline(CovariateFit::estimate(part, position, false, |_| None)));
-        Self { first, both, lines: Vec::new(), telegraph: None, rest: None }
+        Self { raw: first.trace.before.clone(), first, both, lines: Vec::new(), telegraph: None, rest: None }
     }
 
-    /// The baseline model and what it lacks; `own` are the samples of the channel.
-    fn trace(record: &Preprocessed, channel: ChannelProfile, own: &Series, noise_grids: &NoiseGrids) -> Self {
-        let &Preprocessed { profile, estimators, preprocessing, series } = record;
+    /// The baseline model and what it lacks; `own` is the position of the channel's series.
+    fn trace(record: &Preprocessed, channel: ChannelProfile, own: usize, noise_grids: &NoiseGrids) -> Self {
+        let &Preprocessed { profile, estimators, preprocessing, series, first_half } = record;
         let position = estimators.both.position(channel).unwrap_or_default();
-        let own_half = own.first_half();
+        let (own, own_half) = (&series[own], &first_half[own]);
         // Temperature and supply in the first half.
-        let (slow, slow_halves): (Vec<ChannelProfile>, Vec<Series>) = estimators
+        let (slow, slow_halves): (Vec<ChannelProfile>, Vec<&Series>) = estimators
             .both
             .channels
             .iter()
-            .zip(series)
+            .zip(first_half)
             .filter(|(regressor, _)| regressor.quantity.is_environment())
-            .map(|(regressor, series)| (*regressor, series.first_half()))
+            .map(|(regressor, series)| (*regressor, series))
             .unzip();
-        let bias_changes = bias::find(&own_half, &slow_halves.iter().collect::<Vec<_>>(), noise_grids);
+        let bias_changes = bias::find(own_half, &slow_halves, noise_grids);
         let in_half = |regressor: ChannelProfile| {
             let is_of = |(number, _): &&(usize, bias::BiasSensitivity)| slow[*number] == regressor;
             bias_changes.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)
         };
         let has_ramp = preprocessing.has_ramp(channel);
-        let first = CovariateFit::estimate(&estimators.first, position, has_ramp, in_half);
+        let raw = preprocessing.excludes_any(Exclusion::ByFirstHalf).then(|| {
+            let raw = CovariateFit::estimate(&estimators.raw[0], position, has_ramp, in_half);
+            ChannelFit::fit_baseline(raw).trace.before
+        });
+        let first = CovariateFit::estimate(&estimators.ruled[0], position, has_ramp, in_half);
         let both = CovariateFit::estimate(&estimators.both, position, has_ramp, |regressor| {
             preprocessing.sensitivity(channel, regressor)
         });
-        let half = first.compensated_series(own, series).map(|rest| rest.first_half());
+        let half = first.compensated_series(own_half, first_half);
         let whole = both.compensated_series(own, series);
-        let (first, _) = fit_with_lines(first, &own_half, half.as_ref(), profile);
+        let (first, _) = fit_with_lines(first, own_half, half.as_ref(), profile);
         let (both, lines) = fit_with_lines(both, own, whole.as_ref(), profile);
         let correlation_times: Vec<f64> = both.correlation_times().collect();
         let rest = UniformSeries::from_series(whole.as_ref().unwrap_or(own));
         let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times);
-        Self { first, both, lines, telegraph, rest: Some(rest) }
+        let raw = raw.unwrap_or_else(|| first.trace.before.clone());
+        Self { raw, first, both, lines, telegraph, rest: Some(rest) }
     }
 
     /// What was found in the channel over the whole record.
@@ -192,21 +235,35 @@ impl ChannelAnalysis {
         }
     }
 
-    /// The baseline model of the first half.
-    fn before(&self, estimators: &RecordEstimators, channel: ChannelProfile, whole: &Curve<OCTAVES>) -> ModelReport {
-        let position = estimators.first.position(channel).unwrap_or_default();
-        let model = &self.first.trace.before;
+    /// The baseline model of the first half as it was recorded.
+    fn before(
+        &self,
+        estimators: &RecordEstimators,
+        preprocessing: &Preprocessing,
+        channel: ChannelProfile,
+        whole: &Curve<OCTAVES>,
+    ) -> ModelReport {
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let model = &self.raw;
+        let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve(position));
         ModelReport {
             terms: terms(model, channel.unit),
             adev: whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
-            fitted: ModelErrorReport::new(model, &estimators.first.curve(position)),
-            unseen: ModelErrorReport::new(model, &estimators.second.curve(position)),
+            fitted: error(&estimators.raw[0]),
+            unseen: error(&estimators.raw[1]),
+            unseen_excluding: has_rules(preprocessing, channel).then(|| error(&estimators.ruled[1])),
         }
     }
 
-    /// The model of the first half with the added terms.
-    fn after(&self, estimators: &RecordEstimators, channel: ChannelProfile, whole: &Curve<OCTAVES>) -> ModelReport {
-        let position = estimators.first.position(channel).unwrap_or_default();
+    /// The model of the first half with the added terms, without what the rules of the first half exclude.
+    fn after(
+        &self,
+        estimators: &RecordEstimators,
+        preprocessing: &Preprocessing,
+        channel: ChannelProfile,
+        whole: &Curve<OCTAVES>,
+    ) -> ModelReport {
+        let position = estimators.both.position(channel).unwrap_or_default();
         let model = &self.first.trace.after;
         let covariates = &self.first.covariates;
         // The share of the covariates is in the measured curve and not in the model.
@@ -218,13 +275,20 @@ impl ChannelAnalysis {
             avar(&raw).zip(avar(&rest)).map_or(0.0, |(raw, rest)| (raw - rest).max(0.0))
         };
         let adev = whole.points().iter().map(|point| (model.avar(point.n) + of_covariates(point.n)).sqrt());
+        let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, position));
         ModelReport {
             terms: terms(model, channel.unit),
             adev: adev.collect(),
             fitted: ModelErrorReport::new(model, &covariates.curve),
-            unseen: ModelErrorReport::new(model, &covariates.compensated(&estimators.second, position)),
+            unseen: unseen(&estimators.raw[1]),
+            unseen_excluding: has_rules(preprocessing, channel).then(|| unseen(&estimators.ruled[1])),
         }
     }
+}
+
+/// Whether rules of the first half exclude samples of a channel.
+fn has_rules(preprocessing: &Preprocessing, channel: ChannelProfile) -> bool {
+    preprocessing.excludes(channel, Exclusion::ByFirstHalf)
 }
 
 fn terms(model: &Model, unit: &str) -> Vec<TermReport> {

@@ -117,21 +117,29 @@ impl CovariateFit {
 
     /// `series` less the covariates times their sensitivities; `of_part` are the series of the part's channels.
     ///
-    /// The covariates' own noise is added by this. `None` where the channel depends on no covariate, or a covariate has
-    /// other samples.
+    /// The covariates' own noise is added by this. Samples that a covariate lacks are missing in the result. `None` where
+    /// the channel depends on no covariate.
     pub(crate) fn compensated_series(&self, series: &Series, of_part: &[Series]) -> Option<Series> {
         let mut rest = series.clone();
         for (position, sensitivity) in self.sensitivities() {
             let covariate = &of_part[position];
-            if covariate.slots != series.slots {
-                return None;
-            }
-            let mean = covariate.values.iter().sum::<f64>() / covariate.values.len() as f64;
-            for (value, covariate) in rest.values.iter_mut().zip(&covariate.values) {
-                *value -= sensitivity.value * (covariate - mean);
+            if covariate.slots == rest.slots {
+                subtract(&mut rest, sensitivity.value, covariate);
+            } else {
+                rest = rest.filtered(|slot| covariate.has(slot));
+                let common = covariate.clone().filtered(|slot| rest.has(slot));
+                subtract(&mut rest, sensitivity.value, &common);
             }
         }
         (!self.is_empty()).then_some(rest)
+    }
+}
+
+/// Subtracts `sensitivity` times the deviation of `covariate` from its mean; both have the same samples.
+fn subtract(series: &mut Series, sensitivity: f64, covariate: &Series) {
+    let mean = covariate.values.iter().sum::<f64>() / covariate.values.len() as f64;
+    for (value, covariate) in series.values.iter_mut().zip(&covariate.values) {
+        *value -= sensitivity * (covariate - mean);
     }
 }
 

@@ -1,7 +1,8 @@
 //! Detectors of effects in the samples of one channel, which the Allan curve shows badly or not at all.
 //!
 //! ```text
-//! Series ─┬► spikes                                        single samples
+//! Series ─┬► noise_levels ─► knocks                        stretches that are louder than those around them
+//!         ├► spikes                                        single samples
 //!         ├► effective_lsb                                 values rounded to several counts
 //!         └► block_means ─► gls_regression ─► bias         steps, ramps and covariates of the bias
 //! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
@@ -14,9 +15,13 @@ mod bias_step;
 pub mod block_means;
 pub(crate) mod effective_lsb;
 pub mod gls_regression;
+pub(crate) mod knocks;
+mod noise_levels;
 pub(crate) mod random_telegraph;
 pub(crate) mod spikes;
 mod telegraph_models;
 
+#[cfg(test)]
+mod knock_tests;
 #[cfg(test)]
 mod tests;

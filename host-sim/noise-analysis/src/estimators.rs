@@ -1,21 +1,26 @@
 //! Estimators of several channels of a recording: Allan variances of the whole as it was measured, and Allan variances and
-//! covariances of its two halves after preprocessing.
+//! covariances of its two halves.
+//!
+//! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
+//! channels are taken where both have a sample.
 
-use crate::preprocessing::Preprocessing;
+use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
 use allan_core::{Cascade, Coupling, Curve};
-use measurement::{ChannelProfile, Measurement};
+use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use nalgebra::DMatrix;
 
 /// The estimators take integers: a count is divided into so many steps, because a bias step that preprocessing subtracts is
 /// not a whole number of counts.
 const STEPS_PER_COUNT: f64 = 16.0;
 
-/// Cascades of channels that are sampled at the same times, and the Allan covariance of every pair of the first of them.
+/// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
 #[derive(Clone)]
 pub(crate) struct CoupledEstimators {
     cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
+    /// Samples that are missing in each channel since its last one.
+    missing: Vec<u32>,
     /// Of channel `i` with channel `j < i`, at index `i·(i−1)/2 + j`.
     couplings: Vec<Coupling<OCTAVES>>,
 }
@@ -25,24 +30,36 @@ impl CoupledEstimators {
     pub(crate) fn new(channels: usize, coupled: usize) -> Self {
         Self {
             cascades: vec![Cascade::new(); channels],
+            missing: vec![0; channels],
             couplings: vec![Coupling::new(); coupled * coupled.saturating_sub(1) / 2],
         }
     }
 
-    /// Takes one sample of every channel.
-    pub(crate) fn push(&mut self, values: impl Iterator<Item = i32>) {
-        self.cascades.iter_mut().zip(values).for_each(|(cascade, value)| cascade.push(value));
+    /// Takes the sample of every channel in the next sample period; `None` where a channel has none.
+    pub(crate) fn push(&mut self, values: impl Iterator<Item = Option<i32>>) {
+        for ((cascade, missing), value) in self.cascades.iter_mut().zip(&mut self.missing).zip(values) {
+            match value {
+                Some(value) => {
+                    cascade.gap(std::mem::take(missing));
+                    cascade.push(value);
+                }
+                None => *missing = missing.saturating_add(1),
+            }
+        }
         let mut couplings = self.couplings.iter_mut();
         for (at, a) in self.cascades.iter().enumerate() {
-            for (b, coupling) in self.cascades[..at].iter().zip(&mut couplings) {
-                coupling.observe(a, b);
+            for ((b, other), coupling) in self.cascades[..at].iter().zip(&self.missing).zip(&mut couplings) {
+                // Products are taken where both channels have a sample.
+                if self.missing[at] == 0 && *other == 0 {
+                    coupling.observe(a, b);
+                }
             }
         }
     }
 
-    /// Records that `missing` samples are missing.
+    /// Records that the samples of `missing` sample periods are missing in every channel.
     pub(crate) fn gap(&mut self, missing: u32) {
-        self.cascades.iter_mut().for_each(|cascade| cascade.gap(missing));
+        self.missing.iter_mut().for_each(|of| *of = of.saturating_add(missing));
     }
 
     /// The estimators of these samples followed, after a gap, by those of `later`.
@@ -86,61 +103,121 @@ pub(crate) struct RecordPart {
     period_s: f64,
 }
 
-/// The curves of the recording as measured, and the estimators of its halves after preprocessing.
+/// The curves of the recording as measured, and the estimators of its halves.
 pub(crate) struct RecordEstimators {
-    /// In the order of the recording's channels.
+    /// Of the recording as measured, without preprocessing, in the order of its channels.
     pub measured: Vec<Curve<OCTAVES>>,
-    pub first: RecordPart,
-    pub second: RecordPart,
-    /// Both halves, with a gap between them.
+    /// The halves with spikes and knocks.
+    pub raw: [RecordPart; 2],
+    /// The halves without what the rules of the first half exclude.
+    pub ruled: [RecordPart; 2],
+    /// Both halves, with a gap between them, without what the whole record shows.
     pub both: RecordPart,
 }
 
 impl RecordEstimators {
-    /// One pass over `measurement`. The channels of each part are `coupled`, then all others that were recorded.
+    /// Estimates from `measurement`. The channels of each part are `coupled`, then all others that were recorded.
     pub(crate) fn estimate(
         measurement: &Measurement,
         coupled: &[ChannelProfile],
         preprocessing: &Preprocessing,
     ) -> Self {
-        let period_s = measurement.period_s();
-        let mut measured: Vec<Cascade<OCTAVES, OVERLAP>> =
-            measurement.channels.iter().map(|_| Cascade::new()).collect();
-        let others = measurement.profiles().filter(|channel| !coupled.contains(channel));
-        let channels: Vec<ChannelProfile> = coupled.iter().copied().chain(others).collect();
-        let counts: Vec<&[i32]> =
-            channels.iter().filter_map(|channel| Some(measurement.channel(channel)?.counts.as_slice())).collect();
-        let resolutions =
-            channels.iter().map(|channel| f64::from(preprocessing.counts_per_step(*channel)) * channel.lsb).collect();
-        let estimators = CoupledEstimators::new(channels.len(), coupled.len());
-        let part = RecordPart { channels: channels.clone(), estimators, resolutions, period_s };
-        let mut halves = [part.clone(), part];
-        for position in 0..measurement.len() {
-            let half = &mut halves[usize::from(position >= measurement.len() / 2)].estimators;
-            let missing = measurement.missing_before(position);
-            if missing > 0 {
-                measured.iter_mut().for_each(|estimator| estimator.gap(missing));
-                half.gap(missing);
-            }
-            for (estimator, channel) in measured.iter_mut().zip(&measurement.channels) {
-                estimator.push(channel.counts[position]);
-            }
-            if preprocessing.excludes(position) {
-                half.gap(1);
-            } else {
-                half.push(channels.iter().zip(&counts).map(|(channel, counts)| {
-                    let steps = f64::from(counts[position]) * STEPS_PER_COUNT;
-                    (steps - STEPS_PER_COUNT * preprocessing.offset(*channel, position) / channel.lsb).round() as i32
-                }));
-            }
-        }
-        let curves = measured.iter().zip(&measurement.channels);
-        let measured =
-            curves.map(|(estimator, channel)| estimator.curve(period_s).scaled(channel.profile.lsb)).collect();
-        let [first, second] = halves;
-        let both = RecordPart { estimators: first.estimators.clone().followed_by(&second.estimators), ..first.clone() };
-        Self { measured, first, second, both }
+        let halves = |exclusion: Exclusion| halves(measurement, coupled, preprocessing, exclusion);
+        let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
+        // Nothing is estimated twice.
+        let mut distinct = vec![Exclusion::None];
+        distinct.extend([ruled, both].into_iter().filter(|&of| preprocessing.excludes_any(of)));
+        let parts = in_parallel(&distinct, |&exclusion| halves(exclusion));
+        let of = |exclusion: Exclusion| match distinct.iter().position(|of| *of == exclusion) {
+            Some(position) => parts[position].clone(),
+            None => parts[0].clone(),
+        };
+        let (raw, ruled, [first, second]) = (of(Exclusion::None), of(ruled), of(both));
+        let both = RecordPart { estimators: first.estimators.clone().followed_by(&second.estimators), ..first };
+        Self { measured: measured(measurement), raw, ruled, both }
     }
+}
+
+/// The curves of all channels as measured.
+fn measured(measurement: &Measurement) -> Vec<Curve<OCTAVES>> {
+    let curve = |channel: &MeasuredChannel| {
+        let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
+        let mut missing = 0_u32;
+        for (position, &count) in channel.counts.iter().enumerate() {
+            missing = missing.saturating_add(measurement.missing_before(position));
+            if channel.is_refused(position) {
+                missing = missing.saturating_add(1);
+                continue;
+            }
+            estimator.gap(std::mem::take(&mut missing));
+            estimator.push(count);
+        }
+        estimator.curve(measurement.period_s()).scaled(channel.profile.lsb)
+    };
+    in_parallel(&measurement.channels, curve)
+}
+
+/// The estimators of the halves of a recording, by time, without the samples of `exclusion`.
+fn halves(
+    measurement: &Measurement,
+    coupled: &[ChannelProfile],
+    preprocessing: &Preprocessing,
+    exclusion: Exclusion,
+) -> [RecordPart; 2] {
+    let others = measurement.profiles().filter(|channel| !coupled.contains(channel));
+    let channels: Vec<ChannelProfile> = coupled.iter().copied().chain(others).collect();
+    let resolutions =
+        channels.iter().map(|channel| f64::from(preprocessing.counts_per_step(*channel)) * channel.lsb).collect();
+    let estimators = CoupledEstimators::new(channels.len(), coupled.len());
+    let period_s = measurement.period_s();
+    let part = RecordPart { channels: channels.clone(), estimators, resolutions, period_s };
+    let mut halves = [part.clone(), part];
+    let recorded: Vec<RecordedSamples> = channels
+        .iter()
+        .filter_map(|channel| {
+            let of = measurement.channel(channel)?;
+            let excluded = preprocessing.excluded(*channel, exclusion);
+            Some(RecordedSamples { channel: of, is_excluded: positions(measurement, of, &excluded) })
+        })
+        .collect();
+    let middle = measurement.middle();
+    for position in 0..measurement.len() {
+        let slot = measurement.slots[position];
+        let missing = measurement.missing_before(position);
+        if slot < middle {
+            halves[0].estimators.gap(missing);
+        } else {
+            // Of a gap over the middle, each half has the samples on its side.
+            halves[1].estimators.gap(missing.min(u32::try_from(slot - middle).unwrap_or(u32::MAX)));
+        }
+        halves[usize::from(slot >= middle)].estimators.push(recorded.iter().map(|of| {
+            (!of.is_excluded[position]).then(|| {
+                let steps = f64::from(of.channel.counts[position]) * STEPS_PER_COUNT;
+                let profile = of.channel.profile;
+                (steps - STEPS_PER_COUNT * preprocessing.offset(profile, slot) / profile.lsb).round() as i32
+            })
+        }));
+    }
+    halves
+}
+
+/// A channel's samples, and whether each is left out.
+struct RecordedSamples<'a> {
+    channel: &'a MeasuredChannel,
+    is_excluded: Vec<bool>,
+}
+
+/// For each sample of a channel whether it was refused or its sample period is one of `excluded`.
+fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u64]) -> Vec<bool> {
+    let mut is_excluded = vec![false; channel.counts.len()];
+    let refused = channel.refused.values().flatten().copied();
+    let of_slots = excluded.iter().filter_map(|slot| measurement.slots.binary_search(slot).ok());
+    for position in refused.chain(of_slots) {
+        if let Some(of) = is_excluded.get_mut(position) {
+            *of = true;
+        }
+    }
+    is_excluded
 }
 
 impl RecordPart {
@@ -152,6 +229,13 @@ impl RecordPart {
     /// Allan variances of the channel at a position, in its unit squared.
     pub(crate) fn curve(&self, channel: usize) -> Curve<OCTAVES> {
         self.estimators.cascade(channel).curve(self.period_s).scaled(self.step_size(channel))
+    }
+
+    /// Samples of the channel at a position that were replaced because they are missing.
+    pub(crate) fn replaced(&self, channel: usize) -> u64 {
+        let cascade = self.estimators.cascade(channel);
+        let sums = (0..OCTAVES).filter_map(|octave| cascade.octave_sums(octave));
+        sums.map(|sums| u64::from(sums.interpolation.replaced())).sum()
     }
 
     /// Smallest distance of two values of the channel at a position, in its unit.

@@ -78,12 +78,12 @@ pub struct Detection {
 /// What removes an effect from a channel's samples.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Correction {
-    /// These samples become a gap: positions in the series, in ascending order.
-    Exclude(Vec<usize>),
-    /// `size` is subtracted from the sample at `from` and from all after it.
+    /// The samples of these sample periods, in ascending order, become gaps.
+    Exclude(Vec<u64>),
+    /// `size` is subtracted from the sample of the sample period `from` and from all after it.
     Offset {
-        /// Position in the series.
-        from: usize,
+        /// Sample period, counted as in the series.
+        from: u64,
         /// In the unit of the series.
         size: f64,
     },

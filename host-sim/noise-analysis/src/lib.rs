@@ -20,6 +20,7 @@ pub mod detectors;
 pub mod distributions;
 mod estimators;
 pub mod findings;
+mod interpolation;
 mod naming;
 pub mod nonstationarity;
 mod preprocessing;

@@ -1,18 +1,40 @@
 //! Preprocessing: what the detectors find in the samples of each channel, and the series without it.
 //!
-//! Spikes and repeated samples become gaps, a bias step is subtracted. A ramp is reported and stays in the samples, because
+//! Repeated samples become gaps of every channel, knocks and spikes gaps of the channel that shows them; a bias step is
+//! subtracted. A ramp is reported and stays in the samples, because
 //! the noise model has a term for it. A sensitivity to temperature or supply stays in them too, and is kept for the
 //! regression on covariates.
 
 use crate::detectors::bias::{BiasChanges, BiasSensitivity};
 use crate::detectors::block_means::NoiseGrids;
-use crate::detectors::{bias, effective_lsb, spikes};
+use crate::detectors::knocks::{self, Knock, KnockRule};
+use crate::detectors::spikes::{self, SpikeRule};
+use crate::detectors::{bias, effective_lsb};
 use crate::findings::{Correction, Detection, Effect};
 use crate::sampling_faults;
 use crate::series::Series;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
-use std::collections::BTreeSet;
+
+/// Which of the samples that the detectors found are left out. Samples that were read twice always are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Exclusion {
+    /// None.
+    None,
+    /// Knocks and spikes by rules that were fitted to the first half of the record, in both halves.
+    ByFirstHalf,
+    /// The knocks and spikes of the whole record.
+    ByWhole,
+}
+
+/// Sample periods that one channel does not use, in ascending order.
+#[derive(Default)]
+struct ChannelExclusion {
+    knocks: Vec<u64>,
+    spikes: Vec<u64>,
+    /// Both, by the rules of the first half.
+    by_first_half: Vec<u64>,
+}
 
 /// Effects in the samples, and the corrections that remove them.
 #[derive(Default)]
@@ -20,23 +42,35 @@ pub(crate) struct Preprocessing {
     /// Effects that concern every channel: sample loss, repeated samples, the sample clock.
     common_effects: Vec<Effect>,
     channel_effects: Vec<(ChannelProfile, Effect)>,
-    /// Positions in the recording.
-    excluded: BTreeSet<usize>,
-    /// By channel: the first position from which an offset is subtracted, and the offset in the channel's unit.
-    offsets: Vec<(ChannelProfile, usize, f64)>,
+    /// Sample periods that no channel uses: their sample equals the one before in all channels.
+    repeated: Vec<u64>,
+    exclusions: Vec<(ChannelProfile, ChannelExclusion)>,
+    /// By channel: the first sample period from which on an offset is subtracted, and the offset in the channel's unit.
+    offsets: Vec<(ChannelProfile, u64, f64)>,
     /// A channel, the temperature or supply that it depends on, and how much.
     sensitivities: Vec<(ChannelProfile, ChannelProfile, BiasSensitivity)>,
     /// Channels whose values are all multiples of several counts, and of how many.
     counts_per_step: Vec<(ChannelProfile, u32)>,
 }
 
+/// What was found in one channel.
+struct ChannelFindings {
+    lsb: Option<Detection>,
+    knocks: Vec<Detection>,
+    spikes: Option<Detection>,
+    bias_changes: BiasChanges,
+    /// Channels that the bias may depend on, in the order of the sensitivities in `bias_changes`.
+    regressors: Vec<ChannelProfile>,
+    exclusion: ChannelExclusion,
+}
+
 impl Preprocessing {
-    /// Looks for spikes, steps, ramps, sensitivities and a coarse resolution in the channels `traced`, and for lost or
+    /// Looks for knocks, spikes, steps, ramps, sensitivities and a coarse resolution in the channels `traced`, and for lost or
     /// repeated samples and a wrong sample rate in the whole recording.
     pub(crate) fn detect(measurement: &Measurement, traced: &[ChannelProfile], noise_grids: &NoiseGrids) -> Self {
         let mut preprocessing = Self::default();
         for finding in sampling_faults::detect(measurement) {
-            preprocessing.excluded.extend(excluded(&finding.correction));
+            preprocessing.repeated.extend(excluded(&finding.correction));
             preprocessing.common_effects.push(finding.effect);
         }
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
@@ -45,37 +79,53 @@ impl Preprocessing {
         preprocessing.counts_per_step = recorded.iter().copied().zip(steps).filter(|(_, counts)| *counts > 1).collect();
         let series_of =
             |channel: ChannelProfile| measured(channel).with_counts_per_step(preprocessing.counts_per_step(channel));
-        let regressors: Vec<(ChannelProfile, Series)> =
-            recorded.iter().map(|&channel| (channel, series_of(channel))).collect();
-        let found = in_parallel(traced, |&channel| {
-            let series = series_of(channel);
-            let lsb = effective_lsb::find(&measured(channel));
-            let spikes = spikes::find(&series);
-            let left_out = spikes.as_ref().map(|finding| excluded(&finding.correction)).unwrap_or_default();
-            let cleaned = series.corrected(&Correction::Exclude(left_out.clone()));
-            // The regressors need the same samples as the channel.
-            let (profiles, others): (Vec<ChannelProfile>, Vec<Series>) = regressors
+        let series: Vec<Series> = in_parallel(traced, |&channel| series_of(channel));
+        let knocks = KnocksInChannels::find(&series, measurement.middle(), measurement.profile.dithered_avar_counts2);
+        // What a channel may depend on, without its own knocks.
+        let regressors: Vec<(ChannelProfile, Series)> = recorded
+            .iter()
+            .map(|&channel| match traced.iter().position(|of| *of == channel) {
+                Some(at) => (channel, knocks.removed_from(&series[at], at)),
+                None => (channel, series_of(channel)),
+            })
+            .collect();
+        let numbered: Vec<usize> = (0..traced.len()).collect();
+        let found = in_parallel(&numbered, |&at| {
+            let quiet = knocks.removed_from(&series[at], at);
+            let spikes = spikes::find(&quiet);
+            let mut exclusion = ChannelExclusion {
+                spikes: spikes.as_ref().map(|finding| excluded(&finding.correction)).unwrap_or_default(),
+                knocks: slots_within(&series[at], &knocks.by_whole[at]),
+                by_first_half: Vec::new(),
+            };
+            exclusion.by_first_half =
+                excluded_by_first_half(&series[at], &knocks.by_first_half[at], measurement.middle());
+            let (profiles, others): (Vec<ChannelProfile>, Vec<&Series>) = regressors
                 .iter()
-                .filter(|(regressor, _)| may_depend(channel, *regressor))
-                .map(|(regressor, series)| {
-                    (*regressor, series.clone().corrected(&Correction::Exclude(left_out.clone())))
-                })
+                .filter(|(regressor, _)| may_depend(traced[at], *regressor))
+                .map(|(regressor, series)| (*regressor, series))
                 .unzip();
-            let bias_changes = bias::find(&cleaned, &others.iter().collect::<Vec<_>>(), noise_grids);
-            (lsb, spikes, bias_changes, profiles, left_out)
+            ChannelFindings {
+                lsb: effective_lsb::find(&measured(traced[at])),
+                knocks: knocks.detections(&series[at], at, traced),
+                bias_changes: bias::find(&quiet.without(&exclusion.spikes), &others, noise_grids),
+                regressors: profiles,
+                spikes,
+                exclusion,
+            }
         });
-        for (&channel, (lsb, spikes, BiasChanges { step, ramp, sensitivities }, regressors, left_out)) in
-            traced.iter().zip(found)
-        {
+        for (&channel, found) in traced.iter().zip(found) {
+            let ChannelFindings { lsb, knocks, spikes, bias_changes, regressors, exclusion } = found;
+            let BiasChanges { step, ramp, sensitivities } = bias_changes;
             if let Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) = &step {
-                preprocessing.offsets.push((channel, position_with_excluded(*from, &left_out), *size));
+                preprocessing.offsets.push((channel, *from, *size));
             }
             // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its
             // own drift.
             let slow = sensitivities.into_iter().map(|(place, sensitivity)| (channel, regressors[place], sensitivity));
             preprocessing.sensitivities.extend(slow.filter(|(_, regressor, _)| regressor.quantity.is_environment()));
-            preprocessing.excluded.extend(left_out);
-            let findings = lsb.into_iter().chain(spikes).chain(step).chain(ramp);
+            preprocessing.exclusions.push((channel, exclusion));
+            let findings = lsb.into_iter().chain(knocks).chain(spikes).chain(step).chain(ramp);
             preprocessing.channel_effects.extend(findings.map(|finding| (channel, finding.effect)));
         }
         preprocessing
@@ -86,24 +136,51 @@ impl Preprocessing {
         self.counts_per_step.iter().find(|(of, _)| *of == channel).map_or(1, |(_, counts)| *counts)
     }
 
-    /// Whether the sample at `position` of the recording is not used.
-    pub(crate) fn excludes(&self, position: usize) -> bool {
-        self.excluded.contains(&position)
+    /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
+    pub(crate) fn excludes(&self, channel: ChannelProfile, exclusion: Exclusion) -> bool {
+        self.exclusion(channel).is_some_and(|own| !own.slots(exclusion).is_empty())
     }
 
-    /// What is subtracted from the sample at `position`, in the channel's unit.
-    pub(crate) fn offset(&self, channel: ChannelProfile, position: usize) -> f64 {
-        self.offsets.iter().filter(|(of, from, _)| *of == channel && position >= *from).map(|(.., size)| size).sum()
+    /// Whether `exclusion` leaves out a sample of any channel, beyond those that were read twice.
+    pub(crate) fn excludes_any(&self, exclusion: Exclusion) -> bool {
+        self.exclusions.iter().any(|(_, own)| !own.slots(exclusion).is_empty())
+    }
+
+    /// Sample periods that a channel does not use, in ascending order.
+    pub(crate) fn excluded(&self, channel: ChannelProfile, exclusion: Exclusion) -> Vec<u64> {
+        let own = self.exclusion(channel).map(|own| own.slots(exclusion)).unwrap_or_default();
+        merged([&self.repeated, &own])
+    }
+
+    /// Samples of a channel that arrived and are not used, by cause.
+    pub(crate) fn refused(&self, channel: ChannelProfile) -> impl Iterator<Item = (&'static str, u64)> {
+        let own = self.exclusion(channel);
+        let count = |slots: Option<&Vec<u64>>| slots.map_or(0, |slots| slots.len() as u64);
+        let counts = [
+            ("repeated", self.repeated.len() as u64),
+            ("knock", count(own.map(|own| &own.knocks))),
+            ("spikes", count(own.map(|own| &own.spikes))),
+        ];
+        counts.into_iter().filter(|(_, count)| *count > 0)
+    }
+
+    fn exclusion(&self, channel: ChannelProfile) -> Option<&ChannelExclusion> {
+        self.exclusions.iter().find(|(of, _)| *of == channel).map(|(_, own)| own)
+    }
+
+    /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
+    pub(crate) fn offset(&self, channel: ChannelProfile, slot: u64) -> f64 {
+        self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from).map(|(.., size)| size).sum()
     }
 
     /// A channel's series after preprocessing.
-    pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelProfile) -> Series {
+    pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelProfile, exclusion: Exclusion) -> Series {
         let mut series =
             Series::from_measurement(measurement, &channel).with_counts_per_step(self.counts_per_step(channel));
         for &(_, from, size) in self.offsets.iter().filter(|(of, ..)| *of == channel) {
-            series = series.corrected(&Correction::Offset { from, size });
+            series = series.lowered_from(from, size);
         }
-        series.corrected(&Correction::Exclude(self.excluded.iter().copied().collect()))
+        series.without(&self.excluded(channel, exclusion))
     }
 
     /// Whether a ramp was found in a channel.
@@ -124,6 +201,81 @@ impl Preprocessing {
     }
 }
 
+impl ChannelExclusion {
+    fn slots(&self, exclusion: Exclusion) -> Vec<u64> {
+        match exclusion {
+            Exclusion::None => Vec::new(),
+            Exclusion::ByFirstHalf => self.by_first_half.clone(),
+            Exclusion::ByWhole => merged([&self.knocks, &self.spikes]),
+        }
+    }
+}
+
+/// The knocks in the traced channels, by channel.
+struct KnocksInChannels {
+    by_whole: Vec<Vec<Knock>>,
+    /// By the rules of the first half, in both halves.
+    by_first_half: Vec<Vec<Knock>>,
+}
+
+impl KnocksInChannels {
+    fn find(series: &[Series], middle: u64, dithered_avar_counts2: f64) -> Self {
+        let first: Vec<Series> = series.iter().map(|of| of.before(middle)).collect();
+        let second: Vec<Series> = series.iter().map(|of| of.from(middle)).collect();
+        let rules = in_parallel(&first, |first| KnockRule::fit(first, dithered_avar_counts2));
+        let parts = in_parallel(&[first, second], |part| knocks::find_by(&rules, part));
+        let in_both = |channel: usize| parts.iter().flat_map(|part| part[channel].clone()).collect();
+        Self {
+            by_whole: knocks::find(series, dithered_avar_counts2),
+            by_first_half: (0..series.len()).map(in_both).collect(),
+        }
+    }
+
+    /// The series of channel `at` without the knocks of the whole record.
+    fn removed_from(&self, series: &Series, at: usize) -> Series {
+        let knocks = &self.by_whole[at];
+        if knocks.is_empty() { series.clone() } else { series.clone().without(&slots_within(series, knocks)) }
+    }
+
+    /// The knocks of channel `at` as they are reported.
+    fn detections(&self, series: &Series, at: usize, channels: &[ChannelProfile]) -> Vec<Detection> {
+        let detection = |knock: &Knock| {
+            let shows = |others: &&Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
+            let shown: Vec<&str> = channels
+                .iter()
+                .zip(&self.by_whole)
+                .filter(|(_, others)| shows(others))
+                .map(|(of, _)| of.name)
+                .collect();
+            knock.detection(series, &shown)
+        };
+        self.by_whole[at].iter().map(detection).collect()
+    }
+}
+
+/// Sample periods of the samples of a series within knocks, in ascending order.
+fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
+    let is_within = |slot: &u64| knocks.iter().any(|knock| knock.slots.contains(slot));
+    if knocks.is_empty() { Vec::new() } else { series.slots.iter().copied().filter(is_within).collect() }
+}
+
+/// Sample periods within `knocks`, and those of spikes by the rule of the samples before `middle`, in ascending order.
+fn excluded_by_first_half(series: &Series, knocks: &[Knock], middle: u64) -> Vec<u64> {
+    let loud = slots_within(series, knocks);
+    let quiet = series.clone().without(&loud);
+    let (first, second) = (quiet.before(middle), quiet.from(middle));
+    let spikes = SpikeRule::fit(&first).map(|rule| [rule.slots(&first), rule.slots(&second)].concat());
+    merged([&loud, &spikes.unwrap_or_default()])
+}
+
+/// Both lists in ascending order, without duplicates.
+fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
+    let mut all = lists.concat();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
 /// Runs `task` for each of `items`, each on its own thread, and returns the results in the order of `items`.
 pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
@@ -133,9 +285,9 @@ pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R 
     })
 }
 
-fn excluded(correction: &Option<Correction>) -> Vec<usize> {
+fn excluded(correction: &Option<Correction>) -> Vec<u64> {
     match correction {
-        Some(Correction::Exclude(positions)) => positions.clone(),
+        Some(Correction::Exclude(slots)) => slots.clone(),
         _ => Vec::new(),
     }
 }
@@ -145,9 +297,4 @@ fn excluded(correction: &Option<Correction>) -> Vec<usize> {
 fn may_depend(channel: ChannelProfile, regressor: ChannelProfile) -> bool {
     let motion = regressor.quantity == Quantity::SpecificForce && channel.quantity == Quantity::AngularRate;
     regressor.quantity.is_environment() || motion
-}
-
-/// The position that a sample had before those at the positions `left_out` were excluded.
-fn position_with_excluded(position: usize, left_out: &[usize]) -> usize {
-    left_out.iter().fold(position, |position, &excluded| if excluded <= position { position + 1 } else { position })
 }

@@ -37,8 +37,11 @@ pub struct ChannelReport {
     pub name: String,
     /// Unit of every deviation of the channel, such as `deg/s`.
     pub unit: String,
-    /// Samples used.
+    /// Samples that arrived and were used as a whole, in every channel.
     pub samples: u64,
+    /// Samples that the channel's model lacks.
+    #[serde(flatten)]
+    pub missing: MissingSamples,
     /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
     /// The coefficients by the slope method.
@@ -52,6 +55,18 @@ pub struct ChannelReport {
     /// Assessment of the model for use in navigation.
     #[serde(rename = "practice")]
     pub assessment: Assessment,
+}
+
+/// Samples that are missing in a channel, counted apart: lost on the way, refused by cause, replaced by the estimator.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct MissingSamples {
+    /// Samples that never arrived.
+    pub lost: u64,
+    /// Samples that arrived and are not used, by cause: those that the reader refused in all channels or in this one, and
+    /// what the analysis keeps out of the coefficients (`repeated`, `spikes`, `knock`).
+    pub refused: BTreeMap<String, u64>,
+    /// Of all these, samples that the estimator replaced from their neighbours; the others cut the record.
+    pub replaced: u64,
 }
 
 /// One octave of the measured Allan deviation.
@@ -69,6 +84,9 @@ pub struct CurvePoint {
     pub high: f64,
     /// Equivalent degrees of freedom.
     pub edf: f64,
+    /// Share of the samples that were missing and replaced from their neighbours, %. 0 where the differences over gaps are
+    /// left out.
+    pub replaced_percent: f64,
     /// `100/sqrt(2(N/n−1))`: the percentage accuracy of a point in the slope method, for `N` samples.
     pub accuracy_percent: f64,
 }
@@ -84,6 +102,7 @@ impl CurvePoint {
             low: point.low.sqrt(),
             high: point.high.sqrt(),
             edf: point.edf,
+            replaced_percent: 100.0 * point.replaced,
             accuracy_percent: slope_method::percentage_accuracy(samples, point.n),
         }
     }
@@ -122,8 +141,12 @@ pub struct ModelReport {
     pub adev: Vec<f64>,
     /// Against the first half of the record, which the model was fitted to.
     pub fitted: ModelErrorReport,
-    /// Against the second half of the record, which was not used in the fit.
+    /// Against the second half of the record as it was recorded, which was not used in the fit.
     pub unseen: ModelErrorReport,
+    /// Against the second half without what the rules for spikes and knocks exclude that were fitted to the first half;
+    /// absent where they exclude nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unseen_excluding: Option<ModelErrorReport>,
 }
 
 /// One term of a noise model.

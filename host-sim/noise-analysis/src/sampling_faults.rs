@@ -66,7 +66,7 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
             all &= same;
         }
         if all {
-            positions.push(at);
+            positions.push(measurement.slots[at]);
         }
     }
     let refused = measurement.dropped.get("repeated").copied().unwrap_or(0);

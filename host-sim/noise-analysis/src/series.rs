@@ -2,6 +2,7 @@
 
 use crate::findings::Correction;
 use measurement::{ChannelProfile, Measurement};
+use std::ops::Range;
 
 /// The samples of one channel, each with the sample period in which it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,6 +11,9 @@ pub struct Series {
     pub slots: Vec<u64>,
     /// One value for each slot, in [`unit`](Self::unit).
     pub values: Vec<f64>,
+    /// Sample periods of the record, or of the part of it, that the series is from: those of `slots` and of samples that are
+    /// missing. Series of channels that were recorded together have the same span.
+    pub span: Range<u64>,
     /// Sample period, s.
     pub period_s: f64,
     /// Smallest distance of two values, in [`unit`](Self::unit): one count, unless the values are known to be coarser.
@@ -19,13 +23,21 @@ pub struct Series {
 }
 
 impl Series {
-    /// The samples of `channel`; an empty series if it was not recorded.
+    /// The samples of `channel` that were not refused; an empty series if it was not recorded.
     #[must_use]
     pub fn from_measurement(measurement: &Measurement, channel: &ChannelProfile) -> Self {
-        let counts = measurement.channel(channel).map(|channel| channel.counts.as_slice()).unwrap_or_default();
+        let recorded = measurement.channel(channel);
+        let counts = recorded.map(|channel| channel.counts.as_slice()).unwrap_or_default();
+        let mut refused: Vec<usize> =
+            recorded.iter().flat_map(|channel| channel.refused.values().flatten().copied()).collect();
+        refused.sort_unstable();
+        let used = (0..counts.len()).filter(|position| refused.binary_search(position).is_err());
+        let (slots, values) =
+            used.map(|position| (measurement.slots[position], f64::from(counts[position]) * channel.lsb)).unzip();
         Self {
-            slots: measurement.slots[..counts.len()].to_vec(),
-            values: counts.iter().map(|&count| f64::from(count) * channel.lsb).collect(),
+            slots,
+            values,
+            span: 0..measurement.periods(),
             period_s: measurement.period_s(),
             resolution: channel.lsb,
             unit: channel.unit,
@@ -38,34 +50,71 @@ impl Series {
         Self { resolution: self.resolution * f64::from(counts), ..self }
     }
 
-    /// Time from the first sample to the last, s.
+    /// Time from the start of the record to the last sample, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.slots.last().map_or(0.0, |&slot| slot as f64 * self.period_s)
     }
 
-    /// The first half of the samples.
+    /// The samples before the sample period `slot`.
     #[must_use]
-    pub fn first_half(&self) -> Self {
-        let half = self.values.len() / 2;
-        Self { slots: self.slots[..half].to_vec(), values: self.values[..half].to_vec(), ..*self }
+    pub fn before(&self, slot: u64) -> Self {
+        let count = self.slots.partition_point(|&of| of < slot);
+        Self {
+            slots: self.slots[..count].to_vec(),
+            values: self.values[..count].to_vec(),
+            span: self.span.start..slot.min(self.span.end),
+            ..*self
+        }
+    }
+
+    /// The samples from the sample period `slot` on.
+    #[must_use]
+    pub fn from(&self, slot: u64) -> Self {
+        let count = self.slots.partition_point(|&of| of < slot);
+        Self {
+            slots: self.slots[count..].to_vec(),
+            values: self.values[count..].to_vec(),
+            span: slot.max(self.span.start)..self.span.end,
+            ..*self
+        }
+    }
+
+    /// The samples of the sample periods for which `is_kept` holds.
+    #[must_use]
+    pub fn filtered(mut self, is_kept: impl Fn(u64) -> bool) -> Self {
+        let kept = self.slots.iter().zip(&self.values).filter(|(slot, _)| is_kept(**slot));
+        (self.slots, self.values) = kept.map(|(&slot, &value)| (slot, value)).unzip();
+        self
+    }
+
+    /// The samples without those of the sample periods `slots`, which are in ascending order.
+    #[must_use]
+    pub fn without(self, slots: &[u64]) -> Self {
+        if slots.is_empty() { self } else { self.filtered(|slot| slots.binary_search(&slot).is_err()) }
+    }
+
+    /// Whether the channel has a sample in the sample period `slot`.
+    #[must_use]
+    pub fn has(&self, slot: u64) -> bool {
+        self.slots.binary_search(&slot).is_ok()
+    }
+
+    /// The samples from the sample period `slot` on less `offset`.
+    #[must_use]
+    pub fn lowered_from(mut self, slot: u64, offset: f64) -> Self {
+        let from = self.slots.partition_point(|&of| of < slot);
+        self.values[from..].iter_mut().for_each(|value| *value -= offset);
+        self
     }
 
     /// The series without the effect that `correction` removes.
     #[must_use]
-    pub fn corrected(mut self, correction: &Correction) -> Self {
+    pub fn corrected(self, correction: &Correction) -> Self {
         match correction {
-            Correction::Exclude(positions) => {
-                let kept = |position: &usize| positions.binary_search(position).is_err();
-                let positions: Vec<usize> = (0..self.values.len()).filter(kept).collect();
-                self.slots = positions.iter().map(|&position| self.slots[position]).collect();
-                self.values = positions.iter().map(|&position| self.values[position]).collect();
-            }
-            &Correction::Offset { from, size } => {
-                self.values.iter_mut().skip(from).for_each(|value| *value -= size);
-            }
+            Correction::Exclude(slots) => self.without(slots),
+            &Correction::Offset { from, size } => self.lowered_from(from, size),
         }
-        self
     }
 
     /// Whether the samples from `first` to `last` follow each other without a gap.

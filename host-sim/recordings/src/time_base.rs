@@ -203,9 +203,9 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Estimate
     }
 
     let profile = adis16405::profile(recording.range.lsb());
-    let channel = |channel: &Channel| MeasuredChannel {
-        profile: profile.channels[*channel as usize],
-        counts: positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect(),
+    let channel = |channel: &Channel| {
+        let counts = positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect();
+        MeasuredChannel::new(profile.channels[*channel as usize], counts)
     };
     let measurement = Measurement {
         channels: recording.channels.iter().map(channel).collect(),

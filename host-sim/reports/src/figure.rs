@@ -249,11 +249,13 @@ pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError>
         adev: unseen.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
         fitted: ModelErrorReport { deviance_per_point: Some(fitted), rms_percent: None },
         unseen: ModelErrorReport { deviance_per_point: Some(error), rms_percent: None },
+        unseen_excluding: None,
     };
     allan_deviation(&ChannelReport {
         name: format!("{}, second half; models of the first", of.channel.name),
         unit: of.channel.unit.to_owned(),
         samples: unseen.samples(),
+        missing: Default::default(),
         // With the degrees of freedom of the tables.
         curve: unseen.points().iter().map(|point| CurvePoint::new(point, unseen.samples())).collect(),
         read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },

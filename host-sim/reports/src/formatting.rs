@@ -2,6 +2,7 @@
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::assessment::{Innovations, RecordLength};
+use noise_analysis::report::MissingSamples;
 use std::fmt;
 
 /// Shown in the place of a number that is absent or not finite.
@@ -54,6 +55,25 @@ pub fn count(value: u64) -> String {
         out.push(digit);
     }
     out
+}
+
+/// What a channel lacks, in one sentence: samples that were lost, refused by cause, and how many of them were replaced. Empty
+/// where nothing is missing.
+pub fn missing_samples(missing: &MissingSamples) -> String {
+    let refused: Vec<String> =
+        missing.refused.iter().map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
+    let mut parts = Vec::new();
+    if missing.lost > 0 {
+        parts.push(format!("{} samples lost", count(missing.lost)));
+    }
+    if !refused.is_empty() {
+        parts.push(format!("refused: {}", refused.join(", ")));
+    }
+    if parts.is_empty() {
+        return String::new();
+    }
+    parts.push(format!("{} replaced from their neighbours", count(missing.replaced)));
+    parts.join("; ")
 }
 
 /// `seconds` in days, hours, minutes and seconds, such as `2 h 46 min 40 s`; below a minute with four digits.

@@ -4,7 +4,8 @@ mod tables;
 
 use crate::figure::{self, FigureError};
 use crate::formatting::{
-    count, duration, filter_consistency, interval, number, parameter_name, recording_advice, unit, words,
+    count, duration, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit,
+    words,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::assessment::Assessment;
@@ -132,6 +133,8 @@ fn channel_section(channel: &ChannelReport, figure: &str) -> Markup {
     html! {
         section.channel id=(channel.name) {
             h2 { (channel.name) " " small { (unit(&channel.unit)) " · " (count(channel.samples)) " samples" } }
+            @let missing = missing_samples(&channel.missing);
+            @if !missing.is_empty() { p.note { "Missing: " (missing) "." } }
             figure role="img" aria-label={ "Allan deviation of " (channel.name) } { (PreEscaped(figure)) }
             div.tables {
                 div {

@@ -2,8 +2,8 @@
 
 use crate::coefficients::{self, CoefficientRow};
 use crate::formatting::{
-    NONE, TextTable, count, duration, filter_consistency, interval, number, optional, parameter_name, percent,
-    recording_advice, unit, words, wrap,
+    NONE, TextTable, count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name,
+    percent, recording_advice, unit, words, wrap,
 };
 use noise_analysis::assessment::navigation::CALIBRATION_S;
 use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
@@ -33,6 +33,9 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
     writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
     writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")?;
+    if report.channels.iter().any(|channel| channel.after.unseen_excluding.is_some()) {
+        writeln!(out, "excluding: without what the first half's rules for spikes and knocks find in the unseen half.")?;
+    }
     writeln!(
         out,
         "error after t: rms of the integral over t when the bias is the mean of the {CALIBRATION_S} s before."
@@ -55,6 +58,10 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     let used = name.chars().count() + samples.chars().count() + 6;
     let rule = "─".repeat(usize::from(WIDTH).saturating_sub(used));
     writeln!(out, "\n── {name} {rule} {samples}\n")?;
+    let missing = missing_samples(&channel.missing);
+    if !missing.is_empty() {
+        writeln!(out, "{}\n", wrap(&format!("Missing: {missing}."), WIDTH.into()))?;
+    }
 
     writeln!(out, "{}", coefficient_table(channel))?;
     let same = channel.after == channel.before;
@@ -114,14 +121,24 @@ fn term_table(terms: &[TermReport]) -> TextTable {
 }
 
 fn error_table(channel: &ChannelReport) -> TextTable {
-    let rows = [("before", &channel.before), ("after", &channel.after)].map(|(name, model)| {
-        vec![
+    let rows = [("before", &channel.before), ("after", &channel.after)].into_iter().flat_map(|(name, model)| {
+        let all = vec![
             name.to_owned(),
             percent(model.fitted.rms_percent),
             percent(model.unseen.rms_percent),
             optional(model.fitted.deviance_per_point),
             optional(model.unseen.deviance_per_point),
-        ]
+        ];
+        let excluding = model.unseen_excluding.as_ref().map(|error| {
+            vec![
+                format!("{name}, excluding"),
+                String::new(),
+                percent(error.rms_percent),
+                String::new(),
+                optional(error.deviance_per_point),
+            ]
+        });
+        [Some(all), excluding].into_iter().flatten()
     });
     let header = ["model error", "rms, fitted", "rms, unseen", "deviance, fitted", "deviance, unseen"];
     table(&header, 1, rows)

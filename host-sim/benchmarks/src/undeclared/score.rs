@@ -2,10 +2,11 @@
 
 use super::draw::DrawnRecording;
 use super::effect::{EffectKind, parameters};
+use super::sample_loss::lose_samples;
 use super::truth::{detects_known_waveform, true_model_errors};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::{ChannelReport, Report};
+use noise_analysis::report::{ChannelReport, ModelReport, Report};
 use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
 use simulation::SimulationError;
@@ -108,19 +109,21 @@ pub struct RecordingScore {
     pub unseen: Option<UnseenErrors>,
 }
 
-/// Simulates a recording, analyses it and compares the report with the truth.
+/// Simulates a recording, of which the share `loss` of the samples is lost at random, analyses it and compares the report
+/// with the truth.
 ///
 /// # Errors
 /// The recording cannot be simulated, or has no timeline.
-pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreError> {
+pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingScore, ScoreError> {
     let seed = drawn.seed;
     let failed = |reason| ScoreError::Record { seed, reason };
     let mut recording = drawn.simulation.run(|_| ()).map_err(failed)?;
     recording.channels.retain(|channel| RECORDED.contains(channel));
-    let measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
+    let mut measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
+    lose_samples(&mut measurement, loss, seed);
     let report = analyze(&measurement);
     let begin_s = recording.samples.first().and_then(|sample| sample.time_stamp.time_s).unwrap_or(0.0);
-    let mut score = compare(drawn, &report, begin_s);
+    let mut score = compare(drawn, &report, begin_s, loss);
     let effects = &drawn.simulation.scenario.effects;
     if let ([answer], [effect]) = (&mut score.answers[..], &effects[..]) {
         answer.shape_known = detects_known_waveform(effect, &measurement, begin_s);
@@ -132,10 +135,12 @@ pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreEr
         let truth = true_model_errors(drawn, channel).map_err(failed)?;
         let of = report.channels.iter().find(|report| report.name == channel.name());
         score.unseen = of.zip(truth).and_then(|(report, truth)| {
-            let before = report.before.unseen.deviance_per_point?;
+            // Without the spikes that the first half's rule excludes: the true model has none either.
+            let error =
+                |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
             Some(UnseenErrors {
-                before,
-                after: report.after.unseen.deviance_per_point?,
+                before: error(&report.before)?,
+                after: error(&report.after)?,
                 truth: truth.model,
                 refitted: truth.fitted,
             })
@@ -144,8 +149,9 @@ pub fn score_recording(drawn: &DrawnRecording) -> Result<RecordingScore, ScoreEr
     Ok(score)
 }
 
-/// Compares a report with the truth. `begin_s` is the time from the start of the sensor to the first sample.
-pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> RecordingScore {
+/// Compares a report with the truth. `begin_s` is the time from the start of the sensor to the first sample, `loss` the share
+/// of the samples that was lost beside the hidden effects.
+pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64, loss: f64) -> RecordingScore {
     let moved = drawn.simulation.scenario.environment.motion.deviation_g > 0.0;
     // Accelerometers are not scored during a motion: its effect on them can resemble any kind.
     let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
@@ -162,8 +168,10 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> 
         .zip(&drawn.strengths)
         .map(|((&kind, effect), &strength)| score_effect(kind, effect, strength, &scored))
         .collect();
-    let is_true =
-        |channel: Channel, kind: &str| effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel));
+    let is_true = |channel: Channel, kind: &str| {
+        let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
+        is_lost || effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel))
+    };
     let false_alarms = scored
         .iter()
         .flat_map(|(channel, report)| report.effects.iter().map(move |effect| (*channel, effect)))
@@ -174,7 +182,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64) -> 
         .kinds
         .iter()
         .zip(effects)
-        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, begin_s))
+        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, begin_s, loss))
         .collect();
     RecordingScore { seed: drawn.seed, answers, false_alarms, estimates, unseen: None }
 }
@@ -213,6 +221,7 @@ fn score_parameters(
     effect: &InjectedEffect,
     scored: &[(Channel, &ChannelReport)],
     begin_s: f64,
+    loss: f64,
 ) -> Vec<ParameterScore> {
     let found = scored
         .iter()
@@ -223,7 +232,12 @@ fn score_parameters(
     let length = parameters.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
     let score = |&(name, truth): &(&'static str, f64)| {
         let estimate = found.parameters.get(name)?;
-        let truth = if kind == EffectKind::BiasStep && name == "time" { truth - begin_s } else { truth };
+        let truth = match kind {
+            EffectKind::BiasStep if name == "time" => truth - begin_s,
+            // What is dropped cannot be lost once more.
+            EffectKind::DroppedSamples => truth + (1.0 - truth) * loss,
+            _ => truth,
+        };
         let scale = if kind == EffectKind::Acceleration { length } else { truth.abs() };
         let relative_error = (estimate.value - truth).abs() / scale;
         let (value, low, high) = (estimate.value, estimate.low, estimate.high);

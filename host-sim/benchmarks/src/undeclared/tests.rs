@@ -203,6 +203,7 @@ fn a_recording_depends_on_its_seed_only_and_no_seed_is_used_twice() {
         empty: 200,
         pairs: 200,
         seconds: 1800.0,
+        loss_percent: 0.0,
         seed: 0,
         sealed,
         jobs: 1,
@@ -225,6 +226,7 @@ fn report(found: &[Found<'_>]) -> Report {
         adev: Vec::new(),
         fitted: ModelErrorReport { deviance_per_point: None, rms_percent: None },
         unseen: ModelErrorReport { deviance_per_point: None, rms_percent: None },
+        unseen_excluding: None,
     };
     let effect = |&(_, kind, parameters): &Found<'_>| Reported {
         kind: kind.to_owned(),
@@ -241,6 +243,7 @@ fn report(found: &[Found<'_>]) -> Report {
         name: channel.name().to_owned(),
         unit: channel.unit().to_owned(),
         samples: 0,
+        missing: Default::default(),
         curve: Vec::new(),
         read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(),
@@ -267,23 +270,24 @@ fn an_effect_is_named_in_its_channel_and_a_false_alarm_in_another() {
         vec![InjectedEffect::Sinusoid { channel, frequency_hz, amplitude, phase_rad: 0.0 }];
 
     let parameters: &[_] = &[("frequency", 20.1), ("amplitude", 0.4)];
-    let right = compare(&case, &report(&[(Channel::GyroY, "sinusoid", parameters)]), 0.0);
+    let right = compare(&case, &report(&[(Channel::GyroY, "sinusoid", parameters)]), 0.0, 0.0);
     assert!(right.answers[0].named);
     assert_eq!(right.false_alarms, [""; 0]);
     let errors: Vec<f64> = right.estimates.iter().map(|estimate| estimate.relative_error).collect();
     assert!((errors[0] - 0.005).abs() < 1e-9 && (errors[1] - 0.2).abs() < 1e-9, "{errors:?}");
 
-    let elsewhere = compare(&case, &report(&[(Channel::GyroX, "sinusoid", parameters)]), 0.0);
+    let elsewhere = compare(&case, &report(&[(Channel::GyroX, "sinusoid", parameters)]), 0.0, 0.0);
     assert!(!elsewhere.answers[0].named);
     assert_eq!(elsewhere.false_alarms, ["gyro_x: sinusoid"]);
 
-    let otherwise = compare(&case, &report(&[(Channel::GyroY, "markov", &[]), (Channel::Temp, "markov", &[])]), 0.0);
+    let otherwise =
+        compare(&case, &report(&[(Channel::GyroY, "markov", &[]), (Channel::Temp, "markov", &[])]), 0.0, 0.0);
     assert_eq!(otherwise.answers[0].instead.as_deref(), Some("markov"));
     assert_eq!(otherwise.false_alarms, ["gyro_y: markov"]);
 
     // Accelerometers are not scored during a motion.
     case.simulation.scenario.environment.motion.deviation_g = 0.1;
-    assert_eq!(compare(&case, &report(&[(Channel::AcclX, "markov", &[])]), 0.0).false_alarms, [""; 0]);
+    assert_eq!(compare(&case, &report(&[(Channel::AcclX, "markov", &[])]), 0.0, 0.0).false_alarms, [""; 0]);
 }
 
 #[test]
@@ -293,7 +297,7 @@ fn an_effect_of_all_channels_is_named_if_half_of_them_list_it() {
     let listed = |count: usize| {
         let found: Vec<_> =
             Channel::INERTIAL[..count].iter().map(|&channel| (channel, "filter_bandwidth", &[][..])).collect();
-        compare(&case, &report(&found), 0.0).answers[0].named
+        compare(&case, &report(&found), 0.0, 0.0).answers[0].named
     };
     assert_eq!([listed(2), listed(3), listed(6)], [false, true, true]);
 }
@@ -322,6 +326,7 @@ fn a_small_run_does_not_depend_on_the_number_of_jobs() {
         empty: 1,
         pairs: 1,
         seconds: 40.0,
+        loss_percent: 0.0,
         seed: 3,
         sealed: false,
         jobs,

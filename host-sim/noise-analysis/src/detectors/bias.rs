@@ -15,6 +15,8 @@ use nalgebra::DVector;
 /// Highest p-value of a ramp or a regressor. Three or four candidates are tried in each of six channels, so that about one
 /// recording in a hundred has a false one.
 pub const SIGNIFICANCE: f64 = 5e-4;
+/// Least fraction of a channel's samples that a regressor must have too.
+const LEAST_COMMON: f64 = 0.9;
 /// Largest number of candidates that are accepted.
 const MOST: usize = 4;
 
@@ -54,17 +56,39 @@ struct Accepted {
     p_value: f64,
 }
 
-/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it; one with samples at
-/// other times is left out.
+/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of
+/// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out.
 #[must_use]
 pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> BiasChanges {
+    let regressors: Vec<(usize, &Series)> =
+        regressors.iter().copied().enumerate().filter(|(_, regressor)| covers(regressor, series)).collect();
+    if regressors.iter().any(|(_, regressor)| regressor.slots != series.slots) {
+        let is_common = |slot: u64| series.has(slot) && regressors.iter().all(|(_, regressor)| regressor.has(slot));
+        let series = series.clone().filtered(is_common);
+        let regressors: Vec<(usize, Series)> =
+            regressors.iter().map(|&(index, regressor)| (index, regressor.clone().filtered(is_common))).collect();
+        let regressors: Vec<(usize, &Series)> =
+            regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
+        return find_on_common_samples(&series, &regressors, grids);
+    }
+    find_on_common_samples(series, &regressors, grids)
+}
+
+/// Whether `regressor` has at least the fraction [`LEAST_COMMON`] of the samples of `series`.
+fn covers(regressor: &Series, series: &Series) -> bool {
+    regressor.slots == series.slots || {
+        let common = series.slots.iter().filter(|slot| regressor.has(**slot)).count();
+        common as f64 >= LEAST_COMMON * series.slots.len() as f64
+    }
+}
+
+/// [`find`] where all have samples in the same sample periods.
+fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grids: &NoiseGrids) -> BiasChanges {
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
     let grid = grids.get(&blocks);
     let regressors: Vec<(usize, DVector<f64>)> = regressors
         .iter()
-        .enumerate()
-        .filter(|(_, regressor)| regressor.slots == series.slots)
-        .filter_map(|(index, regressor)| {
+        .filter_map(|&(index, regressor)| {
             let means = BlockMeans::from_series(regressor)?.means;
             varies(&means, regressor).then_some((index, means))
         })

@@ -105,7 +105,7 @@ pub(super) fn detection(
             ],
             evidence,
         ),
-        correction: Some(Correction::Offset { from: position.sample, size }),
+        correction: Some(Correction::Offset { from: series.slots[position.sample], size }),
     }
 }
 

@@ -213,7 +213,8 @@ mod tests {
             level + random.sample::<f64, _>(StandardNormal)
         };
         let values: Vec<f64> = (0..128 * 32).map(|_| next()).collect();
-        Series { slots: (0..values.len() as u64).collect(), values, period_s: 1.0, resolution: 0.0, unit: "g" }
+        let slots = 0..values.len() as u64;
+        Series { slots: slots.clone().collect(), span: slots, values, period_s: 1.0, resolution: 0.0, unit: "g" }
     }
 
     /// For any fraction of random walk in the noise.

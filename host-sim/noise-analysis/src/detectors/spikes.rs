@@ -6,10 +6,12 @@
 
 use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
 use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::series::Series;
+use std::collections::BTreeMap;
 
-/// Neighbours on each side.
-const REACH: usize = 6;
+/// Fewest neighbours that must be there on either side.
+const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
 
 /// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
 /// 7·10⁻⁶.
@@ -22,18 +24,55 @@ const SETTLED: f64 = 0.5;
 /// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
 const LEAST_DETECTED: f64 = 0.05;
 
+/// The interpolation that is expected of a channel, and by how much a spike exceeds its error.
+pub(crate) struct SpikeRule {
+    interpolation: Interpolation,
+    threshold: f64,
+}
+
+impl SpikeRule {
+    /// The rule of a channel; `None` if it has fewer than 600 samples or never changes.
+    pub(crate) fn fit(series: &Series) -> Option<Self> {
+        if series.values.len() < 100 * REACH {
+            return None;
+        }
+        let interpolation = Interpolation::fit(series)?;
+        let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / series.values.len() as f64);
+        Some(Self { interpolation, threshold })
+    }
+
+    /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
+    /// as frequent.
+    pub(crate) fn slots(&self, series: &Series) -> Vec<u64> {
+        slots(series, &self.spikes(series))
+    }
+
+    /// The spikes, the largest first.
+    fn spikes(&self, series: &Series) -> Vec<Spike> {
+        if series.values.len() <= 2 * REACH {
+            return Vec::new();
+        }
+        let (spikes, jumps) = self.interpolation.spikes(series, self.threshold);
+        if spikes.len() > jumps { spikes } else { Vec::new() }
+    }
+}
+
+/// Sample periods of spikes, in ascending order.
+fn slots(series: &Series, spikes: &[Spike]) -> Vec<u64> {
+    let mut slots: Vec<u64> = spikes.iter().map(|spike| series.slots[spike.position]).collect();
+    slots.sort_unstable();
+    slots
+}
+
 /// Looks for spikes in one channel. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
 pub(crate) fn find(series: &Series) -> Option<Detection> {
-    if series.values.len() < 100 * REACH {
+    let rule = SpikeRule::fit(series)?;
+    let spikes = rule.spikes(series);
+    if spikes.is_empty() {
         return None;
     }
-    let interpolation = Interpolation::fit(series)?;
-    let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / series.values.len() as f64);
-    let (spikes, jumps) = interpolation.spikes(series, threshold);
-    if spikes.len() <= jumps {
-        return None;
-    }
+    let SpikeRule { interpolation, threshold } = rule;
     let sizes: Vec<f64> = spikes.iter().map(|spike| spike.error.abs()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let hours = series.duration_s() / 3600.0;
@@ -48,8 +87,6 @@ pub(crate) fn find(series: &Series) -> Option<Detection> {
         sizes.len(),
         threshold / interpolation.deviation,
     );
-    let mut positions: Vec<usize> = spikes.iter().map(|spike| spike.position).collect();
-    positions.sort_unstable();
     Some(Detection {
         effect: Effect::new(
             "spikes",
@@ -67,13 +104,16 @@ pub(crate) fn find(series: &Series) -> Option<Detection> {
             ],
             evidence,
         ),
-        correction: Some(Correction::Exclude(positions)),
+        correction: Some(Correction::Exclude(slots(series, &spikes))),
     })
 }
 
-/// The best linear interpolation of a sample from its neighbours: the weight of each distance, to both sides.
+/// The best linear interpolation of a sample from its neighbours.
 struct Interpolation {
+    /// The weight of each distance, to both sides, where no neighbour is missing.
     weights: [f64; REACH],
+    /// The autocovariance of the channel; `None` until it is known.
+    covariance: Option<Autocovariance>,
     mean: f64,
     /// Standard deviation of its error, at least half a count because rounding errors are not normal.
     deviation: f64,
@@ -87,7 +127,7 @@ struct Spike {
 impl Interpolation {
     fn fit(series: &Series) -> Option<Self> {
         let mean = series.values.iter().sum::<f64>() / series.values.len() as f64;
-        let mut interpolation = Self { weights: [0.5 / REACH as f64; REACH], mean, deviation: 0.0 };
+        let mut interpolation = Self { weights: [0.5 / REACH as f64; REACH], covariance: None, mean, deviation: 0.0 };
         // The plain mean of the neighbours finds the gross spikes, which would distort the covariance.
         let errors = interpolation.errors(series, &series.values);
         let rough = clipped_deviation(&errors);
@@ -97,7 +137,9 @@ impl Interpolation {
                 *value -= error;
             }
         }
-        interpolation.weights = weights(&covariance(series, &clean, mean))?;
+        let covariance = covariance(series, &clean, mean);
+        interpolation.weights = weights(&covariance)?;
+        interpolation.covariance = Some(covariance);
         let deviation = clipped_deviation(&interpolation.errors(series, &series.values));
         interpolation.deviation = deviation.max(0.5 * series.resolution);
         Some(interpolation)
@@ -112,14 +154,51 @@ impl Interpolation {
         values[position] - self.mean - pairs.sum::<f64>()
     }
 
-    /// The interpolation error of every sample; 0 within [`REACH`] of a gap or an end.
+    /// The interpolation error of every sample, in units of the standard deviation with all neighbours times
+    /// [`deviation`](Self::deviation); 0 near an end, and where fewer than three neighbours are there on a side.
     fn errors(&self, series: &Series, values: &[f64]) -> Vec<f64> {
-        let inner = REACH..values.len() - REACH;
-        let error = |position: usize| {
-            let complete = inner.contains(&position) && series.is_gapless(position - REACH, position + REACH);
-            if complete { self.error(values, position) } else { 0.0 }
-        };
-        (0..values.len()).map(error).collect()
+        let mut partial = BTreeMap::new();
+        (0..values.len()).map(|position| self.normalised_error(series, values, position, &mut partial)).collect()
+    }
+
+    /// One entry of [`errors`](Self::errors). `partial` keeps the interpolations for each set of neighbours.
+    fn normalised_error(
+        &self,
+        series: &Series,
+        values: &[f64],
+        position: usize,
+        partial: &mut BTreeMap<Neighbours, Option<PartialInterpolation>>,
+    ) -> f64 {
+        if !(REACH..values.len() - REACH).contains(&position) {
+            return 0.0;
+        }
+        if series.is_gapless(position - REACH, position + REACH) {
+            return self.error(values, position);
+        }
+        let slot = series.slots[position];
+        let mut neighbours = [None; 2 * REACH];
+        for other in (position - REACH..=position + REACH).filter(|&other| other != position) {
+            let distance = series.slots[other].abs_diff(slot) as usize;
+            if distance <= REACH {
+                neighbours[distance - 1 + if other > position { REACH } else { 0 }] = Some(values[other] - self.mean);
+            }
+        }
+        let present = neighbours
+            .iter()
+            .enumerate()
+            .fold(0, |present: Neighbours, (bit, neighbour)| present | Neighbours::from(neighbour.is_some()) << bit);
+        let sides = [present & (ALL_NEIGHBOURS >> REACH), present >> REACH];
+        if sides.iter().any(|side| side.count_ones() < FEWEST_ON_A_SIDE) {
+            return 0.0;
+        }
+        let best = partial.entry(present).or_insert_with(|| match &self.covariance {
+            Some(covariance) => PartialInterpolation::best(covariance, present),
+            None => Some(PartialInterpolation::mean(present)),
+        });
+        best.as_ref().map_or(0.0, |best| {
+            let pairs = best.weights.iter().zip(&neighbours).filter_map(|(weight, value)| Some(weight * (*value)?));
+            (values[position] - self.mean - pairs.sum::<f64>()) / best.scale
+        })
     }
 
     /// The spikes above `threshold`, the largest first, and the number of candidates that are jumps of the bias.
@@ -129,9 +208,10 @@ impl Interpolation {
         let mut candidates: Vec<usize> = (0..errors.len()).filter(|&at| errors[at].abs() > threshold).collect();
         candidates.sort_by(|a, b| errors[*b].abs().total_cmp(&errors[*a].abs()));
         let (mut spikes, mut jumps) = (Vec::new(), 0);
+        let mut partial = BTreeMap::new();
         for position in candidates {
             // Again, because a larger spike nearby may have been removed.
-            let error = self.error(&values, position);
+            let error = self.normalised_error(series, &values, position, &mut partial);
             if error.abs() <= threshold {
                 continue;
             }
@@ -161,7 +241,7 @@ fn clipped_deviation(errors: &[f64]) -> f64 {
 }
 
 /// Autocovariance at lags 0 to 2·[`REACH`].
-fn covariance(series: &Series, values: &[f64], mean: f64) -> [f64; 2 * REACH + 1] {
+fn covariance(series: &Series, values: &[f64], mean: f64) -> Autocovariance {
     std::array::from_fn(|lag| {
         let pairs = (0..values.len() - lag).filter(|&at| series.is_gapless(at, at + lag));
         let (count, sum) = pairs
@@ -172,7 +252,7 @@ fn covariance(series: &Series, values: &[f64], mean: f64) -> [f64; 2 * REACH + 1
 
 /// The weights `a` that minimise the variance of the error: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)` with the autocovariance `r`.
 /// `None` for a channel that never changes.
-fn weights(covariance: &[f64; 2 * REACH + 1]) -> Option<[f64; REACH]> {
+fn weights(covariance: &Autocovariance) -> Option<[f64; REACH]> {
     let mut matrix = [[0.0; REACH + 1]; REACH];
     for (j, row) in matrix.iter_mut().enumerate() {
         for (i, entry) in row[..REACH].iter_mut().enumerate() {

@@ -242,7 +242,7 @@ fn lost_and_repeated_samples_are_counted() {
     assert_eq!(sampling_faults::lost_samples(&stale.measurement), None);
     let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
     let values = stale.series(GYRO).values;
-    assert!(positions.iter().all(|&position| values[position] == values[position - 1]));
+    assert!(positions.iter().all(|&slot| values[slot as usize] == values[slot as usize - 1]));
 }
 
 #[test]

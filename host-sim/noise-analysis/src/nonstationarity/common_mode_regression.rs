@@ -6,7 +6,7 @@
 use crate::estimators::CoupledEstimators;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::PowerLaw;
-use measurement::{ChannelProfile, Measurement};
+use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use nalgebra::{DMatrix, DVector};
 
 /// Degrees of freedom that an octave needs for each weight that is estimated from it.
@@ -107,8 +107,7 @@ impl CommonModeRegression {
 
 /// Estimators of the first quarter, the second quarter, and the second half.
 fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelProfile]) -> [CoupledEstimators; 3] {
-    let counts: Vec<&[i32]> =
-        channels.iter().filter_map(|channel| Some(measurement.channel(channel)?.counts.as_slice())).collect();
+    let recorded: Vec<&MeasuredChannel> = channels.iter().filter_map(|channel| measurement.channel(channel)).collect();
     let mut parts = [(); 3].map(|()| CoupledEstimators::new(channels.len(), channels.len()));
     for position in 0..measurement.len() {
         let part = &mut parts[(4 * position / measurement.len()).min(2)];
@@ -116,7 +115,7 @@ fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelProfil
         if missing > 0 {
             part.gap(missing);
         }
-        part.push(counts.iter().map(|counts| counts[position]));
+        part.push(recorded.iter().map(|of| (!of.is_refused(position)).then(|| of.counts[position])));
     }
     parts
 }
@@ -151,7 +150,7 @@ mod tests {
     fn measurement(columns: Vec<(&str, Vec<i32>)>) -> Measurement {
         let profile = adis16405::profile(0.05);
         let samples = columns[0].1.len() as u64;
-        let channel = |(name, counts)| MeasuredChannel { profile: profile.channel(name).expect("a channel"), counts };
+        let channel = |(name, counts)| MeasuredChannel::new(profile.channel(name).expect("a channel"), counts);
         Measurement {
             sample_rate_hz: 100.0,
             stated_rate_hz: Some(100.0),

@@ -98,8 +98,10 @@ fn centroid(series: &Series, range: Range<usize>, near: f64) -> Option<f64> {
         return None;
     }
     let length = ((rate / (RESOLUTION * near)) as usize).next_power_of_two();
+    let slots = series.slots.get(range.clone())?.to_vec();
     let stretch = Series {
-        slots: series.slots.get(range.clone())?.to_vec(),
+        span: *slots.first()?..slots.last()? + 1,
+        slots,
         values: series.values.get(range)?.to_vec(),
         period_s: series.period_s,
         resolution: series.resolution,

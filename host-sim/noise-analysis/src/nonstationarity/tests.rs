@@ -23,6 +23,7 @@ const MOST_FALSE_ALARMS: usize = 8;
 fn series(mut value: impl FnMut(usize) -> f64) -> Series {
     Series {
         slots: (0..SAMPLES as u64).collect(),
+        span: 0..SAMPLES as u64,
         values: (0..SAMPLES).map(|at| (16.0 * value(at)).round() / 16.0).collect(),
         period_s: PERIOD,
         resolution: 1.0 / 16.0,

@@ -22,11 +22,12 @@ pub(super) struct Periodogram {
 }
 
 impl Periodogram {
-    /// Transforms samples whose straight line has been removed. Up to 1 % of them, at the end, are left out so that the
+    /// Transforms samples whose straight line has been removed, with short gaps interpolated. Up to 1 % of them, at the end, are left out so that the
     /// length has no large prime factor. `None` for a record of fewer than two samples.
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
-        let values = &series.values()[..length];
+        let (filled, _) = series.interpolated();
+        let values = &filled.values()[..length];
         if values.iter().filter(|value| value.is_finite()).count() < 2 {
             return None;
         }
@@ -34,9 +35,12 @@ impl Periodogram {
         let mut input = transform.make_input_vec();
         let mut power = 0.0;
         for (at, (slot, value)) in input.iter_mut().zip(values).enumerate() {
+            let weight = taper(at, length);
             if value.is_finite() {
-                let weight = taper(at, length);
                 *slot = weight * value;
+            }
+            // An interpolated sample has hardly any white noise of its own.
+            if series.values()[at].is_finite() {
                 power += weight * weight;
             }
         }
@@ -117,11 +121,12 @@ pub(super) struct SineTapered {
 impl SineTapered {
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
+        let (filled, _) = series.interpolated();
         let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length.max(2));
         let under = |taper: usize| {
             let mut input = transform.make_input_vec();
             let mut power = 0.0;
-            for (at, (slot, value)) in input.iter_mut().zip(series.values()).enumerate() {
+            for (at, (slot, value)) in input.iter_mut().zip(filled.values()).enumerate() {
                 if value.is_finite() {
                     let weight = (PI * taper as f64 * (at + 1) as f64 / (length + 1) as f64).sin();
                     *slot = weight * value;

@@ -12,8 +12,9 @@ const MOST_MISSING: f64 = 0.5;
 /// and under a Hann window (P. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans.
 /// Audio Electroacoust. 15, 1967).
 ///
-/// A missing sample is replaced by the segment's mean and left out of the window's power. For white noise that is exact;
-/// of red noise it spreads the missing fraction of the power over all frequencies.
+/// Samples of short gaps are interpolated ([`UniformSeries::interpolated`]), others replaced by the segment's mean, and all
+/// are left out of the window's power. For white noise that is exact; where noise is predictable from sample to sample, as
+/// behind a filter, the density is too high by the share of the missing samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Welch {
     sample_period: f64,
@@ -34,7 +35,9 @@ impl Welch {
         let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
         let mut density = vec![0.0; output.len()];
         let mut segments = 0;
-        for segment in series.values().windows(length).step_by(length / 2) {
+        let (filled, _) = series.interpolated();
+        let filled = filled.values().windows(length).step_by(length / 2);
+        for (segment, filled) in series.values().windows(length).step_by(length / 2).zip(filled) {
             let present = || segment.iter().zip(&window).filter(|(value, _)| value.is_finite());
             let count = present().count();
             if ((length - count) as f64) > MOST_MISSING * length as f64 {
@@ -42,7 +45,7 @@ impl Welch {
             }
             let mean = present().map(|(value, _)| value).sum::<f64>() / count as f64;
             let power: f64 = present().map(|(_, weight)| weight * weight).sum();
-            for ((slot, value), weight) in input.iter_mut().zip(segment).zip(&window) {
+            for ((slot, value), weight) in input.iter_mut().zip(filled).zip(&window) {
                 *slot = if value.is_finite() { (value - mean) * weight } else { 0.0 };
             }
             // An error means buffers of the wrong length; these are the planner's own.

@@ -142,6 +142,14 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
                 (cell(&model.fitted))
                 (cell(&model.unseen))
             }
+            @if let Some(error) = &model.unseen_excluding {
+                tr {
+                    th scope="row" { (name) ", excluding"
+                        span.under { "without what the first half's rules for spikes and knocks find" } }
+                    td {}
+                    (cell(error))
+                }
+            }
         }
     };
     table("", &[text("model"), numbers("fitted half"), numbers("unseen half")], &rows)

@@ -54,7 +54,8 @@ pub(crate) fn empty() -> Report {
     channel.curve.clear();
     channel.read_off = SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None };
     let error = ModelErrorReport { deviance_per_point: None, rms_percent: None };
-    channel.before = ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error };
+    channel.before =
+        ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error, unseen_excluding: None };
     channel.after = channel.before.clone();
     channel.assessment = Assessment::default();
     report
@@ -74,6 +75,7 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         adev: curve.iter().map(|point| scale * model(point.tau_s)).collect(),
         fitted: ModelErrorReport { deviance_per_point: Some(1.042), rms_percent: Some(2.317) },
         unseen: ModelErrorReport { deviance_per_point: Some(1.385), rms_percent: Some(3.946) },
+        unseen_excluding: None,
     };
     let value = |value: f64, per: &str, from_s: f64, to_s: f64| {
         Some(SlopeMethodValue { value: value * scale, unit: rate_unit(unit, per), from_s, to_s })
@@ -82,6 +84,7 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         name: name.to_owned(),
         unit: unit.to_owned(),
         samples: SAMPLES,
+        missing: Default::default(),
         curve,
         read_off: SlopeMethodReport {
             angle_random_walk: value(0.037_14, "/sqrt(s)", 0.01, 2.56),
@@ -164,6 +167,7 @@ fn point(octave: u32, scale: f64) -> CurvePoint {
         low: adev / (1.0 + spread),
         high: adev * (1.0 + 1.3 * spread),
         edf,
+        replaced_percent: 0.0,
         accuracy_percent: 100.0 / (2.0 * (SAMPLES as f64 / n as f64 - 1.0)).sqrt(),
     }
 }

@@ -3,7 +3,7 @@
 mod fixture;
 
 use fixture::{channel, empty, report};
-use noise_analysis::report::{ChannelReport, Report};
+use noise_analysis::report::{ChannelReport, ModelErrorReport, Report};
 use reports::{figure, page, terminal};
 
 fn text(report: &Report) -> String {
@@ -274,4 +274,23 @@ fn a_page_that_cannot_be_written_names_its_path() {
     let error = page::write(&report(), &file).expect_err("a file is not a folder").to_string();
     assert!(error.contains(&file.join("index.html").display().to_string()), "{error}");
     assert!(error.starts_with("cannot write the page"), "{error}");
+}
+
+#[test]
+fn missing_samples_and_the_error_without_exclusions_are_shown() {
+    let mut report = report();
+    let channel = &mut report.channels[0];
+    channel.missing.lost = 1_234;
+    channel.missing.refused = [("spikes".to_owned(), 17), ("knock".to_owned(), 4_096)].into();
+    channel.missing.replaced = 5_300;
+    channel.after.unseen_excluding =
+        Some(ModelErrorReport { deviance_per_point: Some(1.618), rms_percent: Some(2.718) });
+    for shown in [text(&report), html(&report)] {
+        for content in ["1,234 samples lost", "knock 4,096", "spikes 17", "5,300 replaced", "1.618", "2.718"] {
+            assert!(shown.contains(content), "{content}");
+        }
+    }
+    // Without a gap there is no such line.
+    let whole = fixture::report();
+    assert!(!text(&whole).contains("Missing") && !html(&whole).contains("Missing"));
 }

@@ -1,0 +1,249 @@
+//! The detector of knocks on simulated channels: how often it sees one in noise, and which ones it finds.
+
+use super::knocks::{KnockRule, find, find_by};
+use crate::findings::SIGNIFICANCE;
+use crate::series::Series;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::f64::consts::TAU;
+
+const PERIOD_S: f64 = 0.01;
+/// Ten minutes at 100 Hz.
+const SAMPLES: usize = 60_000;
+/// Samples of a record without a knock.
+const QUIET: u64 = 40_000;
+/// Of the ADIS16405's profile.
+const DITHERED: f64 = 0.2;
+
+/// A channel with a resolution of a quarter of its white noise, from the values of `next`.
+fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> Series {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    Series {
+        slots: (0..SAMPLES as u64).collect(),
+        values: (0..SAMPLES).map(|at| (4.0 * next(&mut random, at)).round() / 4.0).collect(),
+        span: 0..SAMPLES as u64,
+        period_s: PERIOD_S,
+        resolution: 0.25,
+        unit: "g",
+    }
+}
+
+fn normal(random: &mut ChaCha8Rng) -> f64 {
+    random.sample(StandardNormal)
+}
+
+/// White noise of deviation 1, times `level`.
+fn white(seed: u64, level: impl Fn(usize) -> f64) -> Series {
+    series(seed, |random, at| level(at) * normal(random))
+}
+
+/// White noise behind two cascaded averages over `taps` samples, of deviation 1.
+fn filtered(taps: usize) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+    let mut memory = vec![0.0; 2 * taps - 1];
+    // A triangle of 1 … taps … 1; its sum of squares is taps·(2·taps² + 1)/3.
+    let weight = (3.0 / (taps * (2 * taps * taps + 1)) as f64).sqrt();
+    move |random, _| {
+        memory.rotate_right(1);
+        memory[0] = normal(random);
+        let triangle = |(at, value): (usize, &f64)| ((taps - at.abs_diff(taps - 1)) as f64) * value;
+        weight * memory.iter().enumerate().map(triangle).sum::<f64>()
+    }
+}
+
+/// A random walk whose steps have the deviation `step`, in white noise.
+fn walking(step: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+    let mut level = 0.0;
+    move |random, _| {
+        level += step * normal(random);
+        level + normal(random)
+    }
+}
+
+/// Flicker noise as a sum of Markov processes an octave apart, in white noise of deviation 0.3.
+fn flickering() -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+    let mut states = [0.0; 16];
+    move |random, _| {
+        for (octave, state) in states.iter_mut().enumerate() {
+            let kept = (-(0.5_f64).powi(octave as i32)).exp();
+            *state = kept * *state + (1.0 - kept * kept).sqrt() * normal(random);
+        }
+        states.iter().sum::<f64>() + 0.3 * normal(random)
+    }
+}
+
+/// A resonance at a twentieth of the sample rate, in white noise: an amplitude that rises and falls within `width`⁻¹ samples.
+fn resonating(width: f64, deviation: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+    let (mut a, mut b) = (0.0, 0.0);
+    let kept = (-width).exp();
+    let (sine, cosine) = (TAU / 20.0).sin_cos();
+    move |random, _| {
+        let drive = (1.0 - kept * kept).sqrt();
+        (a, b) = (
+            kept * (a * cosine - b * sine) + drive * normal(random),
+            kept * (a * sine + b * cosine) + drive * normal(random),
+        );
+        deviation * a + normal(random)
+    }
+}
+
+/// Jumps to and fro between two levels `amplitude` apart with the correlation time `time_s`, in white noise.
+fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+    let mut up = false;
+    move |random, _| {
+        up ^= random.random_bool(0.5 * PERIOD_S / time_s);
+        normal(random) + if up { amplitude } else { 0.0 }
+    }
+}
+
+/// Of 200 records without a knock as many as chance allows have one: with a probability of 2·10⁻⁴ each, more than one of
+/// them only once in 1,300 times.
+fn assert_quiet(name: &str, record: impl Fn(u64) -> Series + Sync) {
+    let is_found = |seed: &u64| !find(&[record(*seed).before(QUIET)], DITHERED)[0].is_empty();
+    let seeds: Vec<u64> = (0..200).collect();
+    let found = std::thread::scope(|scope| {
+        let tasks: Vec<_> = seeds
+            .chunks(50)
+            .map(|chunk| scope.spawn(move || chunk.iter().filter(|seed| is_found(seed)).count()))
+            .collect();
+        tasks.into_iter().map(|task| task.join().expect("a test")).sum::<usize>()
+    });
+    assert!(found <= 1, "{name}: {found} of 200 records, {} expected", 200.0 * SIGNIFICANCE);
+}
+
+#[test]
+fn white_and_filtered_noise_have_no_knock() {
+    assert_quiet("white", |seed| white(seed, |_| 1.0));
+    assert_quiet("8 taps", |seed| series(seed, filtered(8)));
+    assert_quiet("32 taps", |seed| series(seed, filtered(32)));
+}
+
+#[test]
+fn drifting_noise_has_no_knock() {
+    assert_quiet("weak walk", |seed| series(seed, walking(0.01)));
+    assert_quiet("strong walk", |seed| series(seed, walking(1.0)));
+    assert_quiet("flicker", |seed| series(seed, flickering()));
+}
+
+#[test]
+fn lines_and_resonances_have_no_knock() {
+    assert_quiet("sinusoid", |seed| series(seed, |random, at| 3.0 * (TAU * 0.123 * at as f64).sin() + normal(random)));
+    for width in [0.1, 0.01, 0.001] {
+        assert_quiet(&format!("resonance of width {width}"), |seed| series(seed, resonating(width, 1.0)));
+    }
+}
+
+#[test]
+fn a_noise_level_that_follows_the_temperature_has_no_knock() {
+    // A factor of 1.5 with a time constant of two minutes, and a cycle of ten minutes of ±5 %: white noise that follows the
+    // square root of the absolute temperature does that over ±30 °C.
+    let minute = 60.0 / PERIOD_S;
+    assert_quiet("warming", |seed| white(seed, |at| 1.0 + 0.5 * (1.0 - (-(at as f64) / (2.0 * minute)).exp())));
+    assert_quiet("cycle", |seed| white(seed, |at| 1.0 + 0.05 * (TAU * at as f64 / (10.0 * minute)).sin()));
+    assert_quiet("a level that changes once", |seed| white(seed, |at| if at < SAMPLES / 3 { 1.0 } else { 1.5 }));
+}
+
+#[test]
+fn jumps_of_the_bias_are_no_knock() {
+    for (amplitude, time_s) in [(5.0, 0.1), (5.0, 1.0), (20.0, 3.0), (100.0, 10.0), (100.0, 60.0)] {
+        assert_quiet(&format!("telegraph {amplitude} {time_s}"), |seed| series(seed, telegraph(amplitude, time_s)));
+    }
+}
+
+#[test]
+fn random_losses_are_no_knock() {
+    for share in [0.005, 0.05] {
+        assert_quiet(&format!("{share} lost"), |seed| {
+            let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
+            let lost: Vec<bool> = (0..SAMPLES).map(|_| random.random_bool(share)).collect();
+            series(seed, filtered(8)).filtered(|slot| !lost[slot as usize])
+        });
+    }
+    // All losses in one half minute, where every second sample is missing.
+    assert_quiet("a burst of losses", |seed| {
+        white(seed, |_| 1.0).filtered(|slot| !(20_000..23_000).contains(&slot) || slot % 2 == 0)
+    });
+}
+
+#[test]
+fn noise_below_a_count_has_no_knock() {
+    // The bias drifts from the middle of a count to its edge and back, so that the noise shows and hides.
+    assert_quiet("undithered", |seed| {
+        series(seed, |random, at| 0.03 * normal(random) + 0.125 * (TAU * at as f64 / 20_000.0).sin())
+    });
+}
+
+/// Length in s and level of knocks that are found for certain.
+const KNOCKS: [(f64, f64); 5] = [(1.0, 5.0), (3.0, 3.0), (10.0, 2.0), (30.0, 1.5), (40.0, 1.3)];
+
+#[test]
+fn knocks_of_seconds_to_minutes_are_found_measured_and_excluded() {
+    let start_s = 200.0;
+    let (mut covered, mut all) = (0, 0);
+    for (seed, (length_s, level)) in KNOCKS.into_iter().enumerate() {
+        let inside = |at: usize| (start_s..start_s + length_s).contains(&(at as f64 * PERIOD_S));
+        let record = white(50 + seed as u64, |at| if inside(at) { level } else { 1.0 });
+        let found = find(std::slice::from_ref(&record), DITHERED).remove(0);
+        let [knock] = &found[..] else { panic!("{length_s} s at {level}: {found:?}") };
+        let effect = knock.detection(&record, &["accl_x"]).effect;
+        assert_eq!(effect.kind, "knock");
+        for (name, truth) in [("from", start_s), ("to", start_s + length_s), ("level", level)] {
+            let parameter = &effect.parameters[name];
+            println!("{length_s} s at {level}: {name} {truth}: {parameter:?}");
+            covered += usize::from((parameter.low..=parameter.high).contains(&truth));
+            all += 1;
+        }
+        // Nearly all of it is left out, and little else.
+        let excluded = |slot: f64| knock.slots.contains(&(slot as u64));
+        let samples = (0..SAMPLES).filter(|&at| inside(at));
+        let share = samples.clone().filter(|&at| excluded(at as f64)).count() as f64 / samples.count() as f64;
+        let outside = (0..SAMPLES).filter(|&at| !inside(at) && excluded(at as f64)).count() as f64 * PERIOD_S;
+        assert!(share > 0.9, "{length_s} s at {level}: {share}");
+        assert!(outside < 0.5 + 0.3 * length_s, "{length_s} s at {level}: {outside} s too many");
+    }
+    // Of 15 intervals of 95 %, more than three miss once in 200 times.
+    assert!(covered >= all - 3, "{covered} of {all}");
+}
+
+#[test]
+fn a_decaying_shock_is_left_out_to_its_end() {
+    let record = white(70, |at| {
+        let since = at as f64 * PERIOD_S - 300.0;
+        if since < 0.0 { 1.0 } else { 1.0 + 100.0 * (-since / 2.0).exp() }
+    });
+    let found = find(std::slice::from_ref(&record), DITHERED).remove(0);
+    assert_eq!(found.len(), 1, "{found:?}");
+    // The noise is back within 20 % of its level after 2·ln(100/0.2) = 12.4 s.
+    assert!(found[0].slots.start.abs_diff(30_000) < 100, "{found:?}");
+    assert!((31_000..31_600).contains(&found[0].slots.end), "{found:?}");
+}
+
+#[test]
+fn a_shock_is_found_in_every_channel_that_shows_it_and_in_no_other() {
+    let inside = |at: usize| (25_000..25_500).contains(&at);
+    // By itself, 1.35 times the noise over five seconds would not be a knock anywhere in the record.
+    let channels =
+        [6.0, 1.35, 1.0].map(|level| white((100.0 * level) as u64, |at| if inside(at) { level } else { 1.0 }));
+    assert!(find(&channels[1..], DITHERED).iter().all(Vec::is_empty));
+    let found = find(&channels, DITHERED);
+    assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 0], "{found:?}");
+}
+
+#[test]
+fn rules_of_one_half_are_applied_to_the_other() {
+    let record = white(90, |at| if (45_000..46_000).contains(&at) { 3.0 } else { 1.0 });
+    let (first, second) = (record.before(30_000), record.from(30_000));
+    let rules = [KnockRule::fit(&first, DITHERED)];
+    assert!(find_by(&rules, &[first])[0].is_empty());
+    let found = find_by(&rules, &[second]).remove(0);
+    assert_eq!(found.len(), 1);
+    assert!(found[0].slots.start.abs_diff(45_000) < 50 && found[0].slots.end.abs_diff(46_000) < 50, "{found:?}");
+}
+
+#[test]
+fn short_and_constant_records_have_no_knock() {
+    let short = white(1, |_| 1.0).before(300);
+    assert!(find(&[short], DITHERED)[0].is_empty());
+    assert!(find(&[series(1, |_, _| 0.0)], DITHERED)[0].is_empty());
+    assert!(find(&[white(1, |_| 1.0).before(0)], DITHERED)[0].is_empty());
+}

@@ -1,0 +1,394 @@
+//! Knocks: stretches of seconds to minutes whose noise level the neighbouring stretches exclude, on both sides.
+//!
+//! Blocks of several lengths are tested at several averaging times, in each channel by itself. The probability of a knock
+//! by chance anywhere in the record of a channel is [`SIGNIFICANCE`], divided equally among all blocks. The likeliest stretch
+//! around a block that is too loud is the knock; the record without it is tested again. Where one channel has a knock, the
+//! others are tested in that stretch alone.
+
+use super::noise_levels::{
+    DIFFERENCES, HALF_EFFICIENCY, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, averaging_factors, doublings,
+    exceedance, freedom_by_scatter, longer_levels, median, neighbouring_level, neighbours_freedom,
+};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::series::Series;
+use std::ops::Range;
+
+/// Highest probability by which chance shows a knock in a channel at a time when another channel has one.
+const SIGNIFICANCE_AT_A_KNOWN_TIME: f64 = 1e-3;
+/// Highest probability by which chance raises the smaller half of the squares of a block that is too loud.
+const SIGNIFICANCE_THROUGHOUT: f64 = 1e-3;
+/// A channel that would lose more than this part of its samples has no knocks: its noise level changes all the time, and the
+/// levels between are no better known than those of the supposed knocks.
+const LARGEST_SHARE: f64 = 0.1;
+/// How often a record is tested again without the knocks that were found.
+const PASSES: usize = 8;
+/// Fewest differences in a stretch whose time another channel has given.
+const FEWEST_DIFFERENCES: usize = 16;
+/// Stretches of the same length on either side with which it is compared.
+const SIDE: i64 = 6;
+/// The end of a knock is where the ln likelihood has fallen by half of the 95 % quantile of χ² with one degree of freedom.
+const LIKELIHOOD_LOSS: f64 = 1.92;
+/// Square of a difference, over the level of the knock, above which it counts as this: a single sample does not extend a
+/// knock. Of normal differences 0.3 % are larger.
+const LARGEST_SQUARE: f64 = 9.0;
+
+/// A knock in one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Knock {
+    /// Sample periods that are left out: those that may belong to it.
+    pub slots: Range<u64>,
+    /// Its first sample period and the one after its last.
+    from: BoundedSlot,
+    to: BoundedSlot,
+    /// Standard deviation of the differences over that of the neighbours, with 95 % bounds.
+    level: f64,
+    level_bounds: (f64, f64),
+    /// Averaging factor of the differences.
+    n: usize,
+    /// Probability by chance anywhere in the record, or at a time that another channel has given.
+    p_value: f64,
+}
+
+/// A sample period with its 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct BoundedSlot {
+    value: u64,
+    low: u64,
+    high: u64,
+}
+
+/// How the noise level of one channel scatters where there is no knock.
+#[derive(Debug, Clone)]
+pub(crate) struct KnockRule {
+    scales: Vec<Scale>,
+    /// Least level of the neighbours: where the noise does not reach from one count to the next, the level depends on the
+    /// distance of the bias from a count's edge.
+    floor: f64,
+}
+
+/// One averaging time.
+#[derive(Debug, Clone)]
+struct Scale {
+    n: usize,
+    /// For each doubling of the length of a block.
+    freedoms: Vec<BlockFreedom>,
+}
+
+/// Degrees of freedom of the level of a block, and of that of its neighbours.
+#[derive(Debug, Clone, Copy)]
+struct BlockFreedom {
+    block: f64,
+    neighbours: f64,
+}
+
+/// A block that is too loud.
+struct LoudBlock {
+    scale: usize,
+    /// Differences of the block.
+    differences: Range<usize>,
+    /// Level of its neighbours.
+    quiet: f64,
+    ratio: f64,
+    freedom: BlockFreedom,
+    p_value: f64,
+}
+
+/// Knocks in channels that were recorded together, by channel, in the order of time; `dithered_avar_counts2` as in the
+/// sensor's profile.
+pub(crate) fn find(channels: &[Series], dithered_avar_counts2: f64) -> Vec<Vec<Knock>> {
+    let rules: Vec<KnockRule> = channels.iter().map(|series| KnockRule::fit(series, dithered_avar_counts2)).collect();
+    find_by(&rules, channels)
+}
+
+/// As [`find`], with rules that were fitted to another part of the record; one rule a channel.
+pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series]) -> Vec<Vec<Knock>> {
+    let mut found: Vec<Vec<Knock>> = rules.iter().zip(channels).map(|(rule, series)| rule.find(series)).collect();
+    let all: Vec<Knock> = found.iter().flatten().cloned().collect();
+    for ((rule, series), own) in rules.iter().zip(channels).zip(&mut found) {
+        for known in &all {
+            if !own.iter().any(|own| own.overlaps(known)) {
+                own.extend(rule.at_known_time(series, known));
+            }
+        }
+        own.sort_by_key(|knock| knock.slots.start);
+    }
+    found
+}
+
+impl KnockRule {
+    /// Fits the rule to a channel.
+    pub(crate) fn fit(series: &Series, dithered_avar_counts2: f64) -> Self {
+        let mut largest = 0.0_f64;
+        let mut scales = Vec::new();
+        for n in averaging_factors(series.period_s) {
+            let differences = SquaredDifferences::new(series, n);
+            let levels = differences.levels();
+            let mut freedoms: Vec<BlockFreedom> = Vec::new();
+            for doublings in doublings(&differences, series.period_s) {
+                let longer = longer_levels(&levels, doublings);
+                let by_length = freedoms.last().map_or(differences.freedom(), |freedom| 2.0 * freedom.block);
+                let block = freedom_by_scatter(&longer).map_or(by_length, |freedom| freedom.min(by_length));
+                // Levels that move together at a short length do so at a longer one, which has too few blocks to show it.
+                let neighbours = freedoms.last().map_or(f64::INFINITY, |freedom| 2.0 * freedom.neighbours);
+                freedoms.push(BlockFreedom { block, neighbours: neighbours_freedom(&longer, block).min(neighbours) });
+            }
+            let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
+            // The Allan variance is half the mean square of the differences.
+            largest = largest.max(0.5 * typical);
+            if freedoms.is_empty() {
+                break;
+            }
+            scales.push(Scale { n, freedoms });
+        }
+        let count = series.resolution * series.resolution;
+        let floor = if largest > dithered_avar_counts2 * count { 0.0 } else { count };
+        Self { scales, floor }
+    }
+
+    /// Knocks of a channel, in no order.
+    fn find(&self, series: &Series) -> Vec<Knock> {
+        let mut rest = series.clone();
+        let mut knocks: Vec<Knock> = Vec::new();
+        for _ in 0..PASSES {
+            let next = self.loudest(&rest);
+            if next.is_empty() {
+                break;
+            }
+            let excluded: Vec<Range<u64>> = next.iter().map(|knock| knock.slots.clone()).collect();
+            rest = rest.filtered(|slot| !excluded.iter().any(|of| of.contains(&slot)));
+            for knock in next {
+                join(&mut knocks, knock);
+            }
+            if (series.values.len() - rest.values.len()) as f64 > LARGEST_SHARE * series.values.len() as f64 {
+                return Vec::new();
+            }
+        }
+        knocks
+    }
+
+    /// The knocks around the loudest blocks of a series; none overlaps another.
+    fn loudest(&self, series: &Series) -> Vec<Knock> {
+        let scales: Vec<SquaredDifferences> =
+            self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
+        let (mut blocks, mut tests) = (Vec::new(), 0_usize);
+        for (scale, differences) in scales.iter().enumerate() {
+            let (found, tested) = self.loud_blocks(scale, differences, series.period_s);
+            blocks.extend(found);
+            tests += tested;
+        }
+        let limit = SIGNIFICANCE / tests.max(1) as f64;
+        blocks.retain(|block| block.p_value < limit && self.is_loud_throughout(block, &scales[block.scale]));
+        blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        let mut knocks: Vec<Knock> = Vec::new();
+        for block in blocks {
+            let differences = &scales[block.scale];
+            let slots = differences.slots(block.differences.clone());
+            let reach = 2 * (slots.end - slots.start);
+            let is_near = |other: &Knock| {
+                slots.start < other.slots.end + reach && other.slots.start < slots.end.saturating_add(reach)
+            };
+            // What is near a louder block is tested again without it.
+            if !knocks.iter().any(is_near) {
+                knocks.push(knock_around(&block, differences, block.p_value * tests as f64));
+            }
+        }
+        knocks
+    }
+
+    /// The blocks of one averaging time with the probability of each by chance, and how many were tested.
+    fn loud_blocks(&self, scale: usize, differences: &SquaredDifferences, period_s: f64) -> (Vec<LoudBlock>, usize) {
+        let (mut loud, mut tested) = (Vec::new(), 0);
+        let levels = differences.levels();
+        for doublings in doublings(differences, period_s) {
+            let longer = longer_levels(&levels, doublings);
+            let freedoms = &self.scales[scale].freedoms;
+            let Some(&freedom) = freedoms.get(doublings as usize).or(freedoms.last()) else { continue };
+            let size = DIFFERENCES << doublings;
+            for (at, level) in longer.iter().enumerate() {
+                let (Some(level), Some(quiet)) = (level, neighbouring_level(&longer, at, freedom.block)) else {
+                    continue;
+                };
+                tested += 1;
+                let quiet = quiet.max(self.floor);
+                let ratio = level / quiet;
+                if ratio > 1.0 && ratio.is_finite() {
+                    let p_value = exceedance(ratio, freedom.block, freedom.neighbours);
+                    let differences = at * size..(at + 1) * size;
+                    loud.push(LoudBlock { scale, differences, quiet, ratio, freedom, p_value });
+                }
+            }
+        }
+        (loud, tested)
+    }
+
+    /// Whether the smaller half of the squares of a block is larger than that of its neighbours too. Where the bias jumps
+    /// several times in a block, some of its squares are large and the others are as elsewhere.
+    fn is_loud_throughout(&self, block: &LoudBlock, differences: &SquaredDifferences) -> bool {
+        let size = block.differences.len();
+        let at = block.differences.start / size;
+        let first = at.saturating_sub(NEIGHBOURS + 1);
+        let blocks = first..(at + NEIGHBOURS + 2).min(differences.squares.len() / size);
+        let levels: Vec<Option<f64>> =
+            blocks.map(|block| differences.half_level(block * size..(block + 1) * size)).collect();
+        let freedom = HALF_EFFICIENCY * block.freedom.block;
+        let Some(quiet) = neighbouring_level(&levels, at - first, freedom) else { return false };
+        let Some(level) = levels[at - first] else { return false };
+        let others = HALF_EFFICIENCY * block.freedom.neighbours;
+        exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
+    }
+
+    /// A knock at the time of one in another channel.
+    fn at_known_time(&self, series: &Series, known: &Knock) -> Option<Knock> {
+        let tests = self.scales.len() as f64;
+        let of_scale = |scale: &Scale| {
+            let differences = SquaredDifferences::new(series, scale.n);
+            let from = differences.number(known.slots.start);
+            let length = differences.number(known.slots.end).checked_sub(from + 1)?;
+            if length < FEWEST_DIFFERENCES {
+                return None;
+            }
+            let level = differences.trimmed_level(from..from + length)?;
+            let freedom = scale.freedoms.first()?.block * length as f64 / DIFFERENCES as f64;
+            let beside = (2..2 + SIDE).flat_map(|distance| [-distance, distance]).filter_map(|distance| {
+                let start = from as i64 + distance * length as i64;
+                let start = usize::try_from(start).ok()?;
+                differences.trimmed_level(start..start + length)
+            });
+            let beside: Vec<f64> = beside.collect();
+            let others = beside.len() as f64 * freedom / std::f64::consts::FRAC_PI_2;
+            if beside.len() < SIDE as usize {
+                return None;
+            }
+            let ratio = level / median(beside).max(self.floor);
+            let p_value = tests * exceedance(ratio, freedom, others);
+            (p_value < SIGNIFICANCE_AT_A_KNOWN_TIME).then(|| {
+                let half = NORMAL_975 * (2.0 / freedom + 2.0 / others).sqrt();
+                let bound = |half: f64| (ratio.ln() + half).exp().sqrt();
+                Knock {
+                    level: ratio.sqrt(),
+                    level_bounds: (bound(-half), bound(half)),
+                    n: scale.n,
+                    p_value,
+                    ..known.clone()
+                }
+            })
+        };
+        self.scales.iter().filter_map(of_scale).min_by(|a, b| a.p_value.total_cmp(&b.p_value))
+    }
+}
+
+/// Adds a knock to `knocks`, or extends the one that it follows or precedes at less than the length of the shorter.
+fn join(knocks: &mut Vec<Knock>, knock: Knock) {
+    let length = |knock: &Knock| knock.slots.end - knock.slots.start;
+    let is_near = |other: &&mut Knock| {
+        let reach = length(other).min(length(&knock));
+        knock.slots.start <= other.slots.end.saturating_add(reach)
+            && other.slots.start <= knock.slots.end.saturating_add(reach)
+    };
+    let Some(other) = knocks.iter_mut().find(is_near) else { return knocks.push(knock) };
+    // The earlier one was the louder one, and keeps its level.
+    if knock.slots.start < other.slots.start {
+        (other.slots.start, other.from) = (knock.slots.start, knock.from);
+    }
+    if knock.slots.end > other.slots.end {
+        (other.slots.end, other.to) = (knock.slots.end, knock.to);
+    }
+}
+
+/// The likeliest stretch of a raised level around a block.
+///
+/// The level is tried at the square root of the block's ratio, so that the stretch includes the rise and the decay.
+fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f64) -> Knock {
+    let quiet = block.quiet / TRIMMED_MEAN;
+    let tried = block.ratio.sqrt();
+    let length = block.differences.len();
+    // ln likelihood ratio of each difference; correlated differences count as fewer.
+    let weight = 0.5 * block.freedom.block / length as f64;
+    let window = block.differences.start.saturating_sub(4 * length)
+        ..(block.differences.end + 4 * length).min(differences.squares.len());
+    let gain = |square: f64| {
+        let ratio = (square / quiet).min(LARGEST_SQUARE * block.ratio);
+        if ratio.is_finite() { weight * (ratio * (1.0 - 1.0 / tried) - tried.ln()) } else { 0.0 }
+    };
+    let gains: Vec<f64> = differences.squares[window.clone()].iter().map(|&square| gain(square)).collect();
+    // Running sums of the gains: a stretch gains the difference of two of them.
+    let mut sums = vec![0.0];
+    for gain in &gains {
+        sums.push(sums[sums.len() - 1] + gain);
+    }
+    // The likeliest stretch begins at or before the middle of the block and ends after it.
+    let middle = (block.differences.start + block.differences.end) / 2 - window.start;
+    let by = |a: &usize, b: &usize| sums[*a].total_cmp(&sums[*b]);
+    let start = (0..=middle).min_by(by).unwrap_or(middle);
+    let end = (middle + 1..sums.len()).max_by(by).unwrap_or(middle + 1);
+    let starts = || (0..=middle).filter(|&at| sums[at] < sums[start] + LIKELIHOOD_LOSS);
+    let ends = || (middle + 1..sums.len()).filter(|&at| sums[at] > sums[end] - LIKELIHOOD_LOSS);
+    let bounds = |possible: &mut dyn Iterator<Item = usize>, likeliest: usize| {
+        possible.fold((likeliest, likeliest), |(low, high), at| (low.min(at), high.max(at)))
+    };
+    let (start_low, start_high) = bounds(&mut starts(), start);
+    let (end_low, end_high) = bounds(&mut ends(), end);
+    // The level of what belongs to it for certain.
+    let certain = if end_low > start_high + FEWEST_DIFFERENCES { start_high..end_low } else { start..end };
+    let inside = &differences.squares[window.start + certain.start..window.start + certain.end];
+    let (sum, count) = inside
+        .iter()
+        .filter(|square| square.is_finite())
+        .fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+    let ratio = sum / f64::max(count, 1.0) / quiet;
+    let freedom = block.freedom.block * count / length as f64;
+    let half = NORMAL_975 * (2.0 / freedom + 2.0 / block.freedom.neighbours).sqrt();
+    // A difference is that of its average and the next one, so that the first one that is loud begins one average early.
+    let n = differences.n as u64;
+    let at = |number: usize| differences.slots(window.start + number..window.start + number).start;
+    let from = BoundedSlot { value: at(start) + n, low: at(start_low), high: at(start_high) + 2 * n };
+    let to = BoundedSlot { value: at(end), low: at(end_low).saturating_sub(n), high: at(end_high) + n };
+    Knock {
+        slots: from.low..to.high,
+        from,
+        to,
+        level: ratio.sqrt(),
+        level_bounds: ((ratio.ln() - half).exp().sqrt(), (ratio.ln() + half).exp().sqrt()),
+        n: differences.n,
+        p_value,
+    }
+}
+
+impl Knock {
+    /// Whether both have a sample period in common.
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        self.slots.start < other.slots.end && other.slots.start < self.slots.end
+    }
+
+    /// The knock as it is reported; `channels` are the names of those that show it, the channel's own included.
+    pub(crate) fn detection(&self, series: &Series, channels: &[&str]) -> Detection {
+        let time = |slot: u64| slot as f64 * series.period_s;
+        let bounded = |of: BoundedSlot| Parameter::new(time(of.value), time(of.low), time(of.high), "s");
+        let (low, high) = self.level_bounds;
+        let shown = if channels.len() > 1 {
+            format!("{} channels ({})", channels.len(), channels.join(", "))
+        } else {
+            "this channel alone".to_owned()
+        };
+        let evidence = format!(
+            "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance {:.0e}, in \
+             {shown}; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
+            time(self.from.value),
+            time(self.to.value),
+            self.n as f64 * series.period_s,
+            self.level,
+            self.p_value,
+        );
+        let parameters = [
+            ("from", bounded(self.from)),
+            ("to", bounded(self.to)),
+            ("level", Parameter::new(self.level, low, high, "")),
+        ];
+        let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
+        Detection {
+            effect: Effect::new("knock", parameters, evidence),
+            correction: Some(Correction::Exclude(excluded)),
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Noise level of a channel over time: mean squares of second differences over blocks, at several averaging times.
+//!
+//! A level is compared with those of the neighbouring blocks, on either side. The ratio of two mean squares of noise that
+//! does not change has Fisher's F distribution. Its degrees of freedom are those of the differences' own correlation, and
+//! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
+//! by itself have the false-alarm rate that is asked for.
+
+use crate::series::Series;
+use statrs::function::beta::checked_beta_reg;
+use std::ops::Range;
+
+/// Differences of the shortest block.
+pub(super) const DIFFERENCES: usize = 64;
+/// Longest averaging time of the differences, s: what moves more slowly is motion or drift and no level of noise.
+const LONGEST_AVERAGE_S: f64 = 0.5;
+/// Longest block, s. Disturbances last seconds to minutes.
+const LONGEST_BLOCK_S: f64 = 128.0;
+/// The largest squares of a block, this part of them, are left out of its level: a jump of the bias or a few spikes make
+/// large differences, and are no noise.
+const TRIMMED: f64 = 0.1;
+/// Mean of the squares of standard normal numbers without the largest tenth: P(χ²₃ < q)/0.9 with P(χ²₁ < q) = 0.9.
+pub(super) const TRIMMED_MEAN: f64 = 0.6231;
+/// The same without the larger half has degrees of freedom that are smaller by this factor: its relative variance is
+/// 0.0330/0.5²/0.1427² = 6.49, that without the largest tenth 2.56.
+pub(super) const HALF_EFFICIENCY: f64 = 2.56 / 6.49;
+/// Variance of that mean over that of the mean of all squares, each relative to its expectation (the winsorised variance,
+/// 0.806/0.9², over 0.6231²·2).
+const EFFICIENCY: f64 = 1.0 / 1.282;
+/// Blocks on either side that a block is compared with, beyond the one next to it, and how many of them there must be.
+pub(super) const NEIGHBOURS: usize = 12;
+const FEWEST_NEIGHBOURS: usize = 6;
+/// Variance of the median of normal numbers over that of their mean: π/2.
+const MEDIAN_LOSS: f64 = std::f64::consts::FRAC_PI_2;
+/// An average is used if at least this part of its samples is there.
+const LEAST_FILL: f64 = 0.9;
+/// Blocks from which on their scatter bounds the degrees of freedom.
+const FEWEST_FOR_SCATTER: usize = 24;
+/// Degrees of freedom beyond which a level is taken to be exact.
+const MOST_FREEDOM: f64 = 1e6;
+/// The 90 % quantile of the standard normal distribution.
+const NORMAL_90: f64 = 1.2816;
+
+/// Averaging factors at which levels are estimated, samples: powers of two.
+pub(super) fn averaging_factors(period_s: f64) -> impl Iterator<Item = usize> {
+    (0..).map(|octave| 1_usize << octave).take_while(move |&n| n == 1 || n as f64 * period_s <= LONGEST_AVERAGE_S)
+}
+
+/// Squares of the differences of neighbouring averages over `n` samples; one for each average but the last.
+pub(super) struct SquaredDifferences {
+    pub(super) n: usize,
+    /// First sample period of the first average.
+    start: u64,
+    /// `NaN` where an average has too few samples.
+    pub(super) squares: Vec<f64>,
+    /// Degrees of freedom of the mean of [`DIFFERENCES`] trimmed squares, by the correlation of the differences.
+    freedom: f64,
+}
+
+impl SquaredDifferences {
+    pub(super) fn new(series: &Series, n: usize) -> Self {
+        let start = series.span.start;
+        let count = (series.span.end.saturating_sub(start) / n as u64) as usize;
+        let (mut sums, mut filled) = (vec![0.0; count], vec![0_u32; count]);
+        for (&slot, &value) in series.slots.iter().zip(&series.values) {
+            let at = ((slot - start) / n as u64) as usize;
+            if at < count {
+                sums[at] += value;
+                filled[at] += 1;
+            }
+        }
+        let difference = |at: usize| {
+            let [a, b] = [f64::from(filled[at]), f64::from(filled[at + 1])];
+            if a.min(b) < (LEAST_FILL * n as f64).max(1.0) {
+                return f64::NAN;
+            }
+            // White noise has the same variance in every difference, however many samples are missing.
+            (sums[at + 1] / b - sums[at] / a) / (0.5 * n as f64 * (1.0 / a + 1.0 / b)).sqrt()
+        };
+        let differences: Vec<f64> = (0..count.saturating_sub(1)).map(difference).collect();
+        let freedom = degrees_of_freedom(&differences);
+        Self { n, start, squares: differences.into_iter().map(|value| value * value).collect(), freedom }
+    }
+
+    /// Number of the first difference that begins at or after a sample period.
+    pub(super) fn number(&self, slot: u64) -> usize {
+        (slot.saturating_sub(self.start)).div_ceil(self.n as u64) as usize
+    }
+
+    /// Sample periods of the averages of some differences.
+    pub(super) fn slots(&self, differences: Range<usize>) -> Range<u64> {
+        let at = |number: usize| self.start + number as u64 * self.n as u64;
+        at(differences.start)..at(differences.end + 1)
+    }
+
+    /// Mean of the squares of some differences without the largest tenth; `None` where half of them are missing.
+    pub(super) fn trimmed_level(&self, differences: Range<usize>) -> Option<f64> {
+        self.level_without(TRIMMED, differences)
+    }
+
+    /// The same without the larger half.
+    pub(super) fn half_level(&self, differences: Range<usize>) -> Option<f64> {
+        self.level_without(0.5, differences)
+    }
+
+    fn level_without(&self, left_out: f64, differences: Range<usize>) -> Option<f64> {
+        let all = differences.len();
+        let mut present: Vec<f64> =
+            self.squares.get(differences)?.iter().copied().filter(|square| square.is_finite()).collect();
+        if present.is_empty() || 2 * present.len() < all {
+            return None;
+        }
+        let kept = (present.len() as f64 * (1.0 - left_out)).ceil() as usize;
+        if kept < present.len() {
+            present.select_nth_unstable_by(kept, f64::total_cmp);
+        }
+        Some(present[..kept].iter().sum::<f64>() / kept as f64)
+    }
+
+    /// Levels of the blocks of [`DIFFERENCES`] differences.
+    pub(super) fn levels(&self) -> Vec<Option<f64>> {
+        let blocks = self.squares.len() / DIFFERENCES;
+        (0..blocks).map(|block| self.trimmed_level(block * DIFFERENCES..(block + 1) * DIFFERENCES)).collect()
+    }
+
+    /// Degrees of freedom of the shortest block.
+    pub(super) fn freedom(&self) -> f64 {
+        self.freedom
+    }
+}
+
+/// `m/(1 + 2 Σ (1 − k/m) ρ_k²)` with the autocorrelation ρ of the differences, for `m` = [`DIFFERENCES`] of them.
+fn degrees_of_freedom(differences: &[f64]) -> f64 {
+    let product = |lag: usize| {
+        let pairs = differences.iter().zip(&differences[lag.min(differences.len())..]).map(|(a, b)| a * b);
+        let (sum, count) =
+            pairs.filter(|product| product.is_finite()).fold((0.0, 0.0), |(sum, count), of| (sum + of, count + 1.0));
+        (sum / f64::max(count, 1.0), count)
+    };
+    let (variance, _) = product(0);
+    let m = DIFFERENCES as f64;
+    let squares = |lag: usize| {
+        let (covariance, count) = product(lag);
+        // The square of an estimated correlation is too large by about one over the number of products.
+        let square = (covariance / variance).powi(2) - f64::max(count, 1.0).recip();
+        (1.0 - lag as f64 / m) * square.max(0.0)
+    };
+    let sum: f64 = if variance > 0.0 { (1..DIFFERENCES).map(squares).sum() } else { 0.0 };
+    EFFICIENCY * m / (1.0 + 2.0 * sum)
+}
+
+/// Means of `2^doublings` neighbouring levels each; `None` where half of them are missing.
+pub(super) fn longer_levels(levels: &[Option<f64>], doublings: u32) -> Vec<Option<f64>> {
+    let size = 1_usize << doublings;
+    let mean = |chunk: &[Option<f64>]| {
+        let (sum, count) = chunk.iter().flatten().fold((0.0, 0_usize), |(sum, count), level| (sum + level, count + 1));
+        (2 * count > size || count == size).then(|| sum / count as f64)
+    };
+    levels.chunks_exact(size).map(mean).collect()
+}
+
+/// Sizes of the blocks, as doublings of the shortest one, at which a record is examined: as long as a block has neighbours.
+pub(super) fn doublings(differences: &SquaredDifferences, period_s: f64) -> impl Iterator<Item = u32> {
+    let shortest_s = (DIFFERENCES * differences.n) as f64 * period_s;
+    let blocks = differences.squares.len() / DIFFERENCES;
+    let is_examined = move |doublings: &u32| {
+        let size = 1_usize << doublings;
+        blocks / size >= 2 * FEWEST_NEIGHBOURS + 3 && (*doublings == 0 || size as f64 * shortest_s <= LONGEST_BLOCK_S)
+    };
+    (0..24).take_while(is_examined)
+}
+
+/// The level that the neighbours of a block show.
+///
+/// It is the larger of the medians of the blocks on either side, with at most [`NEIGHBOURS`] each. At an end of the record,
+/// where one side has too few blocks, it is that of the other side.
+pub(super) fn neighbouring_level(levels: &[Option<f64>], at: usize, freedom: f64) -> Option<f64> {
+    let level = side_levels(levels, at).into_iter().flatten().max_by(f64::total_cmp)?;
+    // Median of χ²/ν by Wilson and Hilferty.
+    Some(level / (1.0 - 2.0 / (9.0 * freedom)).max(0.3).powi(3))
+}
+
+/// Medians of the blocks before and after a block, without the next one on either side.
+fn side_levels(levels: &[Option<f64>], at: usize) -> [Option<f64>; 2] {
+    let after = levels[(at + 2).min(levels.len())..].iter().flatten().take(NEIGHBOURS);
+    let before = levels[..at.saturating_sub(1)].iter().rev().flatten().take(NEIGHBOURS);
+    let side = |levels: Vec<f64>| (levels.len() >= FEWEST_NEIGHBOURS).then(|| median(levels));
+    [side(before.copied().collect()), side(after.copied().collect())]
+}
+
+/// Degrees of freedom of the level of the neighbours, for blocks of `freedom` each: those of the median of as many
+/// independent blocks, and no more than the medians of both sides of the blocks differ from each other.
+pub(super) fn neighbours_freedom(levels: &[Option<f64>], freedom: f64) -> f64 {
+    let independent = freedom * NEIGHBOURS as f64 / MEDIAN_LOSS;
+    let change = |at: usize| match side_levels(levels, at) {
+        [Some(before), Some(after)] => Some((after / before).ln()).filter(|change| change.is_finite()),
+        _ => None,
+    };
+    let mut changes: Vec<f64> = (0..levels.len()).filter_map(change).collect();
+    if changes.len() < FEWEST_FOR_SCATTER {
+        return independent;
+    }
+    changes.sort_by(f64::total_cmp);
+    let quantile = |part: f64| changes[((changes.len() - 1) as f64 * part).round() as usize];
+    let deviation = (quantile(0.9) - quantile(0.1)) / (2.0 * NORMAL_90);
+    // The logarithm of a mean square of ν degrees of freedom has the variance 2/ν, and there are two sides.
+    independent.min(4.0 / (deviation * deviation))
+}
+
+/// Degrees of freedom of blocks by the scatter of their levels: by the distance of the 90 % quantile from the median of the
+/// logarithm of level over neighbours, which a tenth of disturbed blocks does not move. `None` for few blocks.
+pub(super) fn freedom_by_scatter(levels: &[Option<f64>]) -> Option<f64> {
+    let around = |at: usize| {
+        let nearby = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(levels.len());
+        median(levels[nearby].iter().copied().flatten().collect())
+    };
+    let ratio = |(at, level): (usize, &Option<f64>)| level.map(|level| (level / around(at)).ln());
+    let mut ratios: Vec<f64> = levels.iter().enumerate().filter_map(ratio).filter(|ratio| ratio.is_finite()).collect();
+    if ratios.len() < FEWEST_FOR_SCATTER {
+        return None;
+    }
+    ratios.sort_by(f64::total_cmp);
+    let quantile = |part: f64| ratios[((ratios.len() - 1) as f64 * part).round() as usize];
+    let deviation = (quantile(0.9) - quantile(0.5)) / NORMAL_90;
+    Some(2.0 / (deviation * deviation))
+}
+
+/// Probability that a mean square of `freedom` degrees of freedom exceeds another one of `of_other`, of the same
+/// expectation, by the factor `ratio`: the upper tail of Fisher's F distribution.
+pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
+    let (freedom, of_other) = (freedom.min(MOST_FREEDOM), of_other.min(MOST_FREEDOM));
+    checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
+}
+
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
