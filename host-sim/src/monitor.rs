@@ -145,6 +145,10 @@ fn hello(report: &Hello) -> Vec<String> {
 fn channel(report: &ChannelMessage) -> String {
     let name = name(report.channel);
     let mut text = format!("   {name}: {} samples, {} missing", report.samples, report.missing);
+    if report.missing > 0 {
+        let ChannelMessage { lost, refused, replaced, .. } = report;
+        text += &format!(" ({lost} lost, {refused} refused; {replaced} replaced in the curve)");
+    }
     for coefficient in &report.coefficients {
         let (value, low, high) = (coefficient.value, coefficient.low, coefficient.high);
         text += &format!(", {} {value:.3e} ({low:.3e} to {high:.3e})", symbol(coefficient.term));
@@ -177,7 +181,23 @@ fn health(health: &Health) -> String {
         ("lost DRDY edges", health.lost_edges),
         ("spurious DRDY edges", health.spurious_edges),
         ("suspect", health.suspect),
+        ("implausible supply", health.implausible_supply),
+        ("refused in a channel", health.partly_used),
+        ("used with a warning", health.marked),
+        ("reads of DIAG_STAT", health.diag_reads),
+        ("supply low", health.diag_supply_low),
+        ("supply high", health.diag_supply_high),
+        ("flash update failed", health.diag_flash_update),
+        ("SPI error", health.diag_spi),
+        ("over-range", health.diag_over_range),
+        ("self-test failed", health.diag_self_test),
+        ("flash checksum", health.diag_flash_checksum),
+        ("alarm", health.diag_alarm),
         ("recoveries", health.recoveries),
+        ("configurations read again", health.rereads),
+        ("bus resets", health.bus_resets),
+        ("software resets", health.sensor_resets),
+        ("pulses on RST", health.reset_lines),
         ("raw messages dropped", health.raw_dropped),
         ("serial overruns", health.serial_overruns),
         ("bad commands", health.bad_commands),
