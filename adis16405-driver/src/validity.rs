@@ -42,6 +42,10 @@ bitflags::bitflags! {
 }
 
 impl Faults {
+    /// Largest gyro count, of either sign, that is not an [`IMPOSSIBLE_RATE`](Self::IMPOSSIBLE_RATE): full scale is ±6000 in
+    /// every range, and a part may exceed it somewhat.
+    pub const LARGEST_RATE: i16 = 7000;
+
     /// Every fault with its name in reports. Where several are present, the one nearest to the root cause comes first.
     pub const CAUSES: [(Faults, &'static str); 10] = [
         (Faults::STUCK_LOW, "stuck_low"),
@@ -82,8 +86,6 @@ impl defmt::Format for Faults {
 
 /// Supply counts of 2.418 mV inside 4.75…5.25 V.
 const SUPPLY_COUNTS: core::ops::RangeInclusive<i16> = 1965..=2171;
-/// Largest possible gyro count: full scale is ±6000 in every range, and a part may exceed it somewhat.
-const MAX_RATE: i16 = 7000;
 
 impl Burst {
     /// The faults that this burst shows without knowledge of others. [`Faults::REPEATED`], [`Faults::FROZEN`] and
@@ -93,7 +95,8 @@ impl Burst {
         let all = words.iter().fold(u16::MAX, |all, word| all & word.0);
         let any = words.iter().fold(0, |any, word| any | word.0);
         let inertial = words[INERTIAL_WORDS].iter().fold(u16::MAX, |all, word| all & word.0);
-        let possible = |channel| (-MAX_RATE..=MAX_RATE).contains(&words[channel as usize].counts(channel));
+        let possible =
+            |channel| (-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&words[channel as usize].counts(channel));
         let rates_are_possible = possible(Channel::GyroX) && possible(Channel::GyroY) && possible(Channel::GyroZ);
 
         let mut faults = Faults::empty();
@@ -133,7 +136,7 @@ fn is_shifted(words: &[OutputWord; 12]) -> bool {
 
 /// True for an x rate that may be a negative one without its sign bit, 2¹³.
 fn may_have_lost_its_sign(x: i16) -> bool {
-    x >= (1 << 13) - MAX_RATE
+    x >= (1 << 13) - Faults::LARGEST_RATE
 }
 
 /// Whether the data of a burst are usable, and the faults that it shows.

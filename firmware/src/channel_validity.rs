@@ -8,8 +8,6 @@ use adis16405_driver::{Burst, Channel, Faults};
 const WARNINGS: Faults = Faults::REPEATED.union(Faults::SUPPLY).union(Faults::ERROR_ALARM);
 /// Faults of single inertial channels.
 const OF_CHANNELS: Faults = Faults::NO_NEW_DATA.union(Faults::IMPOSSIBLE_RATE).union(Faults::X_SIGN);
-/// The greatest rate in counts that is no fault, as for [`Faults::IMPOSSIBLE_RATE`]: full scale is ±6000 in every range.
-const MAX_RATE: i16 = 7000;
 /// Supply in counts of 2.418 mV from 3.0 V to 6.0 V. The sensor does not run with less, and 6.0 V is its absolute maximum
 /// rating: a word beyond these limits was not sent by a sensor.
 const PLAUSIBLE_SUPPLY: core::ops::RangeInclusive<i16> = 1241..=2481;
@@ -35,7 +33,8 @@ pub(crate) fn refused_channels(burst: &Burst, faults: Faults) -> ChannelSet {
     }
     for (index, channel) in CHANNELS.into_iter().enumerate().take(INERTIAL) {
         let word = burst.words[channel as usize];
-        let impossible = index < GYROS && !(-MAX_RATE..=MAX_RATE).contains(&word.counts(channel));
+        let impossible =
+            index < GYROS && !(-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&word.counts(channel));
         let sign_lost = channel == Channel::GyroX && faults.contains(Faults::X_SIGN);
         refused.insert_if(index, !word.new_data() || impossible || sign_lost);
     }

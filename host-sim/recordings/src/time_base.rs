@@ -18,9 +18,15 @@ pub use crate::stamp_alignment::RateEstimate;
 /// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
 const MIN_SAMPLES: u64 = 4;
 
-/// Faults for which a sample is left out. The other faults are warnings; their samples are used.
-const REFUSED: Faults =
-    Faults::all().difference(Faults::REPEATED).difference(Faults::ERROR_ALARM).difference(Faults::SUPPLY);
+/// Faults of one channel's word: the sample is left out in this channel alone.
+const REFUSED_IN_A_CHANNEL: Faults = Faults::IMPOSSIBLE_RATE.union(Faults::X_SIGN);
+
+/// Faults for which a sample is left out in every channel. The others are warnings; their samples are used.
+const REFUSED: Faults = Faults::all()
+    .difference(REFUSED_IN_A_CHANNEL)
+    .difference(Faults::REPEATED)
+    .difference(Faults::ERROR_ALARM)
+    .difference(Faults::SUPPLY);
 
 /// Longest interval, in sample periods, at which a sample equal to the one before is the same sample read twice. Equal samples
 /// farther apart are chance: a filtered output of few counts repeats about once in a thousand samples.
@@ -205,7 +211,8 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Estimate
     let profile = adis16405::profile(recording.range.lsb());
     let channel = |channel: &Channel| {
         let counts = positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect();
-        MeasuredChannel::new(profile.channels[*channel as usize], counts)
+        let refused = refused_positions(*channel, positions.iter().map(|&p| &samples[p]));
+        MeasuredChannel { refused, ..MeasuredChannel::new(profile.channels[*channel as usize], counts) }
     };
     let measurement = Measurement {
         channels: recording.channels.iter().map(channel).collect(),
@@ -218,6 +225,29 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Estimate
         flagged,
     };
     Ok(EstimatedTimeBase { measurement, stamps })
+}
+
+/// Positions of the samples that are refused in `channel` alone, by cause.
+fn refused_positions<'a>(
+    channel: Channel,
+    samples: impl Iterator<Item = &'a RecordedSample>,
+) -> BTreeMap<&'static str, Vec<usize>> {
+    let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
+    for (position, sample) in samples.enumerate().filter(|(_, sample)| sample.faults.intersects(REFUSED_IN_A_CHANNEL)) {
+        let is_gyro = [Channel::GyroX, Channel::GyroY, Channel::GyroZ].contains(&channel);
+        let impossible = is_gyro && sample.counts.get(channel).unsigned_abs() > Faults::LARGEST_RATE.unsigned_abs();
+        let own = if impossible {
+            Faults::IMPOSSIBLE_RATE
+        } else if channel == Channel::GyroX {
+            sample.faults & Faults::X_SIGN
+        } else {
+            Faults::empty()
+        };
+        if let Some(cause) = own.cause() {
+            refused.entry(cause).or_default().push(position);
+        }
+    }
+    refused
 }
 
 /// The samples of a recording that can be used.
@@ -261,7 +291,7 @@ impl Usable {
                 }
                 None => {
                     usable.positions.push(position);
-                    for cause in sample.faults.causes() {
+                    for cause in sample.faults.difference(REFUSED_IN_A_CHANNEL).causes() {
                         *usable.flagged.entry(cause).or_insert(0) += 1;
                     }
                 }
@@ -300,7 +330,7 @@ impl Usable {
                 if let Some(count) = Faults::REPEATED.cause().and_then(|cause| self.dropped.get_mut(cause)) {
                     *count -= 1;
                 }
-                for cause in faults.causes() {
+                for cause in faults.difference(REFUSED_IN_A_CHANNEL).causes() {
                     *self.flagged.entry(cause).or_insert(0) += 1;
                 }
                 self.positions.push(position);

@@ -251,3 +251,28 @@ fn many_refused_samples_hide_neither_the_rate_nor_the_losses() {
         assert!((700..800).contains(&base.measurement.len()), "{}", base.measurement.len());
     }
 }
+
+#[test]
+fn an_impossible_rate_is_missing_in_its_gyro_alone() {
+    let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
+    for at in 0..1000_i16 {
+        let mut values = [at % 50; 12];
+        values[Channel::Supply as usize] = 2068;
+        if at == 400 || at == 700 {
+            values[Channel::GyroY as usize] = -7001;
+        }
+        recorder.push(TimeStamp::from_time(f64::from(at) * PERIOD), &Burst::from_counts(&Counts::new(values)));
+    }
+    let measured = measurement(&recorder.finish(), None).expect("a time base");
+    assert_eq!((measured.len(), &measured.dropped), (1000, &[("gap", 0)].into()));
+    assert!(measured.flagged.is_empty(), "{:?}", measured.flagged);
+    for channel in &measured.channels {
+        let expected = if channel.profile.name == "gyro_y" { vec![400, 700] } else { Vec::new() };
+        assert_eq!(
+            channel.refused.get("impossible_rate").cloned().unwrap_or_default(),
+            expected,
+            "{}",
+            channel.profile.name
+        );
+    }
+}

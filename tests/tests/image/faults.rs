@@ -155,7 +155,8 @@ fn report_after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
 }
 
 /// A failed DMA transfer costs that burst and nothing else: no byte of it is left for the next one. One whose end raises no
-/// interrupt is ended when no burst has come for 25 ms.
+/// interrupt is ended when no burst has come for 25 ms; after such a silence the sensor is left alone for its start-up time of
+/// 290 ms.
 #[test]
 fn a_failed_transfer_costs_one_sample() {
     for (event, bus_errors, recoveries) in [(Event::StopReceiving, 1, 0), (Event::LoseBurstEnd, 0, 1)] {
@@ -170,7 +171,7 @@ fn a_failed_transfer_costs_one_sample() {
         println!("{event:?}: {health:?}");
         assert_eq!((health.bus_errors, health.recoveries), (bus_errors, recoveries), "{health:?}");
         assert_eq!((health.used, health.shifted, health.frozen), (health.bursts, 0, 0), "{health:?}");
-        assert!(f64::from(health.lost_edges) < 0.1 * RATE_HZ * f64::from(recoveries) + 1.0, "{health:?}");
+        assert!(f64::from(health.lost_edges) < 0.4 * RATE_HZ * f64::from(recoveries) + 1.0, "{health:?}");
         assert!(f64::from(health.used) > 3.8 * RATE_HZ, "{health:?}");
         assert_eq!(sensor.expect("a sensor").part.violations().len(), usize::from(recoveries == 0), "the short frame");
     }

@@ -89,8 +89,8 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert_eq!(part.violations(), []);
 }
 
-/// An error of the DMA costs the burst and what comes until the transfer is abandoned, 25 ms later; then no byte of it is left
-/// and the channel works.
+/// An error of the DMA costs the burst and what comes until the transfer is abandoned, 25 ms later, and for the start-up time
+/// of the sensor, 290 ms, after such a silence; then no byte of it is left and the channel works.
 #[test]
 fn a_failed_transfer_is_recovered_from() {
     let board = Pico { dma_error_at: 1.0, ..SOUND };
@@ -99,7 +99,7 @@ fn a_failed_transfer_is_recovered_from() {
     let counter = |name: &str| counter(&decoded.lines, name).unwrap_or(0);
     println!("{:#?}", decoded.lines);
     assert_eq!((counter("bus_errors"), counter("recoveries"), counter("shifted")), (1, 1, 0));
-    assert!(counter("bursts").abs_diff(counter("used")) <= 1 && f64::from(counter("used")) > 1.9 * RATE_HZ);
+    assert!(counter("bursts").abs_diff(counter("used")) <= 1 && f64::from(counter("used")) > 1.5 * RATE_HZ);
     assert!((4..=6).contains(&led_changes), "{led_changes} changes of the LED in 2.6 s");
 }
 
