@@ -94,7 +94,7 @@ impl StampAlignment {
         };
         if beats && is_beat(&track.losses, times.len()) {
             track = Track::complete(times, &track);
-        } else if beats {
+        } else if beats && !are_scattered(&track.losses) && !tick_s.is_some_and(|tick_s| is_finer(times, tick_s)) {
             for loss in &mut track.losses {
                 loss.certain &= loss.missing > 1;
             }
@@ -201,6 +201,33 @@ fn period_estimates(times: &[f64], tick_s: Option<f64>) -> Vec<f64> {
         }
     }
     estimates
+}
+
+/// Fewest losses whose distances tell how regular they are.
+const MIN_SCATTERED: usize = 8;
+/// Variance of the distances of losses, over the square of their mean, from which they are scattered. Rounding makes equal
+/// distances, of variance 0; those of random losses are exponentially distributed, of variance 1, which the least number of
+/// losses shows with a standard deviation of about 0.5.
+const SCATTERED: f64 = 0.4;
+
+/// Whether losses lie at so different distances that rounding cannot have made most of them.
+fn are_scattered(losses: &[LostStretch]) -> bool {
+    let distances = || losses.windows(2).map(|pair| (pair[1].before - pair[0].before) as f64);
+    let count = distances().count() as f64;
+    let mean = distances().sum::<f64>() / count;
+    let variance = distances().map(|distance| (distance - mean) * (distance - mean)).sum::<f64>() / (count - 1.0);
+    losses.len() >= MIN_SCATTERED && variance >= SCATTERED * mean * mean
+}
+
+/// Whether intervals of one tick differ by more than the rounding of a time in f64: the stamps are not multiples of the tick,
+/// and it is the sample period that they show.
+fn is_finer(times: &[f64], tick_s: f64) -> bool {
+    let single =
+        || times.windows(2).map(|pair| pair[1] - pair[0]).filter(|interval| (interval / tick_s).round() == 1.0);
+    let (least, most) = single()
+        .fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), interval| (least.min(interval), most.max(interval)));
+    let rounding = 4.0 * f64::EPSILON * times.iter().fold(0.0, |most: f64, time| most.max(time.abs()));
+    most - least > rounding
 }
 
 /// Whether single losses lie so regularly in a record of `samples` that a slightly longer period explains all of them.

@@ -220,3 +220,37 @@ fn bursts_stalls_repeats_and_a_drifting_clock_are_told_apart() {
         }
     }
 }
+
+/// A logger that writes the time with so many decimals, in s, and loses 2 % or, with `few`, three samples.
+fn logged(rate_hz: f64, decimals: usize, few: bool) -> Vec<f64> {
+    let mut state = 1_u64;
+    let mut lost = |at: usize| {
+        state = state * 16_807 % 2_147_483_647;
+        if few { [5_000, 21_000, 22_500].contains(&at) } else { at > 0 && state % 50 == 0 }
+    };
+    let written = |at: usize| format!("{:.decimals$}", at as f64 / rate_hz).parse().expect("a number");
+    (0..30_000).filter(|&at| !lost(at)).map(written).collect()
+}
+
+#[test]
+fn losses_between_exact_time_stamps_are_certain() {
+    // The period itself divides all intervals, but scattered losses are not rounding; nor are few ones where the last decimal
+    // shows that stamps are finer.
+    for (rate_hz, decimals, few) in
+        [(204.8, 6, false), (200.0, 6, false), (100.0, 2, false), (204.8, 6, true), (819.2, 9, true)]
+    {
+        let times = logged(rate_hz, decimals, few);
+        let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
+        for (at, &time) in times.iter().enumerate() {
+            // No two neighbours are equal.
+            let mut counts = [(at % 100) as i16; 12];
+            counts[Channel::Supply as usize] = 2068;
+            recorder.push(TimeStamp::from_time(time), &Burst::from_counts(&Counts::new(counts)));
+        }
+        let base = time_base(&recorder.finish(), None).expect("a time base");
+        let stamps = base.stamps.expect("time stamps");
+        let lost: u64 = stamps.losses.iter().map(|loss| loss.missing).sum();
+        assert_eq!(times.len() as u64 + lost, 30_000, "{rate_hz} Hz");
+        assert_eq!(stamps.uncertain_losses(), 0, "{rate_hz} Hz, {decimals} decimals");
+    }
+}
