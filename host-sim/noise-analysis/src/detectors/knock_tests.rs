@@ -178,11 +178,24 @@ const KNOCKS: [(f64, f64); 5] = [(1.0, 5.0), (3.0, 3.0), (10.0, 2.0), (30.0, 1.5
 
 #[test]
 fn knocks_of_seconds_to_minutes_are_found_measured_and_excluded() {
+    assert_knocks_are_found(0.0);
+}
+
+#[test]
+fn knocks_are_found_and_measured_where_samples_are_lost() {
+    assert_knocks_are_found(0.02);
+}
+
+/// Every knock in a record that loses this share of its samples at random.
+fn assert_knocks_are_found(lost: f64) {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let kept: Vec<bool> = (0..SAMPLES).map(|_| !random.random_bool(lost)).collect();
     let start_s = 200.0;
     let (mut covered, mut all) = (0, 0);
     for (seed, (length_s, level)) in KNOCKS.into_iter().enumerate() {
         let inside = |at: usize| (start_s..start_s + length_s).contains(&(at as f64 * PERIOD_S));
         let record = white(50 + seed as u64, |at| if inside(at) { level } else { 1.0 });
+        let record = record.filtered(|slot| kept[slot as usize]);
         let found = find(std::slice::from_ref(&record), DITHERED).remove(0);
         let [knock] = &found[..] else { panic!("{length_s} s at {level}: {found:?}") };
         let effect = knock.detection(&record, &["accl_x"]).effect;

@@ -179,7 +179,8 @@ impl KnockRule {
         }
         let limit = SIGNIFICANCE / tests.max(1) as f64;
         blocks.retain(|block| block.p_value < limit && self.is_loud_throughout(block, &scales[block.scale]));
-        blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        // Probabilities below the smallest float are equal; the higher level is then the better located one.
+        blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.ratio.total_cmp(&a.ratio)));
         let mut knocks: Vec<Knock> = Vec::new();
         for block in blocks {
             let differences = &scales[block.scale];
@@ -308,8 +309,12 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     let window = block.differences.start.saturating_sub(4 * length)
         ..(block.differences.end + 4 * length).min(differences.squares.len());
     let gain = |square: f64| {
+        // A difference with a missing sample has no square, and says nothing.
+        if !square.is_finite() {
+            return 0.0;
+        }
         let ratio = (square / quiet).min(LARGEST_SQUARE * block.ratio);
-        if ratio.is_finite() { weight * (ratio * (1.0 - 1.0 / tried) - tried.ln()) } else { 0.0 }
+        weight * (ratio * (1.0 - 1.0 / tried) - tried.ln())
     };
     let gains: Vec<f64> = differences.squares[window.clone()].iter().map(|&square| gain(square)).collect();
     // Running sums of the gains: a stretch gains the difference of two of them.
