@@ -44,6 +44,8 @@ impl BusTiming {
 pub trait SensorBus: SpiDevice<u8> {
     /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
+    /// Drops what was received, and disables and enables the peripheral.
+    fn reset(&mut self);
 }
 
 /// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
@@ -70,7 +72,7 @@ pub trait Board {
     /// Transfers of bursts so far.
     fn sampling_activity(&mut self) -> SamplingActivity;
     /// Resets the microcontroller's side of the sensor's bus. To be used only while sampling is disabled.
-    fn reset_bus(&mut self) {}
+    fn reset_bus(&mut self);
     /// Pulses the sensor's RST line. Returns false if the board does not connect it.
     fn reset_sensor(&mut self) -> bool {
         false
@@ -257,6 +259,10 @@ where
 
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
         self.locks.bus.lock(|bus| bus.set_clock_limit(limit_hz))
+    }
+
+    fn reset_bus(&mut self) {
+        self.locks.bus.lock(SensorBus::reset);
     }
 
     fn set_sampling(&mut self, enabled: bool) {

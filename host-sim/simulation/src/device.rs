@@ -256,6 +256,9 @@ impl Board for SimulatedBoard {
         }
     }
 
+    /// Transfers of the emulated bus are complete when they return: nothing is left to reset.
+    fn reset_bus(&mut self) {}
+
     fn reset_sensor(&mut self) -> bool {
         if self.reset_line {
             self.bus.reset_part();

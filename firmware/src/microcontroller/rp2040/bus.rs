@@ -133,6 +133,12 @@ impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> SensorBus for Sp
         let rate = u32::from(registers().sspcr0().read().scr().bits());
         self.peripheral.to_Hz().div_ceil(prescale.max(1) * (rate + 1))
     }
+
+    fn reset(&mut self) {
+        drain();
+        registers().sspcr1().modify(|_, w| w.sse().clear_bit());
+        registers().sspcr1().modify(|_, w| w.sse().set_bit());
+    }
 }
 
 impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> BurstBus for Spi0Bus<W, S> {

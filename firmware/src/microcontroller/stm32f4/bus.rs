@@ -125,6 +125,12 @@ impl<S: OutputPin<Error = Infallible>> SensorBus for Spi1Bus<S> {
         registers().cr1().modify(|_, w| w.spe().set_bit());
         prescaled_clock_hz(self.bus_hz, registers().cr1().read().br().bits())
     }
+
+    fn reset(&mut self) {
+        drain();
+        registers().cr1().modify(|_, w| w.spe().clear_bit());
+        registers().cr1().modify(|_, w| w.spe().set_bit());
+    }
 }
 
 impl<S: OutputPin<Error = Infallible>> BurstBus for Spi1Bus<S> {
