@@ -31,6 +31,10 @@ const TAPS_LOG2: std::ops::RangeInclusive<u32> = 1..=6;
 /// segments that overlap by half has the variance `2/n·⟨ω²⟩/⟨ω⟩²` for `ω = sin⁴ + cos⁴`, which is 2.111/n, where the product
 /// of both is 1.944·1.056/n.
 const OVERLAPPING_NEIGHBOURS: f64 = 1.944 * 1.056 / 2.111;
+/// Least power gain of a filter at which bands take part in the estimate of N behind it. Where it suppresses the noise,
+/// the spectrum is that of the rounding error, which is correlated where neighbouring samples differ by less than a count and
+/// then no white noise. It takes part in the choice of the filter alone.
+const PASSBAND: f64 = 0.1;
 /// Rounds of the fit at most; it converges in about ten.
 const ROUNDS: usize = 60;
 /// Standard deviations by which the scatter of the bands around the fit must exceed what the fit predicts for the intervals
@@ -90,7 +94,10 @@ pub fn fit_white_noise(welch: &Welch, known: &KnownShapes) -> Option<WhiteNoiseF
     let bartlett = TAPS_LOG2.map(|log2| FilterSpectrum::Bartlett { taps: 1 << log2 });
     let candidates = unfiltered.into_iter().chain([correlated]).chain(bartlett);
     let fits = candidates.filter_map(|filter| MixtureFit::new(&bands, filter, known.model));
-    fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?.white_noise(&bands)
+    let likeliest = fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+    let FilterSpectrum::Bartlett { taps } = likeliest.filter else { return likeliest.white_noise(&bands) };
+    let passband = bands.filtered(|frequency| bartlett_gain(frequency, welch.sample_period(), taps) > PASSBAND);
+    MixtureFit::new(&passband, likeliest.filter, known.model)?.white_noise(&passband)
 }
 
 /// Whether a frequency is within `reach` Hz of a line of the model.
@@ -131,6 +138,20 @@ impl Bands {
             points,
             densities: densities.into(),
             ordinates: ordinates.into(),
+        }
+    }
+
+    /// The bands in which `is_kept` holds at the first point's frequency in Hz.
+    fn filtered(&self, is_kept: impl Fn(f64) -> bool) -> Self {
+        let kept: Vec<usize> =
+            (0..self.points.len()).filter(|&at| is_kept(self.points[at][0] as f64 * self.resolution)).collect();
+        let of = |values: &DVector<f64>| DVector::from_iterator(kept.len(), kept.iter().map(|&at| values[at]));
+        Self {
+            sample_period: self.sample_period,
+            resolution: self.resolution,
+            points: kept.iter().map(|&at| self.points[at].clone()).collect(),
+            densities: of(&self.densities),
+            ordinates: of(&self.ordinates),
         }
     }
 
