@@ -163,6 +163,10 @@ pub struct Discrepancy {
     /// Hilferty; Abramowitz and Stegun, 26.4.14), is compared with its mean `1 − 2/9edf` and its variance `2/9edf`. The mean
     /// deviance weighs short averaging times, and this figure shows a model that fails at the longest ones.
     pub worst_sigma: f64,
+    /// Averaging time of that point, s.
+    pub worst_tau: f64,
+    /// Modelled over measured Allan variance of that point.
+    pub worst_ratio: f64,
     /// Number of octaves that were compared.
     pub points: usize,
 }
@@ -175,12 +179,12 @@ impl Discrepancy {
     #[must_use]
     pub fn between<const OCTAVES: usize>(model: &Model, curve: &Curve<OCTAVES>) -> Option<Self> {
         let (mut deviance, mut square, mut points) = (0.0, 0.0, 0);
-        let mut worst_sigma: f64 = 0.0;
+        let (mut worst_sigma, mut worst_tau, mut worst_ratio) = (0.0_f64, 0.0, 1.0);
         for point in curve.points() {
             let (ratio, edf) = (point.avar / model.avar(point.n), model.edf(point));
             let sigma = cube_root_deviation(ratio, edf);
             if abs(sigma) > abs(worst_sigma) {
-                worst_sigma = sigma;
+                (worst_sigma, worst_tau, worst_ratio) = (sigma, point.tau, 1.0 / ratio);
             }
             if point.n > curve.samples() / 8 {
                 continue;
@@ -194,6 +198,8 @@ impl Discrepancy {
             deviance_per_point: deviance / points as f64,
             rms_percent: 100.0 * sqrt(square / points as f64),
             worst_sigma,
+            worst_tau,
+            worst_ratio,
             points,
         })
     }

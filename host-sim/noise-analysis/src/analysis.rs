@@ -20,9 +20,10 @@ use crate::report::{
 };
 use crate::series::Series;
 use crate::slow_drift::{ChannelsInCommon, common_mode};
+use crate::spectra::allan_deviations_by_spectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
 use crate::uniform_series::UniformSeries;
-use allan_core::{Curve, Model, NoiseTerm};
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelProfile, Measurement, Quantity, SensorProfile};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -81,10 +82,10 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
         // The series still holds the share of the covariates, which the model with added terms does not describe.
         let trace = &analysis.first.trace;
         let model = if analysis.first.covariates.is_empty() { &trace.after } else { &trace.before };
-        let assessment = Assessment::new(&own, model);
-        (analysis, assessment)
+        let assessment = Assessment::new(&own, model, [&trace.after, &analysis.both.trace.after]);
+        (analysis, Assessed { assessment, by_spectrum: by_spectrum(measurement, &channel) })
     });
-    let (analyses, assessments): (Vec<ChannelAnalysis>, Vec<Assessment>) = analyses.into_iter().unzip();
+    let (analyses, assessments): (Vec<ChannelAnalysis>, Vec<Assessed>) = analyses.into_iter().unzip();
     let mut analyses: Vec<(ChannelProfile, ChannelAnalysis)> = recorded.into_iter().zip(analyses).collect();
     let inertial = analyses.iter_mut().filter(|(channel, _)| traced.contains(channel)).map(|(channel, analysis)| {
         let fit = &mut analysis.both;
@@ -93,9 +94,13 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     });
     agree_on_filter(&mut inertial.collect::<Vec<_>>());
     let commons = common_modes(&analyses);
-    let report = |(((channel, analysis), measured), assessment): (
+    let avar_of = |of: ChannelProfile, n: u64| {
+        let position = analyses.iter().position(|(channel, _)| *channel == of)?;
+        estimators.measured[position].points().iter().find(|point| point.n == n).map(|point| point.avar)
+    };
+    let report = |(((channel, analysis), measured), assessed): (
         (&(ChannelProfile, ChannelAnalysis), &Curve<OCTAVES>),
-        Assessment,
+        Assessed,
     )| {
         let unit = channel.unit;
         let mut effects: Vec<Effect> = Vec::new();
@@ -112,15 +117,38 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
             unit: unit.to_owned(),
             samples: measurement.len() as u64,
             missing: missing_samples(measurement, &preprocessing, &estimators.both, *channel),
-            curve: whole.points().iter().map(|point| CurvePoint::new(point, whole.samples())).collect(),
+            curve: whole
+                .points()
+                .iter()
+                .map(|point| curve_point(point, whole.samples(), &assessed.by_spectrum))
+                .collect(),
             read_off: SlopeMethodReport::from_curve(&whole, unit),
             before: analysis.before(&estimators, &preprocessing, *channel, &whole),
-            after: analysis.after(&estimators, &preprocessing, *channel, &whole),
+            after: analysis.after(&estimators, &preprocessing, *channel, &whole, avar_of),
             effects,
-            assessment,
+            assessment: assessed.assessment,
         }
     };
     analyses.iter().zip(&estimators.measured).zip(assessments).map(report).collect()
+}
+
+/// What the samples of a channel say beside its fits.
+struct Assessed {
+    assessment: Assessment,
+    /// The Allan deviation by the measured spectrum at each octave.
+    by_spectrum: Vec<Option<f64>>,
+}
+
+/// The Allan deviation by the spectrum of the samples of a channel as they were recorded, as the measured curve is.
+fn by_spectrum(measurement: &Measurement, channel: &ChannelProfile) -> Vec<Option<f64>> {
+    let factors: Vec<u64> = (0..OCTAVES).map(|octave| 1 << octave).collect();
+    let recorded = UniformSeries::from_series(&Series::from_measurement(measurement, channel));
+    allan_deviations_by_spectrum(&recorded, &factors)
+}
+
+fn curve_point(point: &AllanPoint, samples: u64, by_spectrum: &[Option<f64>]) -> CurvePoint {
+    let adev_by_spectrum = by_spectrum.get(point.n.ilog2() as usize).copied().flatten();
+    CurvePoint { adev_by_spectrum, ..CurvePoint::new(point, samples) }
 }
 
 /// A recording after preprocessing.
@@ -255,26 +283,23 @@ impl ChannelAnalysis {
         }
     }
 
-    /// The model of the first half with the added terms, without what the rules of the first half exclude.
+    /// The model of the first half with the added terms, without what the rules of the first half exclude. `avar_of` is the
+    /// Allan variance of a channel of the whole record at an averaging factor.
     fn after(
         &self,
         estimators: &RecordEstimators,
         preprocessing: &Preprocessing,
         channel: ChannelProfile,
         whole: &Curve<OCTAVES>,
+        avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
     ) -> ModelReport {
         let position = estimators.both.position(channel).unwrap_or_default();
         let model = &self.first.trace.after;
         let covariates = &self.first.covariates;
         // The share of the covariates is in the measured curve and not in the model.
-        let raw = estimators.both.curve(position);
-        let rest = covariates.compensated(&estimators.both, position);
-        let of_covariates = |n: u64| {
-            let avar =
-                |curve: &Curve<OCTAVES>| curve.points().iter().find(|point| point.n == n).map(|point| point.avar);
-            avar(&raw).zip(avar(&rest)).map_or(0.0, |(raw, rest)| (raw - rest).max(0.0))
-        };
-        let adev = whole.points().iter().map(|point| (model.avar(point.n) + of_covariates(point.n)).sqrt());
+        let factors = || whole.points().iter().map(|point| point.n);
+        let shares = covariates.shares(&estimators.both, position, factors(), avar_of);
+        let adev = factors().zip(shares).map(|(n, share)| (model.avar(n) + share).sqrt());
         let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, position));
         ModelReport {
             terms: terms(model, channel.unit),

@@ -5,12 +5,13 @@
 pub mod innovations;
 pub mod navigation;
 pub mod record_length;
+mod spectral_white_noise;
 
 pub use innovations::Innovations;
 
 use crate::findings::Parameter;
 use crate::series::Series;
-use crate::spectra::{Welch, correlation_time};
+use crate::spectra::correlation_time;
 use crate::uniform_series::UniformSeries;
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
@@ -18,12 +19,6 @@ use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
 use serde::Serialize;
-
-/// Segment length of Welch's estimate, samples: long enough to resolve the nulls of the sensor's filter, short enough for
-/// many segments.
-const WELCH_SAMPLES: usize = 1 << 13;
-/// Half-width of the band that is left out around a line, in resolutions of Welch's estimate.
-const LINE_WIDTHS: f64 = 4.0;
 
 /// Assessment of a channel's model. The JSON report has it under `practice`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -34,8 +29,12 @@ pub struct Assessment {
     pub drift: Vec<NavigationDrift>,
     /// Of a Kalman filter built from the model, on the second half of the record.
     pub innovations: Option<Innovations>,
-    /// N by Welch's spectrum of the whole record, without the Allan variance.
+    /// N by Welch's spectrum of the whole record, without the Allan variance; absent where the record does not identify it.
     pub angle_random_walk_by_spectrum: Option<Parameter>,
+    /// Why the record does not identify N by the spectrum, or why that differs from N of the fit by more than both
+    /// intervals allow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle_random_walk_by_spectrum_note: Option<String>,
     /// Correlation time of the model's Markov process by the autocorrelation of the whole record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub markov_time_by_autocorrelation: Option<Parameter>,
@@ -84,17 +83,21 @@ pub struct RecordLength {
 }
 
 impl Assessment {
-    /// Assesses `model`, which was fitted to the first half of `series`.
+    /// Assesses `model`, which was fitted to the first half of `series`. `fits` are the reported models of that half and of
+    /// the whole record, in which the covariates' share may have been taken off.
     #[must_use]
-    pub fn new(series: &Series, model: &Model) -> Self {
+    pub fn new(series: &Series, model: &Model, fits: [&Model; 2]) -> Self {
         let whole = UniformSeries::from_series(series);
         let halfway = whole.values().len() / 2;
+        let [of_half, of_whole] = fits;
+        let by_spectrum = spectral_white_noise::estimate(&whole, of_whole, of_half, series.resolution, series.unit);
         let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
         Self {
             coefficients: coefficients(model, series.unit),
             drift: drift(model, series.unit, &unseen),
             innovations: filter_innovations(model, &unseen),
-            angle_random_walk_by_spectrum: angle_random_walk(&whole, model, series.unit),
+            angle_random_walk_by_spectrum: by_spectrum.angle_random_walk,
+            angle_random_walk_by_spectrum_note: by_spectrum.note,
             markov_time_by_autocorrelation: correlation_time(&whole, model)
                 .map(|time| Parameter::new(time.value, time.low, time.high, "s")),
             record: record_lengths(model, whole.duration() / 2.0),
@@ -140,25 +143,6 @@ fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<NavigationDri
         unit: unit.to_owned(),
     };
     integrated_errors(model, unseen).into_iter().map(of).collect()
-}
-
-/// N by the spectrum, without the bands around the lines of the model.
-fn angle_random_walk(whole: &UniformSeries, model: &Model, unit: &str) -> Option<Parameter> {
-    let welch = Welch::estimate(whole, WELCH_SAMPLES)?;
-    let reach = LINE_WIDTHS / (WELCH_SAMPLES as f64 * whole.sample_period());
-    let is_near_line = |frequency: f64| {
-        model.terms().iter().any(|term| match term.kind {
-            NoiseTerm::Sinusoid(sinusoid) => (frequency - sinusoid.frequency).abs() < reach,
-            NoiseTerm::Resonance(resonance) => {
-                (frequency - resonance.frequency).abs() < reach + LINE_WIDTHS * resonance.bandwidth
-            }
-            _ => false,
-        })
-    };
-    let (shape, bands) = welch.shape(is_near_line);
-    let (value, error) = (shape.angle_random_walk(), shape.angle_random_walk_error(&bands)?);
-    let unit = unit.strip_suffix("/s").map_or_else(|| format!("{unit}/sqrt(Hz)"), |angle| format!("{angle}/sqrt(s)"));
-    Some(Parameter::new(value, value * (1.0 - 1.96 * error), value * (1.0 + 1.96 * error), unit))
 }
 
 /// The record length that each coefficient of `model` needs, whose half record has a length of `half` s.

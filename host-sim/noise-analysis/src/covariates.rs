@@ -110,6 +110,44 @@ impl CovariateFit {
             .regress(|regression| regression.compensated(&self.sensitivities))
     }
 
+    /// What the covariates add to the channel's Allan variance at each of `factors`, in ascending order, by the covariances in
+    /// `part`.
+    ///
+    /// Longer averaging times than those at which the covariances are known, as of a record in two halves, have the last
+    /// share that is known, times the ratio of what the covariates themselves vary at the two times. For that, `avar` is the
+    /// Allan variance of a covariate at an averaging factor in the whole record.
+    pub(crate) fn shares(
+        &self,
+        part: &RecordPart,
+        channel: usize,
+        factors: impl Iterator<Item = u64>,
+        avar: impl Fn(ChannelProfile, u64) -> Option<f64>,
+    ) -> Vec<f64> {
+        let data = RegressionData::new(part, channel, Some(&self.data));
+        let rest = data.regress(|regression| regression.compensated(&self.sensitivities));
+        let at = |curve: &Curve<OCTAVES>, n: u64| curve.points().iter().find(|of| of.n == n).map(|of| of.avar);
+        let is_coupled = |n: u64| {
+            let of = |known: &Sensitivity| data.with_channel[known.covariate].iter().any(|point| point.n == n);
+            self.sensitivities.iter().all(of)
+        };
+        let variation = |n: u64| -> Option<f64> {
+            let of = |(position, known): (usize, &Sensitivity)| {
+                Some(known.value * known.value * avar(part.channels[position], n)?)
+            };
+            self.sensitivities().map(of).sum()
+        };
+        let mut last: Option<(f64, f64)> = None;
+        let share = |n: u64| {
+            if let Some((raw, rest)) = at(&data.channel, n).zip(at(&rest, n)).filter(|_| is_coupled(n)) {
+                let share = (raw - rest).max(0.0);
+                last = variation(n).filter(|varied| *varied > 0.0).map(|varied| (share, varied));
+                return share;
+            }
+            last.zip(variation(n)).map_or(0.0, |((share, before), now)| share * now / before)
+        };
+        factors.map(share).collect()
+    }
+
     /// Each covariate's position in the part, with the sensitivity to it.
     pub(crate) fn sensitivities(&self) -> impl Iterator<Item = (usize, &Sensitivity)> {
         self.sensitivities.iter().map(|sensitivity| (self.data.positions[sensitivity.covariate], sensitivity))

@@ -89,10 +89,13 @@ pub struct CurvePoint {
     pub replaced_percent: f64,
     /// `100/sqrt(2(N/n−1))`: the percentage accuracy of a point in the slope method, for `N` samples.
     pub accuracy_percent: f64,
+    /// Allan deviation by equation (5) from the measured spectrum, in the channel's unit; absent at averaging times of more
+    /// than a sixteenth of the record, which the spectrum does not resolve.
+    pub adev_by_spectrum: Option<f64>,
 }
 
 impl CurvePoint {
-    /// A point of a curve of `samples` samples, in the curve's unit.
+    /// A point of a curve of `samples` samples, in the curve's unit, without the deviation by the spectrum.
     #[must_use]
     pub fn new(point: &AllanPoint, samples: u64) -> Self {
         Self {
@@ -104,6 +107,7 @@ impl CurvePoint {
             edf: point.edf,
             replaced_percent: 100.0 * point.replaced,
             accuracy_percent: slope_method::percentage_accuracy(samples, point.n),
+            adev_by_spectrum: None,
         }
     }
 }
@@ -158,13 +162,21 @@ pub struct TermReport {
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// Error of a model over the octaves with `n ≤ M/8` of a part of `M` samples; absent when there are none.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Error of a model over the octaves with `n ≤ M/8` of a part of `M` samples, and its largest deviation over all octaves;
+/// absent when there are none with `n ≤ M/8`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ModelErrorReport {
     /// `mean edf·(ln(m/v) + v/m − 1)`; 1 is what a true model scores on the data that it was fitted to.
     pub deviance_per_point: Option<f64>,
     /// `100·sqrt(mean (½ ln(v/m))²)`.
     pub rms_percent: Option<f64>,
+    /// The largest deviation of a point in standard deviations over *all* octaves; positive where the measured variance
+    /// exceeds the model.
+    pub worst_sigma: Option<f64>,
+    /// Averaging time of that point, s.
+    pub worst_tau_s: Option<f64>,
+    /// Modelled over measured Allan deviation of that point.
+    pub worst_ratio: Option<f64>,
 }
 
 impl SlopeMethodReport {
@@ -220,6 +232,9 @@ impl ModelErrorReport {
         Self {
             deviance_per_point: error.and_then(|error| finite(error.deviance_per_point)),
             rms_percent: error.and_then(|error| finite(error.rms_percent)),
+            worst_sigma: error.and_then(|error| finite(error.worst_sigma)),
+            worst_tau_s: error.and_then(|error| finite(error.worst_tau)),
+            worst_ratio: error.and_then(|error| finite(error.worst_ratio.sqrt())),
         }
     }
 }

@@ -6,20 +6,26 @@
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
 //!               ├► sine tapers ─► common_mode            drift that several channels share
-//!               ├► Welch ─► SpectralShape ─► N, B, K     independent of the Allan variance
+//!               ├► Welch ─► white_noise                  N, independent of the Allan variance
+//!               │        ├► equation_5                   the Allan deviation, by equation (5) of the paper
+//!               │        └► SpectralShape                a smooth curve through the spectrum
 //!               └► autocorrelation                       correlation time of a Markov process
 //! ```
 
 mod autocorrelation;
 pub(crate) mod common_mode;
+mod equation_5;
 mod line_models;
 mod lines;
 mod periodogram;
 mod smooth_shape;
 mod welch;
+mod white_noise;
 
 pub use autocorrelation::correlation_time;
+pub use equation_5::allan_deviations_by_spectrum;
 pub(crate) use lines::find_lines_over;
 pub use lines::{SpectralLine, find_lines};
 pub use smooth_shape::{SpectralBand, SpectralShape};
 pub use welch::Welch;
+pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};

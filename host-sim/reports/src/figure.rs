@@ -247,8 +247,8 @@ pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError>
     let model = |model: &Model, [fitted, error]: [f64; 2]| ModelReport {
         terms: Vec::new(),
         adev: unseen.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
-        fitted: ModelErrorReport { deviance_per_point: Some(fitted), rms_percent: None },
-        unseen: ModelErrorReport { deviance_per_point: Some(error), rms_percent: None },
+        fitted: ModelErrorReport { deviance_per_point: Some(fitted), ..Default::default() },
+        unseen: ModelErrorReport { deviance_per_point: Some(error), ..Default::default() },
         unseen_excluding: None,
     };
     allan_deviation(&ChannelReport {

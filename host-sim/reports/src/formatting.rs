@@ -2,7 +2,7 @@
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::assessment::{Innovations, RecordLength};
-use noise_analysis::report::MissingSamples;
+use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
 use std::fmt;
 
 /// Shown in the place of a number that is absent or not finite.
@@ -148,6 +148,39 @@ pub fn filter_consistency(innovations: &Innovations) -> &'static str {
     } else {
         "smaller than the model says, and not white"
     }
+}
+
+/// Standard deviations from which a model's largest deviation is told in words. Of twenty octaves of a true model one is
+/// farther off once in 800 records.
+const FAR_OFF: f64 = 4.0;
+
+/// Where a model is farther off than chance explains, in words; `None` where it is not. `data` is what it was compared with.
+pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
+    let (sigma, tau, ratio) = (error.worst_sigma?, error.worst_tau_s?, error.worst_ratio?);
+    let times = |factor: f64| match factor {
+        factor if factor < 1.1 => format!("{} % above", number(100.0 * (factor - 1.0))),
+        factor => format!("{} times", number(factor)),
+    };
+    let text = if ratio > 1.0 {
+        format!("at τ = {} the model is {} what is measured in {data}", duration(tau), times(ratio))
+    } else {
+        format!("at τ = {} what is measured in {data} is {} the model", duration(tau), times(1.0 / ratio))
+    };
+    (sigma.abs() > FAR_OFF).then(|| format!("{text} ({} sigma)", number(sigma)))
+}
+
+/// Where the models of a channel are farther off than chance explains, one text for each half; empty where they are not.
+pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
+    let (before, after) = (&channel.before, &channel.after);
+    let same = before == after;
+    let of = |name: &str, model: &ModelReport| {
+        let name = if same { "" } else { name };
+        let halves = [(&model.fitted, "the fitted half"), (&model.unseen, "the unseen half")];
+        let told = halves.into_iter().filter_map(|(error, data)| worst_deviation(error, data));
+        told.map(|text| if name.is_empty() { text } else { format!("{name}: {text}") }).collect::<Vec<_>>()
+    };
+    let after = of("after", after);
+    if same { after } else { of("before", before).into_iter().chain(after).collect() }
 }
 
 /// How much longer to record for a coefficient with an interval of ±20 %.

@@ -5,7 +5,7 @@ mod tables;
 use crate::figure::{self, FigureError};
 use crate::formatting::{
     count, duration, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit,
-    words,
+    words, worst_deviations,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::assessment::Assessment;
@@ -148,6 +148,8 @@ fn channel_section(channel: &ChannelReport, figure: &str) -> Markup {
                 div {
                     h3 { "Model error" }
                     (tables::errors(channel))
+                    @let far = worst_deviations(channel);
+                    @if !far.is_empty() { ul.effects { @for text in &far { li { (text) "." } } } }
                     @if channel.effects.is_empty() {
                         p.note { "No effect was traced"
                             @if same { ": after equals before" } "." }
@@ -193,7 +195,10 @@ fn assessment(assessment: &Assessment) -> Markup {
             }
             @if let Some(spectrum) = &assessment.angle_random_walk_by_spectrum {
                 li { b { "N by the spectrum" } ": " (number(spectrum.value)) " " (unit(&spectrum.unit))
-                    " (" (interval(spectrum.low, spectrum.high)) ")" }
+                    " (" (interval(spectrum.low, spectrum.high)) ")"
+                    @if let Some(note) = &assessment.angle_random_walk_by_spectrum_note { span.parameter { (note) } } }
+            } @else if let Some(note) = &assessment.angle_random_walk_by_spectrum_note {
+                li { b { "N by the spectrum" } ": none, " (note) "." }
             }
             @if let Some(time) = &assessment.markov_time_by_autocorrelation {
                 li { b { "Markov time by the autocorrelation" } ": " (number(time.value)) " " (unit(&time.unit))
@@ -220,7 +225,11 @@ fn definitions() -> Markup {
                      "With " i { "v" } " the measured and " i { "m" } " the modelled Allan variance, over the "
                      "octaves with " i { "n" } " ≤ " i { "M" } "/8: rms is 100·√(mean (½ ln(" i { "v/m" }
                      "))²) %, deviance a point is mean edf·(ln(" i { "m/v" } ") + " i { "v/m" }
-                     " − 1), which is about 1 for a true model." }
+                     " − 1), which is about 1 for a true model. Beneath is the largest deviation of a point over all "
+                     "averaging times, in standard deviations σ; beyond ±4 σ it is told in words." }
+                dt { "By PSD" }
+                dd { "is the deviation by equation (5), σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df, from the measured "
+                     "spectrum instead of differences of means." }
                 dt { "Error after a time" }
                 dd { "is the root mean square of the integral over that time, of a vehicle that took the mean of the 60 s "
                      "before as its bias: an angle of a gyro, a velocity of an accelerometer." }

@@ -3,7 +3,7 @@
 use crate::coefficients::{self, CoefficientRow};
 use crate::formatting::{
     NONE, TextTable, count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name,
-    percent, recording_advice, unit, words, wrap,
+    percent, recording_advice, unit, words, worst_deviations, wrap,
 };
 use noise_analysis::assessment::navigation::CALIBRATION_S;
 use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
@@ -33,6 +33,8 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
     writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
     writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")?;
+    writeln!(out, "worst σ: largest deviation of a point over all τ; beyond ±4 it is told in words.")?;
+    writeln!(out, "by PSD: σ(τ) by equation (5), from the measured spectrum instead of differences of means.")?;
     if report.channels.iter().any(|channel| channel.after.unseen_excluding.is_some()) {
         writeln!(out, "excluding: without what the first half's rules for spikes and knocks find in the unseen half.")?;
     }
@@ -69,6 +71,9 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", term_table(&channel.after.terms))?;
     }
     writeln!(out, "{}", error_table(channel))?;
+    for text in worst_deviations(channel) {
+        writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
+    }
     for effect in &channel.effects {
         writeln!(out, "{}", wrap(&format!("• {}: {}", words(&effect.kind), effect.evidence), WIDTH.into()))?;
     }
@@ -128,6 +133,8 @@ fn error_table(channel: &ChannelReport) -> TextTable {
             percent(model.unseen.rms_percent),
             optional(model.fitted.deviance_per_point),
             optional(model.unseen.deviance_per_point),
+            optional(model.fitted.worst_sigma),
+            optional(model.unseen.worst_sigma),
         ];
         let excluding = model.unseen_excluding.as_ref().map(|error| {
             vec![
@@ -136,17 +143,19 @@ fn error_table(channel: &ChannelReport) -> TextTable {
                 percent(error.rms_percent),
                 String::new(),
                 optional(error.deviance_per_point),
+                String::new(),
+                optional(error.worst_sigma),
             ]
         });
         [Some(all), excluding].into_iter().flatten()
     });
-    let header = ["model error", "rms, fitted", "rms, unseen", "deviance, fitted", "deviance, unseen"];
+    let header = ["model error", "rms fitted", "unseen", "deviance fitted", "unseen", "worst σ fitted", "unseen"];
     table(&header, 1, rows)
 }
 
 fn curve_table(channel: &ChannelReport) -> TextTable {
     let same = channel.after == channel.before;
-    let mut header = vec!["n", "τ, s", "σ(τ)", "low", "high", "edf", "accuracy, %"];
+    let mut header = vec!["n", "τ, s", "σ(τ)", "low", "high", "edf", "accuracy, %", "by PSD"];
     header.extend(if same { &["model"][..] } else { &["before", "after"] });
     let rows = channel.curve.iter().enumerate().map(|(index, point)| {
         let mut row = vec![
@@ -157,6 +166,7 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
             number(point.high),
             number(point.edf),
             number(point.accuracy_percent),
+            optional(point.adev_by_spectrum),
             optional(channel.before.adev.get(index).copied()),
         ];
         if !same {
@@ -190,6 +200,11 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
     if let Some(by_spectrum) = &assessment.angle_random_walk_by_spectrum {
         let value = format!("{} {}", number(by_spectrum.value), unit(&by_spectrum.unit));
         writeln!(out, "• N by the spectrum: {value} ({}).", interval(by_spectrum.low, by_spectrum.high))?;
+    }
+    if let Some(note) = &assessment.angle_random_walk_by_spectrum_note {
+        let absent = assessment.angle_random_walk_by_spectrum.is_none();
+        let text = if absent { "• N by the spectrum: none, " } else { "  " };
+        writeln!(out, "{}", wrap(&format!("{text}{note}."), WIDTH.into()))?;
     }
     if let Some(time) = &assessment.markov_time_by_autocorrelation {
         let value = format!("{} {}", number(time.value), unit(&time.unit));

@@ -224,8 +224,8 @@ fn report(found: &[Found<'_>]) -> Report {
     let model = || ModelReport {
         terms: Vec::new(),
         adev: Vec::new(),
-        fitted: ModelErrorReport { deviance_per_point: None, rms_percent: None },
-        unseen: ModelErrorReport { deviance_per_point: None, rms_percent: None },
+        fitted: ModelErrorReport::default(),
+        unseen: ModelErrorReport::default(),
         unseen_excluding: None,
     };
     let effect = |&(_, kind, parameters): &Found<'_>| Reported {

@@ -7,6 +7,9 @@ use std::f64::consts::PI;
 
 /// A segment with more than this fraction of its samples missing is left out.
 const MOST_MISSING: f64 = 0.5;
+/// So many points in a row are worth one: neighbouring points under a Hann window correlate by 2/3 at distance 1 and by 1/6
+/// at distance 2, and their squares add.
+const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 
 /// One-sided power spectral density, averaged over segments of one length that overlap by half, each with its mean removed
 /// and under a Hann window (P. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans.
@@ -70,7 +73,7 @@ impl Welch {
 
     /// Frequency in Hz and density in unit²/Hz, from 0 Hz to half the sample rate.
     pub fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let spacing = 1.0 / (self.length as f64 * self.sample_period);
+        let spacing = self.resolution();
         self.density.iter().enumerate().map(move |(bin, &density)| (bin as f64 * spacing, density))
     }
 
@@ -84,34 +87,54 @@ impl Welch {
         count / (1.0 + 2.0 * (1.0 - 1.0 / count) / 36.0)
     }
 
+    /// Distance of two points of the spectrum, Hz.
+    #[must_use]
+    pub fn resolution(&self) -> f64 {
+        1.0 / (self.length as f64 * self.sample_period)
+    }
+
+    /// Seconds between samples.
+    #[must_use]
+    pub fn sample_period(&self) -> f64 {
+        self.sample_period
+    }
+
     /// Averages over bands of up to an eighth of their frequency, without the frequencies in Hz for which `is_line` holds.
     ///
     /// The first two points are left out, because the window spreads drift over them, and the last one, which has half
     /// the degrees of freedom.
     pub(crate) fn bands(&self, is_line: impl Fn(f64) -> bool) -> Vec<SpectralBand> {
-        // Correlation of neighbouring points under a Hann window: 2/3 at distance 1 and 1/6 at distance 2. So many points
-        // in a row are worth one.
-        const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
-        let points: Vec<(f64, f64)> = self.points().collect();
+        self.band_points(2, is_line).iter().map(|band| self.average(band)).collect()
+    }
+
+    /// The points of the spectrum from `lowest` on, by bands of up to an eighth of their frequency, without those at whose
+    /// frequency in Hz `is_line` holds, and without the last one.
+    pub(crate) fn band_points(&self, lowest: usize, is_line: impl Fn(f64) -> bool) -> Vec<Vec<usize>> {
+        let count = self.density.len();
         // Narrow enough to resolve the nulls of a filter.
-        let widest = (points.len() / 256).max(1);
+        let widest = (count / 256).max(1);
         let mut bands = Vec::new();
-        let mut start = 2;
-        while start + 1 < points.len() {
-            let end = (start + (start / 8).clamp(1, widest)).min(points.len() - 1);
-            let kept: Vec<f64> =
-                points[start..end].iter().filter(|point| !is_line(point.0)).map(|point| point.1).collect();
+        let mut start = lowest;
+        while start + 1 < count {
+            let end = (start + (start / 8).clamp(1, widest)).min(count - 1);
+            let kept: Vec<usize> = (start..end).filter(|&bin| !is_line(bin as f64 * self.resolution())).collect();
             if !kept.is_empty() {
-                let count = kept.len() as f64;
-                bands.push(SpectralBand {
-                    frequency: (points[start].0 + points[end - 1].0) / 2.0,
-                    density: kept.iter().sum::<f64>() / count,
-                    ordinates: self.ordinates() * (count / NEIGHBOURS).max(1.0),
-                });
+                bands.push(kept);
             }
             start = end;
         }
         bands
+    }
+
+    /// The average over neighbouring points.
+    pub(crate) fn average(&self, points: &[usize]) -> SpectralBand {
+        let count = points.len() as f64;
+        let middle = points.first().zip(points.last()).map_or(0.0, |(first, last)| (first + last) as f64 / 2.0);
+        SpectralBand {
+            frequency: middle * self.resolution(),
+            density: points.iter().map(|&point| self.density[point]).sum::<f64>() / count,
+            ordinates: self.ordinates() * (count / NEIGHBOURS).max(1.0),
+        }
     }
 
     /// The smooth shape of the spectrum without its lines, and the bands that it was fitted to.

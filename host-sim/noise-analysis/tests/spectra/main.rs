@@ -1,9 +1,10 @@
 //! Spectra of simulated noise: known densities are measured, added lines are found, and pure noise yields none.
 
 mod noise;
+mod white_noise;
 
 use noise::{Output, PAPER, RATE_HZ, gain, resonance, sine};
-use noise_analysis::spectra::{SpectralLine, Welch, find_lines};
+use noise_analysis::spectra::{SpectralLine, Welch, allan_deviations_by_spectrum, find_lines};
 use noise_analysis::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
@@ -183,4 +184,52 @@ fn welch_measures_the_angle_random_walk() {
     }
     // χ² with ten degrees of freedom exceeds 29.6 once in a thousand.
     assert!(pulls.iter().map(|pull| pull * pull).sum::<f64>() < 29.6, "{pulls:?}");
+}
+
+/// Allan deviation of non-overlapping means of `n` samples, and the number of differences.
+fn allan_deviation(values: &[f64], n: usize) -> (f64, usize) {
+    let means: Vec<f64> = values.chunks_exact(n).map(|chunk| chunk.iter().sum::<f64>() / n as f64).collect();
+    let squares: f64 = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    ((0.5 * squares / (means.len() - 1) as f64).sqrt(), means.len() - 1)
+}
+
+#[test]
+fn equation_5_of_the_measured_spectrum_is_the_measured_allan_deviation() {
+    let [n, ..] = PAPER.noise;
+    for (taps_log2, seed) in [(0, 1), (2, 2), (4, 3)] {
+        let series = Output { noise: [n, 0.0, 0.0], taps_log2, added: &[] }.samples(SAMPLES, seed);
+        let factors: Vec<u64> = (0..17).map(|octave| 1 << octave).collect();
+        let by_spectrum = allan_deviations_by_spectrum(&series, &factors);
+        for (&factor, by_spectrum) in factors.iter().zip(by_spectrum) {
+            let Some(by_spectrum) = by_spectrum else {
+                assert!(16 * factor > SAMPLES as u64, "{factor} is within a sixteenth of the record");
+                continue;
+            };
+            let (measured, differences) = allan_deviation(series.values(), factor as usize);
+            // Relative standard deviations of the two estimates from the same record: 1/√(2·edf) of a deviation, with 2/3 of
+            // the differences of white noise for edf (NIST SP 1065), and at the shortest ones, where the filter
+            // correlates them, the 2L samples of its length for one.
+            let correlated = f64::from(2 << taps_log2) / factor as f64;
+            let edf = differences as f64 * 2.0 / 3.0 / correlated.max(1.0);
+            let scatter = 2f64.sqrt() / (2.0 * edf).sqrt();
+            assert!(
+                (by_spectrum / measured - 1.0).abs() < 4.0 * scatter,
+                "{factor}, {taps_log2}: {by_spectrum}, {measured}"
+            );
+            // N/√τ of white noise, once the filter is much shorter than the averaging time.
+            if factor >= 256 {
+                let expected = n / (factor as f64 / RATE_HZ).sqrt();
+                assert!(
+                    (by_spectrum / expected - 1.0).abs() < 4.0 * scatter + 0.01,
+                    "{factor}: {by_spectrum}, {expected}"
+                );
+            }
+        }
+    }
+    let short = UniformSeries::new(0.01, vec![1.0; 500]);
+    assert_eq!(allan_deviations_by_spectrum(&short, &[1, 2]), [None, None]);
+    // A constant record has no deviation.
+    let constant = UniformSeries::new(0.01, vec![1.0; 5000]);
+    let [Some(deviation), None] = allan_deviations_by_spectrum(&constant, &[1, 1024])[..] else { panic!() };
+    assert!(deviation < 1e-12, "{deviation}");
 }

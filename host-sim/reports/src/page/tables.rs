@@ -132,13 +132,14 @@ pub(super) fn terms(model: &ModelReport) -> Markup {
 pub(super) fn errors(channel: &ChannelReport) -> Markup {
     let same = channel.after == channel.before;
     let cell = |error: &ModelErrorReport| {
-        html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) } } }
+        html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) }
+        @if let Some(sigma) = error.worst_sigma { span.under { (number(sigma)) " σ" } } } }
     };
     let rows = html! {
         @for (name, model) in [("before", &channel.before), ("after", &channel.after)] {
             tr {
                 th scope="row" { span class={ "key " (if same { "before" } else { name }) } {} (name)
-                    span.under { "rms, and deviance a point" } }
+                    span.under { "rms, deviance a point, largest deviation" } }
                 (cell(&model.fitted))
                 (cell(&model.unseen))
             }
@@ -190,7 +191,7 @@ pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
 pub(super) fn curve(channel: &ChannelReport) -> Markup {
     let same = channel.after == channel.before;
     let models = if same { &["model"][..] } else { &["before", "after"] };
-    let names = ["n", "τ, s", "σ(τ)", "95 % low", "95 % high", "edf", "accuracy, %"];
+    let names = ["n", "τ, s", "σ(τ)", "95 % low", "95 % high", "edf", "accuracy, %", "by PSD"];
     let headings: Vec<Heading> = names.iter().chain(models).copied().map(numbers).collect();
     let rows = html! {
         @for (index, point) in channel.curve.iter().enumerate() {
@@ -199,6 +200,7 @@ pub(super) fn curve(channel: &ChannelReport) -> Markup {
                 @for value in [point.tau_s, point.adev, point.low, point.high, point.edf, point.accuracy_percent] {
                     td.number { (number(value)) }
                 }
+                td.number { (optional(point.adev_by_spectrum)) }
                 td.number { (optional(channel.before.adev.get(index).copied())) }
                 @if !same {
                     td.number { (optional(channel.after.adev.get(index).copied())) }

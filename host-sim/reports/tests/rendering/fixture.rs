@@ -53,7 +53,7 @@ pub(crate) fn empty() -> Report {
     channel.samples = 1;
     channel.curve.clear();
     channel.read_off = SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None };
-    let error = ModelErrorReport { deviance_per_point: None, rms_percent: None };
+    let error = ModelErrorReport::default();
     channel.before =
         ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error, unseen_excluding: None };
     channel.after = channel.before.clone();
@@ -73,8 +73,8 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         .map(|(kind, value, per)| term(kind, "value", value * scale, &rate_unit(unit, per)))
         .into(),
         adev: curve.iter().map(|point| scale * model(point.tau_s)).collect(),
-        fitted: ModelErrorReport { deviance_per_point: Some(1.042), rms_percent: Some(2.317) },
-        unseen: ModelErrorReport { deviance_per_point: Some(1.385), rms_percent: Some(3.946) },
+        fitted: error(1.042, 2.317),
+        unseen: error(1.385, 3.946),
         unseen_excluding: None,
     };
     let value = |value: f64, per: &str, from_s: f64, to_s: f64| {
@@ -95,6 +95,17 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         effects: vec![],
         after: baseline,
         assessment: assessment(scale),
+    }
+}
+
+/// An error without a large deviation.
+fn error(deviance: f64, rms: f64) -> ModelErrorReport {
+    ModelErrorReport {
+        deviance_per_point: Some(deviance),
+        rms_percent: Some(rms),
+        worst_sigma: Some(-1.876),
+        worst_tau_s: Some(10.24),
+        worst_ratio: Some(1.02),
     }
 }
 
@@ -130,6 +141,7 @@ fn assessment(scale: f64) -> Assessment {
             whiteness_p: 0.4321,
         }),
         angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
+        angle_random_walk_by_spectrum_note: Some("+1.9 % from the fit".to_owned()),
         markov_time_by_autocorrelation: Some(parameter(2.1, "s")),
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
             .map(|(kind, more_hours)| RecordLength { kind: kind.to_owned(), half_s: None, more_hours })
@@ -168,6 +180,8 @@ fn point(octave: u32, scale: f64) -> CurvePoint {
         high: adev * (1.0 + 1.3 * spread),
         edf,
         replaced_percent: 0.0,
+        // Within a sixteenth of the record.
+        adev_by_spectrum: (16 * n <= SAMPLES).then_some(1.003 * adev),
         accuracy_percent: 100.0 / (2.0 * (SAMPLES as f64 / n as f64 - 1.0)).sqrt(),
     }
 }

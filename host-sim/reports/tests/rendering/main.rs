@@ -284,7 +284,7 @@ fn missing_samples_and_the_error_without_exclusions_are_shown() {
     channel.missing.refused = [("spikes".to_owned(), 17), ("knock".to_owned(), 4_096)].into();
     channel.missing.replaced = 5_300;
     channel.after.unseen_excluding =
-        Some(ModelErrorReport { deviance_per_point: Some(1.618), rms_percent: Some(2.615) });
+        Some(ModelErrorReport { deviance_per_point: Some(1.618), rms_percent: Some(2.615), ..Default::default() });
     for shown in [text(&report), html(&report)] {
         for content in ["1,234 samples lost", "knock 4,096", "spikes 17", "5,300 replaced", "1.618", "2.615"] {
             assert!(shown.contains(content), "{content}");
@@ -293,4 +293,39 @@ fn missing_samples_and_the_error_without_exclusions_are_shown() {
     // Without a gap there is no such line.
     let whole = fixture::report();
     assert!(!text(&whole).contains("Missing") && !html(&whole).contains("Missing"));
+}
+
+#[test]
+fn a_model_that_fails_at_one_averaging_time_is_told_in_words() {
+    let mut report = report();
+    let error = &mut report.channels[0].after.unseen;
+    (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(-12.34), Some(1310.72), Some(38.7));
+    let words = "at τ = 21 min 51 s the model is 38.70 times what is measured in the unseen half (-12.34 sigma)";
+    let flat = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(flat(text(&report)).contains(words), "{}", text(&report));
+    assert!(html(&report).contains(words));
+    // The other way round.
+    let error = &mut report.channels[0].after.unseen;
+    (error.worst_sigma, error.worst_ratio) = (Some(56.78), Some(0.1));
+    let words = "at τ = 21 min 51 s what is measured in the unseen half is 10.00 times the model (56.78 sigma)";
+    assert!(flat(text(&report)).contains(words) && html(&report).contains(words));
+    // A deviation as chance has it is a number in the table only.
+    let usual = fixture::report();
+    assert!(!text(&usual).contains("what is measured") && text(&usual).contains("-1.876"));
+    assert!(html(&usual).contains("-1.876 σ"));
+}
+
+#[test]
+fn the_deviation_by_the_spectrum_stands_beside_the_curve() {
+    let report = report();
+    let by_spectrum = reports::formatting::number(report.channels[0].curve[3].adev_by_spectrum.expect("resolved"));
+    for shown in [text(&report), html(&report)] {
+        assert!(shown.contains("by PSD") && shown.contains(&by_spectrum), "{by_spectrum}");
+        assert!(shown.contains("+1.9 % from the fit"));
+    }
+    let mut without = report;
+    without.channels[0].assessment.angle_random_walk_by_spectrum = None;
+    without.channels[0].assessment.angle_random_walk_by_spectrum_note = Some("rounding hides it".to_owned());
+    assert!(text(&without).contains("N by the spectrum: none, rounding hides it."));
+    assert!(html(&without).contains(": none, rounding hides it."));
 }

@@ -1,0 +1,342 @@
+//! N by a spectrum: the density of the white noise far below the corner of the sensor's filter.
+//!
+//! The bands of Welch's spectrum are fitted by Whittle's likelihood with a sum of known shapes: white, flicker and
+//! random-walk noise, each behind the filter, and the Markov processes of the channel's model. The densities are free, also to
+//! be negative: a term that is not in the data then takes part in the estimate without bending it, and the intervals keep
+//! their confidence where flicker noise or a walk is just not visible.
+//!
+//! A filter is assumed only where the data shows it. The candidates are no filter, the two cascaded averages of the part read
+//! at their own rate with white noise (at least that of rounding) behind them, and samples that are correlated with their
+//! next neighbours, as of a filter whose output is read more slowly. The one with the least `−2 ln L + p·ln n` is taken (G.
+//! Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978), `p` being the number of densities, with
+//! one more for the choice of the averages' length, and `n` the number of independent ordinates. Where the noise is white, a
+//! second white term behind a filter leaves `ln L` where it is (twice its rise is χ² of one or two degrees of freedom), and
+//! costs 2·ln n, about 20. A filter that halves the density at the highest frequency changes `ln L` by about 0.02·n.
+
+use super::smooth_shape::walk_amplitude;
+use super::welch::Welch;
+use crate::findings::BoundedEstimate;
+use allan_core::{Model, NoiseTerm};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
+
+/// Lowest point of the spectrum that is used: below, the removed mean and the window's skirts change a steep spectrum.
+const LOWEST: usize = 3;
+/// Half-width of the band that is left out around a line, in resolutions of the spectrum, and in bandwidths of a resonance.
+const LINE_WIDTHS: f64 = 4.0;
+/// Settings of the filter: two averages over `2^1 … 2^6` samples each.
+const TAPS_LOG2: std::ops::RangeInclusive<u32> = 1..=6;
+/// Independent ordinates in a band over those that [`Welch`] counts. It takes the correlations of neighbouring points and of
+/// overlapping segments apart; neighbouring points of overlapping segments are correlated too. The power of white noise under
+/// segments that overlap by half has the variance `2/n·⟨ω²⟩/⟨ω⟩²` for `ω = sin⁴ + cos⁴`, which is 2.111/n, where the product
+/// of both is 1.944·1.056/n.
+const OVERLAPPING_NEIGHBOURS: f64 = 1.944 * 1.056 / 2.111;
+/// Least power gain of a filter at which bands take part in the estimate of N behind it. Where it suppresses the noise,
+/// the spectrum is that of the rounding error, which is correlated where neighbouring samples differ by less than a count and
+/// then no white noise. It takes part in the choice of the filter alone.
+const PASSBAND: f64 = 0.1;
+/// Rounds of the fit at most; it converges in about ten.
+const ROUNDS: usize = 60;
+/// Standard deviations by which the scatter of the bands around the fit must exceed what the fit predicts for the intervals
+/// to be widened.
+const SIGNIFICANT_MISFIT: f64 = 3.0;
+/// 97.5 % quantile of the normal distribution.
+const TWO_SIDED_95: f64 = 1.96;
+
+/// What the sensor's filter makes of white noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FilterSpectrum {
+    /// It stays white.
+    Unfiltered,
+    /// Two cascaded averages over so many samples each, with white noise added behind them.
+    Bartlett {
+        /// Samples of each average.
+        taps: u32,
+    },
+    /// Each sample is correlated with so many on either side.
+    Correlated {
+        /// The longest lag with a correlation, samples.
+        lags: u32,
+    },
+}
+
+/// N by a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WhiteNoiseFit {
+    /// N in unit·√s, with 95 % bounds: the root of half the one-sided density of the white noise at low frequencies, that of
+    /// the rounding included.
+    pub angle_random_walk: BoundedEstimate,
+    /// The filter that the data shows.
+    pub filter: FilterSpectrum,
+    /// Standard deviation of a sample by this white noise, behind the filter.
+    pub sample_deviation: f64,
+    /// Factor by which the bounds were widened because the bands scatter more than the fit predicts; 1 where they do not.
+    pub widened: f64,
+}
+
+/// Shapes that are known of a channel besides N, B and K.
+pub struct KnownShapes<'a> {
+    /// Its fitted model: lines and resonances are left out of the spectrum, Markov processes are fitted.
+    pub model: &'a Model,
+    /// Whether the sensor's filter is known to have been read at a rate below its own, so that neighbouring samples may be
+    /// correlated even where that is too little to be seen.
+    pub is_read_slowly: bool,
+}
+
+/// Fits the white noise of `welch`; `None` where no fit converges, or the white noise is not told from none: its lower 95 %
+/// bound is not above 0.
+#[must_use]
+pub fn fit_white_noise(welch: &Welch, known: &KnownShapes) -> Option<WhiteNoiseFit> {
+    let lines = |frequency: f64| is_near_line(known.model, frequency, LINE_WIDTHS * welch.resolution());
+    let bands = Bands::new(welch, lines);
+    let correlated = FilterSpectrum::Correlated { lags: 1 };
+    let unfiltered = (!known.is_read_slowly).then_some(FilterSpectrum::Unfiltered);
+    let bartlett = TAPS_LOG2.map(|log2| FilterSpectrum::Bartlett { taps: 1 << log2 });
+    let candidates = unfiltered.into_iter().chain([correlated]).chain(bartlett);
+    let fits = candidates.filter_map(|filter| MixtureFit::new(&bands, filter, known.model));
+    let likeliest = fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+    let FilterSpectrum::Bartlett { taps } = likeliest.filter else { return likeliest.white_noise(&bands) };
+    let passband = bands.filtered(|frequency| bartlett_gain(frequency, welch.sample_period(), taps) > PASSBAND);
+    MixtureFit::new(&passband, likeliest.filter, known.model)?.white_noise(&passband)
+}
+
+/// Whether a frequency is within `reach` Hz of a line of the model.
+fn is_near_line(model: &Model, frequency: f64, reach: f64) -> bool {
+    model.terms().iter().any(|term| match term.kind {
+        NoiseTerm::Sinusoid(sinusoid) => (frequency - sinusoid.frequency).abs() < reach,
+        NoiseTerm::Resonance(resonance) => {
+            (frequency - resonance.frequency).abs() < reach + LINE_WIDTHS * resonance.bandwidth
+        }
+        _ => false,
+    })
+}
+
+/// Averages of a spectrum over bands.
+struct Bands {
+    sample_period: f64,
+    resolution: f64,
+    /// Points of the spectrum in each band.
+    points: Vec<Vec<usize>>,
+    /// Mean density, one-sided, unit²/Hz.
+    densities: DVector<f64>,
+    /// Independent ordinates.
+    ordinates: DVector<f64>,
+}
+
+impl Bands {
+    fn new(welch: &Welch, is_line: impl Fn(f64) -> bool) -> Self {
+        let points = welch.band_points(LOWEST, is_line);
+        let averages = points.iter().map(|band| welch.average(band));
+        let (densities, ordinates): (Vec<f64>, Vec<f64>) = averages
+            .filter(|band| band.density > 0.0)
+            .map(|band| (band.density, OVERLAPPING_NEIGHBOURS * band.ordinates))
+            .unzip();
+        let points = points.into_iter().filter(|band| welch.average(band).density > 0.0).collect();
+        Self {
+            sample_period: welch.sample_period(),
+            resolution: welch.resolution(),
+            points,
+            densities: densities.into(),
+            ordinates: ordinates.into(),
+        }
+    }
+
+    /// The bands in which `is_kept` holds at the first point's frequency in Hz.
+    fn filtered(&self, is_kept: impl Fn(f64) -> bool) -> Self {
+        let kept: Vec<usize> =
+            (0..self.points.len()).filter(|&at| is_kept(self.points[at][0] as f64 * self.resolution)).collect();
+        let of = |values: &DVector<f64>| DVector::from_iterator(kept.len(), kept.iter().map(|&at| values[at]));
+        Self {
+            sample_period: self.sample_period,
+            resolution: self.resolution,
+            points: kept.iter().map(|&at| self.points[at].clone()).collect(),
+            densities: of(&self.densities),
+            ordinates: of(&self.ordinates),
+        }
+    }
+
+    /// The mean of a density over each band, as the Hann window shows it: a point of the spectrum has 2/3 of the density
+    /// at its own frequency and 1/6 of that at either neighbour's.
+    fn averaged(&self, density: impl Fn(f64) -> f64) -> DVector<f64> {
+        let at = |point: usize| density(point as f64 * self.resolution);
+        let shown = |&point: &usize| 2.0 / 3.0 * at(point) + (at(point - 1) + at(point + 1)) / 6.0;
+        let mean = |band: &Vec<usize>| band.iter().map(shown).sum::<f64>() / band.len() as f64;
+        DVector::from_iterator(self.points.len(), self.points.iter().map(mean))
+    }
+
+    /// Whittle's `−ln L` up to a constant for these modelled densities; infinite unless all are positive.
+    fn objective(&self, modelled: &DVector<f64>) -> f64 {
+        let of = |((g, p), s): ((&f64, &f64), &f64)| if *s > 0.0 { g * (s.ln() + p / s) } else { f64::INFINITY };
+        self.ordinates.iter().zip(&self.densities).zip(modelled).map(of).sum()
+    }
+}
+
+/// A fitted sum of shapes.
+struct MixtureFit {
+    filter: FilterSpectrum,
+    /// Value of each shape in each band for a coefficient of 1.
+    shapes: DMatrix<f64>,
+    coefficients: DVector<f64>,
+    /// What a coefficient of 1 of each shape contributes to the density of white noise at 0 Hz, and to the variance of a
+    /// sample, over the Nyquist frequency.
+    at_zero: DVector<f64>,
+    in_sample: DVector<f64>,
+    /// `−2 ln L + p·ln n`.
+    criterion: f64,
+}
+
+impl MixtureFit {
+    /// `None` if the shapes cannot be told apart in these bands.
+    fn new(bands: &Bands, filter: FilterSpectrum, model: &Model) -> Option<Self> {
+        let period = bands.sample_period;
+        let gain = |f: f64| match filter {
+            FilterSpectrum::Bartlett { taps } => bartlett_gain(f, period, taps),
+            _ => 1.0,
+        };
+        // Each white shape with its contributions at 0 Hz and to the variance of a sample.
+        let mut white: Vec<(DVector<f64>, f64, f64)> = Vec::new();
+        match filter {
+            FilterSpectrum::Unfiltered => white.push((bands.averaged(|_| 1.0), 1.0, 1.0)),
+            FilterSpectrum::Bartlett { taps } => {
+                // The variance of the triangular weights: (2L² + 1)/(3L³).
+                let l = f64::from(taps);
+                white.push((bands.averaged(gain), 1.0, (2.0 * l * l + 1.0) / (3.0 * l.powi(3))));
+                white.push((bands.averaged(|_| 1.0), 1.0, 1.0));
+            }
+            FilterSpectrum::Correlated { lags } => {
+                white.push((bands.averaged(|_| 1.0), 1.0, 1.0));
+                for lag in 1..=lags {
+                    let wave = |f: f64| 2.0 * (2.0 * PI * f * period * f64::from(lag)).cos();
+                    white.push((bands.averaged(wave), 2.0, 0.0));
+                }
+            }
+        }
+        let coloured =
+            [bands.averaged(|f| gain(f) / f), bands.averaged(|f| gain(f) * walk_amplitude(f, period).powi(2))];
+        let markov = model.terms().iter().filter(|term| matches!(term.kind, NoiseTerm::Markov(_)));
+        let markov = markov.map(|term| bands.averaged(|f| gain(f) * term.kind.process().density(f, period)));
+        let count = white.len();
+        let columns: Vec<DVector<f64>> =
+            white.iter().map(|shape| shape.0.clone()).chain(coloured).chain(markov).collect();
+        let padded = |values: Vec<f64>| {
+            DVector::from_iterator(columns.len(), values.into_iter().chain(std::iter::repeat(0.0)).take(columns.len()))
+        };
+        let (at_zero, in_sample) =
+            (padded(white.iter().map(|shape| shape.1).collect()), padded(white.iter().map(|shape| shape.2).collect()));
+        if bands.points.len() <= columns.len() {
+            return None;
+        }
+        let shapes = DMatrix::from_columns(&columns);
+        let coefficients = fit(bands, &shapes)?;
+        let parameters = columns.len() + usize::from(count == 2 && matches!(filter, FilterSpectrum::Bartlett { .. }));
+        let criterion =
+            2.0 * bands.objective(&(&shapes * &coefficients)) + parameters as f64 * bands.ordinates.sum().ln();
+        Some(Self { filter, shapes, coefficients, at_zero, in_sample, criterion })
+    }
+
+    fn white_noise(&self, bands: &Bands) -> Option<WhiteNoiseFit> {
+        let modelled = &self.shapes * &self.coefficients;
+        let widened = misfit(bands, &modelled, self.coefficients.len());
+        let density = self.at_zero.dot(&self.coefficients);
+        let along = information(bands, &self.shapes, &modelled).cholesky()?.solve(&self.at_zero);
+        let reach = TWO_SIDED_95 * widened * self.at_zero.dot(&along).sqrt();
+        if density - reach <= 0.0 {
+            return None;
+        }
+        let coefficient = |density: f64| (density / 2.0).sqrt();
+        let nyquist = 0.5 / bands.sample_period;
+        Some(WhiteNoiseFit {
+            angle_random_walk: BoundedEstimate {
+                value: coefficient(density),
+                low: coefficient(density - reach),
+                high: coefficient(density + reach),
+            },
+            filter: self.filter,
+            sample_deviation: (nyquist * self.in_sample.dot(&self.coefficients)).max(0.0).sqrt(),
+            widened,
+        })
+    }
+}
+
+/// Fisher information of the bands on the coefficients.
+fn information(bands: &Bands, shapes: &DMatrix<f64>, modelled: &DVector<f64>) -> DMatrix<f64> {
+    let mut weighted = shapes.clone();
+    for (mut row, (ordinates, density)) in weighted.row_iter_mut().zip(bands.ordinates.iter().zip(modelled)) {
+        row *= *ordinates / (density * density);
+    }
+    shapes.transpose() * weighted
+}
+
+/// The likeliest coefficients, by Fisher scoring with shortened steps where the likelihood would fall. Begins with the
+/// non-negative mixture of those shapes that are themselves non-negative.
+fn fit(bands: &Bands, shapes: &DMatrix<f64>) -> Option<DVector<f64>> {
+    let mut coefficients = non_negative_start(bands, shapes);
+    let mut objective = bands.objective(&(shapes * &coefficients));
+    for _ in 0..ROUNDS {
+        let modelled = shapes * &coefficients;
+        let pull = (&bands.densities - &modelled)
+            .component_mul(&bands.ordinates)
+            .component_div(&modelled.component_mul(&modelled));
+        // Columns of one length: flicker and walk are larger than white noise by orders of magnitude.
+        let information = information(bands, shapes, &modelled);
+        let scale = information.diagonal().map(|entry| 1.0 / entry.sqrt());
+        let scaled = DMatrix::from_diagonal(&scale) * information * DMatrix::from_diagonal(&scale);
+        let step = scaled.cholesky()?.solve(&scale.component_mul(&(shapes.transpose() * pull))).component_mul(&scale);
+        let halved = |halvings: i32| &coefficients + 0.5f64.powi(halvings) * &step;
+        let tried = (0..30).map(halved).map(|next| (bands.objective(&(shapes * &next)), next));
+        let Some((lower, next)) = tried.into_iter().find(|(tried, _)| *tried < objective) else {
+            return Some(coefficients);
+        };
+        let gained = objective - lower;
+        (objective, coefficients) = (lower, next);
+        if gained < 1e-6 {
+            return Some(coefficients);
+        }
+    }
+    None
+}
+
+/// A mixture with positive densities to begin with: the multiplicative steps of [`fit_mixture`] for shapes without
+/// negative values.
+///
+/// [`fit_mixture`]: super::smooth_shape
+fn non_negative_start(bands: &Bands, shapes: &DMatrix<f64>) -> DVector<f64> {
+    let is_positive: Vec<bool> = shapes.column_iter().map(|shape| shape.iter().all(|value| *value >= 0.0)).collect();
+    let count = is_positive.iter().filter(|positive| **positive).count() as f64;
+    // Each shape alone explains its part of the mean logarithm of the bands.
+    let alone = |column: usize| {
+        let shape = shapes.column(column);
+        let logs = bands.densities.iter().zip(shape.iter()).map(|(p, s)| (p / s.max(1e-12)).ln());
+        (logs.zip(&bands.ordinates).map(|(log, g)| log * g).sum::<f64>() / bands.ordinates.sum()).exp() / count
+    };
+    let start = (0..shapes.ncols()).map(|column| if is_positive[column] { alone(column) } else { 0.0 });
+    let mut coefficients = DVector::from_iterator(shapes.ncols(), start);
+    for _ in 0..30 {
+        let modelled = shapes * &coefficients;
+        let push = bands.ordinates.component_div(&modelled);
+        let pull = push.component_mul(&bands.densities).component_div(&modelled);
+        let (pull, push) = (shapes.transpose() * pull, shapes.transpose() * push);
+        for (at, coefficient) in coefficients.iter_mut().enumerate().filter(|(at, _)| is_positive[*at]) {
+            *coefficient *= (pull[at] / push[at]).sqrt();
+        }
+    }
+    coefficients
+}
+
+/// By how much more the bands scatter around the fit than it predicts, as a factor of the standard deviation; 1 where chance
+/// explains it.
+///
+/// The deviance `2g·(P/S − 1 − ln(P/S))` of a band has the expectation `1 + 1/(6g)` for `g` ordinates, and about the variance 2.
+fn misfit(bands: &Bands, modelled: &DVector<f64>, parameters: usize) -> f64 {
+    let of = |((g, p), s): ((&f64, &f64), &f64)| 2.0 * g * (p / s - 1.0 - (p / s).ln()) / (1.0 + 1.0 / (6.0 * g));
+    let deviance: f64 = bands.ordinates.iter().zip(&bands.densities).zip(modelled).map(of).sum();
+    let freedom = (bands.points.len() - parameters) as f64;
+    if deviance > freedom + SIGNIFICANT_MISFIT * (2.0 * freedom).sqrt() { (deviance / freedom).sqrt() } else { 1.0 }
+}
+
+/// Power gain of two cascaded averages over `taps` samples each.
+fn bartlett_gain(frequency: f64, sample_period: f64, taps: u32) -> f64 {
+    let phase = PI * frequency * sample_period;
+    let taps = f64::from(taps);
+    if phase.sin() == 0.0 { 1.0 } else { ((taps * phase).sin() / (taps * phase.sin())).powi(4) }
+}

@@ -1,0 +1,92 @@
+//! Figures of a report that have to agree with each other: the share of a covariate in the modelled curve, N by the fit and by
+//! the spectrum, the measured curve and equation (5) on the measured spectrum, the largest deviation and the curve.
+
+use measurement::Measurement;
+use noise_analysis::analysis::analyze;
+use noise_analysis::report::{ChannelReport, Report};
+use simulation::Simulation;
+use std::f64::consts::TAU;
+
+const SECONDS: f64 = 600.0;
+
+/// Ten minutes of the paper's sensor, at 204.8 Hz.
+fn recorded(seed: u64) -> Measurement {
+    let recording = Simulation::paper(SECONDS, seed).run(|_| ()).expect("a simulation");
+    recordings::time_base::measurement(&recording, None).expect("a time base")
+}
+
+fn channel<'a>(report: &'a Report, name: &str) -> &'a ChannelReport {
+    report.channels.iter().find(|channel| channel.name == name).expect("a recorded channel")
+}
+
+#[test]
+fn the_share_of_a_covariate_reaches_to_the_last_octave() {
+    const SENSITIVITY: f64 = 0.05;
+    let mut measurement = recorded(3);
+    // The temperature goes up and down by 4 °C in a third of the record, and the gyro follows.
+    let rate = measurement.sample_rate_hz;
+    let profile =
+        |name: &str| measurement.channels.iter().find(|of| of.profile.name == name).expect("recorded").profile;
+    let (gyro, temperature) = (profile("gyro_x"), profile("temp"));
+    let slots = measurement.slots.clone();
+    let course = |slot: u64| 4.0 * (TAU * slot as f64 / rate / (SECONDS / 3.0)).sin();
+    for of in &mut measurement.channels {
+        let factor = match of.profile {
+            profile if profile == gyro => SENSITIVITY / gyro.lsb,
+            profile if profile == temperature => 1.0 / temperature.lsb,
+            _ => continue,
+        };
+        for (slot, count) in slots.iter().zip(&mut of.counts) {
+            *count += (factor * course(*slot)).round() as i32;
+        }
+    }
+    let report = analyze(&measurement);
+    let (gyro, temperature) = (channel(&report, "gyro_x"), channel(&report, "temp"));
+    assert!(gyro.effects.iter().any(|effect| effect.kind == "temperature"), "{:?}", gyro.effects);
+    // Nearly all of the variance beyond a minute is the temperature's: β²·σ² at each octave. The sensitivity is measured to
+    // a few percent, and the other terms add less than a tenth.
+    let tail = gyro.curve.len() - 2..gyro.curve.len();
+    for ((gyro, temperature), after) in
+        gyro.curve.iter().zip(&temperature.curve).zip(&gyro.after.adev).skip(tail.start).take(tail.len())
+    {
+        let share = SENSITIVITY * temperature.adev;
+        assert!((after / share - 1.0).abs() < 0.2, "{} s: {after} of {share}, measured {}", gyro.tau_s, gyro.adev);
+    }
+}
+
+#[test]
+fn n_by_the_spectrum_is_n_by_the_fit_or_is_not_given() {
+    let report = analyze(&recorded(4));
+    let mut given = 0;
+    for of in &report.channels {
+        let assessment = &of.assessment;
+        let Some(spectrum) = &assessment.angle_random_walk_by_spectrum else {
+            let why = assessment.angle_random_walk_by_spectrum_note.as_ref();
+            assert!(why.is_some_and(|why| !why.is_empty()), "{}", of.name);
+            continue;
+        };
+        given += 1;
+        assert!(spectrum.low > 0.0 && spectrum.high < 1.2 * spectrum.low, "{}: {spectrum:?}", of.name);
+        let fit = &of.after.terms[0].parameters["value"];
+        let reach = (spectrum.high - spectrum.low).hypot(fit.high - fit.low) / 2.0;
+        // 95 % of the differences are within the two intervals: of a dozen channels all are within 1.5 times that.
+        assert!((spectrum.value - fit.value).abs() < 1.5 * reach, "{}: {spectrum:?}, {fit:?}", of.name);
+    }
+    // The noise of the temperature stays within a count.
+    assert_eq!(given, report.channels.len() - 1);
+    assert!(channel(&report, "temp").assessment.angle_random_walk_by_spectrum.is_none());
+}
+
+#[test]
+fn the_largest_deviation_is_that_of_a_point_of_the_curve() {
+    let report = analyze(&recorded(5));
+    for of in &report.channels {
+        for error in [&of.before.fitted, &of.before.unseen, &of.after.fitted, &of.after.unseen] {
+            let (sigma, tau) = (error.worst_sigma.expect("octaves"), error.worst_tau_s.expect("octaves"));
+            let ratio = error.worst_ratio.expect("octaves");
+            assert!(of.curve.iter().any(|point| (point.tau_s / tau - 1.0).abs() < 1e-9), "{}: {tau} s", of.name);
+            // A model above the measurement deviates downwards, but for the mean of the cube root, 1 − 2/9edf.
+            assert!(sigma.abs() < 0.5 || (sigma < 0.0) == (ratio > 1.0), "{}: {sigma}, {ratio}", of.name);
+        }
+    }
+}
