@@ -197,14 +197,18 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
         );
         writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
     }
-    if let Some(by_spectrum) = &assessment.angle_random_walk_by_spectrum {
-        let value = format!("{} {}", number(by_spectrum.value), unit(&by_spectrum.unit));
-        writeln!(out, "• N by the spectrum: {value} ({}).", interval(by_spectrum.low, by_spectrum.high))?;
-    }
-    if let Some(note) = &assessment.angle_random_walk_by_spectrum_note {
-        let absent = assessment.angle_random_walk_by_spectrum.is_none();
-        let text = if absent { "• N by the spectrum: none, " } else { "  " };
-        writeln!(out, "{}", wrap(&format!("{text}{note}."), WIDTH.into()))?;
+    let by_spectrum = assessment
+        .angle_random_walk_by_spectrum
+        .as_ref()
+        .map(|n| format!("{} {} ({})", number(n.value), unit(&n.unit), interval(n.low, n.high)));
+    let told = match (by_spectrum, &assessment.angle_random_walk_by_spectrum_note) {
+        (Some(value), Some(note)) => Some(format!("{value}; {note}")),
+        (Some(value), None) => Some(value),
+        (None, Some(note)) => Some(format!("none, {note}")),
+        (None, None) => None,
+    };
+    if let Some(told) = told {
+        writeln!(out, "{}", wrap(&format!("• N by the spectrum: {told}."), WIDTH.into()))?;
     }
     if let Some(time) = &assessment.markov_time_by_autocorrelation {
         let value = format!("{} {}", number(time.value), unit(&time.unit));

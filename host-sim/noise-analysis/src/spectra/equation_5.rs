@@ -1,4 +1,4 @@
-//! The Allan deviation by equation (5) of IEEE Std 952's relation, from a measured spectrum.
+//! The Allan deviation from a measured spectrum, by the relation of IEEE Std 952 that is equation (5) of the paper.
 
 use super::welch::Welch;
 use crate::uniform_series::UniformSeries;
@@ -8,11 +8,11 @@ use std::f64::consts::PI;
 const SHORTEST: usize = 1 << 10;
 /// Each segment length over the one before.
 const LENGTH_STEP: usize = 8;
-/// Segment length over the averaging time at which the removed mean and the window take no more than 1 % of the deviation,
-/// even of a random walk: what they change is below 2.5 cycles per segment of length T, where a walk has `7.5·τ/T` of its
-/// variance, about a fifth of which is lost.
+/// Least segment length over the averaging time. Below 2.5 cycles per segment of length T the removed mean and the window
+/// change the spectrum; white noise has none of its Allan variance there, a random walk the part 7.5·τ/T, here 12 %.
 const SEGMENT_PER_TAU: u64 = 64;
-/// The same at the longest averaging times, which one segment over the whole record has to show.
+/// The same at the longest averaging times, which segments about as long as the record have to show. The largest part of the
+/// integrand, at f = 0.37/τ, is then at the sixth point of the spectrum.
 const LEAST_SEGMENT_PER_TAU: u64 = 16;
 
 /// The Allan deviation of `series` at the averaging factors `factors` by σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df, with the
