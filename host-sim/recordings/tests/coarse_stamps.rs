@@ -226,7 +226,7 @@ fn logged(rate_hz: f64, decimals: usize, few: bool) -> Vec<f64> {
     let mut state = 1_u64;
     let mut lost = |at: usize| {
         state = state * 16_807 % 2_147_483_647;
-        if few { [5_000, 21_000, 22_500].contains(&at) } else { at > 0 && state % 50 == 0 }
+        if few { [5_000, 21_000, 22_500].contains(&at) } else { at > 0 && state.is_multiple_of(50) }
     };
     let written = |at: usize| format!("{:.decimals$}", at as f64 / rate_hz).parse().expect("a number");
     (0..30_000).filter(|&at| !lost(at)).map(written).collect()
