@@ -39,9 +39,9 @@ use core::mem::replace;
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
     /// Sample periods since the start, those of missing samples included.
     elapsed: u64,
-    /// From this time on no octave below [`ROUNDED`] has to leave out differences. `u64::MAX` before the first sample after
-    /// a gap.
-    settled: u64,
+    /// The time, modulo 2³², from which [`WARM`](Self::WARM) samples later no octave below [`ROUNDED`] has to leave out
+    /// differences: 0 at first, so that an estimator without samples is all zeros. Now while a gap is pending.
+    settling: u32,
     /// Running sum of the samples since the start, or since the last gap that was cut out, modulo 2⁶⁴.
     sum: i64,
     /// The last `OVERLAP` running sums. The sum up to sample `k` is in slot `k mod OVERLAP`; the lines below use the
@@ -129,7 +129,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
         Self {
             elapsed: 0,
-            settled: Self::WARM - 1,
+            settling: 0,
             sum: 0,
             recent: [0; OVERLAP],
             octaves: [Octave::NEW; OCTAVES],
@@ -152,7 +152,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// The first 2048 samples, and those after a gap until the shortest octaves have left it behind, take more time.
     #[inline]
     pub fn push(&mut self, sample: i32) {
-        if self.elapsed < self.settled {
+        // Every 2³² samples this is true without need, which costs time and changes nothing.
+        if (self.elapsed as u32).wrapping_sub(self.settling) < Self::WARM as u32 - 1 {
             return self.push_unsettled(sample);
         }
         let previous = self.sum;
@@ -237,7 +238,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         // In place: a new estimator would be built on the stack first.
         self.recent.fill(0);
         self.octaves.fill(Octave::NEW);
-        (self.elapsed, self.settled, self.sum) = (0, Self::WARM - 1, 0);
+        (self.elapsed, self.settling, self.sum) = (0, 0, 0);
         (self.resumed, self.absent, self.pending) = (0, 0, 0);
         (self.ended, self.missing) = (0, 0);
     }

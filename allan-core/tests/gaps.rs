@@ -202,3 +202,13 @@ fn the_longest_gaps_are_counted_and_cut_out() {
     assert_eq!(cascade.sum_of_squares(1), Some((3 * 16, 3)));
     assert_eq!(cascade.sum_of_squares(2), Some((0, 0)));
 }
+
+#[test]
+fn the_variance_of_one_octave_is_that_of_the_curve() {
+    let lossy = Estimators::new(&record(0.0, 9), &losses(0.02, 1..9, 1, 9)).cascade;
+    for (octave, point) in lossy.curve(1.0).points().iter().enumerate() {
+        assert_eq!(lossy.allan_variance(octave), Some(point.avar), "n = {}", point.n);
+    }
+    assert_eq!(lossy.allan_variance(OCTAVES), None);
+    assert_eq!(Cascade::<OCTAVES, 8>::new().allan_variance(0), None);
+}

@@ -151,6 +151,14 @@ fn the_error_states_the_type_and_size_of_another_state() {
     assert!(refusal::<Hadamard<7, 8>>(&cascade).contains("type 65"));
 }
 
+#[test]
+fn an_estimator_without_samples_is_all_zeros() {
+    // A firmware's statics then lie in memory that is cleared at the start, and take no flash.
+    let state = serde_json::to_string(&Cascade::<24, 8>::new()).unwrap();
+    let words: Vec<u64> = serde_json::from_str(&state).unwrap();
+    assert!(words[1..words.len() - 1].iter().all(|&word| word == 0), "{words:?}");
+}
+
 /// The words of a state with one of them replaced and a correct checksum.
 fn forged(words: &[u64], at: usize, word: u64) -> Vec<u64> {
     let mut words = words.to_vec();
@@ -171,7 +179,7 @@ fn a_state_that_no_samples_lead_to_is_refused_with_the_reason() {
         let found = serde_json::from_value::<Cascade<OCTAVES, 8>>(forged(&words, at, word).into());
         found.expect_err("no samples lead to this").to_string()
     };
-    // Header, three times (now, settled, end of the last gap), four numbers of samples (before the start, missing, absent,
+    // Header, three times (now, settling, end of the last gap), four numbers of samples (before the start, missing, absent,
     // pending), sum, 8 recent sums, checksum, and for each octave 4 words of moments, the oldest sum, 8 in the line, the end
     // of the last gap, the count before it and 3 words on bridged gaps.
     assert_eq!(words.len(), 9 + 8 + OCTAVES * 18 + 1);

@@ -160,9 +160,8 @@ fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
     let config = estimators.config();
     let n = (1_u64 << octave.min(OCTAVES)) as f64;
     let deviation = |index: usize| {
-        let (sum, count) = estimators.channel(index)?.sum_of_squares(octave).filter(|&(_, count)| count > 0)?;
-        let lsb = CHANNELS[index].lsb(config.range());
-        Some(lsb * libm::sqrt(sum as f64 / (2.0 * count as f64)) / n)
+        let variance = estimators.channel(index)?.allan_variance(octave)?;
+        Some(CHANNELS[index].lsb(config.range()) * libm::sqrt(variance))
     };
     let mut any = false;
     let cells: [f64; INERTIAL] = core::array::from_fn(|index| {

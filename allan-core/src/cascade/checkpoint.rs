@@ -4,7 +4,7 @@
 use super::{Cascade, Octave};
 use crate::confidence::Difference;
 use crate::curve::{AllanPoint, Curve};
-use crate::interpolation::{BridgedGaps, Interpolation};
+use crate::interpolation::{BridgedGaps, Interpolation, LARGEST_SUBTRACTION};
 use crate::moments::Moments;
 use crate::noise_type::PowerLaw;
 #[cfg(feature = "serde")]
@@ -59,6 +59,17 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve
     }
 
+    /// The Allan variance of one octave, in counts², without what replacing missing samples has added; `None` beyond the last
+    /// octave and without differences.
+    #[must_use]
+    pub fn allan_variance(&self, octave: usize) -> Option<f64> {
+        let OctaveSums { squares, count, .. } = self.octave_sums(octave).filter(|sums| sums.count > 0)?;
+        let n = 1_u64 << octave;
+        let measured = squares as f64 / (2.0 * count as f64 * n as f64 * n as f64);
+        let added = self.bridged_gaps(n).added_variance(Difference::Second, n, self.len()).variance;
+        Some(measured - added.min(LARGEST_SUBTRACTION * measured))
+    }
+
     /// Makes `curve` the [`curve`](Self::curve) of an estimator with these sums of `samples` samples, without the
     /// estimator. `sums` returns the sums of an octave.
     pub fn rebuild_curve(
@@ -107,9 +118,11 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
     const WORDS: usize = 8 + OVERLAP + OCTAVES * (4 + 1 + OVERLAP + 2 + 3);
 
     fn visit_words<E>(&mut self, mut visit: impl FnMut(&mut u64) -> Result<(), E>) -> Result<(), E> {
-        let times = [&mut self.elapsed, &mut self.settled, &mut self.resumed];
+        let mut settling = u64::from(self.settling);
+        let times = [&mut self.elapsed, &mut settling, &mut self.resumed];
         let samples = [&mut self.ended, &mut self.missing, &mut self.absent, &mut self.pending];
         times.into_iter().chain(samples).try_for_each(&mut visit)?;
+        self.settling = settling as u32;
         for sum in [&mut self.sum].into_iter().chain(&mut self.recent) {
             visit_signed(sum, &mut visit)?;
         }
@@ -133,7 +146,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
         if self.absent > self.resumed || self.resumed > self.elapsed {
             return Some("a gap after the newest sample");
         }
-        if self.settled != self.settled_time() {
+        if self.settling != self.settling_time() {
             return Some("octaves that leave out other differences than the gaps say");
         }
         if self.recent[Self::slot(self.elapsed)] != self.sum {

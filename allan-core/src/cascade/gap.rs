@@ -38,7 +38,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     pub fn gap(&mut self, missing: u32) {
         if missing > 0 {
             self.pending += u64::from(missing);
-            self.settled = u64::MAX;
+            self.settling = self.elapsed as u32;
         }
     }
 
@@ -66,14 +66,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
         self.absent += missing;
         (self.elapsed, self.resumed) = (end, end);
-        self.settled = self.settled_time();
+        self.settling = self.settling_time();
     }
 
-    /// The time from which on no octave below [`ROUNDED`](crate::moments::ROUNDED) has to leave out differences.
-    pub(super) fn settled_time(&self) -> u64 {
-        let complete = |(k, octave): (usize, &Octave<OVERLAP>)| octave.resumed + (2 << k) - 1;
+    /// What [`settling`](Cascade::settling) is by the gaps of the octaves below [`ROUNDED`](crate::moments::ROUNDED).
+    pub(super) fn settling_time(&self) -> u32 {
+        let complete = |(k, octave): (usize, &Octave<OVERLAP>)| octave.resumed + (2 << k);
         let settled = self.octaves[..Self::FINE + Self::SHORT].iter().enumerate().map(complete).max();
-        if self.pending > 0 { u64::MAX } else { settled.unwrap_or(0) }
+        let settling = settled.unwrap_or(0).saturating_sub(Self::WARM);
+        (if self.pending > 0 { self.elapsed } else { settling }) as u32
     }
 
     /// Expected sum of the missing samples: their number times the mean of the samples around them.

@@ -12,13 +12,12 @@ pub(crate) fn after_constant<const OCTAVES: usize, const OVERLAP: usize>(
     samples: u64,
 ) -> Cascade<OCTAVES, OVERLAP> {
     let header = [2, b'A', OCTAVES as u8, OVERLAP as u8];
-    // Three times (now, the time from which on the first eleven octaves are complete, the end of the last gap), four numbers
+    // Three times (now, the one from which the first eleven octaves settle, the end of the last gap), four numbers
     // of samples (before the start, missing, absent, pending), the sum and the recent sums; of each octave, 4 words of
     // moments, the oldest sum, the line, the end of the last gap, the number of differences before it, and 3 words of gaps.
     let of_octave = 5 + OVERLAP + 5;
     let own = 8 + OVERLAP;
     let words = own + OCTAVES * of_octave;
-    let complete = (2_u64 << (OCTAVES.min(11) - 1)) - 1;
     let sum_at = |step: u64, level: usize| i64::from(sample).wrapping_mul((step << level) as i64) as u64;
     // The sum in a slot of a line that holds the steps from `nearest` before the newest on; 0 before the first sample.
     let in_line = |slot: usize, level: usize, nearest: u64| {
@@ -29,8 +28,7 @@ pub(crate) fn after_constant<const OCTAVES: usize, const OVERLAP: usize>(
     let fine = OVERLAP.trailing_zeros() as usize;
     let word = |at: usize| match at {
         0 => samples,
-        1 => complete,
-        2..7 => 0,
+        1..7 => 0,
         7 => sum_at(samples, 0),
         at if at < own => in_line(at - 8, 0, 0),
         at => {

@@ -368,7 +368,8 @@ pub struct Health {
     pub stuck_high: u32,
     /// Bursts whose bits were shifted by 1 to 15 clocks.
     pub shifted: u32,
-    /// Bursts whose twelve words had not changed for hundreds of samples.
+    /// Bursts of a frozen sensor: the inertial words equal for four lengths of the filter and at least 16 bursts, or all twelve
+    /// words for 512.
     pub frozen: u32,
     /// Bursts with a rate beyond the sensor's range.
     pub impossible_rate: u32,

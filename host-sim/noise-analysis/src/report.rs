@@ -65,7 +65,7 @@ pub struct MissingSamples {
     /// Samples that arrived and are not used, by cause: those that the reader refused in all channels or in this one, and
     /// what the analysis keeps out of the coefficients (`repeated`, `spikes`, `knock`).
     pub refused: BTreeMap<String, u64>,
-    /// Of all these, samples that the estimator replaced from their neighbours; the others cut the record.
+    /// Of all these, samples that the estimator replaced from their neighbours. The others lie in gaps that no octave bridges.
     pub replaced: u64,
 }
 
