@@ -33,7 +33,8 @@ fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     // The sensor checks the 16 us between frames. It is not told the clock, which the firmware reports (below).
     assert_eq!(part.violations(), []);
     assert!(bursts.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1), "every sample is read once");
-    assert!(bursts.len() as f64 > (SECONDS - 0.2) * RATE_HZ, "{} bursts", bursts.len());
+    // The sensor is left alone for its start-up time of 290 ms and configured 50 ms later.
+    assert!(bursts.len() as f64 > (SECONDS - 0.4) * RATE_HZ, "{} bursts", bursts.len());
 
     let decoded = Decoded::decode(&outcome.received);
     assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
@@ -43,7 +44,7 @@ fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     assert!(hello.spi_clock_hz <= 1_000_000, "{hello:?}");
     assert_eq!(decoded.channels().len(), 8, "a whole report");
     for report in decoded.channels() {
-        assert!(report.samples as f64 > 1.8 * RATE_HZ && report.missing == 0, "{report:?}");
+        assert!(report.samples as f64 > 1.6 * RATE_HZ && report.missing == 0, "{report:?}");
         assert_eq!(*report, on_host(bursts, RATE_HZ, report), "bit for bit");
     }
     let health = decoded.healths()[0];
