@@ -1,7 +1,7 @@
 //! The measured Allan variance curve with its confidence and noise types.
 
 use crate::confidence::{ChiSquareApproximation, Difference};
-use crate::interpolation::{AddedVariance, LARGEST_SUBTRACTION, subtraction_factor};
+use crate::interpolation::{AddedVariance, subtraction_factor};
 use crate::math::log2;
 use crate::moments::Moments;
 use crate::noise_type::{OctaveVariance, PowerLaw, VarianceFractions, classify};
@@ -68,7 +68,7 @@ impl AllanPoint {
 
     /// The point without the variance that replacing missing samples has added.
     pub(crate) fn without(mut self, added: AddedVariance) -> Self {
-        self.interpolation = added.variance.min(LARGEST_SUBTRACTION * self.avar);
+        self.interpolation = added.subtracted(self.avar);
         self.avar -= self.interpolation;
         self.replaced = added.replaced;
         self

@@ -2,7 +2,7 @@
 
 use crate::cascade::Cascade;
 use crate::confidence::{ChiSquareApproximation, Difference};
-use crate::interpolation::{LARGEST_SUBTRACTION, subtraction_factor};
+use crate::interpolation::subtraction_factor;
 use crate::noise_type::{OctaveVariance, VarianceFractions, classify};
 #[cfg(feature = "serde")]
 use crate::serialized::{StateWords, serde_by_words, visit_wide};
@@ -155,7 +155,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
             let n = 1_u64 << octave;
             let measured = square as f64 / (6.0 * count as f64 * n as f64 * n as f64);
             let added = cascade.bridged_gaps(n).added_variance(Difference::Third, n, cascade.len());
-            let interpolation = added.variance.min(LARGEST_SUBTRACTION * measured);
+            let interpolation = added.subtracted(measured);
             let mut point = HadamardPoint {
                 n,
                 tau: n as f64 * sample_period,

@@ -109,7 +109,14 @@ pub(crate) struct AddedVariance {
 }
 
 /// Largest share of a measured variance that is subtracted.
-pub(crate) const LARGEST_SUBTRACTION: f64 = 0.9;
+const LARGEST_SUBTRACTION: f64 = 0.9;
+
+impl AddedVariance {
+    /// What is subtracted from a measured variance.
+    pub(crate) fn subtracted(&self, measured: f64) -> f64 {
+        self.variance.min(LARGEST_SUBTRACTION * measured)
+    }
+}
 
 /// Factor on the degrees of freedom of a measured variance of which `subtracted` was taken and `left` remains: the scatter
 /// is the same, the value smaller.

@@ -90,7 +90,7 @@ pub(crate) enum Command {
 #[derive(Debug, Args)]
 pub(crate) struct LossArguments {
     /// Records of each noise.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=100_000))]
     records: u64,
     /// Binary logarithm of the number of samples of a record, at 204.8 SPS; 20 is 1.4 hours.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(14..=24))]

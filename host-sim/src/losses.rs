@@ -12,8 +12,8 @@ pub(crate) fn run(plan: &LossPlan, output: &OutputArguments) -> Result<()> {
     }
     let bar = progress_bar(0, "{wide_bar} {pos}/{len} records, {eta} left");
     let table = plan.run(|done, all| {
-        bar.set_length(all);
-        bar.set_position(done);
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
     });
     bar.finish_and_clear();
     write_json(&table, output)?;

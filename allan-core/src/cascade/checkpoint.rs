@@ -4,7 +4,7 @@
 use super::{Cascade, Octave};
 use crate::confidence::Difference;
 use crate::curve::{AllanPoint, Curve};
-use crate::interpolation::{BridgedGaps, Interpolation, LARGEST_SUBTRACTION};
+use crate::interpolation::{BridgedGaps, Interpolation};
 use crate::moments::Moments;
 use crate::noise_type::PowerLaw;
 #[cfg(feature = "serde")]
@@ -66,8 +66,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let OctaveSums { squares, count, .. } = self.octave_sums(octave).filter(|sums| sums.count > 0)?;
         let n = 1_u64 << octave;
         let measured = squares as f64 / (2.0 * count as f64 * n as f64 * n as f64);
-        let added = self.bridged_gaps(n).added_variance(Difference::Second, n, self.len()).variance;
-        Some(measured - added.min(LARGEST_SUBTRACTION * measured))
+        let added = self.bridged_gaps(n).added_variance(Difference::Second, n, self.len());
+        Some(measured - added.subtracted(measured))
     }
 
     /// Makes `curve` the [`curve`](Self::curve) of an estimator with these sums of `samples` samples, without the

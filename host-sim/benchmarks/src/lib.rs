@@ -1,5 +1,6 @@
 //! Benchmarks of the noise analysis on simulated recordings, whose true noise and effects are known.
 
 pub mod losses;
+mod parallel;
 pub mod reproduction;
 pub mod undeclared;

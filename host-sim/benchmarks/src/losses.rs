@@ -16,8 +16,8 @@ pub use loss_pattern::LossPattern;
 pub use noise::{RATE_HZ, TestNoise};
 pub use table::{CoefficientComparison, LossComparison, LossTable, OctaveRatio};
 
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use crate::parallel;
+use std::convert::Infallible;
 
 /// How many records to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,41 +35,20 @@ pub struct LossPlan {
 impl LossPlan {
     /// Runs the benchmark. `progress` is called with the number of finished records and of all.
     #[must_use]
-    pub fn run(&self, progress: impl Fn(u64, u64) + Sync) -> LossTable {
-        let all = self.records * TestNoise::ALL.len() as u64;
-        let next = AtomicU64::new(0);
-        let done = AtomicU64::new(0);
-        let results = Mutex::new(Vec::new());
-        std::thread::scope(|scope| {
-            for _ in 0..self.jobs.max(1) {
-                scope.spawn(|| {
-                    loop {
-                        let at = next.fetch_add(1, Ordering::Relaxed);
-                        if at >= all {
-                            break;
-                        }
-                        let noise = TestNoise::ALL[(at % TestNoise::ALL.len() as u64) as usize];
-                        let estimated = self.record(noise, self.first_seed + at / TestNoise::ALL.len() as u64);
-                        // The list is valid even if a thread panicked: it is only changed by `push`.
-                        results.lock().unwrap_or_else(PoisonError::into_inner).push((at, noise, estimated));
-                        progress(done.fetch_add(1, Ordering::Relaxed) + 1, all);
-                    }
-                });
+    pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> LossTable {
+        let seeds = self.first_seed..self.first_seed + self.records;
+        let items: Vec<(TestNoise, u64)> =
+            TestNoise::ALL.into_iter().flat_map(|noise| seeds.clone().map(move |seed| (noise, seed))).collect();
+        let work = |&(noise, seed): &(TestNoise, u64)| Ok::<_, Infallible>((noise, self.record(noise, seed)));
+        let Ok(results) = parallel::map(&items, self.jobs, work, progress);
+        let mut comparisons = Vec::new();
+        for of_noise in results.chunk_by(|(a, _), (b, _)| a == b) {
+            for (index, pattern) in LossPattern::ALL.into_iter().enumerate() {
+                let pairs: Vec<_> = of_noise.iter().map(|(_, records)| (&records[0], &records[index + 1])).collect();
+                comparisons.push(LossComparison::new(of_noise[0].0, pattern, &pairs));
             }
-        });
-        let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-        results.sort_by_key(|(at, ..)| *at);
-        let comparisons = TestNoise::ALL.into_iter().flat_map(|noise| {
-            let of_noise: Vec<&[EstimatedRecord]> =
-                results.iter().filter(|(_, of, _)| *of == noise).map(|(.., records)| records.as_slice()).collect();
-            (0..LossPattern::ALL.len())
-                .map(|index| {
-                    let pairs: Vec<_> = of_noise.iter().map(|records| (&records[0], &records[index + 1])).collect();
-                    LossComparison::new(noise, LossPattern::ALL[index], &pairs)
-                })
-                .collect::<Vec<_>>()
-        });
-        LossTable { records: self.records, samples: self.samples, comparisons: comparisons.collect() }
+        }
+        LossTable { records: self.records, samples: self.samples, comparisons }
     }
 
     /// The record of a seed, complete and with each of the losses.

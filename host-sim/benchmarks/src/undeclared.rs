@@ -25,8 +25,7 @@ pub use effect::EffectKind;
 pub use score::{EffectScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
 pub use table::{Proportion, STRONG, ScoreTable};
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use crate::parallel;
 
 /// Offset of the sealed seeds from the open ones. The method has been changed after the seeds at 2⁴⁰ were run, so these
 /// are no longer used.
@@ -75,28 +74,11 @@ impl UndeclaredPlan {
     /// # Errors
     /// That of the first recording, in the order of the plan, that cannot be simulated or has no timeline.
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ScoreTable, ScoreError> {
-        let recordings = self.recordings();
-        let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
-        let results = Mutex::new(Vec::with_capacity(recordings.len()));
-        std::thread::scope(|scope| {
-            for _ in 0..self.jobs.max(1) {
-                scope.spawn(|| {
-                    while !failed.load(Ordering::Relaxed) {
-                        let at = next.fetch_add(1, Ordering::Relaxed);
-                        let Some(&(group, seed)) = recordings.get(at) else { break };
-                        let drawn = DrawnRecording::from_group(group, self.seconds, seed);
-                        let score = score_recording(&drawn, self.loss_percent / 100.0);
-                        failed.fetch_or(score.is_err(), Ordering::Relaxed);
-                        // The list is valid even if a thread panicked: it is only changed by `push`.
-                        results.lock().unwrap_or_else(PoisonError::into_inner).push((at, group, score));
-                        progress(done.fetch_add(1, Ordering::Relaxed) + 1, recordings.len());
-                    }
-                });
-            }
-        });
-        let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-        results.sort_by_key(|(at, ..)| *at);
-        let outcomes: Result<Vec<_>, _> = results.into_iter().map(|(_, group, score)| Ok((group, score?))).collect();
-        Ok(ScoreTable { outcomes: outcomes? })
+        let work = |&(group, seed): &(RecordingGroup, u64)| {
+            let drawn = DrawnRecording::from_group(group, self.seconds, seed);
+            Ok((group, score_recording(&drawn, self.loss_percent / 100.0)?))
+        };
+        let outcomes = parallel::map(&self.recordings(), self.jobs, work, progress)?;
+        Ok(ScoreTable { outcomes })
     }
 }
