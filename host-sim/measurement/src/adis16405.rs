@@ -2,7 +2,7 @@
 
 use allan_core::term::MovingAverageFilter;
 
-use crate::profile::{ChannelProfile, Quantity, SensorProfile};
+use crate::profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
 
 /// Rate of the sample clock with SMPL_PRD = 0x0001, which the part has after reset, Hz.
 const INTERNAL_RATE_HZ: f64 = 819.2;
@@ -12,6 +12,25 @@ const SLOW_TIME_BASE: u32 = 31;
 /// Initial bias error (1 σ): deg/s, g.
 const GYRO_BIAS: f64 = 3.0;
 const ACCELEROMETER_BIAS: f64 = 0.05;
+const ACCELEROMETER_LSB: f64 = 3.33e-3;
+const MAGNETOMETER_LSB: f64 = 0.5e-3;
+/// Largest count of a 14-bit register.
+const FULL_SCALE_COUNTS: f64 = 8191.0;
+/// 2 °/√h; 0.007 °/s.
+const GYRO_NOISE: DataSheetNoise =
+    DataSheetNoise { angle_random_walk: Some(2.0 / 60.0), in_run_bias_stability: Some(0.007), rate_random_walk: None };
+/// 0.2 m/s/√h in g·√s; 0.2 mg.
+const ACCELEROMETER_NOISE: DataSheetNoise = DataSheetNoise {
+    angle_random_walk: Some(0.2 / 60.0 / 9.806_65),
+    in_run_bias_stability: Some(0.2e-3),
+    rate_random_walk: None,
+};
+/// 0.066 mgauss/√Hz.
+const MAGNETOMETER_NOISE: DataSheetNoise =
+    DataSheetNoise { angle_random_walk: Some(0.066e-3), in_run_bias_stability: None, rate_random_walk: None };
+/// 0.01 °/s/°C, 0.32 °/s/V, 0.05 °/s/g.
+const GYRO_SENSITIVITIES: DataSheetSensitivities =
+    DataSheetSensitivities { temperature: Some(0.01), supply: Some(0.32), specific_force: Some(0.05) };
 /// Relative standard deviation of the clock of an ordinary host: a crystal that is not trimmed, 20 ppm.
 pub const HOST_CLOCK_ERROR: f64 = 20e-6;
 /// Relative standard deviation of the sample rate: by the clock of a host whose crystal is good to ±100 ppm (2 σ).
@@ -28,11 +47,28 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         unit,
         lsb,
         initial_bias_error,
+        range: None,
+        data_sheet: DataSheetNoise::default(),
+        sensitivities: DataSheetSensitivities::default(),
     };
-    let gyro = |name, axis| channel(name, Quantity::AngularRate, axis, "deg/s", gyro_lsb, Some(GYRO_BIAS));
-    let accelerometer =
-        |name, axis| channel(name, Quantity::SpecificForce, axis, "g", 3.33e-3, Some(ACCELEROMETER_BIAS));
-    let magnetometer = |name, axis| channel(name, Quantity::MagneticField, axis, "gauss", 0.5e-3, None);
+    // 14 bits: the range that the register can express, not the one that is specified.
+    let full_scale = |lsb: f64| Some(lsb * FULL_SCALE_COUNTS);
+    let gyro = |name, axis| ChannelProfile {
+        range: full_scale(gyro_lsb),
+        data_sheet: GYRO_NOISE,
+        sensitivities: GYRO_SENSITIVITIES,
+        ..channel(name, Quantity::AngularRate, axis, "deg/s", gyro_lsb, Some(GYRO_BIAS))
+    };
+    let accelerometer = |name, axis| ChannelProfile {
+        range: full_scale(ACCELEROMETER_LSB),
+        data_sheet: ACCELEROMETER_NOISE,
+        ..channel(name, Quantity::SpecificForce, axis, "g", ACCELEROMETER_LSB, Some(ACCELEROMETER_BIAS))
+    };
+    let magnetometer = |name, axis| ChannelProfile {
+        range: full_scale(MAGNETOMETER_LSB),
+        data_sheet: MAGNETOMETER_NOISE,
+        ..channel(name, Quantity::MagneticField, axis, "gauss", MAGNETOMETER_LSB, None)
+    };
     SensorProfile {
         name: "ADIS16405",
         channels: vec![

@@ -7,7 +7,7 @@
 pub mod adis16405;
 mod profile;
 
-pub use profile::{ChannelProfile, Quantity, SensorProfile};
+pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
 
 use std::collections::BTreeMap;
 

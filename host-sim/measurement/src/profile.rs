@@ -49,6 +49,34 @@ pub struct ChannelProfile {
     /// Initial bias error (1 σ over parts), in `unit`: the distance by which the biases of two parts differ. `None` where
     /// it is not known.
     pub initial_bias_error: Option<f64>,
+    /// Largest magnitude that the channel can measure, in `unit`; `None` where it is not known.
+    pub range: Option<f64>,
+    /// Noise by the data sheet.
+    pub data_sheet: DataSheetNoise,
+    /// Sensitivities by the data sheet.
+    pub sensitivities: DataSheetSensitivities,
+}
+
+/// Typical noise of a channel by its data sheet; `None` where it says nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DataSheetNoise {
+    /// Angle or velocity random walk: the channel's unit times √s.
+    pub angle_random_walk: Option<f64>,
+    /// In-run bias stability: the Allan deviation at the minimum of its curve, in the channel's unit.
+    pub in_run_bias_stability: Option<f64>,
+    /// Rate random walk: the channel's unit per √s.
+    pub rate_random_walk: Option<f64>,
+}
+
+/// Typical sensitivities of the bias of a channel by its data sheet, magnitudes; `None` where it says nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DataSheetSensitivities {
+    /// To temperature, in the channel's unit per °C.
+    pub temperature: Option<f64>,
+    /// To the supply voltage, in the channel's unit per V.
+    pub supply: Option<f64>,
+    /// Of a gyroscope to specific force, in the channel's unit per g.
+    pub specific_force: Option<f64>,
 }
 
 /// A sensor.

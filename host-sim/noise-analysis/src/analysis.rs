@@ -11,12 +11,12 @@ use crate::covariates::CovariateFit;
 use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::{bias, random_telegraph};
 use crate::estimators::{RecordEstimators, RecordPart};
-use crate::findings::{Detection, Effect};
+use crate::findings::{Detection, Effect, Finding, Validation};
 use crate::naming::{ChannelFindings, name_effects};
 use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
 use crate::report::{
-    ChannelReport, CurvePoint, MissingSamples, ModelErrorReport, ModelReport, Report, SCHEMA, SlopeMethodReport,
-    TermReport,
+    ChannelReport, CurvePoint, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
+    SlopeMethodReport, Stretch, TermReport,
 };
 use crate::series::Series;
 use crate::slow_drift::{ChannelsInCommon, common_mode};
@@ -32,14 +32,37 @@ use std::collections::BTreeMap;
 /// model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
+    let mut channels = analyze_channels(measurement);
+    let findings = findings_of(&mut channels);
     Report {
         schema: SCHEMA,
         sample_rate_hz: measurement.sample_rate_hz,
         samples: measurement.len() as u64,
         dropped: by_cause(&measurement.dropped),
         flagged: by_cause(&measurement.flagged),
-        channels: analyze_channels(measurement),
+        part: PartReport { name: measurement.profile.name.to_owned(), ..PartReport::default() },
+        findings,
+        channels,
     }
+}
+
+/// One finding for each effect of each channel; every effect is given the position of its finding.
+fn findings_of(channels: &mut [ChannelReport]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for channel in channels {
+        for effect in &mut channel.effects {
+            effect.finding = findings.len();
+            findings.push(Finding {
+                kind: effect.kind.clone(),
+                channels: vec![channel.name.clone()],
+                parameters: effect.parameters.clone(),
+                evidence: effect.evidence.clone(),
+                validated: Validation::Untestable,
+                share_percent: BTreeMap::new(),
+            });
+        }
+    }
+    findings
 }
 
 fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
@@ -112,6 +135,8 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
             effects.extend(named.into_iter().filter(|effect| !has_ramp || effect.kind != NoiseTerm::RateRamp.name()));
         }
         let whole = measured.clone().with_confidence(|point| analysis.first.trace.before.variance_fractions(point.n));
+        let after = analysis.after(&estimators, &preprocessing, *channel, &whole, &avar_of);
+        let refitted = analysis.refitted(&estimators, *channel, &whole, &after, &avar_of);
         ChannelReport {
             name: channel.name.to_owned(),
             unit: unit.to_owned(),
@@ -124,7 +149,9 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
                 .collect(),
             read_off: SlopeMethodReport::from_curve(&whole, unit),
             before: analysis.before(&estimators, &preprocessing, *channel, &whole),
-            after: analysis.after(&estimators, &preprocessing, *channel, &whole, avar_of),
+            after,
+            refitted,
+            at_rest: vec![Stretch { from_s: 0.0, to_s: measurement.periods() as f64 * measurement.period_s() }],
             effects,
             assessment: assessed.assessment,
         }
@@ -294,19 +321,31 @@ impl ChannelAnalysis {
         avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
     ) -> ModelReport {
         let position = estimators.both.position(channel).unwrap_or_default();
-        let model = &self.first.trace.after;
-        let covariates = &self.first.covariates;
-        // The share of the covariates is in the measured curve and not in the model.
-        let factors = || whole.points().iter().map(|point| point.n);
-        let shares = covariates.shares(&estimators.both, position, factors(), avar_of);
-        let adev = factors().zip(shares).map(|(n, share)| (model.avar(n) + share).sqrt());
+        let (model, covariates) = (&self.first.trace.after, &self.first.covariates);
         let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, position));
         ModelReport {
             terms: terms(model, channel.unit),
-            adev: adev.collect(),
+            adev: self.first.deviations(&estimators.both, position, whole, avar_of),
             fitted: ModelErrorReport::new(model, &covariates.curve),
             unseen: unseen(&estimators.raw[1]),
             unseen_excluding: has_rules(preprocessing, channel).then(|| unseen(&estimators.ruled[1])),
+        }
+    }
+
+    /// The model with the added terms, fitted to the whole record, with the errors of `after`.
+    fn refitted(
+        &self,
+        estimators: &RecordEstimators,
+        channel: ChannelProfile,
+        whole: &Curve<OCTAVES>,
+        after: &ModelReport,
+        avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
+    ) -> ModelReport {
+        let position = estimators.both.position(channel).unwrap_or_default();
+        ModelReport {
+            terms: terms(&self.both.trace.after, channel.unit),
+            adev: self.both.deviations(&estimators.both, position, whole, avar_of),
+            ..after.clone()
         }
     }
 }

@@ -1,12 +1,14 @@
 //! The noise model of one channel in one part of a recording, and the agreement of all channels on the sensor's one
 //! low-pass filter.
 
+use crate::OCTAVES;
 use crate::covariates::CovariateFit;
-use allan_core::NoiseTerm;
+use crate::estimators::RecordPart;
 use allan_core::fit::{fit_shapes, goodness};
 use allan_core::term::{Markov, MovingAverageFilter};
 use allan_core::trace::{LineCandidates, Trace, trace};
-use measurement::SensorProfile;
+use allan_core::{Curve, NoiseTerm};
+use measurement::{ChannelProfile, SensorProfile};
 
 /// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
 /// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times.
@@ -59,6 +61,21 @@ impl ChannelFit {
     pub(crate) fn is_dithered(&self, profile: &SensorProfile, resolution: f64, octaves: usize) -> bool {
         let avars = self.covariates.curve.points().iter().take(octaves).map(|point| point.avar);
         avars.fold(0.0, f64::max) > profile.dithered_avar_counts2 * resolution * resolution
+    }
+
+    /// The Allan deviation of the model with the added terms at each point of `whole`, with the share of the covariates: that
+    /// is in the measured curve and not in the model. `avar_of` is the Allan variance of a channel of the whole record at an
+    /// averaging factor.
+    pub(crate) fn deviations(
+        &self,
+        both: &RecordPart,
+        position: usize,
+        whole: &Curve<OCTAVES>,
+        avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
+    ) -> Vec<f64> {
+        let factors = || whole.points().iter().map(|point| point.n);
+        let shares = self.covariates.shares(both, position, factors(), avar_of);
+        factors().zip(shares).map(|(n, share)| (self.trace.after.avar(n) + share).sqrt()).collect()
     }
 
     /// The filter that the trace added: the term's position in the model, the filter, and its score.

@@ -56,14 +56,46 @@ pub struct Effect {
     pub parameters: BTreeMap<String, Parameter>,
     /// One sentence for the reader: what was measured, against which threshold, and the usual causes.
     pub evidence: String,
+    /// Position in the report's list of findings of the cause that this effect belongs to.
+    pub finding: usize,
 }
 
 impl Effect {
     /// An effect of this kind with its parameters by name.
     pub fn new<'a>(kind: &str, parameters: impl IntoIterator<Item = (&'a str, Parameter)>, evidence: String) -> Self {
         let parameters = parameters.into_iter().map(|(name, parameter)| (name.to_owned(), parameter)).collect();
-        Self { kind: kind.to_owned(), parameters, evidence }
+        Self { kind: kind.to_owned(), parameters, evidence, finding: 0 }
     }
+}
+
+/// One cause of what the baseline noise model lacks, with every channel that shows it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// Such as `sinusoid`, as in [`Effect::kind`].
+    pub kind: String,
+    /// Names of the channels that show it, in the order of the report.
+    pub channels: Vec<String>,
+    /// By name, with intervals: those of the channel that shows the cause most clearly.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// One sentence for the reader: what was measured, against which threshold.
+    pub evidence: String,
+    /// Whether the model with this cause holds on data that it was not fitted to.
+    pub validated: Validation,
+    /// By channel: the part of the channel's Allan variance that is due to this cause, in percent, at the averaging time where
+    /// it is largest.
+    pub share_percent: BTreeMap<String, f64>,
+}
+
+/// Whether a finding holds on data that its model was not fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Validation {
+    /// The first half shows it, and the second half agrees.
+    Yes,
+    /// The first half shows it, and the second half contradicts it.
+    No,
+    /// The first half does not show it, or it cannot show in both halves.
+    Untestable,
 }
 
 /// An effect that a detector found in the samples of one channel or in their time base.

@@ -140,7 +140,7 @@ fn added_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64,
         residual.sigmas.abs(),
         found.score.sqrt(),
     );
-    Effect { kind: term.kind.name().to_owned(), parameters: term_parameters(term, unit), evidence }
+    Effect { kind: term.kind.name().to_owned(), parameters: term_parameters(term, unit), evidence, finding: 0 }
 }
 
 /// An estimate with the 95 % bounds of a normal distribution, of a quantity that is not negative.
@@ -168,7 +168,7 @@ fn telegraph_effect(
         "two levels: excess kurtosis {:.2} ± {:.2} of that of a telegraph signal, a Gaussian process has 0; {}",
         kurtosis.ratio, kurtosis.error, markov.evidence,
     );
-    Effect { kind: "telegraph".to_owned(), parameters, evidence }
+    Effect { kind: "telegraph".to_owned(), parameters, evidence, finding: 0 }
 }
 
 /// A Markov process in place of a random walk that would exceed the initial bias error of the data sheet within an hour.
@@ -180,7 +180,12 @@ fn bounded_drift_effect(found: &BoundedDrift, unit: &str) -> Effect {
         found.bias_errors_per_hour,
         meaning(&found.process.kind),
     );
-    Effect { kind: found.process.kind.name().to_owned(), parameters: term_parameters(&found.process, unit), evidence }
+    Effect {
+        kind: found.process.kind.name().to_owned(),
+        parameters: term_parameters(&found.process, unit),
+        evidence,
+        finding: 0,
+    }
 }
 
 /// A Markov term in the place of the white noise.
@@ -219,6 +224,7 @@ fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &s
             kind: "acceleration".to_owned(),
             parameters: named.collect(),
             evidence: format!("follows the measured specific force, {clearest:.0} sigma; g-sensitivity of the gyro"),
+            finding: 0,
         }
     });
     let temperature = single(Quantity::Temperature, "temperature", "degC", "a bias that drifts with temperature");

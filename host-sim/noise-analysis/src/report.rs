@@ -4,7 +4,7 @@
 //! over the bus give the same bytes.
 
 use crate::assessment::Assessment;
-pub use crate::findings::{Effect, Parameter};
+pub use crate::findings::{Effect, Finding, Parameter, Validation};
 use crate::units::coefficient_unit;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
 use serde::Serialize;
@@ -26,8 +26,40 @@ pub struct Report {
     pub dropped: BTreeMap<String, u64>,
     /// Samples that are used although a warning was raised, by cause.
     pub flagged: BTreeMap<String, u64>,
+    /// What the sensor has once for all its channels.
+    pub part: PartReport,
+    /// What the baseline models lack, one entry a cause.
+    pub findings: Vec<Finding>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
+}
+
+/// What a sensor has once for all its channels: the clock of its converter and the low-pass filter before its output.
+///
+/// What the record does not identify is absent, and `note` says why.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct PartReport {
+    /// Name of the sensor's profile.
+    pub name: String,
+    /// Rate of the sensor's own sample clock, Hz.
+    pub clock: Option<Parameter>,
+    /// Window of the filter: `bartlett`, `moving_average` or `none`.
+    pub filter: Option<String>,
+    /// Taps of each stage of the filter.
+    pub taps: Option<Parameter>,
+    /// Samples of the sensor's own clock from one recorded sample to the next.
+    pub decimation: Option<Parameter>,
+    /// What the record does not identify, and why.
+    pub note: Option<String>,
+}
+
+/// A stretch of the record, in seconds from its first sample.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Stretch {
+    /// Start, s.
+    pub from_s: f64,
+    /// End, s.
+    pub to_s: f64,
 }
 
 /// One output of the sensor.
@@ -52,6 +84,12 @@ pub struct ChannelReport {
     pub effects: Vec<Effect>,
     /// The baseline model with the terms that were added.
     pub after: ModelReport,
+    /// The model of `after`, fitted once more to the whole record. Its errors are those of `after`: the whole record leaves no
+    /// data that it has not seen.
+    #[serde(rename = "final")]
+    pub refitted: ModelReport,
+    /// Stretches in which the sensor was at rest, which the models were fitted to.
+    pub at_rest: Vec<Stretch>,
     /// Assessment of the model for use in navigation.
     #[serde(rename = "practice")]
     pub assessment: Assessment,

@@ -263,6 +263,8 @@ pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError>
         assessment: Default::default(),
         effects: Vec::new(),
         after: model(&of.predictive, of.errors.predictive),
+        refitted: model(&of.predictive, of.errors.predictive),
+        at_rest: Vec::new(),
     })
 }
 

@@ -16,7 +16,8 @@ use adis16405_driver::Channel;
 use allan_core::NoiseTerm as Term;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance};
 use noise_analysis::report::{
-    ChannelReport, Effect as Reported, ModelErrorReport, ModelReport, Parameter, Report, SCHEMA, SlopeMethodReport,
+    ChannelReport, Effect as Reported, ModelErrorReport, ModelReport, Parameter, PartReport, Report, SCHEMA,
+    SlopeMethodReport,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -238,6 +239,7 @@ fn report(found: &[Found<'_>]) -> Report {
             })
             .collect::<BTreeMap<_, _>>(),
         evidence: String::new(),
+        finding: 0,
     };
     let channel = |channel: Channel| ChannelReport {
         name: channel.name().to_owned(),
@@ -250,6 +252,8 @@ fn report(found: &[Found<'_>]) -> Report {
         assessment: Default::default(),
         effects: found.iter().filter(|(of, ..)| *of == channel).map(effect).collect(),
         after: model(),
+        refitted: model(),
+        at_rest: Vec::new(),
     };
     Report {
         schema: SCHEMA,
@@ -257,6 +261,8 @@ fn report(found: &[Found<'_>]) -> Report {
         samples: 0,
         dropped: BTreeMap::new(),
         flagged: BTreeMap::new(),
+        part: PartReport::default(),
+        findings: Vec::new(),
         channels: Channel::ALL.into_iter().map(channel).collect(),
     }
 }

@@ -38,6 +38,8 @@ pub(crate) fn report() -> Report {
         samples: SAMPLES,
         dropped: dropped.map(|(cause, samples)| (cause.to_owned(), samples)).into(),
         flagged: [("repeated".to_owned(), 1804)].into(),
+        part: PartReport::default(),
+        findings: Vec::new(),
         channels,
     }
 }
@@ -57,6 +59,7 @@ pub(crate) fn empty() -> Report {
     channel.before =
         ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error, unseen_excluding: None };
     channel.after = channel.before.clone();
+    channel.refitted = channel.before.clone();
     channel.assessment = Assessment::default();
     report
 }
@@ -93,7 +96,9 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         },
         before: baseline.clone(),
         effects: vec![],
-        after: baseline,
+        after: baseline.clone(),
+        refitted: baseline,
+        at_rest: vec![],
         assessment: assessment(scale),
     }
 }
@@ -209,6 +214,7 @@ fn trace_sinusoid(channel: &mut ChannelReport) {
         evidence: "the residual rises to 41 % at 0.64 s and vanishes at the multiples of 1.43 s, as a line of \
                    0.7 Hz does and no other candidate: 212 units of deviance are explained by two parameters"
             .to_owned(),
+        finding: 0,
     }];
     channel.after.terms.push(sinusoid);
     channel.before.unseen.rms_percent = Some(21.84);
