@@ -96,7 +96,7 @@ impl SpiDevice for Bus {
                     }
                 }
                 Operation::Transfer(answer, _) => {
-                    answer.as_chunks_mut().0.fill(part.burst[1].to_be_bytes());
+                    answer.chunks_exact_mut(2).for_each(|word| word.copy_from_slice(&part.burst[1].to_be_bytes()));
                     answer[2..4].copy_from_slice(&part.burst[0].to_be_bytes());
                 }
                 _ => (),

@@ -3,6 +3,7 @@
 mod block;
 pub(crate) mod checkpoint;
 mod gap;
+pub(crate) mod snapshot;
 
 use crate::interpolation::Interpolation;
 use crate::moments::{Moments, ROUNDED};
@@ -203,11 +204,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     #[inline(never)]
     fn advance(&mut self, level: usize, mut middle: i64) {
         let due = (self.elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
-        for level in level..due {
-            let octave = &mut self.octaves[level + Self::FINE];
+        let lines = self.octaves.iter_mut().enumerate().take(Self::FINE + due).skip(Self::FINE + level);
+        for (at, octave) in lines {
+            let level = at - Self::FINE;
             let oldest = octave.exchange(self.elapsed >> level, middle);
-            if self.elapsed - octave.resumed >= 2 << (level + Self::FINE) {
-                octave.moments.add(level + Self::FINE, second_difference(self.sum, middle, oldest));
+            if self.elapsed - octave.resumed >= 2 << at {
+                octave.moments.add(at, second_difference(self.sum, middle, oldest));
             }
             middle = oldest;
         }
@@ -281,17 +283,20 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         Some((self.octaves.get(octave)?.moments.squares.get(), self.count(octave)))
     }
 
-    /// Number of differences at `n = 2^octave`.
+    /// Number of differences at `n = 2^octave`; 0 beyond the last octave.
     fn count(&self, octave: usize) -> u64 {
-        self.octaves[octave].differences.saturating_add(self.open_differences(octave))
+        let known = self.octaves.get(octave);
+        known.map_or(0, |known| {
+            known.differences.saturating_add(Self::open_differences(self.elapsed, octave, known.resumed))
+        })
     }
 
     /// Differences since the last gap that the octave does not bridge: one at each multiple of its stride from `2n` samples
     /// after the end of the gap on.
-    fn open_differences(&self, octave: usize) -> u64 {
+    fn open_differences(elapsed: u64, octave: usize, resumed: u64) -> u64 {
         let level = octave.saturating_sub(Self::FINE);
-        let incomplete = (self.octaves[octave].resumed + (2 << octave) - 1) >> level;
-        (self.elapsed >> level).saturating_sub(incomplete)
+        let incomplete = (resumed + (2 << octave) - 1) >> level;
+        (elapsed >> level).saturating_sub(incomplete)
     }
 
     /// Number of octaves of which the newest sample ends a stride: those at which

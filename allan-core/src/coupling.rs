@@ -1,12 +1,13 @@
 //! Allan covariance of two channels at every octave, from the sums that their estimators hold.
 
 use crate::cascade::Cascade;
+use crate::list::List;
 #[cfg(feature = "serde")]
 use crate::serialized::{StateWords, serde_by_words, visit_wide};
-use heapless::Vec;
 
 /// Allan covariance of two channels at one averaging factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Covariance {
     /// Averaging factor, samples.
     pub n: u64,
@@ -100,7 +101,7 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
 
     /// The covariance of every octave that has at least one product, shortest first.
     #[must_use]
-    pub fn points(&self) -> Vec<Covariance, OCTAVES> {
+    pub fn points(&self) -> List<Covariance, OCTAVES> {
         let points = (0..OCTAVES).filter_map(|octave| {
             let (sum, count) = self.sum_of_products(octave).filter(|&(_, count)| count > 0)?;
             let n = 1_u64 << octave;

@@ -2,13 +2,16 @@
 
 use crate::confidence::{ChiSquareApproximation, Difference};
 use crate::interpolation::{AddedVariance, subtraction_factor};
-use crate::math::log2;
+use crate::math::{is_finite, log2};
 use crate::moments::Moments;
 use crate::noise_type::{OctaveVariance, PowerLaw, VarianceFractions, classify};
+use core::fmt;
 use heapless::Vec;
 
 /// One averaging factor of a [`Curve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AllanPoint {
     /// Averaging factor, samples.
     pub n: u64,
@@ -50,19 +53,32 @@ impl AllanPoint {
         overlap: u32,
         power_law: PowerLaw,
     ) -> Self {
+        let kurtosis = moments.excess_kurtosis(octave, count);
         Self {
-            n,
             tau: n as f64 * sample_period,
             avar: moments.squares.get() as f64 / (2.0 * count as f64 * n as f64 * n as f64),
+            kurtosis,
+            power_law,
+            ..Self::without_confidence(n, count, overlap)
+        }
+    }
+
+    /// A point without averaging time, variance, kurtosis and noise type, with bounds that every variance is within, and
+    /// with the number of differences that do not overlap as its degrees of freedom.
+    pub(crate) fn without_confidence(n: u64, count: u64, overlap: u32) -> Self {
+        Self {
+            n,
+            tau: 0.0,
+            avar: 0.0,
             interpolation: 0.0,
             replaced: 0.0,
             count,
             overlap,
-            edf: 0.0,
+            edf: (count / (2 * u64::from(overlap))).max(1) as f64,
             low: 0.0,
-            high: 0.0,
-            kurtosis: moments.excess_kurtosis(octave, count),
-            power_law,
+            high: f64::INFINITY,
+            kurtosis: None,
+            power_law: PowerLaw::White,
         }
     }
 
@@ -87,13 +103,186 @@ impl AllanPoint {
 
 /// Allan variance at up to `OCTAVES` octave-spaced averaging factors, shortest first.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked<OCTAVES>"))]
 pub struct Curve<const OCTAVES: usize> {
     sample_period: f64,
     samples: u64,
     points: Vec<AllanPoint, OCTAVES>,
 }
 
+/// A curve of any number of points, borrowed: what is fitted and compared.
+///
+/// It is made of a [`Curve`], or of points from elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CurveView<'a> {
+    sample_period: f64,
+    samples: u64,
+    points: &'a [AllanPoint],
+}
+
+impl<'a> CurveView<'a> {
+    /// The curve with these points, shortest averaging time first, of a record of `samples` samples every `sample_period`
+    /// seconds.
+    #[must_use]
+    pub const fn new(sample_period: f64, samples: u64, points: &'a [AllanPoint]) -> Self {
+        Self { sample_period, samples, points }
+    }
+
+    /// Seconds between samples.
+    #[must_use]
+    pub const fn sample_period(&self) -> f64 {
+        self.sample_period
+    }
+
+    /// Samples that the curve was made of.
+    #[must_use]
+    pub const fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The points, shortest averaging time first.
+    #[must_use]
+    pub const fn points(&self) -> &'a [AllanPoint] {
+        self.points
+    }
+}
+
+impl<'a, const OCTAVES: usize> From<&'a Curve<OCTAVES>> for CurveView<'a> {
+    fn from(curve: &'a Curve<OCTAVES>) -> Self {
+        Self::new(curve.sample_period, curve.samples, &curve.points)
+    }
+}
+
+/// Why a table is no [`Curve`]. Rows are counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum TableError {
+    /// The sample period is not positive and finite.
+    SamplePeriod,
+    /// The overlap is not 1 to 16.
+    Overlap,
+    /// There are more rows than the curve has room for.
+    TooManyRows,
+    /// The averaging factor of this row is 0, not above that of the row before, or more than half of the samples.
+    AveragingFactor(usize),
+    /// The variance of this row, its bounds or its degrees of freedom are negative or not a number.
+    Variance(usize),
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::SamplePeriod => f.write_str("the sample period is not positive and finite"),
+            Self::Overlap => f.write_str("the overlap is not 1 to 16"),
+            Self::TooManyRows => f.write_str("the table has more rows than the curve has room for"),
+            Self::AveragingFactor(row) => write!(
+                f,
+                "the averaging factor in row {row} is 0, not above that of the row before, or more than half of the samples"
+            ),
+            Self::Variance(row) => write!(f, "the variance in row {row} or its confidence is negative or not a number"),
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+/// The fields of a curve as they are deserialised.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked<const OCTAVES: usize> {
+    sample_period: f64,
+    samples: u64,
+    points: Vec<AllanPoint, OCTAVES>,
+}
+
+#[cfg(feature = "serde")]
+impl<const OCTAVES: usize> TryFrom<Unchecked<OCTAVES>> for Curve<OCTAVES> {
+    type Error = TableError;
+
+    fn try_from(unchecked: Unchecked<OCTAVES>) -> Result<Self, TableError> {
+        let Unchecked { sample_period, samples, points } = unchecked;
+        check_table(sample_period, points.iter().map(|point| (point.n, point.avar)))?;
+        for (row, point) in points.iter().enumerate() {
+            if !(1..=16).contains(&point.overlap) {
+                return Err(TableError::Overlap);
+            }
+            let numbers = [point.low, point.high, point.edf, point.interpolation, point.replaced];
+            if point.count == 0 || numbers.iter().any(|number| number.is_nan() || *number < 0.0) {
+                return Err(TableError::Variance(row));
+            }
+        }
+        Ok(Self { sample_period, samples, points })
+    }
+}
+
+/// Checks the averaging factors and variances of a curve.
+fn check_table(sample_period: f64, table: impl Iterator<Item = (u64, f64)>) -> Result<(), TableError> {
+    if !(sample_period > 0.0 && is_finite(sample_period)) {
+        return Err(TableError::SamplePeriod);
+    }
+    let mut before = 0;
+    for (row, (n, avar)) in table.enumerate() {
+        if n <= before {
+            return Err(TableError::AveragingFactor(row));
+        }
+        if !(avar >= 0.0 && is_finite(avar)) {
+            return Err(TableError::Variance(row));
+        }
+        before = n;
+    }
+    Ok(())
+}
+
 impl<const OCTAVES: usize> Curve<OCTAVES> {
+    /// The curve of a table that was computed elsewhere, with the noise type and the confidence that this crate gives it.
+    ///
+    /// A row is an averaging factor in samples and the Allan *variance*, the square of the deviation. `overlap` is the
+    /// number of differences per averaging time: 1 for a table without overlap, 16 for full overlap. The number of
+    /// differences is that of a record of `samples` samples without gaps.
+    ///
+    /// ```
+    /// use allan_core::{Curve, NoiseTerm, fit::fit};
+    ///
+    /// // Fully overlapping, 10,000 samples at 1 Hz: averaging time in s, Allan deviation.
+    /// let table = [(1, 1.00e-3), (2, 7.05e-4), (4, 5.02e-4), (8, 3.49e-4), (16, 2.55e-4)];
+    /// let curve = Curve::<8>::from_points(1.0, 10_000, 16, &table.map(|(n, adev)| (n, adev * adev))).unwrap();
+    /// let n = fit(&curve, &[NoiseTerm::AngleRandomWalk]).terms()[0];
+    /// assert!(n.low < 1.0e-3 && 1.0e-3 < n.high);
+    /// ```
+    ///
+    /// # Errors
+    /// The first row that a curve cannot have.
+    pub fn from_points(
+        sample_period: f64,
+        samples: u64,
+        overlap: u32,
+        table: &[(u64, f64)],
+    ) -> Result<Self, TableError> {
+        if !(1..=16).contains(&overlap) {
+            return Err(TableError::Overlap);
+        }
+        if table.len() > OCTAVES {
+            return Err(TableError::TooManyRows);
+        }
+        check_table(sample_period, table.iter().copied())?;
+        if let Some(row) = table.iter().position(|&(n, _)| n > samples / 2) {
+            return Err(TableError::AveragingFactor(row));
+        }
+        let mut curve = Self::empty();
+        let points = table.iter().map(|&(n, avar)| {
+            let overlap = n.min(u64::from(overlap)) as u32;
+            let steps = u128::from(samples - 2 * n) * u128::from(overlap) / u128::from(n);
+            let count = u64::try_from(steps).unwrap_or(u64::MAX - 1) + 1;
+            let tau = n as f64 * sample_period;
+            AllanPoint { tau, avar, ..AllanPoint::without_confidence(n, count, overlap) }
+        });
+        curve.fill(sample_period, samples, points);
+        Ok(curve)
+    }
+
     /// A curve without points, to be filled in place by [`Cascade::rebuild_curve`](crate::Cascade::rebuild_curve): with 24
     /// octaves a curve takes about 2 kB, too much to be moved over a small stack.
     #[must_use]
@@ -103,11 +292,21 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
 
     /// Replaces the points by `points`, classifies them and sets their confidence.
     pub(crate) fn fill(&mut self, sample_period: f64, samples: u64, points: impl Iterator<Item = AllanPoint>) {
+        self.fill_without_confidence(sample_period, samples, points);
+        self.classify();
+        self.set_confidence(&mut |point| point.power_law.variance_fractions());
+    }
+
+    /// Replaces the points by `points`, which have no confidence.
+    pub(crate) fn fill_without_confidence(
+        &mut self,
+        sample_period: f64,
+        samples: u64,
+        points: impl Iterator<Item = AllanPoint>,
+    ) {
         (self.sample_period, self.samples) = (sample_period, samples);
         self.points.clear();
         self.points.extend(points);
-        self.classify();
-        self.set_confidence(&mut |point| point.power_law.variance_fractions());
     }
 
     /// A curve of points whose noise type is set already.

@@ -3,6 +3,7 @@
 use crate::cascade::Cascade;
 use crate::confidence::{ChiSquareApproximation, Difference};
 use crate::interpolation::subtraction_factor;
+use crate::list::List;
 use crate::noise_type::{OctaveVariance, VarianceFractions, classify};
 #[cfg(feature = "serde")]
 use crate::serialized::{StateWords, serde_by_words, visit_wide};
@@ -10,6 +11,7 @@ use heapless::Vec;
 
 /// One averaging factor of a Hadamard curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HadamardPoint {
     /// Averaging factor, samples.
     pub n: u64,
@@ -129,7 +131,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
     ///
     /// `cascade` must be the observed one, `sample_period` is in seconds. The confidence is that of the power law that the local slope suggests.
     #[must_use]
-    pub fn points(&self, cascade: &Cascade<OCTAVES, OVERLAP>, sample_period: f64) -> Vec<HadamardPoint, OCTAVES> {
+    pub fn points(&self, cascade: &Cascade<OCTAVES, OVERLAP>, sample_period: f64) -> List<HadamardPoint, OCTAVES> {
         let mut points = self.points_with(cascade, sample_period, |_| VarianceFractions::WHITE);
         let octaves: Vec<OctaveVariance, OCTAVES> = points.iter().map(HadamardPoint::octave_variance).collect();
         for (at, point) in points.iter_mut().enumerate() {
@@ -146,7 +148,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         cascade: &Cascade<OCTAVES, OVERLAP>,
         sample_period: f64,
         fractions: impl Fn(u64) -> VarianceFractions,
-    ) -> Vec<HadamardPoint, OCTAVES> {
+    ) -> List<HadamardPoint, OCTAVES> {
         let points = (0..OCTAVES).filter_map(|octave| {
             let (square, count) = (self.squares[octave], self.counts[octave]);
             if count == 0 || square == u128::MAX {

@@ -1,11 +1,13 @@
 //! What the interpolation of missing samples adds to an Allan or Hadamard variance.
 
 use crate::confidence::Difference;
+use crate::math::Real;
 use crate::moments::Sum;
 
 /// The gaps of one length class that were closed by interpolation, and how far the interpolation was off where it was
 /// tested on samples that are known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interpolation {
     replaced: u32,
     tested: u32,
@@ -84,37 +86,38 @@ impl Default for Interpolation {
 
 /// The gaps that an averaging factor bridges, gathered from the shortest octave to the one of that factor.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct BridgedGaps {
+pub(crate) struct BridgedGaps<F = f64> {
     /// Variance of a sample if the noise were white, counts²: for gaps without a test.
-    white: f64,
+    white: F,
     /// Number of replaced samples.
-    replaced: f64,
+    replaced: F,
     /// Sum over the gaps of the expected squared error of the sum of their samples, counts².
-    squared_error: f64,
+    squared_error: F,
     /// The same, each multiplied by the length of the gap.
-    squared_error_length: f64,
+    squared_error_length: F,
     /// Replaced samples of classes without a test.
-    untested: f64,
-    tested: f64,
-    tested_error: f64,
+    untested: F,
+    tested: F,
+    tested_error: F,
 }
 
 /// The variance that the bridged gaps add at an averaging factor, and the share of the samples that is replaced.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct AddedVariance {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AddedVariance<F = f64> {
     /// Counts².
-    pub(crate) variance: f64,
+    pub(crate) variance: F,
     /// Between 0 and 1.
-    pub(crate) replaced: f64,
+    pub(crate) replaced: F,
 }
 
 /// Largest share of a measured variance that is subtracted.
 const LARGEST_SUBTRACTION: f64 = 0.9;
 
-impl AddedVariance {
+impl<F: Real> AddedVariance<F> {
     /// What is subtracted from a measured variance.
-    pub(crate) fn subtracted(&self, measured: f64) -> f64 {
-        self.variance.min(LARGEST_SUBTRACTION * measured)
+    pub(crate) fn subtracted(&self, measured: F) -> F {
+        let largest = F::constant(LARGEST_SUBTRACTION) * measured;
+        if self.variance < largest { self.variance } else { largest }
     }
 }
 
@@ -129,30 +132,40 @@ pub(crate) fn subtraction_factor(left: f64, subtracted: f64) -> f64 {
     }
 }
 
-impl BridgedGaps {
+impl<F: Real> BridgedGaps<F> {
     /// No gaps, in a record with an Allan variance of `white` counts² at one sample.
-    pub(crate) fn new(white: f64) -> Self {
-        let (replaced, squared_error, squared_error_length) = (0.0, 0.0, 0.0);
-        Self { white, replaced, squared_error, squared_error_length, untested: 0.0, tested: 0.0, tested_error: 0.0 }
+    pub(crate) fn new(white: F) -> Self {
+        let none = F::constant(0.0);
+        Self {
+            white,
+            replaced: none,
+            squared_error: none,
+            squared_error_length: none,
+            untested: none,
+            tested: none,
+            tested_error: none,
+        }
     }
 
     /// Adds the gaps that an octave with an averaging factor of `n` bridges and the one before does not. `shortest` is the
     /// octave at which gaps of one sample are bridged.
     pub(crate) fn add(&mut self, gaps: &Interpolation, n: u64, shortest: u64) {
-        let replaced = f64::from(gaps.replaced);
-        self.replaced += replaced;
+        let replaced = F::from_word(gaps.replaced.into());
+        self.replaced = self.replaced + replaced;
         if gaps.tested == 0 {
-            self.untested += replaced;
+            self.untested = self.untested + replaced;
             return;
         }
         // A class holds the lengths from half its upper limit on.
-        let longest = n as f64 / shortest as f64;
-        let length = if longest > 1.0 { 0.75 * longest } else { 1.0 };
-        let squared_error = gaps.squared_error() as f64 * replaced / f64::from(gaps.tested);
-        self.squared_error += squared_error;
-        self.squared_error_length += squared_error * length;
-        self.tested += f64::from(gaps.tested);
-        self.tested_error += gaps.squared_error() as f64;
+        let longest = F::from_word(n) / F::from_word(shortest);
+        let one = F::constant(1.0);
+        let length = if longest > one { F::constant(0.75) * longest } else { one };
+        let (tested, error) = (F::from_word(gaps.tested.into()), F::from_integer(gaps.squared_error()));
+        let squared_error = error * replaced / tested;
+        self.squared_error = self.squared_error + squared_error;
+        self.squared_error_length = self.squared_error_length + squared_error * length;
+        self.tested = self.tested + tested;
+        self.tested_error = self.tested_error + error;
     }
 
     /// What the gaps add to the variance at the averaging factor `n` of a record of `samples` samples, beside which those
@@ -163,19 +176,22 @@ impl BridgedGaps {
     /// vary with neighbours of other signs, which for white noise takes away `4m·e²`. The squares have a mean of `2n²σ²`,
     /// so `⟨e²⟩(1 − 2m/n)/n` times the number of gaps per sample period remains. For third differences, which reach over `3n` periods and have a
     /// mean square of `6n²σ²`, it is `⟨e²⟩(1 − 20m/9n)/n`.
-    pub(crate) fn added_variance(&self, difference: Difference, n: u64, samples: u64) -> AddedVariance {
-        if self.replaced == 0.0 {
-            return AddedVariance::default();
+    pub(crate) fn added_variance(&self, difference: Difference, n: u64, samples: u64) -> AddedVariance<F> {
+        let none = F::constant(0.0);
+        if self.replaced == none {
+            return AddedVariance { variance: none, replaced: none };
         }
         let edges = match difference {
-            Difference::Second => 2.0,
-            Difference::Third => 20.0 / 9.0,
+            Difference::Second => F::constant(2.0),
+            Difference::Third => F::constant(20.0 / 9.0),
         };
-        let n = n as f64;
+        let n = F::from_word(n);
         // Gaps without a test of their own length are taken to be off as those with one, or as white noise would be.
-        let per_sample = if self.tested > 0.0 { self.tested_error / self.tested } else { 1.5 * self.white };
+        let per_sample =
+            if self.tested > none { self.tested_error / self.tested } else { F::constant(1.5) * self.white };
         let squared_error = self.squared_error - edges * self.squared_error_length / n + self.untested * per_sample;
-        let periods = samples as f64 + self.replaced;
-        AddedVariance { variance: (squared_error / n / periods).max(0.0), replaced: self.replaced / periods }
+        let periods = F::from_word(samples) + self.replaced;
+        let variance = squared_error / n / periods;
+        AddedVariance { variance: if variance > none { variance } else { none }, replaced: self.replaced / periods }
     }
 }

@@ -19,6 +19,54 @@
 //! | `ln_gamma` | 8e-15 | 4990, 13796 | — | — |
 
 use core::f64::consts::FRAC_2_PI;
+use core::ops::{Add, Div, Mul, Sub};
+
+/// A floating-point number: double precision for what is reported, single precision where its seven digits are enough and
+/// the soft double-precision arithmetic of small processors would not be linked otherwise.
+pub(crate) trait Real:
+    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// A constant, rounded to nearest.
+    fn constant(value: f64) -> Self;
+    fn from_integer(value: u128) -> Self;
+    fn from_word(value: u64) -> Self;
+}
+
+impl Real for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    fn from_integer(value: u128) -> Self {
+        value as Self
+    }
+
+    fn from_word(value: u64) -> Self {
+        value as Self
+    }
+}
+
+impl Real for f32 {
+    #[inline(always)] // so that the conversion happens at compile time
+    fn constant(value: f64) -> Self {
+        value as Self
+    }
+
+    fn from_integer(value: u128) -> Self {
+        value as Self
+    }
+
+    fn from_word(value: u64) -> Self {
+        value as Self
+    }
+}
+
+/// `x·2^exponent` without arithmetic; `x` itself if it is 0, subnormal, infinite or not a number.
+pub(crate) fn times_power_of_two(x: f64, exponent: u32) -> f64 {
+    let known = x.to_bits() >> 52 & 0x7ff;
+    let scaled = known + u64::from(exponent);
+    if known == 0 || scaled >= 0x7ff { x } else { f64::from_bits(x.to_bits() + (u64::from(exponent) << 52)) }
+}
 
 pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
@@ -71,6 +119,11 @@ pub(crate) fn expm1(x: f64) -> f64 {
 
 pub(crate) fn floor(x: f64) -> f64 {
     libm::floor(x)
+}
+
+/// Whether `x` is neither infinite nor NaN: `f64::is_finite` without a comparison in double precision.
+pub(crate) fn is_finite(x: f64) -> bool {
+    x.to_bits() >> 52 & 0x7ff != 0x7ff
 }
 
 pub(crate) fn ln_gamma(x: f64) -> f64 {

@@ -1,10 +1,11 @@
 //! A noise model: a sum of terms with coefficients. Its Allan variance, spectrum, degrees of freedom, and its distance
 //! from a measured curve.
 
-use crate::curve::{AllanPoint, Curve};
+use crate::curve::{AllanPoint, CurveView};
 use crate::math::{abs, clamp, exp, ln, sqrt};
 use crate::noise_type::VarianceFractions;
-use crate::term::{MAX_SHAPE, NoiseTerm};
+use crate::term::{AllTerms, MAX_SHAPE, NoiseTerm, TermSet};
+use core::mem::discriminant;
 use heapless::Vec;
 
 /// Largest number of terms of a model.
@@ -12,6 +13,8 @@ pub const MAX_TERMS: usize = 8;
 
 /// A fitted term with its 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FittedTerm {
     /// The term, with the estimates of its shape parameters.
     pub kind: NoiseTerm,
@@ -36,7 +39,10 @@ impl FittedTerm {
 
 /// A sum of noise terms.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Model {
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::not_negative"))]
     sample_period: f64,
     terms: Vec<FittedTerm, MAX_TERMS>,
 }
@@ -59,6 +65,13 @@ impl Model {
     #[must_use]
     pub fn sample_period(&self) -> f64 {
         self.sample_period
+    }
+
+    /// The fitted term of this kind; where the kind has shape parameters, the first one of any shape. `None` if the model
+    /// does not have it.
+    #[must_use]
+    pub fn get(&self, kind: NoiseTerm) -> Option<&FittedTerm> {
+        self.terms.iter().find(|term| discriminant(&term.kind) == discriminant(&kind))
     }
 
     /// The terms, in the order in which they were given.
@@ -98,7 +111,11 @@ impl Model {
         if total <= 0.0 {
             return VarianceFractions::WHITE;
         }
-        variance_fractions(self.contributions(n).map(|(kind, avar)| (kind, avar / total)), n, self.sample_period)
+        variance_fractions::<AllTerms>(
+            self.contributions(n).map(|(kind, avar)| (kind, avar / total)),
+            n,
+            self.sample_period,
+        )
     }
 
     /// Equivalent degrees of freedom of a measured point if the model is correct.
@@ -107,7 +124,7 @@ impl Model {
         let avar = self.avar(point.n);
         let parts: Vec<(NoiseTerm, f64), MAX_TERMS> =
             self.contributions(point.n).map(|(kind, part)| (kind, part / avar)).collect();
-        degrees_of_freedom(&parts, point, self.sample_period, &FlickerCorrelations::EMPTY).0
+        degrees_of_freedom::<AllTerms>(&parts, point, self.sample_period, &FlickerCorrelations::EMPTY).0
     }
 
     /// The same model in another unit: every coefficient is multiplied by `lsb`, units per count.
@@ -134,14 +151,14 @@ impl Model {
 
 /// Sum of the variance fractions of the power laws that the terms resemble at averaging factor `n`. Each term comes with
 /// its fraction of the variance.
-pub(crate) fn variance_fractions(
+pub(crate) fn variance_fractions<T: TermSet>(
     parts: impl Iterator<Item = (NoiseTerm, f64)>,
     n: u64,
     sample_period: f64,
 ) -> VarianceFractions {
     let mut fractions = VarianceFractions { white: 0.0, ..VarianceFractions::WHITE };
     for (kind, part) in parts {
-        let share = kind.share(part, n, sample_period);
+        let share = T::share(&kind, part, n, sample_period);
         fractions.white += share.white;
         fractions.flicker += share.flicker;
         fractions.random_walk += share.random_walk;
@@ -153,6 +170,7 @@ pub(crate) fn variance_fractions(
 /// Distance of a model from a measured curve over the octaves with `n ≤ M/8` of a curve of `M` samples. `v` is the
 /// measured and `m` the modelled Allan variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Discrepancy {
     /// `mean edf·(ln(m/v) + v/m − 1)`: about 1 for a correct model on the data to which it was fitted.
     pub deviance_per_point: f64,
@@ -177,7 +195,8 @@ impl Discrepancy {
     /// The degrees of freedom are those of the model's mixture of terms. A measured or modelled variance of 0 makes the
     /// result infinite.
     #[must_use]
-    pub fn between<const OCTAVES: usize>(model: &Model, curve: &Curve<OCTAVES>) -> Option<Self> {
+    pub fn between<'a>(model: &Model, curve: impl Into<CurveView<'a>>) -> Option<Self> {
+        let curve = curve.into();
         let (mut deviance, mut square, mut points) = (0.0, 0.0, 0);
         let (mut worst_sigma, mut worst_tau, mut worst_ratio) = (0.0_f64, 0.0, 1.0);
         for point in curve.points() {
@@ -206,8 +225,9 @@ impl Discrepancy {
 }
 
 /// Deviation of `ratio`, a χ² variable over its `edf` degrees of freedom, from its expectation in standard deviations of a
-/// normal variable.
-fn cube_root_deviation(ratio: f64, edf: f64) -> f64 {
+/// normal variable (Wilson and Hilferty; Abramowitz and Stegun, 26.4.14).
+#[must_use]
+pub fn cube_root_deviation(ratio: f64, edf: f64) -> f64 {
     let variance = 2.0 / (9.0 * edf);
     (exp(ln(ratio) / 3.0) - (1.0 - variance)) / sqrt(variance)
 }
@@ -226,7 +246,7 @@ const MAX_LAGS: usize = 4 * MAX_OVERLAP as usize + 1;
 ///
 /// [`confidence`]: crate::confidence
 #[inline(never)] // its stack frame would otherwise be part of every caller's
-pub(crate) fn degrees_of_freedom(
+pub(crate) fn degrees_of_freedom<T: TermSet>(
     parts: &[(NoiseTerm, f64)],
     point: &AllanPoint,
     sample_period: f64,
@@ -245,11 +265,11 @@ pub(crate) fn degrees_of_freedom(
             _ => &mut noise[..reach(2)],
         };
         match kind {
-            NoiseTerm::BiasInstability => flicker.add(*share as f32, overlap, sums),
-            kind => add_correlations(kind, *share as f32, point.n, overlap, sample_period, sums),
+            NoiseTerm::BiasInstability => flicker.add::<T>(*share as f32, overlap, sums),
+            kind => add_correlations::<T>(kind, *share as f32, point.n, overlap, sample_period, sums),
         }
         let stride = point.n as f64 / f64::from(overlap);
-        far += 2.0 * share * share * kind.squared_covariance_tail(point.n, stride, sample_period);
+        far += 2.0 * share * share * T::squared_covariance_tail(kind, point.n, stride, sample_period);
     }
     let pairs = noise.iter().zip(&deterministic).map(|(noise, fixed)| f64::from(noise * (noise + 2.0 * fixed)));
     let weight = |lag: usize| if lag == 0 { 1.0 } else { 2.0 * (1.0 - lag as f64 / count) };
@@ -272,17 +292,17 @@ impl FlickerCorrelations {
     pub(crate) const EMPTY: Self = Self { overlap: 0, table: [0.0; MAX_LAGS] };
 
     /// Computes the correlations for points of this overlap and of those that divide it.
-    pub(crate) fn fill(&mut self, overlap: u32) {
+    pub(crate) fn fill<T: TermSet>(&mut self, overlap: u32) {
         let overlap = overlap.min(MAX_OVERLAP);
         (self.overlap, self.table) = (overlap, [0.0; MAX_LAGS]);
-        add_flicker_correlations(1.0, overlap, &mut self.table);
+        add_flicker_correlations::<T>(1.0, overlap, &mut self.table);
     }
 
     /// Adds `share` times the correlations at lags of 0, 1, 2 … strides to `sums`.
-    fn add(&self, share: f32, overlap: u32, sums: &mut [f32]) {
+    fn add<T: TermSet>(&self, share: f32, overlap: u32, sums: &mut [f32]) {
         let per_lag = if self.overlap.is_multiple_of(overlap) { (self.overlap / overlap) as usize } else { 0 };
         if per_lag == 0 || (sums.len() - 1) * per_lag >= MAX_LAGS {
-            return add_flicker_correlations(share, overlap, sums);
+            return add_flicker_correlations::<T>(share, overlap, sums);
         }
         for (sum, known) in sums.iter_mut().zip(self.table.iter().step_by(per_lag)) {
             *sum += share * known;
@@ -291,8 +311,8 @@ impl FlickerCorrelations {
 }
 
 /// [`add_correlations`] of flicker noise. They do not depend on the averaging factor, for which the overlap serves.
-fn add_flicker_correlations(share: f32, overlap: u32, sums: &mut [f32]) {
-    add_correlations(&NoiseTerm::BiasInstability, share, u64::from(overlap), overlap, 1.0, sums);
+fn add_flicker_correlations<T: TermSet>(share: f32, overlap: u32, sums: &mut [f32]) {
+    add_correlations::<T>(&NoiseTerm::BiasInstability, share, u64::from(overlap), overlap, 1.0, sums);
 }
 
 /// Adds `share` times the correlations of second differences of averages over `n` samples to `sums`, at lags of 0, 1, 2 …
@@ -300,11 +320,18 @@ fn add_flicker_correlations(share: f32, overlap: u32, sums: &mut [f32]) {
 ///
 /// For up to [`MAX_LAGS`] lags and an overlap of up to [`MAX_OVERLAP`]; otherwise nothing is added.
 #[inline(never)] // its stack frame would otherwise be part of every caller's
-fn add_correlations(kind: &NoiseTerm, share: f32, n: u64, overlap: u32, sample_period: f64, sums: &mut [f32]) {
+fn add_correlations<T: TermSet>(
+    kind: &NoiseTerm,
+    share: f32,
+    n: u64,
+    overlap: u32,
+    sample_period: f64,
+    sums: &mut [f32],
+) {
     let width = overlap as usize;
     let mut table = [0.0; MAX_LAGS + 2 * MAX_OVERLAP as usize];
     let Some(v) = table.get_mut(..sums.len() + 2 * width) else { return };
-    kind.sum_variances(n as f64 / f64::from(overlap), sample_period, v);
+    T::sum_variances(kind, n as f64 / f64::from(overlap), sample_period, v);
     // The covariances are these fourth differences times `−1/(4n²)`.
     let fourth = |lag: usize| {
         6.0 * v[lag] - 4.0 * (v[lag.abs_diff(width)] + v[lag + width]) + v[lag.abs_diff(2 * width)] + v[lag + 2 * width]
@@ -330,7 +357,7 @@ mod tests {
             // The second difference of averages is a filter of 2n weights; at n = 6, lags on both sides of 2n.
             let weights: Vec<f64> = (0..2 * n).map(|i| if i < n { 1.0 } else { -1.0 } / n as f64).collect();
             let mut correlations = [0.0; 31];
-            add_correlations(&kind, 1.0, n as u64, n as u32, PERIOD, &mut correlations);
+            add_correlations::<AllTerms>(&kind, 1.0, n as u64, n as u32, PERIOD, &mut correlations);
             for lag in [0_usize, 1, 5, 6, 11, 12, 13, 30] {
                 let mut covariance = 0.0;
                 for (i, a) in weights.iter().enumerate() {

@@ -122,6 +122,7 @@ pub(crate) fn fourth_power(difference: i64, bits: u32) -> u128 {
 /// Held as `high·2⁶³ + low`: most additions touch `low` alone, whose top bit is a pending carry. Two pairs of words can
 /// stand for the same sum while a carry is pending, so equality compares values.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Sum {
     low: u64,
     high: u64,

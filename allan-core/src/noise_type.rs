@@ -4,6 +4,8 @@ use crate::math::coarse_log2;
 
 /// A power-law noise of a rate signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum PowerLaw {
     /// Angle quantization, σ² ∝ τ⁻².
     Quantization,
@@ -43,6 +45,7 @@ impl PowerLaw {
 
 /// The fractions of a variance that are due to each power law; they sum to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VarianceFractions {
     /// Angle quantization, σ² ∝ τ⁻².
     pub quantization: f64,

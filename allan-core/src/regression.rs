@@ -15,9 +15,10 @@ use crate::coupling::Covariance;
 use crate::curve::{AllanPoint, Curve};
 use crate::fit::least_squares::{entry, solve, triangle};
 use crate::fit::{FreeShapes, estimate, fit};
+use crate::list::List;
 use crate::math::sqrt;
 use crate::model::Model;
-use crate::term::NoiseTerm;
+use crate::term::{AllTerms, NoiseTerm};
 use heapless::Vec;
 use uncertainty::{OctaveWeight, edf, is_poor, sum_variance};
 
@@ -30,7 +31,7 @@ const LEAST_EDF: f64 = 2.0;
 const SIGNIFICANT: f64 = 4.5;
 
 /// Allan covariances of two channels, by averaging factor, in the product of their units.
-pub type CovarianceCurve<const POINTS: usize> = Vec<Covariance, POINTS>;
+pub type CovarianceCurve<const POINTS: usize> = List<Covariance, POINTS>;
 
 /// Octaves at which the measurement noise of a covariate exceeds this fraction of its variance are not used.
 const NOISE_FRACTION: f64 = 0.5;
@@ -44,6 +45,7 @@ const NOISE: [NoiseTerm; 2] = [NoiseTerm::Quantization, NoiseTerm::AngleRandomWa
 /// A measured quantity on which a channel may depend: its Allan variance at up to `POINTS` averaging factors, and its
 /// measurement noise.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Covariate<const POINTS: usize> {
     sample_period: f64,
     /// Coefficients of [`NOISE`].
@@ -107,7 +109,7 @@ impl<const POINTS: usize> Covariate<POINTS> {
 }
 
 /// Sensitivities to several covariates at once.
-type Sensitivities = Vec<Sensitivity, MAX_COVARIATES>;
+type Sensitivities = List<Sensitivity, MAX_COVARIATES>;
 
 /// A channel, the covariates on which it may depend, and their Allan covariances at up to `COUPLED` octaves.
 pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = POINTS> {
@@ -123,14 +125,14 @@ pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = P
 impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, COUPLED> {
     /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen.
     #[must_use]
-    pub fn sensitivities(&self) -> Vec<Sensitivity, MAX_COVARIATES> {
+    pub fn sensitivities(&self) -> List<Sensitivity, MAX_COVARIATES> {
         self.sensitivities_while(&mut || true).unwrap_or_default()
     }
 
     /// As [`sensitivities`](Self::sensitivities), calling `keep_on` before every fit; `None` if it returned false.
     #[must_use]
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
-    pub fn sensitivities_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<Vec<Sensitivity, MAX_COVARIATES>> {
+    pub fn sensitivities_while(&self, keep_on: &mut dyn FnMut() -> bool) -> Option<List<Sensitivity, MAX_COVARIATES>> {
         let mut accepted = Sensitivities::new();
         let (mut octaves, mut reweighted) = (Vec::new(), Vec::new());
         while accepted.len() < self.covariates.len() {
@@ -169,7 +171,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         residual.copy_from(self.channel);
         self.subtract(&mut residual, sensitivities, |covariate, n| self.measured(covariate, n));
         let mut model = Model::new(0.0, []);
-        estimate(&residual, &NoiseTerm::BASELINE, FreeShapes::None, &mut || true, &mut model);
+        estimate::<AllTerms>((&residual).into(), &NoiseTerm::BASELINE, FreeShapes::None, &mut || true, &mut model);
         let is_known = |point: &&AllanPoint| self.covariates.iter().any(|covariate| covariate.avar(point.n).is_some());
         octaves.clear();
         let is_poor = is_poor(&model, residual.points());

@@ -4,12 +4,13 @@
 //! its fields, and a CRC-32 of both. Deserialising refuses another version, type or size, a wrong checksum, and words that
 //! no sequence of samples leads to; the error says which.
 
+use crate::math::is_finite;
 use core::fmt;
 use core::marker::PhantomData;
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::ser::SerializeTuple;
-use serde::{Deserializer, Serializer};
+use serde::{Deserialize, Deserializer, Serializer};
 
 const VERSION: u8 = 2;
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -141,3 +142,38 @@ macro_rules! serde_by_words {
     };
 }
 pub(crate) use serde_by_words;
+
+/// Deserialises a number and checks it.
+fn checked<'de, T: Deserialize<'de> + Copy, D: Deserializer<'de>>(
+    deserializer: D,
+    is_valid: impl Fn(T) -> bool,
+    expected: &'static str,
+) -> Result<T, D::Error> {
+    let value = T::deserialize(deserializer)?;
+    if is_valid(value) { Ok(value) } else { Err(de::Error::custom(expected)) }
+}
+
+/// A time constant, a frequency or a bandwidth.
+pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |x: f64| x > 0.0 && is_finite(x), "a shape parameter that is not positive and finite")
+}
+
+/// The sample period of a model, 0 in a model without a curve.
+pub(crate) fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |x: f64| x >= 0.0 && is_finite(x), "a sample period that is negative or not finite")
+}
+
+/// The decimation of a filter.
+pub(crate) fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |x: f64| x >= 1.0 && is_finite(x), "a decimation below 1 or not finite")
+}
+
+/// The stages of a filter.
+pub(crate) fn stages<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u8, D::Error> {
+    checked(deserializer, |stages| matches!(stages, 1 | 2), "a filter that has neither 1 nor 2 stages")
+}
+
+/// The taps of a filter.
+pub(crate) fn taps<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> {
+    checked(deserializer, |taps| (1..=128).contains(&taps), "a filter that has not 1 to 128 taps")
+}

@@ -2,7 +2,7 @@
 //!
 //! It is biased wherever two terms overlap, and serves as a comparison with the [`fit`](crate::fit::fit).
 
-use crate::curve::{AllanPoint, Curve};
+use crate::curve::{AllanPoint, CurveView};
 use crate::math;
 use core::f64::consts::{LN_2, PI};
 use core::ops::RangeInclusive;
@@ -18,6 +18,7 @@ pub const WORST_ACCURACY: f64 = 25.0;
 
 /// A coefficient and the interval of averaging times, in s, on which its slope was found.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlopeEstimate {
     /// Value, in the unit of [`NoiseTerm::unit`](crate::term::NoiseTerm::unit).
     pub value: f64,
@@ -34,15 +35,15 @@ pub fn percentage_accuracy(samples: u64, n: u64) -> f64 {
 
 /// N: the value at τ = 1 s of the line of slope −½ through the longest interval of this slope left of the minimum.
 #[must_use]
-pub fn angle_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<SlopeEstimate> {
-    let (points, lowest) = accurate_points(curve)?;
+pub fn angle_random_walk<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
+    let (points, lowest) = accurate_points(curve.into())?;
     on_line(&points[..=lowest], -0.5, 1.0)
 }
 
 /// B: the minimum of σ times `√(π/(2 ln 2))`, if it lies in a flat interval.
 #[must_use]
-pub fn bias_instability<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<SlopeEstimate> {
-    let (points, lowest) = accurate_points(curve)?;
+pub fn bias_instability<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
+    let (points, lowest) = accurate_points(curve.into())?;
     let tau = points[lowest].tau;
     let flat = runs(points, 0.0, FLAT_TOLERANCE).find(|run| interval(run).contains(&tau))?;
     Some(SlopeEstimate { value: math::sqrt(points[lowest].avar * PI / (2.0 * LN_2)), interval: interval(flat) })
@@ -50,13 +51,13 @@ pub fn bias_instability<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<
 
 /// K: the value at τ = 3 s of the line of slope +½ through the longest interval of this slope right of the minimum.
 #[must_use]
-pub fn rate_random_walk<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<SlopeEstimate> {
-    let (points, lowest) = accurate_points(curve)?;
+pub fn rate_random_walk<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
+    let (points, lowest) = accurate_points(curve.into())?;
     on_line(&points[lowest..], 0.5, 3.0)
 }
 
 /// The points that are accurate enough, and the index of the lowest.
-fn accurate_points<const OCTAVES: usize>(curve: &Curve<OCTAVES>) -> Option<(&[AllanPoint], usize)> {
+fn accurate_points(curve: CurveView<'_>) -> Option<(&[AllanPoint], usize)> {
     let accurate = |point: &&AllanPoint| percentage_accuracy(curve.samples(), point.n) <= WORST_ACCURACY;
     let points = &curve.points()[..curve.points().iter().take_while(accurate).count()];
     let lowest = (0..points.len()).min_by(|&a, &b| points[a].avar.total_cmp(&points[b].avar))?;

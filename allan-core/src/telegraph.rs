@@ -1,6 +1,6 @@
 //! Random telegraph noise: it has the Allan variance of a Gauss–Markov process, but another kurtosis.
 
-use crate::curve::Curve;
+use crate::curve::CurveView;
 use crate::math::{ln, sqrt};
 use crate::model::Model;
 use crate::term::{Markov, NoiseTerm};
@@ -15,6 +15,7 @@ const FIRST: f64 = 1.0 / 20.0;
 
 /// Measured kurtosis relative to that of a telegraph signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KurtosisRatio {
     /// Measured kurtosis over that of a symmetric telegraph signal: 0 for a Gaussian process, 1 for two levels with equal
     /// dwell times, more for unequal ones.
@@ -35,11 +36,8 @@ impl KurtosisRatio {
 ///
 /// `None` if the model does not have this term or the curve has no kurtosis.
 #[must_use]
-pub fn kurtosis_ratio<const POINTS: usize>(
-    curve: &Curve<POINTS>,
-    model: &Model,
-    markov: Markov,
-) -> Option<KurtosisRatio> {
+pub fn kurtosis_ratio<'a>(curve: impl Into<CurveView<'a>>, model: &Model, markov: Markov) -> Option<KurtosisRatio> {
+    let curve = curve.into();
     let term = model.terms().iter().find(|term| term.kind == NoiseTerm::Markov(markov))?;
     let (mut along, mut weight) = (0.0, 0.0);
     for point in curve.points() {

@@ -7,10 +7,12 @@
 mod exponential;
 mod filter;
 mod process;
+mod set;
 
 pub use exponential::{Markov, Resonance};
 pub use filter::MovingAverageFilter;
 pub use process::{AngleRandomWalk, BiasInstability, Process, Quantization, RateRamp, RateRandomWalk, Sinusoid};
+pub(crate) use set::{AllTerms, PowerLawTerms, TermSet};
 
 use crate::math::clamp;
 use crate::noise_type::VarianceFractions;
@@ -22,6 +24,8 @@ pub const MAX_SHAPE: usize = 2;
 ///
 /// "Unit" is that of the channel, of a rate in deg/s for example.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum NoiseTerm {
     /// Q: white noise of the angle, in unit·s.
     Quantization,
@@ -48,11 +52,18 @@ const SHARPEST: f64 = 200.0;
 /// Frequency over bandwidth below which it cannot distinguish a resonance from a Markov process.
 const BROADEST: f64 = 1.5;
 
+/// Averaging time over time constant `x` up to which a Gauss-Markov process counts as a random walk, and from which on as white
+/// noise. Its Allan variance is proportional to `(1 − (3 − 4e⁻ˣ + e⁻²ˣ)/(2x))/x`: at these two its slope is +½ and −½, halfway
+/// between that of a random walk (+1), of flicker noise (0) and of white noise (−1).
+const WALK_UP_TO: f64 = 0.769;
+const WHITE_FROM: f64 = 4.145;
+
 /// An unused shape parameter.
 const UNUSED: (&str, f64) = ("", 0.0);
 
 /// The unit of a coefficient in terms of the unit of the channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CoefficientUnit {
     /// unit·s
     TimesSecond,
@@ -69,28 +80,17 @@ pub enum CoefficientUnit {
 /// Evaluates an expression with the process of a term, without dynamic dispatch: methods that are never called are not
 /// linked.
 macro_rules! with_process {
+    (@one $power_law:ident, $process:ident => $expression:expr) => {{
+        let $process = &$power_law;
+        $expression
+    }};
     ($kind:expr, $process:ident => $expression:expr) => {
         match $kind {
-            NoiseTerm::Quantization => {
-                let $process = &Quantization;
-                $expression
-            }
-            NoiseTerm::AngleRandomWalk => {
-                let $process = &AngleRandomWalk;
-                $expression
-            }
-            NoiseTerm::BiasInstability => {
-                let $process = &BiasInstability;
-                $expression
-            }
-            NoiseTerm::RateRandomWalk => {
-                let $process = &RateRandomWalk;
-                $expression
-            }
-            NoiseTerm::RateRamp => {
-                let $process = &RateRamp;
-                $expression
-            }
+            NoiseTerm::Quantization => with_process!(@one Quantization, $process => $expression),
+            NoiseTerm::AngleRandomWalk => with_process!(@one AngleRandomWalk, $process => $expression),
+            NoiseTerm::BiasInstability => with_process!(@one BiasInstability, $process => $expression),
+            NoiseTerm::RateRandomWalk => with_process!(@one RateRandomWalk, $process => $expression),
+            NoiseTerm::RateRamp => with_process!(@one RateRamp, $process => $expression),
             NoiseTerm::Filtered($process) => $expression,
             NoiseTerm::Markov($process) => $expression,
             NoiseTerm::Resonance($process) => $expression,
@@ -98,6 +98,7 @@ macro_rules! with_process {
         }
     };
 }
+use with_process;
 
 impl NoiseTerm {
     /// The terms of the baseline model: N, B, K.
@@ -233,11 +234,28 @@ impl NoiseTerm {
             Self::Markov(markov) => {
                 let averaged = n as f64 * sample_period / markov.time_constant;
                 match averaged {
-                    short if short < 0.7 => VarianceFractions { random_walk: fraction, ..none },
-                    long if long > 4.0 => VarianceFractions { white: fraction, ..none },
+                    short if short < WALK_UP_TO => VarianceFractions { random_walk: fraction, ..none },
+                    long if long > WHITE_FROM => VarianceFractions { white: fraction, ..none },
                     _ => VarianceFractions { flicker: fraction, ..none },
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Markov, NoiseTerm, WALK_UP_TO, WHITE_FROM};
+
+    /// The slopes of the process's own curve, of a time constant of a million samples.
+    #[test]
+    fn a_gauss_markov_process_has_the_slopes_that_it_is_classified_by() {
+        let process = NoiseTerm::Markov(Markov { time_constant: 1e6 }).process();
+        let slope = |x: f64| {
+            let avar = |x: f64| process.avar((x * 1e6) as u64, 1.0);
+            (avar(1.01 * x) / avar(x / 1.01)).ln() / (2.0 * 1.01_f64.ln())
+        };
+        assert!((slope(WALK_UP_TO) - 0.5).abs() < 1e-3, "{}", slope(WALK_UP_TO));
+        assert!((slope(WHITE_FROM) + 0.5).abs() < 1e-3, "{}", slope(WHITE_FROM));
     }
 }

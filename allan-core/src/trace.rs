@@ -8,11 +8,12 @@ mod candidates;
 
 pub use candidates::LineCandidates;
 
-use crate::curve::{AllanPoint, Curve};
+use crate::curve::{AllanPoint, CurveView};
 use crate::fit::{Baseline, FreeShapes, Goodness, deviance, estimate, goodness, set_bounds};
+use crate::list::List;
 use crate::math;
 use crate::model::{MAX_TERMS, Model};
-use crate::term::{MovingAverageFilter, NoiseTerm};
+use crate::term::{AllTerms, MovingAverageFilter, NoiseTerm};
 use candidates::Families;
 use heapless::Vec;
 
@@ -31,6 +32,7 @@ const PROMISING: f32 = 0.4;
 
 /// A term that was missing in the baseline model.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AddedTerm {
     /// Index of the term in the final model.
     pub term: usize,
@@ -43,6 +45,7 @@ pub struct AddedTerm {
 
 /// Residual of the Allan deviation at one averaging factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Residual {
     /// Averaging factor, samples.
     pub n: u64,
@@ -54,6 +57,7 @@ pub struct Residual {
 
 /// The result of a [`trace`].
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Trace {
     /// The fitted baseline model.
     pub before: Model,
@@ -64,13 +68,13 @@ pub struct Trace {
     /// Goodness of that model.
     pub after_goodness: Goodness,
     /// The added terms, in the order in which they were found; empty if the baseline model is complete.
-    pub added: Vec<AddedTerm, MAX_ADDED>,
+    pub added: List<AddedTerm, MAX_ADDED>,
 }
 
 impl Trace {
     /// The baseline model (N, B, K) fitted to `curve`, without added terms.
     #[must_use]
-    pub fn baseline<const POINTS: usize>(curve: &Curve<POINTS>) -> Self {
+    pub fn baseline<'a>(curve: impl Into<CurveView<'a>>) -> Self {
         let mut trace = Self::empty();
         trace.fit_baseline(curve);
         trace
@@ -82,13 +86,17 @@ impl Trace {
     pub fn empty() -> Self {
         let nothing = Goodness { deviance: 0.0, p_value: 1.0 };
         let (before, after) = (Model::new(0.0, []), Model::new(0.0, []));
-        Self { before, before_goodness: nothing, after, after_goodness: nothing, added: Vec::new() }
+        Self { before, before_goodness: nothing, after, after_goodness: nothing, added: List::new() }
     }
 
     /// Makes it the [`baseline`](Self::baseline) of `curve`.
+    pub fn fit_baseline<'a>(&mut self, curve: impl Into<CurveView<'a>>) {
+        self.fit_baseline_in(curve.into());
+    }
+
     #[inline(never)] // its stack frame would otherwise be part of every caller's
-    pub fn fit_baseline<const POINTS: usize>(&mut self, curve: &Curve<POINTS>) {
-        estimate(curve, &NoiseTerm::BASELINE, FreeShapes::None, &mut || true, &mut self.before);
+    fn fit_baseline_in(&mut self, curve: CurveView) {
+        estimate::<AllTerms>(curve, &NoiseTerm::BASELINE, FreeShapes::None, &mut || true, &mut self.before);
         set_bounds(curve, &mut self.before);
         self.before_goodness = goodness(curve, &self.before);
         self.after.clone_from(&self.before);
@@ -103,11 +111,8 @@ impl Trace {
 /// that the sensor may have: `filters` lists their starting shapes, with a decimation of 1 where every value of the filter
 /// is read. The decimation of the others is adjusted. Of each of the two kinds the first 64 are used.
 #[must_use]
-pub fn trace<const POINTS: usize>(
-    curve: &Curve<POINTS>,
-    lines: LineCandidates,
-    filters: &[MovingAverageFilter],
-) -> Trace {
+pub fn trace<'a>(curve: impl Into<CurveView<'a>>, lines: LineCandidates, filters: &[MovingAverageFilter]) -> Trace {
+    let curve = curve.into();
     let mut trace = Trace::baseline(curve);
     let _completed = trace_while(&mut trace, curve, lines, filters, &mut || true);
     trace
@@ -118,13 +123,14 @@ pub fn trace<const POINTS: usize>(
 ///
 /// `keep_on` may do other work: a trace takes seconds on a microcontroller.
 #[must_use]
-pub fn trace_while<const POINTS: usize>(
+pub fn trace_while<'a>(
     trace: &mut Trace,
-    curve: &Curve<POINTS>,
+    curve: impl Into<CurveView<'a>>,
     lines: LineCandidates,
     filters: &[MovingAverageFilter],
     keep_on: &mut dyn FnMut() -> bool,
 ) -> bool {
+    let curve = curve.into();
     let mut search = Search { families: Families::new(curve, lines, filters), free: lines.free(), keep_on };
     search.complete(curve, trace).is_ok()
 }
@@ -148,7 +154,7 @@ struct Best {
 
 impl Search<'_> {
     /// Adds all missing terms.
-    fn complete<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<(), Cancelled> {
+    fn complete(&mut self, curve: CurveView, trace: &mut Trace) -> Result<(), Cancelled> {
         while trace.after.terms().len() < MAX_TERMS && !trace.added.is_full() && self.extend(curve, trace)? {
             if trace.added.len() > 1 {
                 self.reconsider(curve, &mut trace.after, &trace.added)?;
@@ -163,7 +169,7 @@ impl Search<'_> {
 
     /// Adds the most significant term; false if there is none.
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
-    fn extend<const POINTS: usize>(&mut self, curve: &Curve<POINTS>, trace: &mut Trace) -> Result<bool, Cancelled> {
+    fn extend(&mut self, curve: CurveView, trace: &mut Trace) -> Result<bool, Cancelled> {
         let mut best = Best::NONE;
         self.most_significant(curve, &trace.after, &mut best)?;
         if best.kinds.is_empty() {
@@ -173,7 +179,7 @@ impl Search<'_> {
         // A decimated filter replaces the white noise, which is the first term.
         let before = trace.after.terms().len();
         let term = if best.kinds.len() == before { 0 } else { before };
-        estimate(curve, &best.kinds, self.free, self.keep_on, &mut trace.after);
+        estimate::<AllTerms>(curve, &best.kinds, self.free, self.keep_on, &mut trace.after);
         self.check_cancelled()?;
         // There is room: the caller adds nothing to a full list.
         let _ = trace.added.push(AddedTerm { term, score: best.score, residual });
@@ -183,17 +189,12 @@ impl Search<'_> {
     /// Tests again the terms that were added before the latest one: each is replaced by another candidate that fits
     /// significantly better.
     #[inline(never)]
-    fn reconsider<const POINTS: usize>(
-        &mut self,
-        curve: &Curve<POINTS>,
-        model: &mut Model,
-        added: &[AddedTerm],
-    ) -> Result<(), Cancelled> {
+    fn reconsider(&mut self, curve: CurveView, model: &mut Model, added: &[AddedTerm]) -> Result<(), Cancelled> {
         let mut other = Model::new(0.0, []);
         for known in added.iter().filter(|known| known.term >= NoiseTerm::BASELINE.len()) {
             let mut kinds = model.kinds();
             let old = kinds.remove(known.term);
-            estimate(curve, &kinds, FreeShapes::None, self.keep_on, &mut other);
+            estimate::<AllTerms>(curve, &kinds, FreeShapes::None, self.keep_on, &mut other);
             let mut best = Best::NONE;
             self.most_significant(curve, &other, &mut best)?;
             // A decimated filter would change the order of the terms.
@@ -203,7 +204,7 @@ impl Search<'_> {
             let Some(new) = best.kinds.pop().filter(|new| new.name() != old.name()) else { continue };
             // At the index of the old term.
             let _ = best.kinds.insert(known.term.min(kinds.len()), new);
-            estimate(curve, &best.kinds, self.free, self.keep_on, &mut other);
+            estimate::<AllTerms>(curve, &best.kinds, self.free, self.keep_on, &mut other);
             self.check_cancelled()?;
             if deviance(curve, &other) < deviance(curve, model) - SIGNIFICANT {
                 core::mem::swap(model, &mut other);
@@ -215,17 +216,18 @@ impl Search<'_> {
     /// Sets `most` to the model extended by the candidate with the largest decrease of the deviance beyond the required one;
     /// leaves it if no candidate reaches that.
     #[inline(never)]
-    fn most_significant<const POINTS: usize>(
-        &mut self,
-        curve: &Curve<POINTS>,
-        model: &Model,
-        most: &mut Best,
-    ) -> Result<(), Cancelled> {
+    fn most_significant(&mut self, curve: CurveView, model: &Model, most: &mut Best) -> Result<(), Cancelled> {
         let mut baseline = Baseline::empty(curve);
         baseline.fill(model);
         let families = self.families;
         let mut kinds = model.kinds();
         let known = kinds.len();
+        // As many terms as points fit every curve: one more explains nothing. Of a point half of whose samples were replaced from
+        // their neighbours the interpolation has made the greater part.
+        let is_measured = |point: &&AllanPoint| point.avar > 0.0 && point.replaced < 0.5;
+        if curve.points().iter().filter(is_measured).count() <= known {
+            return Ok(());
+        }
         for family in families.all() {
             let mut best: Option<(f32, NoiseTerm)> = None;
             for shape in families.shapes(family) {
@@ -297,7 +299,7 @@ fn with_candidate<T>(
 }
 
 /// The largest residual in units of its uncertainty.
-fn largest_residual<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Residual {
+fn largest_residual(curve: CurveView, model: &Model) -> Residual {
     let residual = |point: &AllanPoint| {
         let excess = math::sqrt(point.avar / model.avar(point.n)) - 1.0;
         Residual { n: point.n, excess, sigmas: excess * math::sqrt(2.0 * model.edf(point)) }

@@ -4,7 +4,8 @@
 use super::{Cascade, Octave};
 use crate::confidence::Difference;
 use crate::curve::{AllanPoint, Curve};
-use crate::interpolation::{BridgedGaps, Interpolation};
+use crate::interpolation::{AddedVariance, BridgedGaps, Interpolation};
+use crate::math::{Real, times_power_of_two};
 use crate::moments::Moments;
 use crate::noise_type::PowerLaw;
 #[cfg(feature = "serde")]
@@ -12,6 +13,7 @@ use crate::serialized::{StateWords, serde_by_words, visit_signed};
 
 /// The exact sums of one octave of a [`Cascade`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OctaveSums {
     /// Sum of the squared second differences, counts².
     pub squares: u128,
@@ -21,6 +23,10 @@ pub struct OctaveSums {
     pub count: u64,
     /// The gaps that this octave bridges and the octave before does not.
     pub interpolation: Interpolation,
+}
+
+impl OctaveSums {
+    pub(super) const EMPTY: Self = Self { squares: 0, fourths: 0, count: 0, interpolation: Interpolation::NONE };
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
@@ -70,6 +76,44 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         Some(measured - added.subtracted(measured))
     }
 
+    /// The [`curve`](Self::curve) without confidence: less flash, and a small part of the instructions.
+    ///
+    /// Variances are computed in single precision, with a relative error below 10⁻⁶.
+    /// Its points have no kurtosis, the bounds 0 and infinity, white noise as their noise type, and the number of
+    /// differences that do not overlap, a lower limit, as their degrees of freedom. A [`fit`](crate::fit::fit) computes the
+    /// degrees of freedom itself and gives nearly the same coefficients from both curves.
+    #[must_use]
+    pub fn curve_without_confidence(&self, sample_period: f64) -> Curve<OCTAVES> {
+        let mut curve = Curve::empty();
+        Self::rebuild_without_confidence(&mut curve, sample_period, self.len(), |octave| {
+            self.octave_sums(octave).unwrap_or_default()
+        });
+        curve
+    }
+
+    /// As [`rebuild_curve`](Self::rebuild_curve), for [`curve_without_confidence`](Self::curve_without_confidence).
+    pub fn rebuild_without_confidence(
+        curve: &mut Curve<OCTAVES>,
+        sample_period: f64,
+        samples: u64,
+        sums: impl Fn(usize) -> OctaveSums,
+    ) {
+        let points = Self::points(samples, sums, |octave, sums, overlap, added: AddedVariance<f32>| {
+            let n = 1_u64 << octave;
+            // Divided by one factor after the other, so that no intermediate value leaves the range of single precision.
+            let measured = sums.squares as f32 / sums.count as f32 / n as f32 / (2 * n) as f32;
+            let interpolation = added.subtracted(measured);
+            AllanPoint {
+                tau: times_power_of_two(sample_period, octave as u32),
+                avar: f64::from(measured - interpolation),
+                interpolation: interpolation.into(),
+                replaced: added.replaced.into(),
+                ..AllanPoint::without_confidence(n, sums.count, overlap)
+            }
+        });
+        curve.fill_without_confidence(sample_period, samples, points);
+    }
+
     /// Makes `curve` the [`curve`](Self::curve) of an estimator with these sums of `samples` samples, without the
     /// estimator. `sums` returns the sums of an octave.
     pub fn rebuild_curve(
@@ -78,21 +122,32 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         samples: u64,
         sums: impl Fn(usize) -> OctaveSums,
     ) {
-        let mut gaps = BridgedGaps::new(0.0);
-        let points = (0..OCTAVES).filter_map(|octave| {
-            let OctaveSums { squares, fourths, count, interpolation } = sums(octave);
-            let moments = Moments { squares: squares.into(), fourths: fourths.into() };
-            let n = 1_u64 << octave;
-            if octave == 0 && count > 0 {
-                gaps = BridgedGaps::new(squares as f64 / (2.0 * count as f64));
-            }
-            gaps.add(&interpolation, n, 1 << Self::SHORTEST_BRIDGING);
-            let overlap = n.min(OVERLAP as u64) as u32;
-            let added = gaps.added_variance(Difference::Second, n, samples);
-            let point = AllanPoint::new(n, sample_period, &moments, octave, count, overlap, PowerLaw::White);
-            (count > 0).then(|| point.without(added))
+        let points = Self::points(samples, sums, |octave, sums, overlap, added: AddedVariance| {
+            let moments = Moments { squares: sums.squares.into(), fourths: sums.fourths.into() };
+            AllanPoint::new(1 << octave, sample_period, &moments, octave, sums.count, overlap, PowerLaw::White)
+                .without(added)
         });
         curve.fill(sample_period, samples, points);
+    }
+
+    /// The points that `point` makes of an octave, its sums, its overlap, and what replacing missing samples has added.
+    fn points<F: Real>(
+        samples: u64,
+        sums: impl Fn(usize) -> OctaveSums,
+        point: impl Fn(usize, &OctaveSums, u32, AddedVariance<F>) -> AllanPoint,
+    ) -> impl Iterator<Item = AllanPoint> {
+        let mut gaps = BridgedGaps::new(F::constant(0.0));
+        (0..OCTAVES).filter_map(move |octave| {
+            let sums = sums(octave);
+            let n = 1_u64 << octave;
+            if octave == 0 && sums.count > 0 {
+                gaps = BridgedGaps::new(F::from_integer(sums.squares) / (F::constant(2.0) * F::from_word(sums.count)));
+            }
+            gaps.add(&sums.interpolation, n, 1 << Self::SHORTEST_BRIDGING);
+            let overlap = n.min(OVERLAP as u64) as u32;
+            let added = gaps.added_variance(Difference::Second, n, samples);
+            (sums.count > 0).then(|| point(octave, &sums, overlap, added))
+        })
     }
 
     /// The gaps that an averaging factor of `n` samples bridges.
@@ -162,7 +217,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
             if octave.resumed > self.resumed {
                 return Some("a gap after the newest sample");
             }
-            let count = octave.differences.checked_add(self.open_differences(k));
+            let count = octave.differences.checked_add(Self::open_differences(self.elapsed, k, octave.resumed));
             if count.is_none_or(|count| count > periods) {
                 return Some("more differences than samples");
             }

@@ -5,6 +5,11 @@ use super::{Cascade, Octave, second_difference};
 /// A bridged gap has at most `1/REACH` of the averaging time of the octaves that keep their differences over it.
 const REACH: u64 = 8;
 
+/// The quotient rounded down; 0 for a divisor of 0, which no gap has: a panic would be linked for it otherwise.
+fn quotient(dividend: i64, divisor: i64) -> i64 {
+    dividend.checked_div_euclid(divisor).unwrap_or(0)
+}
+
 /// A gap that is being closed by replacing its samples with their expected mean.
 struct Bridge {
     /// Time of the last sample before the gap and of the last replaced one.
@@ -49,15 +54,16 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         // The octave from which on a gap of this length is bridged; all octaves cut it out if nothing precedes it.
         let bridging = Self::SHORTEST_BRIDGING + (u64::BITS - (missing - 1).leading_zeros()) as usize;
         let bridging = if start > self.resumed { bridging.min(OCTAVES) } else { OCTAVES };
-        for k in 0..bridging {
-            self.octaves[k].differences = self.count(k);
-            self.octaves[k].resumed = end;
+        for (k, octave) in self.octaves.iter_mut().enumerate().take(bridging) {
+            let open = Self::open_differences(start, k, octave.resumed);
+            octave.differences = octave.differences.saturating_add(open);
+            octave.resumed = end;
         }
         if bridging < OCTAVES {
             // At most 2²⁷ samples are bridged.
             self.test_interpolation(missing as u32, bridging);
             let replaced = self.interpolated(missing, next);
-            let each = if missing > 1 { replaced.div_euclid(missing as i64) } else { replaced };
+            let each = if missing > 1 { quotient(replaced, missing as i64) } else { replaced };
             self.bridge(&Bridge { start, end, sum: self.sum, replaced, each }, bridging);
         } else {
             self.sum = 0;
@@ -80,7 +86,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Expected sum of the missing samples: their number times the mean of the samples around them.
     fn interpolated(&self, missing: u64, next: i32) -> i64 {
         let before = (2 * missing - 1).min(self.elapsed - self.resumed);
-        let level = (before / (2 * OVERLAP as u64)).checked_ilog2().map_or(0, |log| log as usize + 1);
+        let level = (u64::BITS - (before / (2 * OVERLAP as u64)).leading_zeros()) as usize;
         let step = (self.elapsed - before + (1 << level) - 1) >> level;
         let samples = (self.elapsed - (step << level) + 1) as i64;
         let sum = self.sum.wrapping_sub(self.sum_at(level, step)).wrapping_add(i64::from(next));
@@ -88,15 +94,18 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         if samples == 2 * missing {
             return sum >> 1;
         }
-        let (mean, rest) = (sum.div_euclid(samples), sum.rem_euclid(samples));
-        mean * missing + rest * missing / samples
+        let mean = quotient(sum, samples);
+        let rest = sum.wrapping_sub(mean.wrapping_mul(samples));
+        mean * missing + quotient(rest * missing, samples)
     }
 
     /// Replaces as many known samples before the gap as are missing, in the same way, and adds the squared error. Where
     /// the delay lines do not hold the sums for this number, it is rounded to a multiple of a power of two, and no sample
     /// after the replaced ones is used.
     fn test_interpolation(&mut self, missing: u32, bridging: usize) {
-        self.octaves[bridging].interpolation.add_gap(missing);
+        if let Some(octave) = self.octaves.get_mut(bridging) {
+            octave.interpolation.add_gap(missing);
+        }
         // The lines reach back 2·OVERLAP strides, of which the mean and the samples to replace take three parts.
         let widest = (2 * OVERLAP as u32 - 1) / 3;
         let strides = |level: usize| (missing + (1 << level >> 1)) >> level;
@@ -112,13 +121,16 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let after = if level == 0 { self.sum.wrapping_sub(end) } else { 0 };
         let around = start.wrapping_sub(first).wrapping_add(after);
         let error = (around >> 1).wrapping_sub(end.wrapping_sub(start));
-        self.octaves[bridging].interpolation.add_test((width as u32) << level, error);
+        if let Some(octave) = self.octaves.get_mut(bridging) {
+            octave.interpolation.add_test((width as u32) << level, error);
+        }
     }
 
     /// Fills the delay lines with the running sums of the gap, at most `OVERLAP + 1` a line, and adds the differences that
     /// end in it at the octaves that bridge it.
     fn bridge(&mut self, gap: &Bridge, bridging: usize) {
-        let highest = (gap.start ^ gap.end).ilog2() as usize;
+        // Not `ilog2`, as the code for its panic is linked although a gap is never empty.
+        let highest = (u64::BITS - 1).saturating_sub((gap.start ^ gap.end).leading_zeros()) as usize;
         // From the coarsest line on, as each takes its sums from finer ones.
         for level in (0..=highest.min(Self::LEVELS - 1)).rev() {
             let (last, newest) = (gap.start >> level, gap.end >> level);
@@ -128,10 +140,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             for step in entering..=entered {
                 let time = step << level;
                 middle = if time > gap.start { gap.sum_at(time) } else { self.sum_at(level, step) };
-                self.octaves[level + Self::FINE].exchange(step, middle);
+                if let Some(octave) = self.octaves.get_mut(level + Self::FINE) {
+                    octave.exchange(step, middle);
+                }
             }
             let (k, time) = (level + Self::FINE, newest << level);
-            let octave = &mut self.octaves[k];
+            let Some(octave) = self.octaves.get_mut(k) else { continue };
             if k >= bridging && time - octave.resumed >= 2 << k {
                 octave.moments.add(k, second_difference(gap.sum_at(time), middle, octave.oldest));
             }
@@ -147,11 +161,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let (mut level, mut step) = (level, step);
         loop {
             let back = (self.elapsed >> level) - step;
-            if back >= 2 * OVERLAP as u64 {
-                return self.octaves[level + Self::FINE].oldest;
-            }
             if back >= OVERLAP as u64 {
-                return self.octaves[level + Self::FINE].line[Self::slot(step)];
+                let Some(octave) = self.octaves.get(level + Self::FINE) else { return 0 };
+                return if back >= 2 * OVERLAP as u64 { octave.oldest } else { octave.line[Self::slot(step)] };
             }
             if level == 0 {
                 return self.recent[Self::slot(step)];

@@ -6,12 +6,13 @@
 //! bound is the value under which the estimate lies at the 2.5 % or 97.5 % quantile of the distribution for that value.
 
 use super::least_squares::{entry, solve, triangle};
-use super::likelihood::{MAX_PARAMETERS, Points, Problem};
-use super::shape::Parameter;
-use crate::confidence::{NORMAL_975, chi_square_quantile};
-use crate::curve::Curve;
+use super::likelihood::{MAX_PARAMETERS, MAX_POINTS, Points, Problem};
+use super::shape::{FreeShapes, Parameter};
+use crate::confidence::NORMAL_975;
+use crate::curve::CurveView;
 use crate::math::{absf, exp, sqrt, sqrtf};
 use crate::model::{MAX_TERMS, Model};
+use crate::term::TermSet;
 
 /// Standard deviation over the estimate of an amount below which the scatter at the estimate is used: the error of the
 /// bounds of the coefficient is then a hundredth of their distance.
@@ -22,15 +23,25 @@ const SMALLEST: f32 = 1e-4;
 const SEARCH_ROUNDS: usize = 5;
 
 /// Sets the bounds of all parameters of `model`, which was fitted to the curve.
+pub(crate) fn set<T: TermSet>(curve: CurveView, model: &mut Model) {
+    set_free::<T>(curve, model, FreeShapes::AllExcept(&[]));
+}
+
+/// Sets the bounds of all coefficients of `model`, which was fitted to the curve, and of its `free` shapes.
 #[inline(never)] // here and below: so that stack frames do not add up in the caller
-pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model) {
-    let (mut points, mut problem) = (Points::empty(curve), Problem::empty());
-    points.fill();
+pub(crate) fn set_free<T: TermSet>(curve: CurveView, model: &mut Model, free: FreeShapes) {
+    let (mut points, mut problem) = (Points::empty(curve), Problem::<T>::empty());
+    points.fill::<T>();
     problem.fill_from_model(&mut points, model);
-    let parameters = problem.differentiate(&points);
+    let parameters = problem.differentiate(&points, free);
     let estimate = problem.amounts;
+    if points.measured.len() < parameters.len() {
+        return leave_open(&points, &problem, model);
+    }
     for (column, parameter) in parameters.iter().enumerate() {
-        let Some(own) = scatter(&points, &problem, parameters.len(), column) else { return };
+        let Some(own) = scatter(&points, &problem, parameters.len(), column) else {
+            return leave_open(&points, &problem, model);
+        };
         match *parameter {
             Parameter::Amount(term) => {
                 let direction = core::array::from_fn(|other| own.direction[other] / own.direction[term]);
@@ -43,6 +54,11 @@ pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model)
                     term,
                 };
                 let (low, high) = candidates.bounds(&own);
+                // Far from the estimate the search can leave the range in which a quantile exists.
+                let amount = estimate[term];
+                let low = if low <= amount { low } else { 0.0 };
+                let high = if high >= amount { high } else { largest(candidates.points, candidates.problem, term) };
+                let high = high.max(amount);
                 let coefficient = |amount: f32| sqrt(f64::from(amount) * problem.units[term]);
                 let set = &mut model.terms_mut()[term];
                 (set.low, set.high) = (coefficient(low), coefficient(high));
@@ -51,6 +67,7 @@ pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model)
                     problem.set_confidence(&mut points);
                 }
             }
+            Parameter::Shape(..) if !T::SHAPES => {}
             Parameter::Shape(term, index) => {
                 let term = &mut model.terms_mut()[term];
                 let (_, value) = term.kind.shape()[index];
@@ -59,6 +76,32 @@ pub(crate) fn set<const POINTS: usize>(curve: &Curve<POINTS>, model: &mut Model)
             }
         }
     }
+}
+
+/// Sets the bounds of a model whose terms the points do not determine: each coefficient is between 0 and the largest one that
+/// the points allow.
+#[inline(never)]
+fn leave_open<T: TermSet>(points: &Points, problem: &Problem<T>, model: &mut Model) {
+    for (term, set) in model.terms_mut().iter_mut().enumerate() {
+        let amount = largest(points, problem, term).max(problem.amounts[term]);
+        (set.low, set.high) = (0.0, sqrt(f64::from(amount) * problem.units[term]));
+    }
+}
+
+/// The largest amount of a term that no point excludes: alone it has at one of them the upper 95 % bound of the variance,
+/// `edf/χ²` times what was measured, and less at the others. 0 without a point.
+fn largest<T: TermSet>(points: &Points, problem: &Problem<T>, term: usize) -> f32 {
+    let mut largest = f32::INFINITY;
+    for (at, point) in points.measured.iter().enumerate() {
+        // χ²/edf has a skewness of √(8/edf) and a deviation of √(2/edf).
+        let smallest = 1.0 + sqrtf(2.0 / point.edf) * T::gamma_quantile(sqrtf(8.0 / point.edf), false);
+        let bound = 1.0 / (smallest * problem.columns[term][at]);
+        // A point without the term, or with too few degrees of freedom for a quantile, excludes nothing.
+        if bound < largest {
+            largest = bound;
+        }
+    }
+    if largest.is_finite() { largest } else { 0.0 }
 }
 
 /// The distribution of the estimate of a parameter.
@@ -72,26 +115,19 @@ struct Scatter {
 }
 
 impl Scatter {
-    /// The `p` quantile of the estimate less its expectation: that of the gamma distribution with this standard deviation
+    /// The 97.5 % quantile if `upper`, else the 2.5 % quantile, of the estimate less its expectation: that of the gamma distribution with this standard deviation
     /// and skewness (Pearson type III).
-    fn quantile(&self, p: f64) -> f32 {
+    fn quantile<T: TermSet>(&self, upper: bool) -> f32 {
         // At lower skewness the distribution is normal to a hundredth of a standard deviation.
-        let skewness = f64::from(self.skewness.max(0.02));
-        let dof = 8.0 / (skewness * skewness);
-        self.deviation * ((chi_square_quantile(p, dof) - dof) / sqrt(2.0 * dof)) as f32
+        self.deviation * T::gamma_quantile(self.skewness.max(0.02), upper)
     }
 }
 
 /// The scatter of the parameter of a column if the present amounts are the true ones: the sandwich covariance
 /// `H⁻¹·JᵀRJ·H⁻¹`, and the skewness of the points weighted by their contributions to it.
 #[inline(never)]
-fn scatter<const POINTS: usize>(
-    points: &Points<POINTS>,
-    problem: &Problem<POINTS>,
-    parameters: usize,
-    column: usize,
-) -> Option<Scatter> {
-    let mut weights = [0.0; POINTS];
+fn scatter<T: TermSet>(points: &Points, problem: &Problem<T>, parameters: usize, column: usize) -> Option<Scatter> {
+    let mut weights = [0.0; MAX_POINTS];
     let direction = direction(points, problem, parameters, column, &mut weights)?;
     // The skewness of χ² with edf degrees of freedom is √(8/edf).
     let mut skewed = weights;
@@ -108,12 +144,12 @@ fn scatter<const POINTS: usize>(
 /// The parameter's column of the inverse information matrix; sets `weights` to those of the standardised residuals in its
 /// estimate. `None` if the matrix is singular.
 #[inline(never)]
-fn direction<const POINTS: usize>(
-    points: &Points<POINTS>,
-    problem: &Problem<POINTS>,
+fn direction<T: TermSet>(
+    points: &Points,
+    problem: &Problem<T>,
     parameters: usize,
     column: usize,
-    weights: &mut [f32; POINTS],
+    weights: &mut [f32; MAX_POINTS],
 ) -> Option<[f32; MAX_PARAMETERS]> {
     let mut information = [0.0_f64; triangle(MAX_PARAMETERS)];
     for (at, (weight, point)) in weights.iter_mut().zip(&points.measured).enumerate() {
@@ -134,16 +170,16 @@ fn direction<const POINTS: usize>(
 }
 
 /// Test inversion for the amount of one term.
-struct Candidates<'a, 'b, const POINTS: usize> {
-    points: &'a mut Points<'b, POINTS>,
-    problem: &'a mut Problem<POINTS>,
+struct Candidates<'a, 'b, T> {
+    points: &'a mut Points<'b>,
+    problem: &'a mut Problem<T>,
     parameters: usize,
     estimate: [f32; MAX_TERMS],
     direction: [f32; MAX_TERMS],
     term: usize,
 }
 
-impl<const POINTS: usize> Candidates<'_, '_, POINTS> {
+impl<T: TermSet> Candidates<'_, '_, T> {
     /// 95 % bounds of the amount; `own` is the scatter at the estimate.
     fn bounds(&mut self, own: &Scatter) -> (f32, f32) {
         let amount = self.estimate[self.term];
@@ -163,43 +199,43 @@ impl<const POINTS: usize> Candidates<'_, '_, POINTS> {
     /// The value under which the observed estimate is the 97.5 % quantile; 0 if there is none.
     fn low(&mut self, observed: f32, own: &Scatter) -> f32 {
         let smallest = SMALLEST * observed;
-        let excess = self.quantile(smallest, 0.975) - observed;
+        let excess = self.quantile(smallest, true) - observed;
         if excess >= 0.0 {
             return 0.0;
         }
-        self.root(0.975, observed, (smallest, excess), (observed, own.quantile(0.975)))
+        self.root(true, observed, (smallest, excess), (observed, own.quantile::<T>(true)))
     }
 
     /// The value under which the observed estimate is the 2.5 % quantile.
     fn high(&mut self, observed: f32, own: &Scatter) -> f32 {
-        let distance = -own.quantile(0.025);
+        let distance = -own.quantile::<T>(false);
         let further = observed + 1.5 * distance;
-        let excess = self.quantile(further, 0.025) - observed;
-        self.root(0.025, observed, (observed, -distance), (further, excess))
+        let excess = self.quantile(further, false) - observed;
+        self.root(false, observed, (observed, -distance), (further, excess))
     }
 
-    /// The value under which the `p` quantile of the estimate is the observed one, by the secant method from two values with
+    /// The value under which this quantile of the estimate is the observed one, by the secant method from two values with
     /// their differences.
-    fn root(&mut self, p: f64, observed: f32, mut a: (f32, f32), mut b: (f32, f32)) -> f32 {
+    fn root(&mut self, upper: bool, observed: f32, mut a: (f32, f32), mut b: (f32, f32)) -> f32 {
         for _ in 0..SEARCH_ROUNDS {
             let slope = ((b.1 - a.1) / (b.0 - a.0)).max(0.02);
             let next = (b.0 - b.1 / slope).max(0.0);
             if absf(next - b.0) < 0.01 * absf(next - observed) {
                 return next;
             }
-            (a, b) = (b, (next, self.quantile(next, p) - observed));
+            (a, b) = (b, (next, self.quantile(next, upper) - observed));
         }
         b.0
     }
 
-    /// The `p` quantile of the estimate if the true amount is `value` and the other amounts are fitted to it.
-    fn quantile(&mut self, value: f32, p: f64) -> f32 {
+    /// This quantile of the estimate if the true amount is `value` and the other amounts are fitted to it.
+    fn quantile(&mut self, value: f32, upper: bool) -> f32 {
         let change = value - self.estimate[self.term];
         for (other, entry) in self.problem.amounts.iter_mut().enumerate() {
             *entry = (self.estimate[other] + change * self.direction[other]).max(0.0);
         }
         self.problem.set_confidence(self.points);
         let scatter = scatter(self.points, self.problem, self.parameters, self.term);
-        scatter.map_or(f32::NAN, |scatter| value + scatter.quantile(p))
+        scatter.map_or(f32::NAN, |scatter| value + scatter.quantile::<T>(upper))
     }
 }

@@ -6,12 +6,18 @@
 
 use super::least_squares::{MOST, entry, non_negative, triangle};
 use crate::confidence::{pure_octave_correlation, roots};
-use crate::curve::{AllanPoint, Curve};
-use crate::math::{absf, lnf, log2, sqrt, sqrtf};
+use crate::curve::{AllanPoint, CurveView};
+use crate::math::{absf, lnf, sqrt, sqrtf};
 use crate::model::{FittedTerm, FlickerCorrelations, MAX_TERMS, Model, degrees_of_freedom, variance_fractions};
 use crate::noise_type::VarianceFractions;
-use crate::term::NoiseTerm;
+use crate::term::{NoiseTerm, TermSet};
+use core::f32::consts::LN_2;
+use core::marker::PhantomData;
 use heapless::Vec;
+
+/// Largest number of points that a fit uses: one more than a cascade can have octaves. Of a curve with more points it uses
+/// those at octaves, as its bounds do not hold for the strongly correlated points between them.
+pub const MAX_POINTS: usize = 32;
 
 /// A measured point: its index in the curve and its statistical properties under the present model.
 pub(super) struct Measured {
@@ -27,26 +33,30 @@ pub(super) struct Measured {
 }
 
 /// The points of a curve with a positive variance.
-pub(super) struct Points<'a, const POINTS: usize> {
-    pub(super) curve: &'a Curve<POINTS>,
-    pub(super) measured: Vec<Measured, POINTS>,
+pub(super) struct Points<'a> {
+    pub(super) curve: CurveView<'a>,
+    pub(super) measured: Vec<Measured, MAX_POINTS>,
     flicker: FlickerCorrelations,
 }
 
-impl<'a, const POINTS: usize> Points<'a, POINTS> {
+impl<'a> Points<'a> {
     /// Without points, to be filled in place: it is too large to be moved over a small stack.
     #[inline(always)]
-    pub(super) const fn empty(curve: &'a Curve<POINTS>) -> Self {
+    pub(super) const fn empty(curve: CurveView<'a>) -> Self {
         Self { curve, measured: Vec::new(), flicker: FlickerCorrelations::EMPTY }
     }
 
     /// Sets the points to those of the curve, with the degrees of freedom that the curve gives.
-    pub(super) fn fill(&mut self) {
-        self.flicker.fill(self.curve.points().last().map_or(1, |point| point.overlap));
-        let positive = self.curve.points().iter().enumerate().filter(|(_, point)| point.avar > 0.0);
-        self.measured.extend(positive.map(|(at, point)| Measured {
+    pub(super) fn fill<T: TermSet>(&mut self) {
+        // More points than a cascade has octaves: those between octaves are left out.
+        let all = self.curve.points().len() <= MAX_POINTS;
+        let is_used = |point: &AllanPoint| point.avar > 0.0 && (all || point.n.is_power_of_two());
+        let last = self.curve.points().iter().rfind(|point| is_used(point));
+        self.flicker.fill::<T>(last.map_or(1, |point| point.overlap));
+        let used = self.curve.points().iter().enumerate().filter(|(_, point)| is_used(point));
+        self.measured.extend(used.take(MAX_POINTS).map(|(at, point)| Measured {
             at: at as u16,
-            octave: log2(point.n as f64) as f32,
+            octave: lnf(point.n as f32) / LN_2,
             edf: point.edf as f32,
             near: 1.0,
             roots: roots(VarianceFractions::WHITE).map(|root| root as f32),
@@ -73,7 +83,7 @@ impl<'a, const POINTS: usize> Points<'a, POINTS> {
     }
 
     /// Variances of the sums `Σ weights·residual` of standardised residuals.
-    pub(super) fn variances<const SUMS: usize>(&self, weights: [&[f32; POINTS]; SUMS]) -> [f32; SUMS] {
+    pub(super) fn variances<const SUMS: usize>(&self, weights: [&[f32; MAX_POINTS]; SUMS]) -> [f32; SUMS] {
         let mut variances = [0.0; SUMS];
         for (i, a) in self.measured.iter().enumerate() {
             for (j, b) in self.measured.iter().enumerate().take(i + 1) {
@@ -107,17 +117,18 @@ const CONVERGED_FRACTION: f32 = 1e-6;
 const FAR_OFF: f32 = 5.0;
 
 /// Terms with the squares of their coefficients (amounts), and the contribution of each to the points.
-pub(super) struct Problem<const POINTS: usize> {
+pub(super) struct Problem<T> {
     pub(super) kinds: Vec<NoiseTerm, MAX_TERMS>,
     /// Squared coefficient for an amount of 1.
     pub(super) units: [f64; MAX_TERMS],
     pub(super) amounts: [f32; MAX_TERMS],
     /// Derivatives, at every point, of the modelled over the measured variance with respect to the amounts of the terms,
     /// and after [`differentiate`](Self::differentiate) also to the logarithms of their shape parameters.
-    pub(super) columns: [[f32; POINTS]; MAX_PARAMETERS],
+    pub(super) columns: [[f32; MAX_POINTS]; MAX_PARAMETERS],
+    terms: PhantomData<T>,
 }
 
-impl<const POINTS: usize> Problem<POINTS> {
+impl<T: TermSet> Problem<T> {
     /// Without terms, to be filled in place: a problem is too large to be moved over a small stack.
     #[inline(always)]
     pub(super) const fn empty() -> Self {
@@ -125,15 +136,16 @@ impl<const POINTS: usize> Problem<POINTS> {
             kinds: Vec::new(),
             units: [0.0; MAX_TERMS],
             amounts: [0.0; MAX_TERMS],
-            columns: [[0.0; POINTS]; MAX_PARAMETERS],
+            columns: [[0.0; MAX_POINTS]; MAX_PARAMETERS],
+            terms: PhantomData,
         }
     }
 
     /// Sets the terms to the first [`MAX_TERMS`] of `kinds`. Terms that are unchanged keep their columns and amounts.
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
-    pub(super) fn set_terms(&mut self, points: &Points<POINTS>, kinds: &[NoiseTerm]) {
-        self.kinds.truncate(kinds.len());
-        for (term, &kind) in kinds.iter().enumerate().take(MAX_TERMS) {
+    pub(super) fn set_terms(&mut self, points: &Points, kinds: &[NoiseTerm]) {
+        self.kinds.truncate(kinds.iter().filter(|kind| T::contains(kind)).count());
+        for (term, &kind) in kinds.iter().filter(|kind| T::contains(kind)).enumerate().take(MAX_TERMS) {
             if self.kinds.get(term) != Some(&kind) {
                 // The vector has room for MAX_TERMS.
                 let _ = if term == self.kinds.len() { self.kinds.push(kind) } else { Ok(()) };
@@ -145,7 +157,7 @@ impl<const POINTS: usize> Problem<POINTS> {
 
     /// Sets the terms and the coefficients to those of a model, and the points' confidence to that under it.
     #[inline(never)]
-    pub(super) fn fill_from_model(&mut self, points: &mut Points<POINTS>, model: &Model) {
+    pub(super) fn fill_from_model(&mut self, points: &mut Points, model: &Model) {
         for (term, &FittedTerm { kind, value, .. }) in model.terms().iter().enumerate() {
             // A model has at most MAX_TERMS.
             let _ = self.kinds.push(kind);
@@ -156,7 +168,7 @@ impl<const POINTS: usize> Problem<POINTS> {
     }
 
     /// Computes the coefficients and the degrees of freedom that depend on them in turn, `rounds` times.
-    pub(super) fn fit_with_confidence(&mut self, points: &mut Points<POINTS>, rounds: usize) {
+    pub(super) fn fit_with_confidence(&mut self, points: &mut Points, rounds: usize) {
         for _ in 0..rounds {
             self.minimise(points);
             if self.amounts.iter().any(|&amount| amount > 0.0) {
@@ -167,7 +179,7 @@ impl<const POINTS: usize> Problem<POINTS> {
 
     /// Sets the points' degrees of freedom and variance fractions from the present mixture of terms.
     #[inline(never)]
-    pub(super) fn set_confidence(&self, points: &mut Points<POINTS>) {
+    pub(super) fn set_confidence(&self, points: &mut Points) {
         let period = points.curve.sample_period();
         for at in 0..points.measured.len() {
             let modelled = self.modelled(at, &self.amounts);
@@ -175,19 +187,19 @@ impl<const POINTS: usize> Problem<POINTS> {
             let present = (0..self.kinds.len()).filter(|&term| self.amounts[term] > 0.0);
             let parts: Vec<(NoiseTerm, f64), MAX_TERMS> = present.map(|term| (self.kinds[term], part(term))).collect();
             let point = points.point(at);
-            let fractions = variance_fractions(parts.iter().copied(), point.n, period);
-            let edf = degrees_of_freedom(&parts, point, period, &points.flicker);
+            let fractions = variance_fractions::<T>(parts.iter().copied(), point.n, period);
+            let edf = degrees_of_freedom::<T>(&parts, point, period, &points.flicker);
             points.set(at, edf, fractions);
         }
     }
 
     /// Replaces a term by one with another shape; its coefficient stays.
     #[inline(never)]
-    pub(super) fn set_kind(&mut self, points: &Points<POINTS>, term: usize, kind: NoiseTerm) {
+    pub(super) fn set_kind(&mut self, points: &Points, term: usize, kind: NoiseTerm) {
         self.kinds[term] = kind;
         let mut largest = 0.0_f64;
-        for (known, point) in (0..POINTS).zip(points.all()) {
-            let share = kind.avar(point.n, points.curve.sample_period()) / point.avar;
+        for (known, point) in (0..MAX_POINTS).zip(points.all()) {
+            let share = T::avar(&kind, point.n, points.curve.sample_period()) / point.avar;
             let column = &mut self.columns[term];
             if share > largest {
                 let shrink = (largest / share) as f32;
@@ -203,7 +215,7 @@ impl<const POINTS: usize> Problem<POINTS> {
 
     /// Sets the amounts to those that minimise the deviance at the present degrees of freedom, and returns it.
     #[inline(never)]
-    pub(super) fn minimise(&mut self, points: &Points<POINTS>) -> f32 {
+    pub(super) fn minimise(&mut self, points: &Points) -> f32 {
         let mut deviance = self.deviance(points);
         // A bad start, as left by a smaller model, may lead to a local minimum: try a step with the measured variances.
         if deviance > FAR_OFF * points.measured.len() as f32 {
@@ -230,7 +242,7 @@ impl<const POINTS: usize> Problem<POINTS> {
 
     /// Moves the amounts towards `proposed`, halving the step until the deviance falls, and returns the new deviance; `None`
     /// if it does not fall.
-    fn descend(&mut self, points: &Points<POINTS>, proposed: &[f32; MAX_TERMS], deviance: f32) -> Option<f32> {
+    fn descend(&mut self, points: &Points, proposed: &[f32; MAX_TERMS], deviance: f32) -> Option<f32> {
         let mut length = 1.0;
         for _ in 0..20 {
             let mut next = self.amounts;
@@ -248,11 +260,11 @@ impl<const POINTS: usize> Problem<POINTS> {
     }
 
     /// `Σ edf·(v/m − 1 − ln(v/m))`; infinite if the model has no variance at a point.
-    pub(super) fn deviance(&self, points: &Points<POINTS>) -> f32 {
+    pub(super) fn deviance(&self, points: &Points) -> f32 {
         self.deviance_at(points, &self.amounts)
     }
 
-    fn deviance_at(&self, points: &Points<POINTS>, amounts: &[f32; MAX_TERMS]) -> f32 {
+    fn deviance_at(&self, points: &Points, amounts: &[f32; MAX_TERMS]) -> f32 {
         let term = |at: usize| points.measured[at].edf * unit_deviance(self.modelled(at, amounts));
         let sum: f32 = (0..points.measured.len()).map(term).sum();
         if sum.is_nan() { f32::INFINITY } else { sum }
@@ -266,7 +278,7 @@ impl<const POINTS: usize> Problem<POINTS> {
 
     /// One step of Fisher scoring: non-negative least squares with weights from the modelled or from the measured variances.
     #[inline(never)]
-    fn scoring_step(&self, points: &Points<POINTS>, modelled: bool) -> [f32; MAX_TERMS] {
+    fn scoring_step(&self, points: &Points, modelled: bool) -> [f32; MAX_TERMS] {
         let mut normal = [0.0_f64; triangle(MAX_TERMS)];
         let mut right = [0.0_f64; MAX_TERMS];
         let terms = self.kinds.len();

@@ -3,10 +3,10 @@
 //!
 //! The search goes coordinate by coordinate in the logarithm of the parameters and refits the coefficients at each step.
 
-use super::likelihood::{MAX_PARAMETERS, Points, Problem};
+use super::likelihood::{MAX_PARAMETERS, MAX_POINTS, Points, Problem};
 use crate::math::{absf, exp, sqrtf};
 use crate::model::MAX_TERMS;
-use crate::term::{MAX_SHAPE, NoiseTerm};
+use crate::term::{MAX_SHAPE, NoiseTerm, TermSet};
 use heapless::Vec;
 
 /// Largest number of rounds over all parameters.
@@ -28,15 +28,17 @@ const SHORTEST: f64 = 1.5;
 pub(crate) enum FreeShapes<'a> {
     /// None.
     None,
-    /// All except the frequencies of the sinusoids in this list, which are known from a spectrum.
+    /// All except the frequencies of the sinusoids in this list, which are known from a spectrum, and the decimations of the
+    /// filters in it.
     AllExcept(&'a [NoiseTerm]),
 }
 
 impl FreeShapes<'_> {
     /// Whether the shape of this term is adjusted.
-    pub(super) fn has(self, kind: &NoiseTerm) -> bool {
-        let is_fixed = |known: &[NoiseTerm]| matches!(kind, NoiseTerm::Sinusoid(_)) && known.contains(kind);
-        !kind.free_parameters().is_empty() && matches!(self, Self::AllExcept(known) if !is_fixed(known))
+    pub(super) fn has<T: TermSet>(self, kind: &NoiseTerm) -> bool {
+        let can_be_known = matches!(kind, NoiseTerm::Sinusoid(_) | NoiseTerm::Filtered(_));
+        let is_fixed = |known: &[NoiseTerm]| can_be_known && known.contains(kind);
+        !T::free_parameters(kind).is_empty() && matches!(self, Self::AllExcept(known) if !is_fixed(known))
     }
 }
 
@@ -44,21 +46,21 @@ impl FreeShapes<'_> {
 ///
 /// `keep_on` is called before every step; if it returns false, the search ends where it is.
 #[inline(never)]
-pub(super) fn search<const POINTS: usize>(
-    points: &Points<POINTS>,
-    problem: &mut Problem<POINTS>,
+pub(super) fn search<T: TermSet>(
+    points: &Points,
+    problem: &mut Problem<T>,
     free: FreeShapes,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> f32 {
     let mut deviance = problem.minimise(points);
     // Decided before any shape changes, as known lines are recognised by their frequency.
     let mut is_free = [false; MAX_TERMS];
-    is_free.iter_mut().zip(&problem.kinds).for_each(|(is_free, kind)| *is_free = free.has(kind));
+    is_free.iter_mut().zip(&problem.kinds).for_each(|(is_free, kind)| *is_free = free.has::<T>(kind));
     let mut steps = [[FIRST_STEP; MAX_SHAPE]; MAX_TERMS];
     for _ in 0..ROUNDS {
         let (before, mut bracketed) = (deviance, true);
         for term in (0..problem.kinds.len()).filter(|&term| is_free[term]) {
-            for index in problem.kinds[term].free_parameters() {
+            for index in T::free_parameters(&problem.kinds[term]) {
                 if !keep_on() {
                     return deviance;
                 }
@@ -76,9 +78,9 @@ pub(super) fn search<const POINTS: usize>(
 
 /// Searches along one parameter: steps while the deviance falls, then goes to the vertex of a parabola. Returns the
 /// deviance, and whether the minimum is known to a fraction of its uncertainty.
-fn line_search<const POINTS: usize>(
-    points: &Points<POINTS>,
-    problem: &mut Problem<POINTS>,
+fn line_search<T: TermSet>(
+    points: &Points,
+    problem: &mut Problem<T>,
     (term, index): (usize, usize),
     step: &mut f64,
     mut deviance: f32,
@@ -145,21 +147,22 @@ pub(super) enum Parameter {
     Shape(usize, usize),
 }
 
-impl<const POINTS: usize> Problem<POINTS> {
-    /// Sets the columns of all amounts and of the free shape parameters of all terms with a positive amount, and lists the
-    /// parameters in the order of the columns.
+impl<T: TermSet> Problem<T> {
+    /// Sets the columns of all amounts and of the shape parameters of all terms with a positive amount and a `free` shape, and
+    /// lists the parameters in the order of the columns.
     #[inline(never)]
-    pub(super) fn differentiate(&mut self, points: &Points<POINTS>) -> Vec<Parameter, MAX_PARAMETERS> {
+    pub(super) fn differentiate(&mut self, points: &Points, free: FreeShapes) -> Vec<Parameter, MAX_PARAMETERS> {
         let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
-        for (term, kind) in self.kinds.iter().enumerate().filter(|(term, _)| self.amounts[*term] > 0.0) {
+        let is_free = |(term, kind): &(usize, &NoiseTerm)| self.amounts[*term] > 0.0 && free.has::<T>(kind);
+        for (term, kind) in self.kinds.iter().enumerate().filter(is_free) {
             let square = self.square(term);
-            for index in kind.free_parameters() {
+            for index in T::free_parameters(kind) {
                 let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
                 for (entry, point) in column.iter_mut().zip(points.all()) {
                     let at = |factor: f64| {
                         let mut shape: [f64; MAX_SHAPE] = kind.shape().map(|(_, value)| value);
                         shape[index] *= factor;
-                        kind.with_shape(shape).avar(point.n, points.curve.sample_period())
+                        T::avar(&kind.with_shape(shape), point.n, points.curve.sample_period())
                     };
                     *entry = (square * (at(1.0 + STEP) - at(1.0 - STEP)) / (2.0 * STEP) / point.avar) as f32;
                 }
@@ -173,9 +176,9 @@ impl<const POINTS: usize> Problem<POINTS> {
     /// Replaces the first columns by an orthonormal basis of the directions of the parameters in the space of standardised
     /// residuals, and returns the number of these directions.
     #[inline(never)]
-    pub(super) fn orthonormal(&mut self, points: &Points<POINTS>) -> usize {
-        let parameters = self.differentiate(points);
-        let mut scale = [0.0; POINTS];
+    pub(super) fn orthonormal(&mut self, points: &Points) -> usize {
+        let parameters = self.differentiate(points, FreeShapes::AllExcept(&[]));
+        let mut scale = [0.0; MAX_POINTS];
         for (at, (scale, point)) in scale.iter_mut().zip(&points.measured).enumerate() {
             *scale = sqrtf(point.edf / 2.0) / self.modelled(at, &self.amounts);
         }

@@ -91,6 +91,7 @@ fn quadratic_form(octaves: &[OctaveWeight], factor: impl Fn(usize) -> f64) -> f6
 
 /// The sensitivity of a channel to a covariate, with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sensitivity {
     /// Index of the covariate.
     pub covariate: usize,

@@ -14,17 +14,24 @@ use core::ops::{Add, Div, Mul, Sub};
 ///
 /// Sampled, it is an AR(1) process, whose Allan variance this is exactly. Random telegraph noise has the same Allan variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Markov {
     /// T: correlation time, s, above 0.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::positive"))]
     pub time_constant: f64,
 }
 
 /// A damped oscillation of variance 1 driven by white noise: `r(t) = exp(−π·Δf·|t|)·cos(2πf·t)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Resonance {
     /// f: centre frequency, Hz.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::positive"))]
     pub frequency: f64,
     /// Δf: full width of the spectral line at half its height, Hz, above 0.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::positive"))]
     pub bandwidth: f64,
 }
 

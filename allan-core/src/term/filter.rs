@@ -11,13 +11,18 @@ use core::f64::consts::PI;
 /// read at intervals near that length, only a correlation of neighbouring samples remains. The coefficient is that of the
 /// white noise at frequencies far below both rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MovingAverageFilter {
     /// Number of cascaded moving averages, 1 or 2.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::stages"))]
     pub stages: u8,
     /// L: number of values that each averages, 1 to 128.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::taps"))]
     pub taps: u16,
     /// Filter values per sample that is read, 1 or more. Not an integer where the filter and the reader have independent
     /// clocks.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::at_least_one"))]
     pub decimation: f64,
 }
 

@@ -38,23 +38,28 @@ pub trait Process {
 
 /// Quantization of the angle: `σ² = 3Q²/τ²` (IEEE 952), exact at every `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quantization;
 
 /// White rate noise: `σ² = N²/τ` (IEEE 952), exact at every `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngleRandomWalk;
 
 /// Flicker rate noise, averaged over each sampling interval: `σ² = (2 ln 2/π)·B²` (IEEE 952), exact at every `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BiasInstability;
 
 /// A random walk of the rate, sampled every `dt` seconds: `σ² = K²·dt·(2n² + 1)/(6n)`, which is 1.5 times the `K²τ/3` of
 /// IEEE 952 at `n = 1` and tends to it at large `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateRandomWalk;
 
 /// A linear trend of the rate: `σ² = R²τ²/2` (IEEE 952), exact at every `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateRamp;
 
 impl Process for Quantization {
@@ -139,8 +144,11 @@ impl Process for RateRamp {
 /// The form for continuous time is `[sin²(πfτ)/(πfτ)]²` (IEEE 952). A frequency above half the sample rate gives the
 /// variance of its alias.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sinusoid {
     /// f: frequency, Hz, above 0.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::positive"))]
     pub frequency: f64,
 }
 

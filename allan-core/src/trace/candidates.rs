@@ -1,6 +1,6 @@
 //! The candidate terms of a trace, by families that differ in their shape parameters alone.
 
-use crate::curve::Curve;
+use crate::curve::CurveView;
 use crate::fit::FreeShapes;
 use crate::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 
@@ -9,6 +9,7 @@ const MAX_SHAPES: usize = 64;
 
 /// Where candidate spectral lines come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LineCandidates<'a> {
     /// From the curve itself, in which only strong lines show.
     Curve,
@@ -67,11 +68,7 @@ pub(super) struct Families<'a> {
 }
 
 impl<'a> Families<'a> {
-    pub(super) fn new<const POINTS: usize>(
-        curve: &Curve<POINTS>,
-        lines: LineCandidates<'a>,
-        filters: &'a [MovingAverageFilter],
-    ) -> Self {
+    pub(super) fn new(curve: CurveView, lines: LineCandidates<'a>, filters: &'a [MovingAverageFilter]) -> Self {
         let sample_period = curve.sample_period();
         let longest_tau = curve.points().last().map_or(sample_period, |point| point.tau);
         Self { lines, filters, sample_period, longest_tau }

@@ -1,6 +1,6 @@
 //! Prints what the driver takes of a Cortex-M4F: bytes of flash, and instructions for a burst, counted by QEMU.
 
-use driver_footprint::{build, driver_bytes};
+use driver_footprint::{M4F, added_bytes, build};
 use std::process::Command;
 
 fn main() {
@@ -10,13 +10,13 @@ fn main() {
         ("everything", "every method, blocking (with arithmetic of f64)"),
         ("asynchronous", "every method, async (with arithmetic of f64)"),
     ] {
-        println!("{:>8} bytes  {what}", driver_bytes(features));
+        println!("{:>8} bytes  {what}", added_bytes(M4F, features));
     }
     println!("instructions:");
     let output = Command::new("qemu-system-arm")
         .args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=0"])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-        .arg(build("counted"))
+        .arg(build(M4F, "counted"))
         .output()
         .expect("qemu-system-arm starts; it is the Debian package of that name");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -4,11 +4,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
+/// The target of a Cortex-M4F.
+pub const M4F: &str = "thumbv7em-none-eabihf";
 
-/// Builds the image with these features, optimised as the firmware is, and returns the path of its ELF.
-pub fn build(features: &str) -> PathBuf {
+/// Builds the image for a target with these features, optimised as the firmware is, and returns the path of its ELF.
+pub fn build(target: &str, features: &str) -> PathBuf {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate lies in tests/");
     let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
     // Not the target folder of the tests, which the cargo that runs the tests may have locked.
@@ -16,18 +18,24 @@ pub fn build(features: &str) -> PathBuf {
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
         .args(["build", "--quiet", "--package", "driver-footprint", "--bin", "footprint", "--profile", "image"])
-        .args(["--locked", "--target", TARGET, "--features", &format!("on-target,{features}"), "--target-dir"])
+        .args(["--locked", "--target", target, "--features", &format!("on-target,{features}"), "--target-dir"])
         .arg(&directory)
         .status()
         .expect("cargo starts");
-    assert!(status.success(), "the image does not build; its target comes with `rustup target add {TARGET}`");
-    directory.join(TARGET).join("image").join("footprint")
+    assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
+    directory.join(target).join("image").join("footprint")
+}
+
+/// The image with these features, read before another one is built into the same file.
+pub fn built(target: &str, features: &str) -> Vec<u8> {
+    static BUILDING: Mutex<()> = Mutex::new(());
+    let _building = BUILDING.lock().unwrap_or_else(PoisonError::into_inner);
+    std::fs::read(build(target, features)).expect("the image is readable")
 }
 
 /// Bytes of flash that the image takes, which are those that its program headers load (ELF of 32 bits, little-endian).
-pub fn flash_bytes(image: &Path) -> u32 {
+pub fn flash_bytes(elf: &[u8]) -> u32 {
     const LOAD: u32 = 1;
-    let elf = std::fs::read(image).expect("the image is readable");
     let word = |at: usize| u32::from_le_bytes(elf[at..at + 4].try_into().expect("four bytes"));
     let half = |at: usize| usize::from(u16::from_le_bytes(elf[at..at + 2].try_into().expect("two bytes")));
     assert_eq!((&elf[..4], elf[4]), (&b"\x7fELF"[..], 1), "a 32-bit ELF");
@@ -36,7 +44,17 @@ pub fn flash_bytes(image: &Path) -> u32 {
     headers.filter(|&header| word(header) == LOAD).map(|header| word(header + 16)).sum()
 }
 
-/// Bytes of flash that these features add to the image without the driver.
-pub fn driver_bytes(features: &str) -> u32 {
-    flash_bytes(&build(features)) - flash_bytes(&build(""))
+/// Bytes of flash that these features add to the image without them.
+pub fn added_bytes(target: &str, features: &str) -> u32 {
+    flash_bytes(&built(target, features)) - flash_bytes(&built(target, ""))
+}
+
+/// Names of the functions in an image that belong to a panic.
+pub fn panic_symbols(elf: &[u8]) -> Vec<String> {
+    use object::{Object, ObjectSymbol, SymbolKind};
+    let elf = object::File::parse(elf).expect("an ELF");
+    let functions = elf.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text);
+    let names = functions.filter_map(|symbol| symbol.name().ok().map(str::to_owned));
+    let is_panic = |name: &String| ["panic", "unwrap_failed", "expect_failed"].iter().any(|part| name.contains(part));
+    names.filter(is_panic).collect()
 }

@@ -1,10 +1,13 @@
-//! An image that uses the part of the driver that its features choose, or counts the instructions of a burst.
+//! An image that uses the part of the driver or of allan-core that its features choose, or counts the instructions of a
+//! burst.
 #![no_std]
 #![no_main]
 
 mod bus;
 #[cfg(feature = "counted")]
 mod counted;
+#[cfg(feature = "push")]
+mod estimator;
 #[cfg(any(feature = "everything", feature = "asynchronous"))]
 mod methods;
 
@@ -22,6 +25,8 @@ fn main() -> ! {
     core::hint::black_box(methods::blocking(bus).is_ok());
     #[cfg(feature = "asynchronous")]
     core::hint::black_box(methods::asynchronous(bus));
+    #[cfg(feature = "push")]
+    estimator::run();
     core::hint::black_box(bus);
     debug::exit(debug::EXIT_SUCCESS);
     loop {

@@ -2,7 +2,7 @@
 
 use crate::emulator::instructions;
 use crate::late_state;
-use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
+use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard, Snapshot};
 use core::hint::black_box;
 use cortex_m_semihosting::{hprint, hprintln};
 
@@ -37,6 +37,12 @@ pub(crate) fn count() {
     additional_estimators(&sensor);
     let curve = late_state::after_constant::<OCTAVES, 8>(0, 1 << 24);
     report("curve_p8", 10, || (0..10).for_each(|_| drop(black_box(black_box(&curve).curve(0.01)))));
+    report("curve_without_confidence_p8", 10, || {
+        (0..10).for_each(|_| drop(black_box(black_box(&curve).curve_without_confidence(0.01))));
+    });
+    let mut snapshot = Snapshot::empty();
+    report("snapshot_p8", 10, || (0..10).for_each(|_| black_box(&curve).snapshot_into(black_box(&mut snapshot))));
+    hprintln!("bytes snapshot_p8 {}", size_of::<Snapshot<OCTAVES, 8>>());
     hprintln!("bytes p4 {}", Cascade::<OCTAVES, 4>::memory());
     hprintln!("bytes p8 {}", Cascade::<OCTAVES, 8>::memory());
     hprintln!("bytes p16 {}", Cascade::<OCTAVES, 16>::memory());

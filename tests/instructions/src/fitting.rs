@@ -5,7 +5,7 @@
 
 mod emulator;
 
-use allan_core::fit::{fit, goodness};
+use allan_core::fit::{fit, fit_power_laws, goodness};
 use allan_core::regression::{Covariate, CovariateRegression};
 use allan_core::term::MovingAverageFilter;
 use allan_core::trace::{LineCandidates, Trace, trace_while};
@@ -66,6 +66,7 @@ fn main() -> ! {
     let with_tone = black_box(record(100));
     let mut model = Model::new(SAMPLE_PERIOD, []);
     measure("fit", || model = black_box(fit(&quiet, &NoiseTerm::BASELINE)));
+    measure("fit_power_laws", || _ = black_box(fit_power_laws(&quiet, &NoiseTerm::BASELINE)));
     measure("goodness", || _ = black_box(goodness(&quiet, &model)));
     // The result lies outside the stack that is measured, as in the firmware.
     let mut result = Trace::empty();

@@ -1,0 +1,116 @@
+//! What the functions of both estimator types have in common.
+
+use crate::curve::{Points, allan_curve, put_curve};
+use crate::status::allan_status::{self, *};
+use crate::storage::{Object, check, elements, initialise_zeroed, object, object_mut, store};
+use allan_core::{Cascade, OctaveSums};
+
+/// The object behind an estimator.
+pub(crate) type Estimator<const OCTAVES: usize, const OVERLAP: usize> = Cascade<OCTAVES, OVERLAP>;
+
+/// # Safety
+/// As [`initialise_zeroed`], but for the promise about zeros.
+pub(crate) unsafe fn init<const OCTAVES: usize, const OVERLAP: usize, M>(
+    memory: *mut M,
+    bytes: usize,
+) -> Result<(), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    // SAFETY: an estimator consists of integers and arrays of them, for which zeros are valid; they are that of
+    // `Cascade::new`, which would take the stack of a whole estimator.
+    unsafe { initialise_zeroed::<Estimator<OCTAVES, OVERLAP>>(memory, bytes) }
+}
+
+/// # Safety
+/// As [`object_mut`] for `estimator` and [`object`] for `later`.
+pub(crate) unsafe fn merge<const OCTAVES: usize, const OVERLAP: usize, M>(
+    estimator: *mut M,
+    later: *const M,
+) -> Result<(), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    if estimator.cast_const() == later && !later.is_null() {
+        return Err(ALLAN_ERROR_SAME_OBJECT);
+    }
+    // SAFETY: as the caller promises. They are different objects.
+    let (estimator, later): (&mut Estimator<OCTAVES, OVERLAP>, &Estimator<OCTAVES, OVERLAP>) =
+        unsafe { (object_mut(estimator)?, object(later)?) };
+    estimator.merge(later);
+    Ok(())
+}
+
+/// # Safety
+/// As [`object`] for `estimator`; `curve` is null or points to memory of its type that the caller may write.
+pub(crate) unsafe fn curve<const OCTAVES: usize, const OVERLAP: usize, M>(
+    estimator: *const M,
+    sample_period: f64,
+    lsb: f64,
+    curve: *mut allan_curve,
+) -> Result<(), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    // SAFETY: as the caller promises.
+    let estimator: &Estimator<OCTAVES, OVERLAP> = unsafe { object(estimator)? };
+    if ![sample_period, lsb].into_iter().all(|number| number > 0.0 && number.is_finite()) {
+        return Err(ALLAN_ERROR_RANGE);
+    }
+    // SAFETY: as the caller promises.
+    let curve = unsafe { put_curve(curve)? };
+    let sums = |octave: usize| -> OctaveSums { estimator.octave_sums(octave).unwrap_or_default() };
+    // The points of an estimator with fewer octaves are the first ones of a curve with room for more.
+    Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_curve(curve, sample_period, estimator.len(), sums);
+    curve.scale(lsb);
+    Ok(())
+}
+
+/// # Safety
+/// As [`object`] for `estimator`; `buffer` is null or points to `capacity` bytes, and `length` to a number, that the caller
+/// may write.
+pub(crate) unsafe fn save<const OCTAVES: usize, const OVERLAP: usize, M>(
+    estimator: *const M,
+    buffer: *mut u8,
+    capacity: usize,
+    length: *mut usize,
+) -> Result<(), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    // SAFETY: as the caller promises.
+    let estimator: &Estimator<OCTAVES, OVERLAP> = unsafe { object(estimator)? };
+    check(buffer)?;
+    check(length)?;
+    if capacity > isize::MAX as usize {
+        return Err(ALLAN_ERROR_SIZE);
+    }
+    // SAFETY: not null and of a possible length, as just checked; the bytes are the caller's to write, and are cleared
+    // before they are read as initialised memory.
+    let buffer = unsafe {
+        buffer.write_bytes(0, capacity);
+        core::slice::from_raw_parts_mut(buffer, capacity)
+    };
+    let written = postcard::to_slice(estimator, buffer).map_err(|_| ALLAN_ERROR_SIZE)?.len();
+    // SAFETY: as the caller promises.
+    unsafe { store(length, written) }
+}
+
+/// # Safety
+/// As [`object_mut`] for `estimator`; `state` is null or points to `length` bytes.
+pub(crate) unsafe fn restore<const OCTAVES: usize, const OVERLAP: usize, M>(
+    estimator: *mut M,
+    state: *const u8,
+    length: usize,
+) -> Result<(), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    // SAFETY: as the caller promises.
+    let estimator: &mut Estimator<OCTAVES, OVERLAP> = unsafe { object_mut(estimator)? };
+    check(state)?;
+    // SAFETY: as the caller promises.
+    let state = unsafe { elements(state, length)? };
+    *estimator = postcard::from_bytes(state).map_err(|_| ALLAN_ERROR_STATE)?;
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! Builds the static library, and C programs with it.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+pub(crate) const ARM_GCC: &str = "arm-none-eabi-gcc";
+
+/// A microcontroller: Rust's target, the compiler's options, and the board that QEMU emulates.
+pub(crate) struct ArmTarget {
+    pub(crate) name: &'static str,
+    options: &'static [&'static str],
+    board: &'static str,
+}
+
+/// For the Cortex-M0+, whose board QEMU lacks, a Cortex-M3 executes the instructions of ARMv6-M.
+pub(crate) const ARM_TARGETS: [ArmTarget; 2] = [
+    ArmTarget {
+        name: "thumbv7em-none-eabihf",
+        options: &["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"],
+        board: "mps2-an386",
+    },
+    ArmTarget { name: "thumbv6m-none-eabi", options: &["-mcpu=cortex-m0plus"], board: "mps2-an385" },
+];
+
+/// A file of this crate.
+pub(crate) fn ours(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// Whether a tool starts.
+pub(crate) fn tool(name: &str) -> bool {
+    Command::new(name).arg("--version").output().is_ok()
+}
+
+/// The output of a command that must succeed.
+pub(crate) fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let (text, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{command:?}: {}\n{text}\n{errors}", output.status);
+    text.into_owned()
+}
+
+/// The header that cbindgen makes of the sources.
+pub(crate) fn header_text() -> String {
+    let config = cbindgen::Config::from_file(ours("cbindgen.toml")).expect("cbindgen.toml");
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for file in ["status", "storage", "cascade_24_8", "cascade_20_4", "curve", "model", "trace"] {
+        builder = builder.with_src(ours(&format!("src/{file}.rs")));
+    }
+    let mut text = Vec::new();
+    builder.generate().expect("the header").write(&mut text);
+    String::from_utf8(text).expect("UTF-8")
+}
+
+/// The static library for a target, or for this machine.
+pub(crate) fn library(target: Option<&str>) -> PathBuf {
+    let workspace = ours("../..");
+    let folder = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
+    // Not the folder of the tests, which the cargo that runs the tests may have locked.
+    let folder = workspace.join(folder).join("ffi");
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(workspace).args([
+        "build",
+        "--package",
+        "allan-core-ffi",
+        "--release",
+        "--locked",
+        "--target-dir",
+    ]);
+    cargo.arg(&folder);
+    if let Some(target) = target {
+        cargo.args(["--target", target]);
+    }
+    run(&mut cargo);
+    folder.join(target.unwrap_or("")).join("release/liballan_core.a")
+}
+
+/// Copies the library, the header and the files for CMake and pkg-config to where users have them.
+pub(crate) fn install(folder: &Path) -> PathBuf {
+    let prefix = folder.join("prefix");
+    run(Command::new("sh").arg(ours("install.sh")).arg(library(None)).arg(&prefix));
+    prefix
+}
+
+/// A linked program.
+pub(crate) struct Program {
+    folder: TempDir,
+    command: Command,
+}
+
+impl Program {
+    fn linked(sources: &[PathBuf], mut compiler: Command, libraries: &[&str], library: &Path) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("program");
+        compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-I"]).arg(ours("include"));
+        run(compiler.args(sources).arg(library).args(libraries).arg("-o").arg(&path));
+        Self { command: Command::new(path), folder }
+    }
+
+    /// A program for this machine.
+    pub(crate) fn on_host(sources: &[PathBuf], options: &[&str]) -> Self {
+        let mut compiler = Command::new("cc");
+        compiler.args(options);
+        Self::linked(sources, compiler, &["-lm", "-lpthread", "-ldl"], &library(None))
+    }
+
+    /// A program for an emulated board.
+    pub(crate) fn on_board(sources: &[PathBuf], target: &ArmTarget) -> Self {
+        let mut compiler = Command::new(ARM_GCC);
+        compiler.args(["-mthumb", "-Os", "--specs=rdimon.specs"]).args(target.options);
+        compiler.arg("-T").arg(ours("tests/programs/board.ld")).arg(ours("tests/programs/startup.c"));
+        Self::linked(sources, compiler, &["-lm"], &library(Some(target.name)))
+    }
+
+    /// The command that runs it.
+    pub(crate) fn command(&mut self) -> &mut Command {
+        &mut self.command
+    }
+
+    /// The command that runs it in the emulator.
+    pub(crate) fn emulated(&self, target: &ArmTarget) -> Command {
+        let mut qemu = Command::new("qemu-system-arm");
+        qemu.args(["-M", target.board, "-nographic", "-monitor", "none", "-serial", "none"]);
+        qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+            .arg(self.folder.path().join("program"));
+        qemu
+    }
+}

@@ -1,0 +1,107 @@
+"""Arrays of any dtype as the chunks of bytes that the compiled estimators read, and time stamps as gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+
+# Samples of one call of the compiled estimators. Between the calls Ctrl-C is noticed.
+CHUNK = 1 << 20
+
+Grid = tuple[float, float]
+
+
+def as_samples(samples: npt.ArrayLike) -> npt.NDArray[Any]:
+    """The samples as an array of one dimension, without a copy if they are one."""
+    array = np.asarray(samples)
+    if array.dtype == object and array.size:
+        # pandas has missing values of its own in its nullable types.
+        to_numpy = getattr(samples, "to_numpy", None)
+        if to_numpy is not None:
+            array = to_numpy(dtype=np.float64, na_value=np.nan)
+    if array.size == 0:
+        return np.empty(0, dtype=np.int32)
+    if array.ndim > 1:
+        raise ValueError(f"samples have the shape {array.shape}: one channel has one dimension")
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"samples of the dtype {array.dtype}: they must be integers or floats")
+    return np.atleast_1d(array)
+
+
+def automatic_grid(array: npt.NDArray[Any]) -> Grid:
+    """Origin and LSB for the floats of the first array that is pushed."""
+    values = np.ascontiguousarray(array[:CHUNK], dtype=np.float64)
+    grid = _native.automatic_quantizer(values.tobytes())
+    if grid is None:
+        raise ValueError(
+            "the first floats do not show how fine their grid must be, because no two neighbours differ: pass lsb=…"
+        )
+    return grid
+
+
+def chunks(array: npt.NDArray[Any], grid: Grid | None) -> Iterator[tuple[bytes, int]]:
+    """The bytes of each chunk, and the index of its first sample."""
+    limits = np.iinfo(np.int32)
+    for first in range(0, len(array), CHUNK):
+        chunk = array[first : first + CHUNK]
+        if grid is not None:
+            yield np.ascontiguousarray(chunk, dtype=np.float64).tobytes(), first
+            continue
+        if not np.can_cast(chunk.dtype, np.int32):
+            outside = (chunk < limits.min) | (chunk > limits.max)
+            if outside.any():
+                index = int(outside.argmax())
+                raise OverflowError(
+                    f"sample {first + index} is {chunk[index]}, outside the 32 bits of a count: "
+                    "pass lsb=1 and the origin from which counts are to be taken"
+                )
+        yield np.ascontiguousarray(chunk, dtype=np.int32).tobytes(), first
+
+
+def seconds(times: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Time stamps in s: numbers as they are, `datetime64` since 1970."""
+    array = np.atleast_1d(np.asarray(times))
+    if array.dtype.kind == "M":
+        # Whole seconds apart from the rest: nanoseconds since 1970 exceed the 53 bits of a float.
+        whole = array.astype("datetime64[s]")
+        rest = (array - whole) / np.timedelta64(1, "s")
+        start = whole[0] if len(whole) else np.datetime64(0, "s")
+        return np.asarray((whole - start) / np.timedelta64(1, "s") + rest + float(start.astype(np.int64)))
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"times of the dtype {array.dtype}: they must be numbers of seconds or datetime64")
+    return array.astype(np.float64)
+
+
+def missing_before(
+    times: npt.NDArray[np.float64], previous: float | None, rate: float
+) -> npt.NDArray[np.int64]:
+    """Samples missing before each one, from time stamps rounded to whole sample periods after the one before."""
+    if not np.isfinite(times).all():
+        raise ValueError(f"time stamp {int((~np.isfinite(times)).argmax())} is not finite")
+    start = times[0] - 1.0 / rate if previous is None else previous
+    periods = np.rint(np.diff(times, prepend=start) * rate)
+    if (periods < 1).any():
+        index = int((periods < 1).argmax())
+        raise ValueError(
+            f"time stamp {index}, {float(times[index])} s, is less than half a sample period after the one before"
+        )
+    return periods.astype(np.int64) - 1
+
+
+def check_rate(rate: float) -> float:
+    """The rate, if it is one."""
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise ValueError(f"rate is {rate}: it must be the samples per second, above 0")
+    return float(rate)
+
+
+def check_lsb(lsb: float) -> float:
+    """The size of a count, if it is one."""
+    if not (np.isfinite(lsb) and lsb > 0.0):
+        raise ValueError(f"lsb is {lsb}: it must be the units per count, above 0")
+    return float(lsb)

@@ -1,0 +1,83 @@
+"""The global interpreter lock is released, and Ctrl-C is noticed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+
+import allan_core
+import numpy as np
+import pytest
+from allan_core import _native
+
+
+def seen_during(work: Callable[[], object]) -> int:
+    """How often another thread ran in the middle half of one call of compiled code."""
+    stamps: list[float] = []
+    stop = threading.Event()
+
+    def watch() -> None:
+        while not stop.is_set():
+            stamps.append(time.perf_counter())
+            time.sleep(1e-4)
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    start = time.perf_counter()
+    work()
+    end = time.perf_counter()
+    stop.set()
+    thread.join()
+    quarter = (end - start) / 4
+    return sum(start + quarter < stamp < end - quarter for stamp in stamps)
+
+
+def test_other_threads_run_during_a_push() -> None:
+    estimator = _native.Estimator(8)
+    samples = np.zeros(1 << 25, dtype=np.int32).tobytes()
+    # With the lock held the other thread could not run at all inside of the call. A busy machine may let it starve once.
+    assert any(seen_during(lambda: estimator.push(samples, None, 0)) for _ in range(20))
+
+
+def test_other_threads_run_during_a_fit() -> None:
+    curve = allan_core.curve(np.random.default_rng(1).integers(0, 100, 1 << 16), 1.0)
+    terms = ["quantization", "angle_random_walk", "bias_instability", "rate_random_walk", "rate_ramp"]
+    named = [(name, ()) for name in terms] + [("sinusoid", (0.1,)), ("markov", (9.0,))]
+    assert any(seen_during(lambda: _native.fit(curve._native, named, True)) for _ in range(20))
+
+
+def test_estimators_can_be_used_by_several_threads_at_once() -> None:
+    estimator = _native.Estimator(8)
+    samples = np.zeros(1 << 16, dtype=np.int32).tobytes()
+    threads = [threading.Thread(target=lambda: estimator.push(samples, None, 0)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert estimator.samples()[0] == 8 << 16
+
+
+def test_ctrl_c_ends_a_push_and_nothing_is_added() -> None:
+    cascade = allan_core.Cascade()
+    cascade.push([1, 2, 3])
+    endless = np.broadcast_to(np.int32(5), (1 << 40,))  # no memory, half an hour of samples
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        cascade.push(endless)
+    timer.join()
+    assert len(cascade) == 3
+
+
+def test_ctrl_c_ends_a_trace() -> None:
+    curve = allan_core.curve(np.random.default_rng(1).integers(0, 100, 10_000), 1.0)
+
+    def interrupt() -> bool:
+        os.kill(os.getpid(), signal.SIGINT)
+        return True
+
+    with pytest.raises(KeyboardInterrupt):
+        allan_core.trace(curve, keep_on=interrupt)

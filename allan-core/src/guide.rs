@@ -1,0 +1,17 @@
+//! The book: what the Allan variance is for, how to record, how to choose the parameters, how to share an estimator with
+//! an interrupt, and where the limits are.
+#![doc = include_str!("../guide/allan_variance.md")]
+#![doc = include_str!("../guide/allan_deviation.svg")]
+#![doc = include_str!("../guide/terms.md")]
+
+#[doc = include_str!("../guide/recording.md")]
+pub mod recording {}
+
+#[doc = include_str!("../guide/parameters.md")]
+pub mod parameters {}
+
+#[doc = include_str!("../guide/interrupts.md")]
+pub mod interrupts {}
+
+#[doc = include_str!("../guide/limits.md")]
+pub mod limits {}

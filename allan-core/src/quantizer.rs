@@ -1,0 +1,176 @@
+//! Samples that are not counts of 32 bits: physical values, wider integers, and the phase of a clock.
+
+use crate::math::{abs, floor, is_finite};
+use core::fmt;
+
+/// Turns values in a physical unit into the counts that a [`Cascade`](crate::Cascade) takes.
+///
+/// A count is `round((value − origin)/lsb)`, ties up. The Allan variance does not depend on `origin`, which is best near
+/// the mean of the values. Multiply the curve with the LSB ([`Curve::scaled`](crate::Curve::scaled)) to have it in the unit again.
+///
+/// Rounding adds the variance of the rounding error. In white noise with a standard deviation of σ the estimate of N is
+/// off by a part that depends on where the mean lies between two counts:
+///
+/// | LSB | N, mean at a count | N, mean between two |
+/// |---|---|---|
+/// | σ/4 | +0.3 % | +0.3 % |
+/// | σ/2 | +1.0 % | +1.0 % |
+/// | σ | +4.1 % | +4.1 % |
+/// | 2σ | +14.1 % | +16.8 % |
+/// | 3σ | +9.7 % | +51.6 % |
+/// | 4σ | −14.7 % | +100.1 % |
+///
+/// An LSB of σ/4 or less costs nothing that matters; beyond 2σ the curve is that of the rounding.
+///
+/// ```
+/// use allan_core::{Cascade, Quantizer};
+///
+/// let in_g = Quantizer::new(1.0, 50e-6).unwrap(); // an accelerometer that points up, 50 µg per count
+/// let mut cascade = Cascade::<16, 8>::new();
+/// for value in [1.000_12_f32, 0.999_87, 1.000_05] {
+///     cascade.push(in_g.count(value).unwrap());
+/// }
+/// assert!(in_g.count(f32::NAN).is_err());
+/// let curve = cascade.curve(0.01).scaled(in_g.lsb()); // in g
+/// # assert_eq!(curve.points().len(), 1);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Quantizer {
+    origin: f64,
+    lsb: f64,
+}
+
+/// Why a value has no count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SampleError {
+    /// It is not a number.
+    NotANumber,
+    /// It is infinite.
+    Infinite,
+    /// It is more than 2³¹ counts from the origin, or for a phase from the phase before.
+    OutOfRange,
+}
+
+impl fmt::Display for SampleError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotANumber => "the sample is not a number",
+            Self::Infinite => "the sample is infinite",
+            Self::OutOfRange => "the sample is more than 2^31 counts from the origin: use a larger LSB",
+        })
+    }
+}
+
+impl core::error::Error for SampleError {}
+
+impl Quantizer {
+    /// `origin` and `lsb` in the unit of the values. `None` unless both are finite and `lsb` is positive.
+    #[must_use]
+    pub fn new(origin: f64, lsb: f64) -> Option<Self> {
+        (is_finite(origin) && is_finite(lsb) && lsb > 0.0).then_some(Self { origin, lsb })
+    }
+
+    /// The value of a count of 0.
+    #[must_use]
+    pub const fn origin(&self) -> f64 {
+        self.origin
+    }
+
+    /// Units per count.
+    #[must_use]
+    pub const fn lsb(&self) -> f64 {
+        self.lsb
+    }
+
+    /// The count of a value: an `f32`, an `f64`, or an integer of up to 32 bits.
+    ///
+    /// # Errors
+    /// The value is not finite, or its count does not fit.
+    pub fn count(&self, value: impl Into<f64>) -> Result<i32, SampleError> {
+        let count = self.wide_count(value.into())?;
+        i32::try_from(count).map_err(|_| SampleError::OutOfRange)
+    }
+
+    /// The count, if it is within ±2⁵³, where every integer is a double.
+    fn wide_count(&self, value: f64) -> Result<i64, SampleError> {
+        if value.is_nan() {
+            return Err(SampleError::NotANumber);
+        }
+        if !is_finite(value) {
+            return Err(SampleError::Infinite);
+        }
+        let count = floor((value - self.origin) / self.lsb + 0.5);
+        const LARGEST: f64 = (1_u64 << 53) as f64;
+        if abs(count) <= LARGEST { Ok(count as i64) } else { Err(SampleError::OutOfRange) }
+    }
+}
+
+/// The difference of an integer of up to 64 bits, for example a `u32` or a `u64`, to an `origin` near the mean.
+///
+/// ```
+/// use allan_core::integer_count;
+///
+/// assert_eq!(integer_count(4_294_967_295_u32, 4_294_967_290_u32), Ok(5));
+/// assert!(integer_count(u64::MAX, 0_u64).is_err());
+/// ```
+///
+/// # Errors
+/// The difference does not fit in 32 bits.
+pub fn integer_count(value: impl Into<i128>, origin: impl Into<i128>) -> Result<i32, SampleError> {
+    i32::try_from(value.into() - origin.into()).map_err(|_| SampleError::OutOfRange)
+}
+
+/// Turns phase (time error) data of a clock into counts of its frequency.
+///
+/// A count is the difference of two neighbouring phases, each rounded to the quantizer's LSB. The sums of the counts are
+/// therefore the rounded phases themselves, and rounding errors do not accumulate. With phases in s and a sample period in
+/// s, [`Curve::scaled`](crate::Curve::scaled) by `lsb/period` gives the curve of the fractional frequency.
+///
+/// ```
+/// use allan_core::{Cascade, PhaseCounts, Quantizer};
+///
+/// let mut phases = PhaseCounts::new(Quantizer::new(0.0, 1e-12).unwrap()); // a counter with 1 ps
+/// let mut cascade = Cascade::<16, 8>::new();
+/// for phase in [0.0, 1.2e-9, 2.1e-9, 3.5e-9] {
+///     if let Some(count) = phases.count(phase).unwrap() {
+///         cascade.push(count);
+///     }
+/// }
+/// assert_eq!(cascade.len(), 3); // frequencies between four phases
+/// let curve = cascade.curve(1.0).scaled(1e-12 / 1.0);
+/// # assert!((curve.points()[0].avar / 0.085e-18 - 1.0).abs() < 1e-9); // ((−0.3)² + 0.5²)/(2·2) · 10⁻¹⁸
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PhaseCounts {
+    quantizer: Quantizer,
+    /// Counts of the phase before.
+    last: Option<i64>,
+}
+
+impl PhaseCounts {
+    /// The quantizer is that of the phase, in its unit.
+    #[must_use]
+    pub const fn new(quantizer: Quantizer) -> Self {
+        Self { quantizer, last: None }
+    }
+
+    /// The count between the phase before and this one; `None` for the first.
+    ///
+    /// # Errors
+    /// The phase is not finite, beyond 2⁵³ counts, or 2³¹ counts or more from the phase before. The phase before stays the
+    /// same after a phase that is not finite.
+    pub fn count(&mut self, phase: f64) -> Result<Option<i32>, SampleError> {
+        let count = self.quantizer.wide_count(phase)?;
+        let Some(last) = self.last.replace(count) else { return Ok(None) };
+        i32::try_from(count - last).map(Some).map_err(|_| SampleError::OutOfRange)
+    }
+
+    /// Forgets the phase before. To be called where phases are missing: `m` missing phases are a
+    /// [`gap`](crate::Cascade::gap) of `m + 1` frequencies.
+    pub fn restart(&mut self) {
+        self.last = None;
+    }
+}

@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# Whether the two published libraries are complete: files of the packages, the packages' own tests, the oldest Rust and the
+# oldest direct dependencies that they build with. ./tests/publish.sh
+#
+# Needs rustup, which installs the toolchains 1.85, 1.88 and nightly if they are missing (nightly alone resolves minimal versions).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")/publish
+run() { printf '+ %s\n' "$*"; "$@"; }
+
+check() { # PACKAGE OLDEST_RUST
+    local package=$1 oldest=$2 directory
+    run cargo package --locked --allow-dirty --no-verify --quiet --package "$package" --target-dir "$TARGET"
+    tar -xzf "$TARGET/package/$package"-*.crate -C "$work"
+    directory=$(echo "$work/$package"-*)
+    for file in Cargo.toml README.md LICENSE-MIT LICENSE-APACHE src/lib.rs; do
+        [ -s "$directory/$file" ] || { echo "$package: the package lacks $file" >&2; exit 1; }
+    done
+    for field in description documentation readme keywords categories license rust-version; do
+        grep -q "^$field = " "$directory/Cargo.toml" || { echo "$package: the package has no $field" >&2; exit 1; }
+    done
+    for version in "$oldest" nightly; do
+        rustup toolchain list | grep -q "^$version-" || run rustup toolchain install --profile minimal "$version"
+    done
+    (
+        cd "$directory"
+        # As a user builds it: alone, with all features, with its own tests.
+        run cargo test --quiet --no-run --all-features --target-dir "$TARGET/tests"
+        run cargo "+$oldest" check --quiet --all-features --target-dir "$TARGET/$oldest"
+        # Tests need newer versions of their dependencies than the library.
+        sed -i '/^\[dev-dependencies/,/^$/d; /^\[target.*dev-dependencies/,/^$/d; /^\[\[\(test\|bench\|example\)\]\]/,/^$/d' Cargo.toml
+        rm -rf Cargo.lock tests benches examples
+        run cargo +nightly update --quiet -Z direct-minimal-versions
+        run cargo +nightly check --quiet --lib --all-features --target-dir "$TARGET/minimal"
+    )
+}
+
+check adis16405-driver 1.85
+check allan-core 1.88
+echo "both packages are complete"
