@@ -2,7 +2,10 @@
 
 use allan_core::term::MovingAverageFilter;
 
-use crate::profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
+use crate::profile::{
+    ChannelProfile, DITHERED_AVAR_COUNTS2, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR,
+    LARGEST_SENSITIVITY_MULTIPLE, Quantity, SAMPLE_RATE_ERROR, SensorProfile,
+};
 
 /// Rate of the sample clock with SMPL_PRD = 0x0001, which the part has after reset, Hz.
 const INTERNAL_RATE_HZ: f64 = 819.2;
@@ -31,10 +34,10 @@ const MAGNETOMETER_NOISE: DataSheetNoise =
 /// 0.01 °/s/°C, 0.32 °/s/V, 0.05 °/s/g.
 const GYRO_SENSITIVITIES: DataSheetSensitivities =
     DataSheetSensitivities { temperature: Some(0.01), supply: Some(0.32), specific_force: Some(0.05) };
-/// Relative standard deviation of the clock of an ordinary host: a crystal that is not trimmed, 20 ppm.
-pub const HOST_CLOCK_ERROR: f64 = 20e-6;
-/// Relative standard deviation of the sample rate: by the clock of a host whose crystal is good to ±100 ppm (2 σ).
-const SAMPLE_RATE_ERROR: f64 = 5e-5;
+/// Name of the part.
+pub const NAME: &str = "ADIS16405";
+/// Size of a gyroscope's count in the largest range, 300 deg/s: deg/s.
+pub const GYRO_LSB_300: f64 = 0.05;
 
 /// The profile of the part; `gyro_lsb` is the size of a gyroscope's count in deg/s in the range that was set: 0.05, 0.025
 /// or 0.0125.
@@ -70,7 +73,7 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         ..channel(name, Quantity::MagneticField, axis, "gauss", MAGNETOMETER_LSB, None)
     };
     SensorProfile {
-        name: "ADIS16405",
+        name: NAME,
         channels: vec![
             channel("supply", Quantity::SupplyVoltage, "", "V", 2.418e-3, None),
             gyro("gyro_x", "x"),
@@ -89,7 +92,8 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         internal_rate_hz: INTERNAL_RATE_HZ,
         native_rates_hz: native_rates_hz(),
         filters: filters(),
-        dithered_avar_counts2: 0.2,
+        dithered_avar_counts2: DITHERED_AVAR_COUNTS2,
+        largest_sensitivity_multiple: LARGEST_SENSITIVITY_MULTIPLE,
         host_clock_error: HOST_CLOCK_ERROR,
         sample_rate_error: SAMPLE_RATE_ERROR,
     }
@@ -103,12 +107,9 @@ fn native_rates_hz() -> Vec<f64> {
     fast.chain(slow).collect()
 }
 
-/// Bartlett windows of 2 to 64 taps per stage, as SENS_AVG selects them; and the window of 8 taps read at a lower rate than
-/// the part samples at, from four starting decimations.
+/// Bartlett windows of 2 to 64 taps per stage, as SENS_AVG selects them.
 fn filters() -> Vec<MovingAverageFilter> {
-    let own_rate = (1..=6).map(|taps_log2| MovingAverageFilter::bartlett(1 << taps_log2));
-    let read_slowly = [6.1, 8.1, 10.1, 12.1];
-    own_rate.chain(read_slowly.map(|decimation| MovingAverageFilter { stages: 2, taps: 8, decimation })).collect()
+    (1..=6).map(|taps_log2| MovingAverageFilter::bartlett(1 << taps_log2)).collect()
 }
 
 #[cfg(test)]
@@ -126,6 +127,18 @@ mod tests {
                 assert_eq!(known.quantity.is_inertial(), Channel::INERTIAL.contains(&channel));
             }
         }
+    }
+
+    /// 819.2 Hz read at 100 Hz is every 8.192th value; 2 × 4 taps reach over 7 values, so that the samples do not correlate.
+    #[test]
+    fn filters_are_read_at_the_rate_of_the_recording() {
+        let profile = profile(0.05);
+        let own: Vec<u16> = profile.filters.iter().map(|filter| filter.taps).collect();
+        assert_eq!(own, [2, 4, 8, 16, 32, 64]);
+        assert_eq!(profile.filters_read_at(819.2), profile.filters);
+        let slow: Vec<(u16, f64)> =
+            profile.filters_read_at(100.0)[6..].iter().map(|of| (of.taps, of.decimation)).collect();
+        assert_eq!(slow, [(8, 8.192), (16, 8.192), (32, 8.192), (64, 8.192)]);
     }
 
     #[test]

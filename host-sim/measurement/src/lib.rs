@@ -2,12 +2,14 @@
 //! sensor.
 //!
 //! A reader of recordings produces a [`Measurement`], the noise analysis consumes it; neither knows the other. Everything
-//! that is specific to one sensor lies in its [`SensorProfile`]; [`adis16405`] is one.
+//! that is specific to one sensor lies in its [`SensorProfile`]: [`adis16405`], one of a [file](profile_file), or
+//! [that of any sensor](SensorProfile::generic).
 
 pub mod adis16405;
 mod profile;
+pub mod profile_file;
 
-pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
+pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity, SensorProfile};
 
 use std::collections::BTreeMap;
 
@@ -89,6 +91,37 @@ impl Measurement {
     #[must_use]
     pub fn middle(&self) -> u64 {
         self.periods() / 2
+    }
+
+    /// The recording as it would be had it ended before the sample period `slot`. Of the samples that never arrived, it has
+    /// the share of the sample periods without a sample; the other causes of `dropped` and `flagged`, whose times are not
+    /// known, are left out.
+    #[must_use]
+    pub fn before(&self, slot: u64) -> Self {
+        let count = self.slots.partition_point(|&of| of < slot);
+        let missing = |slots: &[u64]| slots.last().map_or(0, |&last| last + 1 - slots.len() as u64);
+        let lost = self.dropped.get("gap").copied().unwrap_or(0) as f64;
+        let gap = lost * missing(&self.slots[..count]) as f64 / missing(&self.slots).max(1) as f64;
+        let channel = |channel: &MeasuredChannel| {
+            let refused = channel.refused.iter().map(|(&cause, positions)| {
+                (cause, positions[..positions.partition_point(|&position| position < count)].to_vec())
+            });
+            MeasuredChannel {
+                profile: channel.profile,
+                counts: channel.counts[..count].to_vec(),
+                refused: refused.collect(),
+            }
+        };
+        Self {
+            profile: self.profile.clone(),
+            sample_rate_hz: self.sample_rate_hz,
+            stated_rate_hz: self.stated_rate_hz,
+            slots: self.slots[..count].to_vec(),
+            times_s: self.times_s.as_ref().map(|times| times[..count].to_vec()),
+            channels: self.channels.iter().map(channel).collect(),
+            dropped: BTreeMap::from([("gap", gap.round() as u64)]),
+            flagged: BTreeMap::new(),
+        }
     }
 
     /// Sample periods from the first sample to the last, both included, with or without a sample.

@@ -168,6 +168,13 @@ impl Column {
     }
 }
 
+/// Whether a first line names a channel of register counts.
+pub(crate) fn is_header(header: &str) -> bool {
+    let is_channel =
+        |name: &str| Column::from_name(delimited_text::field(name)).is_some_and(|it| it.channel().is_some());
+    header.split([',', ';', '\t', ' ']).any(is_channel)
+}
+
 fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputError> {
     if header == frame_log::HEADER {
         return Err(InputError::line(file, line, Reason::FrameLog));

@@ -106,7 +106,7 @@ fn parse(text: &str, last_s: f64) -> Result<Frame, (Option<&'static str>, Reason
     Ok(Frame { time_s, mosi, miso })
 }
 
-fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
+pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
     let nibble = |digit: u8| (digit as char).to_digit(16).map(|value| value as u8);
     if text.len() % 2 == 1 {
         return Err(Reason::NotHex(delimited_text::quote(text)));

@@ -1,5 +1,6 @@
 //! Errors of an input file: which file, line and column, and the reason.
 
+use crate::column_selection::SelectionError;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,6 +12,8 @@ pub struct InputError {
     pub file: PathBuf,
     /// Counted from 1, the header included; absent when the file as a whole is at fault.
     pub line: Option<u64>,
+    /// Row of an array or message of a log, counted from 1, in files without lines.
+    pub row: Option<u64>,
     /// Name of the column, where one column is at fault.
     pub column: Option<String>,
     /// Why it is refused.
@@ -143,6 +146,59 @@ pub enum Reason {
         /// Of this burst, deg/s.
         now: u16,
     },
+    /// No row of numbers near the beginning.
+    #[error("no row of numbers: neither a table nor another known format")]
+    NoNumbers,
+    /// Columns, units or channels that cannot be chosen.
+    #[error("{0}")]
+    Selection(Box<SelectionError>),
+    /// A time column whose unit nobody says and that shows none.
+    #[error("column {0}: no unit of the time; give one, as in --units us")]
+    NoTimeUnit(String),
+    /// A clock that was set back so that many rows are out of order.
+    #[error(
+        "the time goes back before row {row} by {by} of its units, and {rows} rows are earlier than one before them"
+    )]
+    ClockSetBack {
+        /// The first such row, from 1.
+        row: u64,
+        /// In the unit of the column.
+        by: f64,
+        /// Such rows.
+        rows: u64,
+    },
+    /// A log without a message that this program reads.
+    #[error("no message of an inertial sensor in this {format}")]
+    NoTopic {
+        /// Name of the format.
+        format: &'static str,
+    },
+    /// A topic that the log does not have: as given, and the names of the topics.
+    #[error("--topic {}: not in the file; it has {}", .0.0, .0.1)]
+    UnknownTopic(Box<(String, String)>),
+    /// Several topics of which the user names none.
+    #[error("several topics: choose one with --topic: {0}")]
+    SeveralTopics(String),
+    /// A ROS 1 bag of a recording that was interrupted.
+    #[error("the bag has no index, as after an interrupted recording; make one with `rosbag reindex`")]
+    NoIndex,
+    /// An array that is no column or matrix of numbers.
+    #[error("{0}")]
+    Array(String),
+    /// A file that its format's reader refuses.
+    #[error("damaged {format} file: {error}")]
+    Format {
+        /// Name of the format.
+        format: &'static str,
+        /// What its reader says.
+        error: Box<str>,
+    },
+    /// A file that ends early.
+    #[error("truncated {format}: the data end early")]
+    Truncated {
+        /// Name of the format.
+        format: &'static str,
+    },
     /// The driver refused the replayed transaction.
     #[error("replay over the bus: {0}")]
     Bus(String),
@@ -151,17 +207,24 @@ pub enum Reason {
 impl InputError {
     /// A fault of the file as a whole.
     pub fn file(file: &Path, reason: Reason) -> Self {
-        Self { file: file.to_owned(), line: None, column: None, reason }
+        Self { file: file.to_owned(), line: None, row: None, column: None, reason }
     }
 
     /// A fault of one line.
     pub fn line(file: &Path, line: u64, reason: Reason) -> Self {
-        Self { file: file.to_owned(), line: Some(line), column: None, reason }
+        Self { file: file.to_owned(), line: Some(line), row: None, column: None, reason }
     }
 
     /// A fault of one field.
     pub fn field(file: &Path, line: u64, column: &str, reason: Reason) -> Self {
-        Self { file: file.to_owned(), line: Some(line), column: Some(column.to_owned()), reason }
+        Self { file: file.to_owned(), line: Some(line), row: None, column: Some(column.to_owned()), reason }
+    }
+}
+
+impl InputError {
+    /// A fault of one row of an array or one message of a log.
+    pub fn row(file: &Path, row: u64, column: &str, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: None, row: Some(row), column: Some(column.to_owned()), reason }
     }
 }
 
@@ -171,10 +234,16 @@ impl fmt::Display for InputError {
         if let Some(line) = self.line {
             write!(f, ": line {line}")?;
         }
+        if let Some(row) = self.row {
+            write!(f, ": row {row}")?;
+        }
         if let Some(column) = &self.column {
             write!(f, ": column {}", Printable(column))?;
         }
-        write!(f, ": {}", self.reason)
+        // Some readers of formats describe a fault in several lines.
+        let reason = self.reason.to_string();
+        let lines: Vec<&str> = reason.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        write!(f, ": {}", lines.join(" "))
     }
 }
 

@@ -194,6 +194,36 @@ pub fn record<P: Read + Write>(
     Ok(summary)
 }
 
+/// Whether `start`, the first bytes of a file, has a message of the raw stream of a device.
+pub(crate) fn is_capture(start: &[u8]) -> bool {
+    let mut decoder = Decoder::new();
+    start.iter().any(|&byte| matches!(decoder.push(byte), Some(Received::Message { message: Message::Raw(_), .. })))
+}
+
+/// Writes the bursts of `capture`, the bytes that a device sent while its raw stream was on, to the frame log `file`. A
+/// restart of the device takes no time: nobody knows how long it lasted.
+///
+/// # Errors
+/// The capture cannot be read or the log cannot be written.
+pub(crate) fn log_of_capture(mut capture: impl Read, file: &Path) -> io::Result<()> {
+    let mut recorder = RawStreamRecorder::create(file)?;
+    let (mut decoder, received) = (Decoder::new(), Instant::now());
+    let mut bytes = [0; 4096];
+    loop {
+        let count = match capture.read(&mut bytes) {
+            Ok(0) => return recorder.finish(),
+            Ok(count) => count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error),
+        };
+        for &byte in &bytes[..count] {
+            if let Some(Received::Message { message: Message::Raw(raw), .. }) = decoder.push(byte) {
+                recorder.write_received(&raw, received)?;
+            }
+        }
+    }
+}
+
 /// Adds a message to the log, which is created before the first burst.
 fn write(recorder: &mut Option<RawStreamRecorder>, file: &Path, raw: &RawMessage) -> io::Result<()> {
     if recorder.is_none() && !raw.bursts.is_empty() {
@@ -265,10 +295,14 @@ impl RawStreamRecorder {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
+        self.write_received(raw, Instant::now())
+    }
+
+    /// As [`write`](Self::write), of a message that the host received at another time than now.
+    fn write_received(&mut self, raw: &RawMessage, received: Instant) -> io::Result<()> {
         if raw.bursts.is_empty() {
             return Ok(());
         }
-        let received = Instant::now();
         let (mut number, mut at_us) = (raw.first, raw.at_us);
         // With new settings the device counts from the start, without a restart.
         if let Some(last) = self.last.as_mut().filter(|last| number < last.number) {

@@ -3,10 +3,11 @@
 //! A sample that was read late is not a lost sample, and stamps that are coarser than the sample period are no losses:
 //! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
 
-use crate::indexed_clock::IndexedClock;
 use crate::lateness_track::COARSE;
 use crate::recording::{RecordedSample, Recording};
-use crate::stamp_alignment::{StampAlignment, uncertain};
+use crate::sample_slots::{MAX_REPEATED_READ_INTERVAL, contradiction, slots, usual_interval};
+use crate::stamp_alignment::StampAlignment;
+use crate::time_base_error::MIN_SAMPLES;
 use adis16405_driver::{Channel, Faults};
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use std::collections::BTreeMap;
@@ -14,9 +15,8 @@ use std::collections::BTreeMap;
 pub use crate::indexed_clock::ClockStep;
 pub use crate::lateness_track::LostStretch;
 pub use crate::stamp_alignment::RateEstimate;
-
-/// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
-const MIN_SAMPLES: u64 = 4;
+pub use crate::stamp_quality::StampQuality;
+pub use crate::time_base_error::TimeBaseError;
 
 /// Faults of one channel's word: the sample is left out in this channel alone.
 const REFUSED_IN_A_CHANNEL: Faults = Faults::IMPOSSIBLE_RATE.union(Faults::X_SIGN);
@@ -28,77 +28,8 @@ const REFUSED: Faults = Faults::all()
     .difference(Faults::ERROR_ALARM)
     .difference(Faults::SUPPLY);
 
-/// Longest interval, in sample periods, at which a sample equal to the one before is the same sample read twice. Equal samples
-/// farther apart are chance: a filtered output of few counts repeats about once in a thousand samples.
-const MAX_REPEATED_READ_INTERVAL: f64 = 0.75;
-
-/// Samples whose median duration tells which interval is shorter than a period.
-const REPEATED_READ_WINDOW: usize = 32;
-
 /// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
 const SEARCHED_WIDTHS: f64 = 4.0;
-
-/// Largest relative difference between the stated and the measured rate: a wrong nominal rate and a clock on a breadboard,
-/// not another rate.
-const MAX_RATE_CONTRADICTION: f64 = 0.1;
-
-/// Share of samples that follow their neighbour below which the stated rate is doubted.
-const MIN_NEIGHBOURS: f64 = 0.75;
-
-/// Most sample periods of a recording for each of its samples, and beside them. The gaps of a series of this length fit into
-/// memory.
-const MAX_PERIODS_PER_SAMPLE: u64 = 64;
-const MAX_PERIODS: u64 = 1 << 22;
-
-/// Why a recording has no time base.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TimeBaseError {
-    /// No rate was given and none can be measured.
-    #[error("no sample rate: give --rate HZ, or a recording with a time_s column")]
-    NoRate,
-    /// The given rate is not positive and finite.
-    #[error("a sample rate of {0} Hz: it must be positive and finite")]
-    InvalidRate(f64),
-    /// Most time stamps are equal, or they span no time.
-    #[error("the time stamps show no sample period: give --rate HZ")]
-    NoPeriod,
-    /// The time stamps show another rate than the given one.
-    #[error("--rate {stated_hz} contradicts the time stamps: by them it is {measured_hz:.4} Hz")]
-    RateContradictsStamps {
-        /// As given, Hz.
-        stated_hz: f64,
-        /// By the time stamps, Hz.
-        measured_hz: f64,
-    },
-    /// No sample follows another one by one sample period.
-    #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
-    NoNeighbours(u64),
-    /// The gaps are so long that their periods do not fit into memory.
-    #[error(
-        "{samples} samples in {periods} sample periods: the gaps are longer than this analysis holds; give each stretch its \
-         own file"
-    )]
-    TooSparse {
-        /// Usable samples.
-        samples: u64,
-        /// Sample periods from the first to the last.
-        periods: u64,
-    },
-    /// Too few samples for one octave of the Allan deviation.
-    #[error("record too short: {used} usable samples, one octave needs {MIN_SAMPLES}{}", list(.dropped))]
-    TooShort {
-        /// Samples without a fault for which they are left out.
-        used: u64,
-        /// Samples that were left out, by cause.
-        dropped: BTreeMap<&'static str, u64>,
-    },
-}
-
-/// The causes for which samples were left out, as the end of a sentence.
-fn list(dropped: &BTreeMap<&'static str, u64>) -> String {
-    let causes: Vec<String> = dropped.iter().map(|(cause, count)| format!("{cause} {count}")).collect();
-    if causes.is_empty() { String::new() } else { format!("; left out: {}", causes.join(", ")) }
-}
 
 /// A recording on its time base.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,63 +38,6 @@ pub struct EstimatedTimeBase {
     pub measurement: Measurement,
     /// What the time stamps show; `None` where the samples have none.
     pub stamps: Option<StampQuality>,
-}
-
-/// What the time stamps of a recording show, and what they cannot show.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct StampQuality {
-    /// The rate by the clock that stamped the samples, whatever rate was stated.
-    pub rate: Option<RateEstimate>,
-    /// Tick of that clock, s: the step that all stamps are multiples of. `None` where it is less than a twentieth of a period.
-    pub tick_s: Option<f64>,
-    /// Width of the lateness of ordinary samples, sample periods: the tick and the jitter. 0 where the samples have an index.
-    pub width: f64,
-    /// Losses that the stamps show, refused samples included; none where the samples have an index.
-    pub losses: Vec<LostStretch>,
-    /// Whether losses of single samples are told from the rounding of the stamps.
-    pub resolved: bool,
-    /// Samples that were read at least a period later than the others.
-    pub late: u64,
-    /// Where the index and the stamps contradict each other.
-    pub clock_steps: Vec<ClockStep>,
-}
-
-impl StampQuality {
-    /// What a reader of the analysis has to know, one sentence each; none for stamps that leave no doubt.
-    pub fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        if let (Some(rate), true) = (self.rate, self.width >= COARSE) {
-            let tick = self.tick_s.map_or_else(String::new, |tick| format!(", ticks of {:.4} ms", 1e3 * tick));
-            notes.push(format!(
-                "the time stamps are coarser than the sample period ({:.2} periods{tick}): {:.4} Hz ({:.4} to {:.4}); a loss \
-                 is located to {:.0} samples",
-                self.width, rate.hz, rate.low_hz, rate.high_hz, self.width.ceil(),
-            ));
-        }
-        let uncertain: u64 = self.uncertain_losses();
-        if uncertain > 0 {
-            notes.push(format!(
-                "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
-            ));
-        }
-        if !self.resolved {
-            notes.push("losses of single samples cannot be told from the rounding of the time stamps".to_owned());
-        }
-        if let Some(step) = self.clock_steps.first() {
-            notes.push(format!(
-                "index and time contradict each other at {} places, first before sample {} by {:+.3} s; the index is believed",
-                self.clock_steps.len(),
-                step.before,
-                step.seconds
-            ));
-        }
-        notes
-    }
-
-    /// Samples in losses that something else may explain.
-    pub fn uncertain_losses(&self) -> u64 {
-        uncertain(&self.losses, self.resolved)
-    }
 }
 
 /// The usable samples of `recording` on their time base, as [`time_base`] gives them.
@@ -200,12 +74,7 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Estimate
     let slots = slots(&periods)?;
     dropped.insert("gap", never_arrived);
     if let Some(stamps) = &stamps {
-        let warnings = [
-            ("late_delivery", stamps.late),
-            ("uncertain_loss", stamps.uncertain_losses()),
-            ("clock_step", stamps.clock_steps.len() as u64),
-        ];
-        flagged.extend(warnings.into_iter().filter(|(_, count)| *count > 0));
+        flagged.extend(stamps.warnings());
     }
 
     let profile = adis16405::profile(recording.range.lsb());
@@ -342,15 +211,6 @@ impl Usable {
     }
 }
 
-/// The mean interval of the window of samples that lasts as long as half of the others, s.
-fn usual_interval(times: &[f64]) -> Option<f64> {
-    let window = if times.len() > 4 * REPEATED_READ_WINDOW { REPEATED_READ_WINDOW } else { 1 };
-    let mut durations: Vec<f64> = times.windows(window + 1).map(|row| row[window] - row[0]).collect();
-    let middle = durations.len() / 2;
-    let duration = (!durations.is_empty()).then(|| *durations.select_nth_unstable_by(middle, f64::total_cmp).1)?;
-    (duration > 0.0 && duration.is_finite()).then_some(duration / window as f64)
-}
-
 /// Where the usable samples lie in time.
 struct SamplePeriods {
     /// The sample period in which each was taken, counted from any origin.
@@ -375,10 +235,7 @@ fn sample_periods(
         if least > 1 {
             return Err(TimeBaseError::NoNeighbours(least));
         }
-        let stamps = times_of(&usable.positions).map(|times| {
-            let IndexedClock { rate, steps } = IndexedClock::new(&indices, &times);
-            StampQuality { rate, clock_steps: steps, resolved: true, ..StampQuality::default() }
-        });
+        let stamps = times_of(&usable.positions).map(|times| StampQuality::of_index(&indices, &times));
         let never_arrived = indices.windows(2).zip(usable.positions.windows(2)).map(|(indices, positions)| {
             let left_out = (positions[1] - positions[0] - 1) as u64;
             (indices[1] - indices[0] - 1).saturating_sub(left_out)
@@ -422,34 +279,4 @@ fn sample_periods(
         .collect();
     let stamps = StampQuality { rate, tick_s, width, losses, resolved, late, clock_steps: Vec::new() };
     Ok(SamplePeriods { periods, never_arrived, stamps: Some(stamps) })
-}
-
-/// Checks a stated rate against the stamps.
-fn contradiction(times: &[f64], alignment: &StampAlignment, stated_hz: f64) -> Result<(), TimeBaseError> {
-    let differs = |measured_hz: f64| (measured_hz / stated_hz - 1.0).abs() > MAX_RATE_CONTRADICTION;
-    let few_neighbours = (alignment.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
-    if !few_neighbours && !alignment.rate.is_some_and(|rate| differs(rate.hz)) {
-        return Ok(());
-    }
-    match StampAlignment::new(times, None) {
-        Some(StampAlignment { rate: Some(rate), losses, .. })
-            if differs(rate.hz) && losses.len() <= times.len() / 4 =>
-        {
-            Err(TimeBaseError::RateContradictsStamps { stated_hz, measured_hz: rate.hz })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The periods counted from the first sample, strictly increasing.
-fn slots(periods: &[u64]) -> Result<Vec<u64>, TimeBaseError> {
-    let first = periods.first().copied().unwrap_or(0);
-    let slots: Vec<u64> = periods.iter().map(|period| period.saturating_sub(first)).collect();
-    // Periods beyond the range of u64 are all the same.
-    let is_increasing = slots.is_sorted_by(|one, next| one < next);
-    let (samples, span) = (slots.len() as u64, slots.last().copied().unwrap_or(0));
-    if !is_increasing || (span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS) {
-        return Err(TimeBaseError::TooSparse { samples, periods: span.saturating_add(1) });
-    }
-    Ok(slots)
 }

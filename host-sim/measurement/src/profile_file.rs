@@ -1,0 +1,247 @@
+//! Sensor profiles from TOML files, and those that are included.
+
+use crate::profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+/// The profiles that are included: the name by which one is asked for, and its file.
+const INCLUDED: [(&str, &str); 3] = [
+    ("adis16470", include_str!("../profiles/adis16470.toml")),
+    ("bmi088", include_str!("../profiles/bmi088.toml")),
+    ("mpu6050", include_str!("../profiles/mpu6050.toml")),
+];
+
+/// Why a profile cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProfileError {
+    /// The text is no TOML, or a field is missing, unknown or of another type.
+    #[error("{0}")]
+    Syntax(String),
+    /// A value without a meaning.
+    #[error("channel {channel}: {field} is {value}; it must be positive and finite")]
+    NotPositive {
+        /// Name of the channel; empty for the sensor.
+        channel: String,
+        /// Name of the field.
+        field: &'static str,
+        /// As read.
+        value: f64,
+    },
+    /// A unit other than that of the quantity.
+    #[error("channel {channel}: the unit is {unit:?}; that of its quantity is {expected}")]
+    Unit {
+        /// Name of the channel.
+        channel: String,
+        /// As read.
+        unit: String,
+        /// Unit of the quantity.
+        expected: &'static str,
+    },
+    /// Two channels of one name.
+    #[error("two channels are named {0}")]
+    DuplicateChannel(String),
+    /// No channel at all.
+    #[error("no channel")]
+    NoChannel,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProfileFile {
+    name: String,
+    /// For the reader of the file.
+    #[serde(rename = "source")]
+    _source: String,
+    internal_rate_hz: Option<f64>,
+    #[serde(default)]
+    native_rates_hz: Vec<f64>,
+    #[serde(default)]
+    channels: Vec<ChannelGroup>,
+}
+
+/// Channels that differ in nothing but their names.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ChannelGroup {
+    names: Vec<String>,
+    quantity: String,
+    unit: String,
+    lsb: f64,
+    range: Option<f64>,
+    initial_bias_error: Option<f64>,
+    angle_random_walk: Option<f64>,
+    in_run_bias_stability: Option<f64>,
+    rate_random_walk: Option<f64>,
+    temperature_sensitivity: Option<f64>,
+    supply_sensitivity: Option<f64>,
+    specific_force_sensitivity: Option<f64>,
+}
+
+/// Names of the included profiles.
+pub fn included_names() -> impl Iterator<Item = &'static str> {
+    INCLUDED.iter().map(|(name, _)| *name)
+}
+
+/// The included profile `name`; `None` for other names.
+#[must_use]
+pub fn included(name: &str) -> Option<SensorProfile> {
+    let (_, text) = INCLUDED.iter().find(|(included, _)| included.eq_ignore_ascii_case(name))?;
+    parse(text).ok()
+}
+
+/// Reads a profile. Names of the sensor and its channels are kept until the program ends: each distinct one once.
+///
+/// # Errors
+/// The text is no TOML, a field is missing or unknown, or a value has no meaning.
+pub fn parse(text: &str) -> Result<SensorProfile, ProfileError> {
+    let file: ProfileFile = toml::from_str(text).map_err(|error| {
+        let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+        let line = before.matches('\n').count() + 1;
+        ProfileError::Syntax(format!("line {line}: {}", error.message()))
+    })?;
+    let rates = file.native_rates_hz.iter().copied().map(|rate| ("native_rates_hz", rate));
+    for (field, value) in rates.chain(file.internal_rate_hz.map(|rate| ("internal_rate_hz", rate))) {
+        positive("", field, value)?;
+    }
+    let mut channels: Vec<ChannelProfile> = Vec::new();
+    for group in &file.channels {
+        for name in &group.names {
+            if channels.iter().any(|channel| channel.name == name) {
+                return Err(ProfileError::DuplicateChannel(name.clone()));
+            }
+            channels.push(channel(group, name)?);
+        }
+    }
+    if channels.is_empty() {
+        return Err(ProfileError::NoChannel);
+    }
+    let fastest = file.native_rates_hz.iter().copied().fold(0.0, f64::max);
+    Ok(SensorProfile {
+        name: intern(&file.name),
+        channels,
+        internal_rate_hz: file.internal_rate_hz.unwrap_or(fastest),
+        native_rates_hz: file.native_rates_hz,
+        ..SensorProfile::generic()
+    })
+}
+
+fn channel(group: &ChannelGroup, name: &str) -> Result<ChannelProfile, ProfileError> {
+    let quantities = Quantity::ALL.into_iter();
+    let quantity = quantities.clone().find(|quantity| quantity.name() == group.quantity).ok_or_else(|| {
+        let known: Vec<&str> = quantities.map(Quantity::name).collect();
+        ProfileError::Syntax(format!("quantity {:?}; known are {}", group.quantity, known.join(", ")))
+    })?;
+    if group.unit != quantity.unit() {
+        let (channel, unit) = (name.to_owned(), group.unit.clone());
+        return Err(ProfileError::Unit { channel, unit, expected: quantity.unit() });
+    }
+    let values = [
+        ("lsb", Some(group.lsb)),
+        ("range", group.range),
+        ("initial_bias_error", group.initial_bias_error),
+        ("angle_random_walk", group.angle_random_walk),
+        ("in_run_bias_stability", group.in_run_bias_stability),
+        ("rate_random_walk", group.rate_random_walk),
+        ("temperature_sensitivity", group.temperature_sensitivity),
+        ("supply_sensitivity", group.supply_sensitivity),
+        ("specific_force_sensitivity", group.specific_force_sensitivity),
+    ];
+    for (field, value) in values {
+        value.map_or(Ok(()), |value| positive(name, field, value))?;
+    }
+    Ok(ChannelProfile {
+        lsb: group.lsb,
+        initial_bias_error: group.initial_bias_error,
+        range: group.range,
+        data_sheet: DataSheetNoise {
+            angle_random_walk: group.angle_random_walk,
+            in_run_bias_stability: group.in_run_bias_stability,
+            rate_random_walk: group.rate_random_walk,
+        },
+        sensitivities: DataSheetSensitivities {
+            temperature: group.temperature_sensitivity,
+            supply: group.supply_sensitivity,
+            specific_force: group.specific_force_sensitivity,
+        },
+        ..ChannelProfile::generic(intern(name), quantity)
+    })
+}
+
+fn positive(channel: &str, field: &'static str, value: f64) -> Result<(), ProfileError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(ProfileError::NotPositive { channel: channel.to_owned(), field, value })
+}
+
+/// `text` for as long as the program runs. Profiles are `Copy` in the hot path, so their names are not owned; equal texts
+/// share their memory, so that reading a profile again takes none.
+fn intern(text: &str) -> &'static str {
+    static KNOWN: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(interned) = known.get(text) {
+        return interned;
+    }
+    let interned: &'static str = Box::leak(text.to_owned().into_boxed_str());
+    known.insert(interned);
+    interned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{included, included_names, parse};
+
+    /// Values from the data sheets, written down again: ADIS16470 8 °/h and 0.34 °/√h, BMI088 0.014 °/s/√Hz and
+    /// 160 µg/√Hz, MPU-6050 0.005 °/s/√Hz and 400 µg/√Hz.
+    #[test]
+    fn the_included_profiles_state_the_data_sheets() {
+        for (name, channel, noise) in [
+            ("adis16470", "gyro_x", 0.34 / 60.0),
+            ("adis16470", "accl_z", 0.037 / 60.0 / 9.80665),
+            ("bmi088", "gyro_z", 0.014),
+            ("bmi088", "accl_x", 160e-6),
+            ("bmi088", "accl_z", 190e-6),
+            ("mpu6050", "gyro_y", 0.005),
+            ("mpu6050", "accl_z", 400e-6),
+        ] {
+            let profile = included(name).expect(name).channel(channel).expect(channel);
+            let stated = profile.data_sheet.angle_random_walk.expect("stated");
+            assert!((stated / noise - 1.0).abs() < 2e-4, "{name} {channel}: {stated} for {noise}");
+        }
+        let gyro = included("ADIS16470").expect("a name in capitals").channel("gyro_x").expect("gyro");
+        assert!((gyro.data_sheet.in_run_bias_stability.expect("stated") * 3600.0 - 8.0).abs() < 0.01);
+        assert_eq!(included_names().count(), 3);
+        assert!(included("adis16405").is_none());
+    }
+
+    #[test]
+    fn the_names_of_equal_profiles_share_their_memory() {
+        let text = "name = \"A1\"\nsource = \"none\"\n[[channels]]\nnames = [\"gyro_x\"]\nquantity = \"angular_rate\"\n\
+                    unit = \"deg/s\"\nlsb = 0.1\n";
+        let [one, other] = [parse(text), parse(text)].map(|profile| profile.expect("a profile").name.as_ptr());
+        assert_eq!(one, other);
+    }
+
+    #[test]
+    fn faults_are_named() {
+        let sensor = "name = \"A1\"\nsource = \"none\"\n";
+        let channel = |unit: &str, lsb: &str, rest: &str| {
+            format!(
+                "{sensor}[[channels]]\nnames = [\"gyro_x\"]\nquantity = \"angular_rate\"\nunit = \"{unit}\"\nlsb = {lsb}\n{rest}"
+            )
+        };
+        for (text, expected) in [
+            (sensor.to_owned(), "no channel"),
+            ("name = 3".to_owned(), "line 1"),
+            (channel("rad/s", "0.1", ""), "the unit is \"rad/s\"; that of its quantity is deg/s"),
+            (channel("deg/s", "-1.0", ""), "lsb is -1"),
+            (channel("deg/s", "nan", ""), "lsb is NaN"),
+            (channel("deg/s", "0.1", "noise = 3.0\n"), "unknown field `noise`"),
+            (channel("deg/s", "0.1", "range = inf\n"), "range is inf"),
+        ] {
+            let error = parse(&text).expect_err(expected).to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

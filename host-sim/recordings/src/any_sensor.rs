@@ -1,0 +1,49 @@
+//! Recordings of any inertial sensor, in files of any known format.
+
+use crate::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, SelectionError};
+use crate::sensor_measurement;
+use crate::sensor_table::SensorTable;
+use crate::time_base::{EstimatedTimeBase, TimeBaseError};
+use measurement::SensorProfile;
+
+/// What the user says of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// The sensor that was recorded.
+    pub sensor: SensorProfile,
+    /// Which columns are read, and in which units they are.
+    pub selection: ColumnSelection,
+    /// Topic, message or array of a file with several.
+    pub topic: Option<String>,
+}
+
+impl ReadOptions {
+    pub(crate) fn choose(&self, available: &[AvailableColumn]) -> Result<Vec<ChosenColumn>, SelectionError> {
+        self.selection.choose(available, &self.sensor)
+    }
+}
+
+/// The rows of a recording and their sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorRecording {
+    table: SensorTable,
+    sensor: SensorProfile,
+}
+
+impl SensorRecording {
+    pub(crate) fn new(table: SensorTable, sensor: &SensorProfile) -> Self {
+        Self { table, sensor: sensor.clone() }
+    }
+
+    /// The usable samples on their time base; and what the user should know, one sentence each.
+    ///
+    /// `stated_hz` overrides the rate that the time stamps show. Values become counts of the file's own step where they are
+    /// multiples of one, else of a step that adds at most 1e-4 to the variance of the noise.
+    ///
+    /// # Errors
+    /// There is no usable rate or the stated one contradicts the stamps, there are fewer than 4 usable samples, no two of them
+    /// are neighbours, or the gaps are more than 64 times as long as the samples.
+    pub fn time_base(self, stated_hz: Option<f64>) -> Result<(EstimatedTimeBase, Vec<String>), TimeBaseError> {
+        sensor_measurement::time_base(self.table, &self.sensor, stated_hz)
+    }
+}

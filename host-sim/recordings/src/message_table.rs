@@ -1,0 +1,71 @@
+//! Tables from logs of messages: the choice of a topic, and rows from messages whose fields are known.
+
+use crate::any_sensor::ReadOptions;
+use crate::column_selection::AvailableColumn;
+use crate::input_error::{InputError, Reason};
+use crate::sensor_table::{Number, SensorTable, TableBuilder};
+use std::path::Path;
+
+/// The topic to read of `topics`, each with its number of messages where that is known: the one that the user names, else
+/// the only one.
+pub(crate) fn choose_topic<'a, T>(
+    format: &'static str,
+    topics: &'a [(String, T)],
+    wanted: Option<&str>,
+) -> Result<&'a (String, T), Reason> {
+    let names = || topics.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    match (wanted, topics) {
+        (_, []) => Err(Reason::NoTopic { format }),
+        (Some(wanted), topics) => topics
+            .iter()
+            .find(|(name, _)| name == wanted)
+            .ok_or_else(|| Reason::UnknownTopic(Box::new((wanted.to_owned(), names())))),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(Reason::SeveralTopics(names())),
+    }
+}
+
+/// Builds the table of one topic.
+pub(crate) struct MessageTable<'a> {
+    file: &'a Path,
+    builder: TableBuilder,
+    row: Vec<Number>,
+    rows: u64,
+}
+
+impl<'a> MessageTable<'a> {
+    /// Of messages with `fields`, each with its unit.
+    pub(crate) fn new(file: &'a Path, fields: &[(&str, &str)], options: &ReadOptions) -> Result<Self, InputError> {
+        let available: Vec<AvailableColumn> =
+            fields.iter().map(|(name, unit)| AvailableColumn::known(name, unit)).collect();
+        let chosen =
+            options.choose(&available).map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
+        Ok(Self { file, row: Vec::with_capacity(chosen.len()), builder: TableBuilder::new(chosen), rows: 0 })
+    }
+
+    /// Adds a message: a number for each field.
+    pub(crate) fn push(&mut self, fields: &[Number]) -> Result<(), InputError> {
+        self.rows += 1;
+        self.row.clear();
+        let number = |position: usize| fields.get(position).copied().unwrap_or(Number::Real(f64::NAN));
+        self.row.extend(self.builder.chosen().iter().map(|column| number(column.position)));
+        self.builder.push(&self.row).map_err(|(at, reason)| {
+            let label = self.builder.chosen().get(at).map_or("", |column| column.label.as_str());
+            InputError::row(self.file, self.rows, label, reason)
+        })
+    }
+
+    /// The table of all messages. `damage` says why there are no more, where the file ends early: what came before is used.
+    pub(crate) fn finish(self, damage: Option<Reason>) -> Result<SensorTable, InputError> {
+        let fail = |reason| InputError::file(self.file, reason);
+        match damage {
+            Some(reason) if self.rows == 0 => Err(fail(reason)),
+            damage => {
+                let mut table = self.builder.finish().map_err(fail)?;
+                let note = |reason| format!("{reason}; the {} messages before that are used", self.rows);
+                table.notes.extend(damage.map(note));
+                Ok(table)
+            }
+        }
+    }
+}

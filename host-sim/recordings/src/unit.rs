@@ -1,0 +1,119 @@
+//! Units of the columns of recordings, as people write them, and their factors to the units of the analysis.
+
+use measurement::Quantity;
+
+/// Standard gravity, m/s².
+const GRAVITY: f64 = 9.806_65;
+/// deg/s per rad/s.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
+/// What a number in a column counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Unit {
+    /// As it is written in messages.
+    pub(crate) name: &'static str,
+    /// The unit of the analysis that measures the same; `s` for times, `count` for register counts.
+    pub(crate) base: &'static str,
+    /// Size of this unit, in `base`.
+    pub(crate) factor: f64,
+}
+
+/// Base of times.
+pub(crate) const SECOND: &str = "s";
+/// Base of register counts.
+pub(crate) const COUNT: &str = "count";
+
+/// The first spelling is the name; all but it are as [`normalized`] leaves them.
+const UNITS: &[(&[&str], &str, f64)] = &[
+    (&["deg/s", "degs", "degs-1", "deg/sec", "dps"], "deg/s", 1.0),
+    (&["mdeg/s", "mdegs", "mdps"], "deg/s", 1e-3),
+    (&["deg/h", "degh", "deg/hr", "dph"], "deg/s", 1.0 / 3600.0),
+    (&["rad/s", "rads", "rads-1", "rad/sec"], "deg/s", DEGREES),
+    (&["mrad/s", "mrads", "mrads-1"], "deg/s", 1e-3 * DEGREES),
+    (&["g"], "g", 1.0),
+    (&["mg"], "g", 1e-3),
+    (&["ug"], "g", 1e-6),
+    (&["m/s^2", "m/s2", "ms2", "ms-2", "m/s/s", "mps2", "m/ss"], "g", 1.0 / GRAVITY),
+    (&["gauss", "gs"], "gauss", 1.0),
+    (&["mgauss"], "gauss", 1e-3),
+    (&["T", "tesla"], "gauss", 1e4),
+    (&["uT", "ut"], "gauss", 1e-2),
+    (&["nT", "nt"], "gauss", 1e-5),
+    // The origin of the scale does not matter to noise.
+    (&["degC", "degc", "celsius", "c"], "degC", 1.0),
+    (&["K", "kelvin", "k"], "degC", 1.0),
+    (&["V", "v", "volt"], "V", 1.0),
+    (&["mV", "mv"], "V", 1e-3),
+    (&["s", "sec", "secs", "seconds"], SECOND, 1.0),
+    (&["ms", "msec", "milliseconds"], SECOND, 1e-3),
+    (&["us", "usec", "microseconds"], SECOND, 1e-6),
+    (&["ns", "nsec", "nanoseconds"], SECOND, 1e-9),
+    (&["counts", "count", "lsb", "raw"], COUNT, 1.0),
+];
+
+impl Unit {
+    /// The unit that `text` names, such as `rad/s`, `m s^-2`, `°/s` or `mg`; `None` for other texts.
+    #[must_use]
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let spelling = normalized(text);
+        UNITS.iter().find_map(|(spellings, base, factor)| {
+            let known = spellings.iter().any(|known| *known == text.trim() || *known == spelling);
+            known.then_some(Self { name: spellings[0], base, factor: *factor })
+        })
+    }
+
+    /// Names of all units.
+    pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+        UNITS.iter().map(|(spellings, ..)| spellings[0])
+    }
+
+    /// Whether it is a unit of `quantity`.
+    #[must_use]
+    pub(crate) fn measures(&self, quantity: Quantity) -> bool {
+        self.base == quantity.unit()
+    }
+}
+
+/// Small letters, `deg` for °, `u` for µ, `/` for "per", and without blanks, underscores, powers and multiplication signs.
+fn normalized(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for letter in text.to_lowercase().chars() {
+        match letter {
+            '°' => plain.push_str("deg"),
+            'µ' | 'μ' => plain.push('u'),
+            '²' => plain.push('2'),
+            ' ' | '_' | '^' | '*' | '·' | '(' | ')' => {}
+            other => plain.push(other),
+        }
+    }
+    plain.replace("per", "/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Unit;
+
+    #[test]
+    fn units_are_understood_as_people_write_them() {
+        // 1 rad/s is 57.29578 deg/s; 1 m/s² is 0.1019716 g; 1 µT is 0.01 gauss.
+        for (texts, base, factor) in [
+            (&["deg/s", "°/s", "dps", "deg_s", "deg_per_s", "deg s^-1"][..], "deg/s", 1.0),
+            (&["rad/s", "rad s^-1", "rad_s", "rad_per_sec", "Rad/S"], "deg/s", 57.295_78),
+            (&["m/s^2", "m s^-2", "m/s²", "m_s2", "m/s**2", "m_per_s2"], "g", 0.101_971_6),
+            (&["mg"], "g", 1e-3),
+            (&["µT", "uT"], "gauss", 0.01),
+            (&["°C", "degC", "C"], "degC", 1.0),
+            (&["us", "µs"], "s", 1e-6),
+            (&["counts", "LSB"], "count", 1.0),
+        ] {
+            for text in texts {
+                let unit = Unit::parse(text).unwrap_or_else(|| panic!("{text}"));
+                assert_eq!(unit.base, base, "{text}");
+                assert!((unit.factor / factor - 1.0).abs() < 1e-6, "{text}: {}", unit.factor);
+            }
+        }
+        for text in ["", "x", "m/s", "furlong", "s^2"] {
+            assert_eq!(Unit::parse(text), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,347 @@
+#!/usr/bin/env python3
+"""Writes a small recording of every format that other programs write, with known noise, rate and losses.
+
+    python3 make_samples.py FOLDER
+
+Needs numpy, scipy, rosbags, mcap, mcap-ros2-support, pyulog and pymavlink, and sigrok-cli for its SPI decoder. The writers are those of the formats' own
+projects (numpy, scipy, rosbags, mcap). ULog and ArduPilot logs have no writer in Python: the bytes are written here and read
+back by pyulog and pymavlink, which must find every sample. FOLDER/truth.json says what each file holds: arguments, rate in
+Hz, rows, samples that are missing between them, and the angle random walk of each channel in deg/s/sqrt(Hz) or g/sqrt(Hz).
+"""
+
+import json
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+
+GRAVITY = 9.80665
+ROWS = 20_000
+RATE = 200.0
+# Standard deviations of white noise.
+GYRO_SIGMA = np.radians([0.05, 0.07, 0.09])  # rad/s
+ACCL_SIGMA = np.array([0.002, 0.003, 0.004]) * GRAVITY  # m/s^2
+GYRO = ["gyro_x", "gyro_y", "gyro_z"]
+ACCL = ["accl_x", "accl_y", "accl_z"]
+# Samples that never arrive: single ones, and an outage.
+LOST = np.r_[500, 3_000, 7_777, 12_000:12_040, 17_001]
+START_NS = 1_700_000_000_000_000_000
+
+
+def samples(seed, rows=ROWS, rate=RATE):
+    """Times in ns, rates in rad/s, forces in m/s^2, without the lost rows."""
+    random = np.random.default_rng(seed)
+    gyro = random.normal(0.0, GYRO_SIGMA, (rows, 3)) + [0.01, -0.02, 0.005]
+    accl = random.normal(0.0, ACCL_SIGMA, (rows, 3)) + [0.1, -0.05, GRAVITY]
+    times = START_NS + np.round(np.arange(rows) * 1e9 / rate + random.uniform(0.0, 0.02e9 / rate, rows)).astype(np.int64)
+    kept = np.setdiff1d(np.arange(rows), LOST)
+    return times[kept], gyro[kept], accl[kept]
+
+
+def noise(channels, rate=RATE):
+    sigmas = dict(zip(GYRO, np.degrees(GYRO_SIGMA))) | dict(zip(ACCL, ACCL_SIGMA / GRAVITY))
+    return {channel: float(sigmas[channel] / np.sqrt(rate)) for channel in channels}
+
+
+class Truth(list):
+    """What the files hold."""
+
+    def add(self, file, arguments=(), rate=RATE, rows=ROWS - len(LOST), missing=len(LOST), channels=GYRO + ACCL):
+        known = dict(file=str(file), arguments=list(arguments), rate_hz=rate, rows=rows, missing=missing)
+        self.append(known | dict(angle_random_walk=noise(channels, rate)))
+
+
+def tables(folder, truth):
+    times, gyro, accl = samples(1)
+    seconds = (times - times[0]) / 1e9
+    columns = np.c_[seconds, np.degrees(gyro), accl]
+    header = "time_s,gyro_x_deg_s,gyro_y_deg_s,gyro_z_deg_s,ax [m/s^2],ay [m/s^2],az [m/s^2]"
+    np.savetxt(folder / "units.csv", columns, delimiter=",", header=header, comments="", fmt="%.9f")
+    truth.add("units.csv")
+    # The headings of EuRoC's imu0/data.csv.
+    euroc = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+    euroc += "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"
+    with open(folder / "euroc.csv", "w") as out:
+        print(euroc, file=out)
+        for time, rate, force in zip(times, gyro, accl):
+            print(time, *rate, *force, sep=",", file=out)
+    truth.add("euroc.csv")
+    with open(folder / "semicolon.csv", "w") as out:
+        print("t;p;q;r", file=out)
+        for time, rate in zip(seconds, np.degrees(gyro) * 1e3):
+            print(*(f"{value:.6f}".replace(".", ",") for value in [time * 1e3, *rate]), sep=";", file=out)
+    named = ["--columns", "time=t,gyro_x=p,gyro_y=q,gyro_z=r", "--units", "ms,mdeg/s"]
+    truth.add("semicolon.csv", named, channels=GYRO)
+    # Counts of the included profile of an MPU-6050: 131 LSB per deg/s.
+    counts = np.round(np.degrees(gyro) * 131).astype(int)
+    table = np.c_[np.round(seconds * 1e6).astype(int), counts]
+    np.savetxt(folder / "counts.tsv", table, delimiter="\t", header="time_us\tgx_raw\tgy_raw\tgz_raw", comments="", fmt="%d")
+    truth.add("counts.tsv", ["--sensor", "mpu6050"], channels=GYRO)
+
+
+def numpy_arrays(folder, truth):
+    times, gyro, accl = samples(2)
+    np.save(folder / "matrix.npy", gyro)
+    # Without time stamps the lost samples are not seen.
+    chosen = ["--columns", "gyro_x=0,gyro_y=1,gyro_z=2", "--units", "rad/s", "--rate", "200"]
+    truth.add("matrix.npy", chosen, missing=0, channels=GYRO)
+    np.save(folder / "transposed.npy", np.asfortranarray(np.c_[(times - times[0]) / 1e9, gyro].T.astype(">f8")))
+    chosen = ["--columns", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "--units", "rad/s,s"]
+    truth.add("transposed.npy", chosen, channels=GYRO)
+    fields = [("t_us", "<i8")] + [(name, "<f4") for name in ["gx", "gy", "gz", "ax", "ay", "az"]]
+    records = np.zeros(len(times), fields)
+    for name, column in zip(records.dtype.names, [(times - times[0]) // 1000, *gyro.T, *accl.T]):
+        records[name] = column
+    np.save(folder / "records.npy", records)
+    truth.add("records.npy", ["--units", "rad/s,m/s^2"])
+    np.savez_compressed(folder / "arrays.npz", stamp=times, gyro=gyro, accel=accl / GRAVITY, note=np.array("text"))
+    truth.add("arrays.npz", ["--units", "ns,rad/s,g"])
+
+
+def matlab(folder, truth):
+    times, gyro, accl = samples(3)
+    arrays = dict(time=(times - times[0])[:, None] / 1e9, gyro=gyro, accel=accl, name="bench")
+    for file, compressed in [("level5.mat", False), ("compressed.mat", True)]:
+        scipy.io.savemat(folder / file, arrays, do_compression=compressed)
+        truth.add(file, ["--units", "s,rad/s,m/s^2"])
+
+
+def ros_bags(folder, truth):
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    times, gyro, accl = samples(4)
+
+    def write(writer, topics, store, serialize):
+        types = store.types
+        kind = "sensor_msgs/msg/Imu"
+        vector, zeros = types["geometry_msgs/msg/Vector3"], np.zeros(9)
+        extra = dict(seq=0) if store is ros1 else {}
+        with writer:
+            connections = [writer.add_connection(topic, kind, typestore=store) for topic in topics]
+            for time, rate, force in zip(times, gyro, accl):
+                stamp = types["builtin_interfaces/msg/Time"](sec=int(time // 10**9), nanosec=int(time % 10**9))
+                message = types[kind](
+                    header=types["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **extra),
+                    orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+                    orientation_covariance=zeros,
+                    angular_velocity=vector(*map(float, rate)),
+                    angular_velocity_covariance=zeros,
+                    linear_acceleration=vector(*map(float, force)),
+                    linear_acceleration_covariance=zeros,
+                )
+                for connection in connections:
+                    # Written 3 ms late and more: the stamp in the header is the time of the sample.
+                    writer.write(connection, int(time) + 3_000_000, serialize(message, kind))
+
+    ros1, ros2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+    bag = Writer1(folder / "one.bag")
+    bag.set_compression(Writer1.CompressionFormat.LZ4)
+    write(bag, ["/imu/data"], ros1, ros1.serialize_ros1)
+    truth.add("one.bag")
+    write(Writer1(folder / "two.bag"), ["/imu/data", "/imu/other"], ros1, ros1.serialize_ros1)
+    truth.add("two.bag", ["--topic", "/imu/other"])
+    for name, plugin, ending in [("mcap", StoragePlugin.MCAP, "mcap"), ("sqlite", StoragePlugin.SQLITE3, "db3")]:
+        writer = Writer2(folder / name, version=9, storage_plugin=plugin)
+        write(writer, ["/imu/data"], ros2, ros2.serialize_cdr)
+        truth.add(f"{name}/{name}.{ending}")
+
+    # The same by Foxglove's own writer, compressed in chunks.
+    from mcap_ros2.writer import Writer as McapWriter
+
+    definition = ros2.generate_msgdef("sensor_msgs/msg/Imu", ros_version=2)[0]
+    with open(folder / "foxglove.mcap", "wb") as out:
+        writer = McapWriter(out)
+        schema = writer.register_msgdef("sensor_msgs/msg/Imu", definition)
+        for number, (time, rate, force) in enumerate(zip(times, gyro, accl)):
+            axes = lambda values: dict(zip("xyz", map(float, values)))
+            stamp = dict(sec=int(time // 10**9), nanosec=int(time % 10**9))
+            message = dict(header=dict(stamp=stamp, frame_id="a_longer_name"), angular_velocity=axes(rate))
+            message |= dict(orientation=dict(x=0.0, y=0.0, z=0.0, w=1.0), linear_acceleration=axes(force))
+            covariances = ["orientation", "angular_velocity", "linear_acceleration"]
+            message |= {f"{name}_covariance": [0.0] * 9 for name in covariances}
+            writer.write_message("/imu", schema, message, log_time=int(time), publish_time=int(time), sequence=number)
+        writer.finish()
+    truth.add("foxglove.mcap")
+
+
+def ulog(folder, truth):
+    """ULog by its specification; pyulog reads it back."""
+    from pyulog import ULog
+
+    times, gyro, accl = samples(5)
+    micros = (times - START_NS) // 1000 + 1_000_000
+
+    def message(kind, payload):
+        return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+    def log(formats, subscriptions, data):
+        header = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+        flags = message("B", bytes(40))
+        head = b"".join(message("F", text.encode()) for text in formats)
+        head += b"".join(message("A", struct.pack("<BH", 0, number) + name.encode()) for number, name in subscriptions)
+        return header + flags + head + b"".join(message("D", payload) for payload in data)
+
+    single = "{}:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float x;float y;float z;"
+    formats = [single.format("sensor_gyro"), single.format("sensor_accel")]
+    data = []
+    for time, rate, force in zip(micros, gyro, accl):
+        # Published later than sampled.
+        data.append(struct.pack("<HQQIfff", 0, time + 700, time, 1, *rate))
+        data.append(struct.pack("<HQQIfff", 1, time + 900, time, 2, *force))
+    (folder / "single.ulg").write_bytes(log(formats, [(0, "sensor_gyro"), (1, "sensor_accel")], data))
+    read = {topic.name: topic.data for topic in ULog(str(folder / "single.ulg")).data_list}
+    assert np.array_equal(read["sensor_gyro"]["timestamp_sample"], micros)
+    assert np.allclose(read["sensor_accel"]["z"], accl[:, 2], rtol=1e-6)
+    truth.add("single.ulg", channels=GYRO)
+    truth.add("single.ulg", ["--topic", "sensor_accel"], channels=ACCL)
+
+    # FIFO: 8 samples of 16 bits a message at 8 kHz; three messages are lost. The range is small enough that the step, a seventh
+    # of the noise, adds no more than 0.2 % to its variance.
+    rate, each, scale = 8000.0, 8, np.radians(250.0) / 32768
+    random = np.random.default_rng(6)
+    counts = np.round(random.normal(0.0, GYRO_SIGMA, (4 * ROWS, 3)) / scale).astype(int)
+    fifo = "sensor_gyro_fifo:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float dt;float scale;"
+    fifo += "uint8_t samples;int16_t[32] x;int16_t[32] y;int16_t[32] z;"
+    lost = {100, 2_000, 5_555}
+    data = []
+    for number in sorted(set(range(len(counts) // each)) - lost):
+        time = 1_000_000 + ((number + 1) * each - 1) * 125
+        block = np.zeros((32, 3), int)
+        block[:each] = counts[number * each : (number + 1) * each]
+        data.append(struct.pack("<HQQIffB96h", 0, time + 50, time, 1, 125.0, scale, each, *block.T.ravel()))
+    (folder / "fifo.ulg").write_bytes(log([fifo], [(0, "sensor_gyro_fifo")], data))
+    topic = ULog(str(folder / "fifo.ulg")).data_list[0].data
+    assert len(topic["x[0]"]) == len(counts) // each - len(lost) and topic["y[7]"][0] == counts[7, 1]
+    missing = each * len(lost)
+    truth.add("fifo.ulg", rate=rate, rows=len(counts) - missing, missing=missing, channels=GYRO)
+
+
+def ardupilot(folder, truth):
+    """DataFlash by its format messages; pymavlink reads it back."""
+    from pymavlink import DFReader
+
+    times, gyro, accl = samples(7)
+    micros = (times - START_NS) // 1000 + 5_000_000
+    sizes = dict(zip("bBhHiIfQaMnNZ", [1, 1, 2, 2, 4, 4, 4, 8, 64, 1, 4, 16, 64]))
+
+    def fmt(kind, name, types, labels):
+        length = 3 + sum(sizes[letter] for letter in types)
+        text = struct.pack("<BB4s16s64s", kind, length, name.encode(), types.encode(), labels.encode())
+        return b"\xa3\x95\x80" + text
+
+    def message(kind, *fields):
+        return bytes([0xA3, 0x95, kind]) + struct.pack(*fields)
+
+    head = fmt(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")
+    head += fmt(130, "IMU", "QBffffffIIfBBHH", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz")
+    head += fmt(131, "ISBH", "QHBBHHQf", "TimeUS,N,type,instance,mul,smp_cnt,SampleUS,smp_rate")
+    head += fmt(132, "ISBD", "QHHaaa", "TimeUS,N,seqno,x,y,z")
+    imu = b"".join(
+        message(130, "<QBffffffIIfBBHH", time, 0, *rate, *force, 0, 0, 41.5, 1, 1, 1000, 1000)
+        for time, rate, force in zip(micros, gyro, accl)
+    )
+    (folder / "imu.bin").write_bytes(head + imu)
+
+    def read_back(file, kind):
+        log = DFReader.DFReader_binary(str(folder / file))
+        return [found for found in iter(lambda: log.recv_match(type=kind), None)]
+
+    found = read_back("imu.bin", "IMU")
+    assert len(found) == len(micros) and abs(found[9].GyrX - gyro[9, 0]) < 1e-6
+    truth.add("imu.bin")
+
+    # Batches of 1024 raw samples at 2 kHz, every 0.75 s: the gaps between them are as long as 476 samples. One message of
+    # 32 samples is lost.
+    rate, size, every, multiplier, batches = 2000.0, 1024, 1500, 900, 60
+    counts = np.round(np.random.default_rng(8).normal(0.0, GYRO_SIGMA, (batches * size, 3)) * multiplier * 16).astype(int)
+    body, lost = [], (7, 11)
+    for batch in range(batches):
+        start = 3_000_000 + batch * every * 500
+        body.append(message(131, "<QHBBHHQf", start + 600_000, batch, 1, 0, multiplier * 16, size, start, rate))
+        for sequence in range(size // 32):
+            block = counts[batch * size + 32 * sequence :][:32]
+            if (batch, sequence) != lost:
+                body.append(message(132, "<QHH96h", start + 600_100, batch, sequence, *block.T.ravel()))
+    (folder / "batches.bin").write_bytes(head + b"".join(body))
+    found = read_back("batches.bin", "ISBD")
+    assert len(found) == batches * size // 32 - 1 and list(found[0].x) == list(counts[:32, 0])
+    missing = (batches - 1) * (every - size) + 32
+    truth.add("batches.bin", rate=rate, rows=batches * size - 32, missing=missing, channels=GYRO)
+
+
+def spi_captures(folder, truth):
+    """Burst reads of an ADIS16405 on the bus: decoded by sigrok from a capture of the four lines, and as Saleae exports them."""
+    rows, rate, lost = 1500, 200.0, [200, 700, 701]
+    random = np.random.default_rng(9)
+    # Supply 5 V, then three rates, three forces and three fields, temperature 25 degC, auxiliary input.
+    level = np.array([2068, 0, 10, -20, 0, 30, 300, 100, -200, 400, 0, 0])
+    sigma = np.array([1, 8, 9, 10, 4, 4, 4, 3, 3, 3, 1, 1])
+    counts = np.round(level + random.normal(0, 1, (rows, 12)) * sigma).astype(int)
+    # Bit 15 says that the word is new; supply, temperature and auxiliary input have 12 bits, the others 14.
+    words = np.where(np.isin(np.arange(12), [0, 10, 11]), counts & 0xFFF, counts & 0x3FFF) | 0x8000
+    frames = []  # time in us, bytes out, bytes in
+    for row in sorted(set(range(rows)) - set(lost)):
+        out, back = bytes([0x3E, 0]) + bytes(24), bytes(2) + words[row].astype(">u2").tobytes()
+        frames.append((1_000 + row * 5_000, out, back))
+    noise = {name: float(sigma[at] * lsb / np.sqrt(rate)) for at, name, lsb in
+             [(1, "gyro_x", 0.05), (2, "gyro_y", 0.05), (3, "gyro_z", 0.05), (6, "accl_z", 3.33e-3)]}
+
+    def add(file):
+        known = dict(file=file, arguments=[], rate_hz=rate, rows=rows - len(lost), missing=len(lost))
+        truth.append(known | dict(angle_random_walk=noise))
+
+    # SPI mode 3 at 500 kHz; one time unit is 1 us, the high and the low of the clock take one each.
+    lines = ["$timescale 1 us $end", "$scope module bus $end"]
+    lines += [f"$var wire 1 {letter} {name} $end" for letter, name in zip("abcd", ["CS", "CLK", "MOSI", "MISO"])]
+    lines += ["$upscope $end", "$enddefinitions $end", "#0", "1a", "1b", "0c", "0d"]
+    for time, out, back in frames:
+        lines += [f"#{time}", "0a"]
+        for sent, received in zip(out, back):
+            for bit in range(7, -1, -1):
+                time += 1
+                lines += [f"#{time}", "0b", f"{sent >> bit & 1}c", f"{received >> bit & 1}d", f"#{time + 1}", "1b"]
+                time += 1
+        lines += [f"#{time + 1}", "1a"]
+    lines.append(f"#{time + 100}")
+    (folder / "bus.vcd").write_text("\n".join(lines) + "\n")
+    decoder = "spi:clk=CLK:mosi=MOSI:miso=MISO:cs=CS:cpol=1:cpha=1"
+    command = ["sigrok-cli", "-I", "vcd", "-i", str(folder / "bus.vcd"), "-P", decoder]
+    command += ["-A", "spi=mosi-transfer:miso-transfer", "--protocol-decoder-jsontrace"]
+    if shutil.which(command[0]):
+        (folder / "sigrok.json").write_bytes(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+        add("sigrok.json")
+    # Saleae has no writer outside its program: its columns, as Logic 2 and Logic 1.2 name them.
+    with open(folder / "saleae_table.csv", "w") as table, open(folder / "saleae_words.csv", "w") as words:
+        print('name,type,start_time,duration,"mosi","miso"', file=table)
+        print("Time [s],Packet ID,MOSI,MISO", file=words)
+        for packet, (time, out, back) in enumerate(frames):
+            start = time / 1e6
+            print(f'"SPI","enable",{start:.9f},8e-09,,', file=table)
+            for at, (sent, received) in enumerate(zip(out, back)):
+                byte = start + 1e-6 + at * 16e-6
+                print(f'"SPI","result",{byte:.9f},1.5e-05,0x{sent:02X},0x{received:02X}', file=table)
+                if at % 2 == 0:
+                    pair = [int.from_bytes(data[at : at + 2], "big") for data in (out, back)]
+                    print(f"{byte:.9f},{packet},0x{pair[0]:04X},0x{pair[1]:04X}", file=words)
+            print(f'"SPI","disable",{start + 420e-6:.9f},8e-09,,', file=table)
+    add("saleae_table.csv")
+    add("saleae_words.csv")
+
+
+def main():
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    truth = Truth()
+    for write in [tables, numpy_arrays, matlab, ros_bags, ulog, ardupilot, spi_captures]:
+        write(folder, truth)
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1))
+
+
+if __name__ == "__main__":
+    main()
