@@ -5,23 +5,30 @@
 //! fitted to the first half.
 
 use crate::OCTAVES;
-use crate::assessment::Assessment;
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, agree_on_filter};
+use crate::assessment::{AssessedModels, Assessment};
+use crate::causes;
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::contradiction::Contradiction;
 use crate::covariates::CovariateFit;
 use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::{bias, random_telegraph};
 use crate::estimators::{RecordEstimators, RecordPart};
-use crate::findings::{Detection, Effect, Finding, Validation};
+use crate::figure_data;
+use crate::findings::{Detection, Effect};
+use crate::motion::{self, PlatformMotion};
 use crate::naming::{ChannelFindings, name_effects};
+use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
+use crate::part_report;
 use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
 use crate::report::{
-    ChannelReport, CurvePoint, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
-    SlopeMethodReport, Stretch, TermReport,
+    ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
+    SlopeMethodReport, term_reports,
 };
 use crate::series::Series;
-use crate::slow_drift::{ChannelsInCommon, common_mode};
+use crate::slow_drift::{ChannelsInCommon, common_mode, goes_as_far_as_ramp};
 use crate::spectra::allan_deviations_by_spectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
+use crate::unexplained;
 use crate::uniform_series::UniformSeries;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelProfile, Measurement, Quantity, SensorProfile};
@@ -32,44 +39,32 @@ use std::collections::BTreeMap;
 /// model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
-    let mut channels = analyze_channels(measurement);
-    let findings = findings_of(&mut channels);
-    Report {
+    let (mut channels, part) = analyze_channels(measurement);
+    // What the first half shows by itself, to compare with what the whole record shows.
+    let has_effects = channels.iter().any(|channel| !channel.effects.is_empty());
+    let first_half =
+        if has_effects { analyze_channels(&measurement.before(measurement.middle())).0 } else { Vec::new() };
+    let duration_s = measurement.periods() as f64 * measurement.period_s();
+    let findings = causes::find(&mut channels, &first_half, &measurement.profile, duration_s);
+    let mut report = Report {
         schema: SCHEMA,
         sample_rate_hz: measurement.sample_rate_hz,
         samples: measurement.len() as u64,
         dropped: by_cause(&measurement.dropped),
         flagged: by_cause(&measurement.flagged),
-        part: PartReport { name: measurement.profile.name.to_owned(), ..PartReport::default() },
+        part,
         findings,
         channels,
-    }
-}
-
-/// One finding for each effect of each channel; every effect is given the position of its finding.
-fn findings_of(channels: &mut [ChannelReport]) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    for channel in channels {
-        for effect in &mut channel.effects {
-            effect.finding = findings.len();
-            findings.push(Finding {
-                kind: effect.kind.clone(),
-                channels: vec![channel.name.clone()],
-                parameters: effect.parameters.clone(),
-                evidence: effect.evidence.clone(),
-                validated: Validation::Untestable,
-                share_percent: BTreeMap::new(),
-            });
-        }
-    }
-    findings
+    };
+    figure_data::set(&mut report, measurement);
+    report
 }
 
 fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
     counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
-fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
+fn analyze_channels(measurement: &Measurement) -> (Vec<ChannelReport>, PartReport) {
     let of = |quantities: [Quantity; 2]| {
         quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
     };
@@ -82,6 +77,12 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
     let estimators = RecordEstimators::estimate(measurement, &coupled, &preprocessing);
     let series_without =
         |exclusion: Exclusion| in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, exclusion));
+    let motions: Vec<(ChannelProfile, PlatformMotion)> = traced
+        .iter()
+        .filter_map(|channel| Some((*channel, motion::find(&Series::from_measurement(measurement, channel), channel)?)))
+        .collect();
+    let duration_s = measurement.periods() as f64 * measurement.period_s();
+    let at_rest = motion::at_rest(motions.iter().map(|(_, motion)| motion), duration_s);
     let series = series_without(Exclusion::ByWhole);
     let first_half: Vec<Series> =
         series_without(Exclusion::ByFirstHalf).iter().map(|series| series.before(measurement.middle())).collect();
@@ -92,30 +93,22 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
         series: &series,
         first_half: &first_half,
     };
-    let analyses = in_parallel(&recorded, |&channel| {
-        let traced = traced.iter().position(|of| *of == channel);
-        let analysis = match traced {
-            Some(position) => ChannelAnalysis::trace(&preprocessed, channel, position, &noise_grids),
-            None => ChannelAnalysis::baseline(&preprocessed, channel),
-        };
-        let own = match traced {
-            Some(position) => Cow::Borrowed(&series[position]),
-            None => Cow::Owned(Series::from_measurement(measurement, &channel)),
-        };
-        // The series still holds the share of the covariates, which the model with added terms does not describe.
-        let trace = &analysis.first.trace;
-        let model = if analysis.first.covariates.is_empty() { &trace.after } else { &trace.before };
-        let assessment = Assessment::new(&own, model, [&trace.after, &analysis.both.trace.after]);
-        (analysis, Assessed { assessment, by_spectrum: by_spectrum(measurement, &channel) })
+    let analyses = in_parallel(&recorded, |&channel| match traced.iter().position(|of| *of == channel) {
+        Some(position) => ChannelAnalysis::trace(&preprocessed, channel, position, &noise_grids),
+        None => ChannelAnalysis::baseline(&preprocessed, channel),
     });
-    let (analyses, assessments): (Vec<ChannelAnalysis>, Vec<Assessed>) = analyses.into_iter().unzip();
     let mut analyses: Vec<(ChannelProfile, ChannelAnalysis)> = recorded.into_iter().zip(analyses).collect();
-    let inertial = analyses.iter_mut().filter(|(channel, _)| traced.contains(channel)).map(|(channel, analysis)| {
-        let fit = &mut analysis.both;
-        let is_dithered = fit.is_dithered(profile, estimators.both.resolution_of(*channel), DITHERED_OCTAVES);
-        (fit, is_dithered)
+    let common = agree_on_filter(measurement, &estimators, &traced, &mut analyses);
+    let assessments = in_parallel(&analyses, |(channel, analysis)| {
+        let own = match traced.iter().position(|of| of == channel) {
+            Some(position) => Cow::Borrowed(&series[position]),
+            None => Cow::Owned(Series::from_measurement(measurement, channel)),
+        };
+        Assessed {
+            assessment: Assessment::new(&own, analysis.assessed_models()),
+            by_spectrum: by_spectrum(measurement, channel),
+        }
     });
-    agree_on_filter(&mut inertial.collect::<Vec<_>>());
     let commons = common_modes(&analyses);
     let avar_of = |of: ChannelProfile, n: u64| {
         let position = analyses.iter().position(|(channel, _)| *channel == of)?;
@@ -128,15 +121,28 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
         let unit = channel.unit;
         let mut effects: Vec<Effect> = Vec::new();
         if traced.contains(channel) {
+            let moved = motions.iter().filter(|(of, _)| of == channel);
+            effects.extend(moved.map(|(_, motion)| motion.effect.clone()));
             effects.extend(preprocessing.effects(*channel));
-            let has_ramp = preprocessing.has_ramp(*channel);
+            // The longest octaves of the curve see a sinusoid of a few periods as a ramp.
+            let has_ramp = preprocessing.has_ramp(*channel) || analysis.lines.iter().any(MergedLine::is_slow);
             let common = commons.iter().find(|common| common.channels.contains(channel));
-            let named = name_effects(profile, &analysis.findings(&estimators.both, *channel, common));
-            effects.extend(named.into_iter().filter(|effect| !has_ramp || effect.kind != NoiseTerm::RateRamp.name()));
+            let mut named = name_effects(profile, &analysis.findings(&estimators.both, *channel, common));
+            // The response that is not proportional has the sensitivity too.
+            let responds = preprocessing.responds_to_temperature(*channel);
+            named.retain(|effect| !responds || effect.kind != "temperature");
+            let own = traced.iter().position(|of| of == channel).map(|position| &series[position]);
+            let is_ramp = |effect: &Effect| {
+                let slope = effect.parameters.get("slope").map_or(0.0, |slope| slope.value);
+                !has_ramp && own.is_some_and(|own| goes_as_far_as_ramp(own, slope))
+            };
+            let is_named = |effect: &Effect| effect.kind != NoiseTerm::RateRamp.name() || is_ramp(effect);
+            effects.extend(named.into_iter().filter(is_named));
+            effects.extend(unexplained::by_curve(&analysis.both, profile, estimators.both.resolution_of(*channel)));
         }
         let whole = measured.clone().with_confidence(|point| analysis.first.trace.before.variance_fractions(point.n));
-        let after = analysis.after(&estimators, &preprocessing, *channel, &whole, &avar_of);
-        let refitted = analysis.refitted(&estimators, *channel, &whole, &after, &avar_of);
+        let after = analysis.after(&estimators, &preprocessing, *channel, &whole, avar_of);
+        let refitted = analysis.refitted(&estimators, *channel, &whole, &after, avar_of);
         ChannelReport {
             name: channel.name.to_owned(),
             unit: unit.to_owned(),
@@ -151,12 +157,61 @@ fn analyze_channels(measurement: &Measurement) -> Vec<ChannelReport> {
             before: analysis.before(&estimators, &preprocessing, *channel, &whole),
             after,
             refitted,
-            at_rest: vec![Stretch { from_s: 0.0, to_s: measurement.periods() as f64 * measurement.period_s() }],
+            at_rest: at_rest.clone(),
             effects,
             assessment: assessed.assessment,
+            figure_data: FigureData::default(),
         }
     };
-    analyses.iter().zip(&estimators.measured).zip(assessments).map(report).collect()
+    let channels = analyses.iter().zip(&estimators.measured).zip(assessments).map(report).collect();
+    (channels, part_report::report(measurement, &common))
+}
+
+/// Gives the fits of all channels `traced` the filter that the sensor has once: those of the whole record by the whole record,
+/// those of the first half by the first half. Returns that of the whole record.
+fn agree_on_filter(
+    measurement: &Measurement,
+    estimators: &RecordEstimators,
+    traced: &[ChannelProfile],
+    analyses: &mut [(ChannelProfile, ChannelAnalysis)],
+) -> Result<PartFilter, Unidentified> {
+    let profile = &measurement.profile;
+    let decimation = profile.internal_rate_hz / measurement.sample_rate_hz;
+    let mut agree = |of: fn(&mut ChannelAnalysis) -> &mut ChannelFit| {
+        let mut fits: Vec<(&ChannelProfile, &mut ChannelFit)> = analyses
+            .iter_mut()
+            .filter(|(channel, _)| traced.contains(channel))
+            .map(|(channel, analysis)| (&*channel, of(analysis)))
+            .collect();
+        let resolution = |channel: &ChannelProfile| estimators.both.resolution_of(*channel);
+        let filtered = |(channel, fit): &(&'_ ChannelProfile, &mut ChannelFit)| {
+            let resolution = resolution(channel);
+            fit.is_dithered(profile, resolution, DITHERED_OCTAVES)
+        };
+        let dithered: Vec<bool> = fits.iter().map(filtered).collect();
+        let channels: Vec<FilteredChannel> = fits
+            .iter()
+            .zip(&dithered)
+            .map(|((channel, fit), &is_dithered)| FilteredChannel {
+                name: channel.name,
+                curve: &fit.covariates.curve,
+                model: &fit.trace.after,
+                resolution: resolution(channel),
+                is_dithered,
+            })
+            .collect();
+        let common = part_filter::estimate(&channels, &profile.filters, decimation);
+        for ((_, fit), is_dithered) in fits.iter_mut().zip(dithered) {
+            fit.agree(common.as_ref().ok(), is_dithered);
+        }
+        common
+    };
+    let _of_first_half = agree(|analysis| &mut analysis.first);
+    let common = agree(|analysis| &mut analysis.both);
+    for (channel, analysis) in analyses.iter_mut().filter(|(channel, _)| traced.contains(channel)) {
+        analysis.refit(estimators, *channel, common.as_ref().ok());
+    }
+    common
 }
 
 /// What the samples of a channel say beside its fits.
@@ -266,9 +321,29 @@ impl ChannelAnalysis {
         let (both, lines) = fit_with_lines(both, own, whole.as_ref(), profile);
         let correlation_times: Vec<f64> = both.correlation_times().collect();
         let rest = UniformSeries::from_series(whole.as_ref().unwrap_or(own));
-        let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times);
+        let is_reversible =
+            |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
+        let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
         let raw = raw.unwrap_or_else(|| first.trace.before.clone());
         Self { raw, first, both, lines, telegraph, rest: Some(rest) }
+    }
+
+    /// Makes the terms of the first half's model those of the whole record's where the second half does not contradict it.
+    fn refit(&mut self, estimators: &RecordEstimators, channel: ChannelProfile, common: Option<&PartFilter>) {
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let unseen = self.first.covariates.compensated(&estimators.ruled[1], position);
+        if Contradiction::find(&self.first.trace.after, &unseen).is_none() {
+            self.both.take_terms_that_held(&self.first.trace, common);
+        }
+    }
+
+    /// The models that are assessed by samples that still have the share of the covariates.
+    fn assessed_models(&self) -> AssessedModels<'_> {
+        AssessedModels {
+            refitted: &self.both.trace.after,
+            uncompensated: self.both.with_covariates(),
+            of_first_half: self.first.with_covariates(),
+        }
     }
 
     /// What was found in the channel over the whole record.
@@ -287,6 +362,7 @@ impl ChannelAnalysis {
             lines: &self.lines,
             telegraph: self.telegraph.as_ref(),
             common,
+            rest: self.rest.as_ref(),
         }
     }
 
@@ -302,7 +378,7 @@ impl ChannelAnalysis {
         let model = &self.raw;
         let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve(position));
         ModelReport {
-            terms: terms(model, channel.unit),
+            terms: term_reports(model, channel.unit),
             adev: whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
             fitted: error(&estimators.raw[0]),
             unseen: error(&estimators.raw[1]),
@@ -324,7 +400,7 @@ impl ChannelAnalysis {
         let (model, covariates) = (&self.first.trace.after, &self.first.covariates);
         let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, position));
         ModelReport {
-            terms: terms(model, channel.unit),
+            terms: term_reports(model, channel.unit),
             adev: self.first.deviations(&estimators.both, position, whole, avar_of),
             fitted: ModelErrorReport::new(model, &covariates.curve),
             unseen: unseen(&estimators.raw[1]),
@@ -343,7 +419,7 @@ impl ChannelAnalysis {
     ) -> ModelReport {
         let position = estimators.both.position(channel).unwrap_or_default();
         ModelReport {
-            terms: terms(&self.both.trace.after, channel.unit),
+            terms: term_reports(&self.both.trace.after, channel.unit),
             adev: self.both.deviations(&estimators.both, position, whole, avar_of),
             ..after.clone()
         }
@@ -353,10 +429,6 @@ impl ChannelAnalysis {
 /// Whether rules of the first half exclude samples of a channel.
 fn has_rules(preprocessing: &Preprocessing, channel: ChannelProfile) -> bool {
     preprocessing.excludes(channel, Exclusion::ByFirstHalf)
-}
-
-fn terms(model: &Model, unit: &str) -> Vec<TermReport> {
-    model.terms().iter().map(|term| TermReport::new(term, unit)).collect()
 }
 
 /// The drift that the gyroscopes have in common, and that of the accelerometers.

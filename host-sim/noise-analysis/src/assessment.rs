@@ -9,7 +9,7 @@ mod spectral_white_noise;
 
 pub use innovations::Innovations;
 
-use crate::findings::Parameter;
+use crate::findings::{BoundedEstimate, Parameter};
 use crate::series::Series;
 use crate::spectra::correlation_time;
 use crate::uniform_series::UniformSeries;
@@ -23,8 +23,11 @@ use serde::Serialize;
 /// Assessment of a channel's model. The JSON report has it under `practice`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Assessment {
-    /// The coefficients in the usual units.
+    /// The coefficients of the model that was fitted to the whole record, in the usual units.
     pub coefficients: Vec<Coefficient>,
+    /// Why there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coefficients_note: Option<String>,
     /// Error of the integrated channel without aiding.
     pub drift: Vec<NavigationDrift>,
     /// Of a Kalman filter built from the model, on the second half of the record.
@@ -38,7 +41,7 @@ pub struct Assessment {
     /// Correlation time of the model's Markov process by the autocorrelation of the whole record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub markov_time_by_autocorrelation: Option<Parameter>,
-    /// Record length at which each coefficient is known to ±20 %.
+    /// Record length at which each coefficient is known to ±20 % by a fit to all of it.
     pub record: Vec<RecordLength>,
 }
 
@@ -75,34 +78,84 @@ pub struct NavigationDrift {
 pub struct RecordLength {
     /// Such as `rate_random_walk`.
     pub kind: String,
-    /// Length of the half to which the model is fitted, s; absent where it is more than a month or the data does not show
-    /// the term.
+    /// Half of that length, s; absent where the length is more than a month or the data does not show the term.
     pub half_s: Option<f64>,
-    /// Hours more than this record, for both halves.
+    /// Hours more than this record.
     pub more_hours: Option<f64>,
 }
 
+/// The models of a channel that are assessed.
+#[derive(Debug, Clone, Copy)]
+pub struct AssessedModels<'a> {
+    /// Fitted to the whole record: the model that people use.
+    pub refitted: &'a Model,
+    /// As `refitted`, with the share of the covariates, which the samples still have.
+    pub uncompensated: &'a Model,
+    /// Fitted to the first half alone, with the share of the covariates: the second half is a test of it.
+    pub of_first_half: &'a Model,
+}
+
 impl Assessment {
-    /// Assesses `model`, which was fitted to the first half of `series`. `fits` are the reported models of that half and of
-    /// the whole record, in which the covariates' share may have been taken off.
+    /// Assesses the models of the channel whose samples are `series`.
     #[must_use]
-    pub fn new(series: &Series, model: &Model, fits: [&Model; 2]) -> Self {
+    pub fn new(series: &Series, models: AssessedModels) -> Self {
+        let AssessedModels { refitted, uncompensated, of_first_half } = models;
         let whole = UniformSeries::from_series(series);
         let halfway = whole.values().len() / 2;
-        let [of_half, of_whole] = fits;
-        let by_spectrum = spectral_white_noise::estimate(&whole, of_whole, of_half, series.resolution, series.unit);
         let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
+        let markov_time_by_autocorrelation =
+            correlation_time(&whole, refitted).map(|time| Parameter::new(time.value, time.low, time.high, "s"));
+        if !is_known(refitted) {
+            let note = if series.values.is_empty() {
+                "no sample of the channel was used"
+            } else {
+                "the channel never changes by a count: nothing is known of its noise but that it is below the rounding"
+            };
+            return Self { coefficients_note: Some(note.to_owned()), ..Self::default() };
+        }
+        let by_spectrum = spectral_white_noise::estimate(&whole, refitted, series.resolution, series.unit);
         Self {
-            coefficients: coefficients(model, series.unit),
-            drift: drift(model, series.unit, &unseen),
-            innovations: filter_innovations(model, &unseen),
+            coefficients: coefficients(refitted, series.unit),
+            coefficients_note: None,
+            drift: drift(uncompensated, series.unit, &unseen),
+            innovations: filter_innovations(of_first_half, &unseen),
             angle_random_walk_by_spectrum: by_spectrum.angle_random_walk,
             angle_random_walk_by_spectrum_note: by_spectrum.note,
-            markov_time_by_autocorrelation: correlation_time(&whole, model)
-                .map(|time| Parameter::new(time.value, time.low, time.high, "s")),
-            record: record_lengths(model, whole.duration() / 2.0),
+            markov_time_by_autocorrelation,
+            record: record_lengths(refitted, whole.duration()),
         }
     }
+}
+
+/// Whether the record says anything of a term: an upper bound of 0 belongs to a channel that never changes.
+fn is_known(model: &Model) -> bool {
+    model.terms().iter().any(|term| term.high > 0.0)
+}
+
+/// The terms of a model with the white noise as one: what passed the filter and what entered after it add up at averaging
+/// times longer than the filter, and their sum is N.
+fn terms_with_one_white_noise(model: &Model) -> Vec<FittedTerm> {
+    let is_white = |term: &FittedTerm| name(&term.kind) == NoiseTerm::AngleRandomWalk.name();
+    let (white, others): (Vec<FittedTerm>, Vec<FittedTerm>) = model.terms().iter().copied().partition(is_white);
+    let Some(first) = white.first().copied() else { return others };
+    let parts: Vec<BoundedEstimate> =
+        white.iter().map(|&FittedTerm { value, low, high, .. }| BoundedEstimate { value, low, high }).collect();
+    let BoundedEstimate { value, low, high } = sum_of_white_noise(&parts);
+    std::iter::once(FittedTerm { value, low, high, ..first }).chain(others).collect()
+}
+
+/// N of several white noises that add up, such as what passed a filter and what entered after it: the root of the sum of their
+/// squares, whose errors are taken as independent. All in one unit.
+#[must_use]
+pub fn sum_of_white_noise(parts: &[BoundedEstimate]) -> BoundedEstimate {
+    if let [one] = parts {
+        return *one;
+    }
+    let root_of_sum = |of: &dyn Fn(&BoundedEstimate) -> f64| parts.iter().map(of).sum::<f64>().max(0.0).sqrt();
+    let value = root_of_sum(&|of| of.value * of.value);
+    let below = root_of_sum(&|of| (of.value * of.value - of.low * of.low).powi(2));
+    let above = root_of_sum(&|of| (of.high * of.high - of.value * of.value).powi(2));
+    BoundedEstimate { value, low: (value * value - below).max(0.0).sqrt(), high: (value * value + above).sqrt() }
 }
 
 /// Name of a term's coefficient; that of white noise behind a filter is N.
@@ -124,7 +177,7 @@ fn coefficients(model: &Model, unit: &str) -> Vec<Coefficient> {
         };
         conversions(kind, unit, rate_hz).into_iter().map(converted)
     };
-    model.terms().iter().flat_map(of).collect()
+    terms_with_one_white_noise(model).iter().flat_map(of).collect()
 }
 
 fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<NavigationDrift> {
@@ -145,12 +198,16 @@ fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<NavigationDri
     integrated_errors(model, unseen).into_iter().map(of).collect()
 }
 
-/// The record length that each coefficient of `model` needs, whose half record has a length of `half` s.
-fn record_lengths(model: &Model, half: f64) -> Vec<RecordLength> {
+/// The record length that each coefficient of `model` needs, which was fitted to `duration` s. Of the white noise behind a
+/// filter and that after it, the larger one stands for N.
+fn record_lengths(model: &Model, duration: f64) -> Vec<RecordLength> {
+    let is_white = |term: &FittedTerm| name(&term.kind) == NoiseTerm::AngleRandomWalk.name();
+    let largest = model.terms().iter().filter(|term| is_white(term)).map(|term| term.value).fold(0.0, f64::max);
+    let is_smaller = |term: &FittedTerm| is_white(term) && term.value < largest;
     let of = |(index, term): (usize, &FittedTerm)| {
-        let half_s = record_length::required_length(model, index, half);
-        let more_hours = half_s.map(|length| 2.0 * (length - half) / 3600.0);
-        RecordLength { kind: name(&term.kind).to_owned(), half_s, more_hours }
+        let length = record_length::required_length(model, index, duration);
+        let more_hours = length.map(|length| (length - duration) / 3600.0);
+        RecordLength { kind: name(&term.kind).to_owned(), half_s: length.map(|length| length / 2.0), more_hours }
     };
-    model.terms().iter().enumerate().map(of).collect()
+    model.terms().iter().enumerate().filter(|(_, term)| !is_smaller(term)).map(of).collect()
 }

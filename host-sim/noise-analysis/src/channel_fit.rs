@@ -1,13 +1,16 @@
-//! The noise model of one channel in one part of a recording, and the agreement of all channels on the sensor's one
-//! low-pass filter.
+//! The noise model of one channel in one part of a recording, with the low-pass filter that all channels of the sensor have.
 
 use crate::OCTAVES;
 use crate::covariates::CovariateFit;
 use crate::estimators::RecordPart;
-use allan_core::fit::{fit_shapes, goodness};
+use crate::findings::BoundedEstimate;
+use crate::octave_covariance::with_bounds_behind_a_filter;
+use crate::part_filter::{PartFilter, is_white};
+use allan_core::fit::{Goodness, fit_shapes_except, goodness};
+use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter};
-use allan_core::trace::{LineCandidates, Trace, trace};
-use allan_core::{Curve, NoiseTerm};
+use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Residual, Trace, trace};
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelProfile, SensorProfile};
 
 /// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
@@ -18,8 +21,9 @@ const POOR_FIT: f64 = 1e-3;
 /// By how much the deviance may rise with the other channels' filter: a correct filter rises by more by chance once in 600
 /// times (χ² of one degree of freedom).
 const MAX_DEVIANCE_RISE: f64 = 10.0;
-/// From so many channels on, at least half of them must show a filter.
-const MIN_CHANNELS_FOR_MAJORITY: usize = 3;
+
+/// Least decrease of the deviance by a term of two parameters that a trace adds.
+const COST_OF_A_TERM: f64 = 18.0;
 
 /// The fit of one channel in one part of a recording: its covariates, and the trace of what the baseline model lacks.
 pub(crate) struct ChannelFit {
@@ -78,67 +82,212 @@ impl ChannelFit {
         factors().zip(shares).map(|(n, share)| (self.trace.after.avar(n) + share).sqrt()).collect()
     }
 
-    /// The filter that the trace added: the term's position in the model, the filter, and its score.
-    fn added_filter(&self) -> Option<(usize, MovingAverageFilter, f64)> {
-        let trace = &self.trace;
-        trace.added.iter().find_map(|found| match trace.after.terms()[found.term].kind {
-            NoiseTerm::Filtered(filter) => Some((found.term, filter, found.score)),
-            _ => None,
-        })
+    /// The model of the channel as it was sampled: the one with added terms, which does not describe the share of the
+    /// covariates, or with covariates the baseline model.
+    pub(crate) fn with_covariates(&self) -> &Model {
+        if self.covariates.is_empty() { &self.trace.after } else { &self.trace.before }
+    }
+
+    /// Whether the model has a filter.
+    fn has_filter(&self) -> bool {
+        self.trace.after.terms().iter().any(|term| matches!(term.kind, NoiseTerm::Filtered(_)))
+    }
+
+    /// Fits the channel's other terms again with the filter that all channels of the sensor have, or, where the record does
+    /// not identify one, traces them again without a filter.
+    ///
+    /// A channel whose own trace added no filter takes the common one if it is dithered and the deviance, with
+    /// [`COST_OF_A_TERM`] for each added term, does not rise by more than [`MAX_DEVIANCE_RISE`].
+    pub(crate) fn agree(&mut self, common: Option<&PartFilter>, is_dithered: bool) {
+        match common {
+            Some(common) => self.take_filter(common, is_dithered),
+            None if self.has_filter() => {
+                let is_line = |kind: &NoiseTerm| matches!(kind, NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_));
+                let kinds = self.trace.after.terms().iter().map(|term| term.kind);
+                let lines: Vec<NoiseTerm> = kinds.filter(is_line).collect();
+                self.trace = trace(&self.covariates.curve, LineCandidates::Spectrum(&lines), &[]);
+            }
+            None => {}
+        }
+        let decimation = common.map(|common| common.decimation);
+        self.trace.after = with_resolved_bounds(&self.covariates.curve, &self.trace.after, decimation);
+        while let Some(fit) = self.without_unresolved_term() {
+            let (model, fitted, added) = fit;
+            self.trace.after = with_resolved_bounds(&self.covariates.curve, &model, decimation);
+            self.trace.after_goodness = fitted;
+            self.trace.added = added.into_iter().collect();
+        }
+    }
+
+    /// The fit without the first added term that may be absent and of whose shape the record resolves nothing, if the deviance
+    /// does not rise by more than [`MAX_DEVIANCE_RISE`] without it.
+    fn without_unresolved_term(&self) -> Option<(Model, Goodness, Vec<AddedTerm>)> {
+        let curve = &self.covariates.curve;
+        let terms = self.trace.after.terms();
+        let is_unresolved = |found: &&AddedTerm| {
+            let term = &terms[found.term];
+            let mut shapes = term.kind.shape().into_iter().zip(term.shape);
+            let is_whole_range = |((name, _), bounds): ((&str, f64), (f64, f64))| {
+                resolvable(name, curve).is_some_and(|(least, most)| bounds.0 <= least && bounds.1 >= most)
+            };
+            term.low == 0.0 && !is_white(&term.kind) && shapes.any(is_whole_range)
+        };
+        let removed = self.trace.added.iter().find(is_unresolved)?.term;
+        let kept = terms.iter().enumerate().filter(|(index, _)| *index != removed);
+        let kinds: Vec<NoiseTerm> = kept.map(|(_, term)| term.kind).collect();
+        let model = fit_shapes_except(curve, &kinds, &kinds);
+        let fitted = goodness(curve, &model);
+        let others = self.trace.added.iter().filter(|found| found.term != removed);
+        let moved = |found: &AddedTerm| AddedTerm { term: found.term - usize::from(found.term > removed), ..*found };
+        let worse = fitted.deviance - self.trace.after_goodness.deviance;
+        (worse <= MAX_DEVIANCE_RISE).then(|| (model, fitted, others.map(moved).collect()))
+    }
+
+    fn take_filter(&mut self, common: &PartFilter, is_dithered: bool) {
+        let had = self.has_filter();
+        if !had && !is_dithered {
+            return;
+        }
+        let own = (self.trace.after_goodness, self.trace.added.len());
+        let residual = self.first_residual();
+        let mut best = self.with_filter(&self.trace, common);
+        // The channel's own terms may have stood in for the filter.
+        if !had || cost(&best) > cost_of(own.0, own.1) + MAX_DEVIANCE_RISE {
+            let again = trace(&self.covariates.curve, LineCandidates::Curve, &[common.filter]);
+            let other = self.with_filter(&again, common);
+            best = if cost(&other) < cost(&best) { other } else { best };
+        }
+        if !had && cost(&best) > cost_of(own.0, own.1) + MAX_DEVIANCE_RISE {
+            return;
+        }
+        let (model, fitted, mut added) = best;
+        if added.iter().all(|found| found.term != 0) {
+            let score = (own.0.deviance - fitted.deviance).max(0.0);
+            added.insert(0, AddedTerm { term: 0, score, residual });
+        }
+        self.trace.added = added.into_iter().take(MAX_ADDED).collect();
+        (self.trace.after, self.trace.after_goodness) = (model, fitted);
+    }
+
+    /// The terms of `traced` with the common filter in place of its white noise, fitted to the channel's curve, and what they
+    /// add to the baseline model. Terms that this leaves without an amplitude are left out.
+    fn with_filter(&self, traced: &Trace, common: &PartFilter) -> (Model, Goodness, Vec<AddedTerm>) {
+        let others = traced.after.terms().iter().enumerate().filter(|(_, term)| !is_white(&term.kind));
+        let mut others: Vec<(usize, NoiseTerm)> = others.map(|(index, term)| (index, term.kind)).collect();
+        loop {
+            let kinds: Vec<NoiseTerm> = std::iter::once(NoiseTerm::Filtered(common.filter))
+                .chain(others.iter().map(|(_, kind)| *kind))
+                .collect();
+            let (model, fitted) = self.fitted_with(&kinds);
+            let is_baseline = |kind: &NoiseTerm| NoiseTerm::BASELINE.contains(kind);
+            let absent = (1..kinds.len()).find(|&term| model.terms()[term].value == 0.0 && !is_baseline(&kinds[term]));
+            if let Some(absent) = absent {
+                others.remove(absent - 1);
+                continue;
+            }
+            let moved = |found: &AddedTerm| {
+                let is_filter = is_white(&traced.after.terms()[found.term].kind);
+                let position = others.iter().position(|(index, _)| *index == found.term);
+                let term = if is_filter { Some(0) } else { position.map(|position| position + 1) };
+                term.map(|term| AddedTerm { term, ..*found })
+            };
+            let added = traced.added.iter().filter_map(moved).collect();
+            return (model, fitted, added);
+        }
+    }
+
+    /// The model of `kinds` with their filter and the frequencies of their sinusoids as they are, and its goodness. White
+    /// noise that entered after the filter, at least that of rounding, is added as the last term where the curve shows it.
+    fn fitted_with(&self, kinds: &[NoiseTerm]) -> (Model, Goodness) {
+        let curve = &self.covariates.curve;
+        let plain = fit_shapes_except(curve, kinds, kinds);
+        let fitted = goodness(curve, &plain);
+        if kinds.len() == MAX_TERMS {
+            return (plain, fitted);
+        }
+        let with_white = [kinds, &[NoiseTerm::AngleRandomWalk]].concat();
+        let more = fit_shapes_except(curve, &with_white, &with_white);
+        let is_shown = more.terms().last().is_some_and(|term| term.low > 0.0);
+        let better = goodness(curve, &more);
+        if is_shown && better.deviance < fitted.deviance { (more, better) } else { (plain, fitted) }
+    }
+
+    /// The residual of the model at the shortest averaging time.
+    fn first_residual(&self) -> Residual {
+        let model = &self.trace.after;
+        let residual = |point: &AllanPoint| {
+            let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
+            Residual { n: point.n, excess, sigmas: excess * (2.0 * model.edf(point)).sqrt() }
+        };
+        let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
+        self.covariates.curve.points().first().map_or(nothing, residual)
+    }
+
+    /// Takes the terms of `held`, a model of the first half that held on the second, in place of those that were traced in the
+    /// whole record, unless they fit the whole record worse by more than [`MAX_DEVIANCE_RISE`].
+    pub(crate) fn take_terms_that_held(&mut self, held: &Trace, common: Option<&PartFilter>) {
+        let names = |model: &Model| {
+            let mut names: Vec<&str> = model.terms().iter().map(|term| term.kind.name()).collect();
+            names.sort_unstable();
+            names
+        };
+        let has_filter = held.after.terms().iter().any(|term| matches!(term.kind, NoiseTerm::Filtered(_)));
+        if names(&held.after) == names(&self.trace.after) || (has_filter && common.is_none()) {
+            return;
+        }
+        let kind = |term: &FittedTerm| match (term.kind, common) {
+            (NoiseTerm::Filtered(_), Some(common)) => NoiseTerm::Filtered(common.filter),
+            (kind, _) => kind,
+        };
+        let kinds: Vec<NoiseTerm> = held.after.terms().iter().map(kind).collect();
+        let curve = &self.covariates.curve;
+        let model = fit_shapes_except(curve, &kinds, &kinds);
+        let fitted = goodness(curve, &model);
+        if fitted.deviance > self.trace.after_goodness.deviance + MAX_DEVIANCE_RISE {
+            return;
+        }
+        self.trace.after = with_resolved_bounds(curve, &model, common.map(|common| common.decimation));
+        self.trace.after_goodness = fitted;
+        self.trace.added.clone_from(&held.added);
     }
 }
 
-/// Replaces the filters of the channels by the one with the largest sum of scores, unless the deviance of a dithered
-/// channel rises by more than [`MAX_DEVIANCE_RISE`].
-///
-/// Each fit comes with whether the channel is dithered: whether its noise reaches from one count to the next. A channel that
-/// is not shows the filter badly, because its rounding error is no white noise and falls faster at the shortest averaging
-/// times than behind the filter; its score is not counted, and it takes the filter without this test. Of three channels or more at least half must show a
-/// filter; otherwise no filter is reported; the fitted models keep theirs.
-pub(crate) fn agree_on_filter(channels: &mut [(&mut ChannelFit, bool)]) {
-    let Some(agreed) = highest_scoring_filter(channels) else { return };
-    let showing = channels.iter().filter(|(fit, _)| fit.added_filter().is_some()).count();
-    if channels.len() >= MIN_CHANNELS_FOR_MAJORITY && 2 * showing < channels.len() {
-        for (fit, _) in channels {
-            if let Some((term, ..)) = fit.added_filter() {
-                fit.trace.added.retain(|found| found.term != term);
+/// Deviance of a fit with what its added terms must take off at least.
+fn cost((_, fitted, added): &(Model, Goodness, Vec<AddedTerm>)) -> f64 {
+    cost_of(*fitted, added.len())
+}
+
+fn cost_of(fitted: Goodness, added: usize) -> f64 {
+    fitted.deviance + COST_OF_A_TERM * added as f64
+}
+
+/// The range of a shape parameter that a record can resolve: times from a sample period to its length, frequencies and
+/// bandwidths from one over its length to half the sample rate.
+fn resolvable(name: &str, curve: &Curve<OCTAVES>) -> Option<(f64, f64)> {
+    let period = curve.sample_period();
+    let duration = curve.samples() as f64 * period;
+    match name {
+        "time_constant" => Some((period, duration)),
+        "frequency" | "bandwidth" => Some((1.0 / duration, 0.5 / period)),
+        _ => None,
+    }
+}
+
+/// `model`, which was fitted to `curve`, with the bounds that the curve gives to white noise behind a filter, the decimation
+/// of the sensor, and bounds of shapes that the record can [resolve](resolvable).
+fn with_resolved_bounds(curve: &Curve<OCTAVES>, model: &Model, decimation: Option<BoundedEstimate>) -> Model {
+    let model = with_bounds_behind_a_filter(curve, model);
+    let resolved = |term: &FittedTerm| {
+        let mut term = *term;
+        for ((name, value), bounds) in term.kind.shape().into_iter().zip(&mut term.shape) {
+            if let Some(common) = decimation.filter(|_| name == "decimation") {
+                *bounds = (common.low, common.high);
+            } else if let Some((least, most)) = resolvable(name, curve) {
+                // `max` and `min` take the limit in place of a bound that is not a number.
+                *bounds = (bounds.0.max(least).min(value), bounds.1.min(most).max(value));
             }
         }
-        return;
-    }
-    for (fit, is_dithered) in channels {
-        let Some((term, filter, _)) = fit.added_filter() else { continue };
-        if is_alike(filter, agreed) {
-            continue;
-        }
-        let mut kinds: Vec<NoiseTerm> = fit.trace.after.terms().iter().map(|known| known.kind).collect();
-        kinds[term] = NoiseTerm::Filtered(agreed);
-        // At the filter's own rate, white noise that is added behind the filter (at least rounding) can be told from the
-        // noise that passes it.
-        if agreed.decimation == 1.0 && !kinds.contains(&NoiseTerm::AngleRandomWalk) {
-            kinds.push(NoiseTerm::AngleRandomWalk);
-        }
-        let model = fit_shapes(&fit.covariates.curve, &kinds);
-        let judged = goodness(&fit.covariates.curve, &model);
-        if !*is_dithered || judged.deviance < fit.trace.after_goodness.deviance + MAX_DEVIANCE_RISE {
-            (fit.trace.after, fit.trace.after_goodness) = (model, judged);
-        }
-    }
-}
-
-/// The filter of the dithered channels whose scores, those of filters alike included, have the largest sum.
-fn highest_scoring_filter(channels: &[(&mut ChannelFit, bool)]) -> Option<MovingAverageFilter> {
-    let dithered = channels.iter().filter(|(_, is_dithered)| *is_dithered);
-    let shown: Vec<(MovingAverageFilter, f64)> =
-        dithered.filter_map(|(fit, _)| fit.added_filter()).map(|(_, filter, score)| (filter, score)).collect();
-    let sum = |of: MovingAverageFilter| {
-        shown.iter().filter(|(filter, _)| is_alike(*filter, of)).map(|(_, score)| score).sum::<f64>()
+        term
     };
-    let scored = shown.iter().map(|&(filter, score)| (filter, sum(filter), score));
-    scored.max_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2))).map(|(filter, ..)| filter)
-}
-
-/// Whether two filters differ at most in the ratio of the two sample clocks.
-fn is_alike(a: MovingAverageFilter, b: MovingAverageFilter) -> bool {
-    (a.stages, a.taps, a.decimation == 1.0) == (b.stages, b.taps, b.decimation == 1.0)
+    Model::new(model.sample_period(), model.terms().iter().map(resolved))
 }

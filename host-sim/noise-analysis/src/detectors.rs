@@ -4,7 +4,8 @@
 //! Series ─┬► noise_levels ─► knocks                        stretches that are louder than those around them
 //!         ├► spikes                                        single samples
 //!         ├► effective_lsb                                 values rounded to several counts
-//!         └► block_means ─► gls_regression ─► bias         steps, ramps and covariates of the bias
+//!         ├► output_range                                  values that are cut off, and noise below a count
+//!         └► block_means ─► gls_regression ─► bias         steps, ramps, covariates of the bias; thermal_response
 //! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
 //! ```
 //!
@@ -17,9 +18,11 @@ pub(crate) mod effective_lsb;
 pub mod gls_regression;
 pub(crate) mod knocks;
 mod noise_levels;
+pub(crate) mod output_range;
 pub(crate) mod random_telegraph;
 pub(crate) mod spikes;
 mod telegraph_models;
+pub mod thermal_response;
 
 #[cfg(test)]
 mod knock_tests;

@@ -1,39 +1,31 @@
 //! Tail probabilities, quantiles and bounds of the normal and of the Poisson distribution.
-//!
-//! The normal distribution is not taken from statrs yet: its error function differs in the last digits, which the reports
-//! print.
 
-use statrs::function::gamma::gamma_lr;
-use std::f64::consts::{PI, SQRT_2};
+use statrs::distribution::{Continuous, ContinuousCDF, DiscreteCDF, Normal, Poisson};
 
 pub use allan_core::confidence::NORMAL_975;
 
 /// Probability that a standard normal number exceeds `z`.
 pub fn upper_tail(z: f64) -> f64 {
-    0.5 * libm::erfc(z / SQRT_2)
+    Normal::standard().sf(z)
 }
 
 /// Density of the standard normal distribution.
 pub(crate) fn density(z: f64) -> f64 {
-    (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
+    Normal::standard().pdf(z)
 }
 
-/// The `z` from 0 to 40 that a standard normal number exceeds with `probability` (at most ½), by bisection.
+/// The `z` that a standard normal number exceeds with `probability` (above 0 and at most ½).
 pub fn quantile(probability: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if upper_tail(middle) > probability { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+    -Normal::standard().inverse_cdf(probability)
 }
 
 /// Probability that a Poisson number of the given mean is `count` or more.
 pub fn poisson_tail(count: u64, mean: f64) -> f64 {
-    match count {
-        0 => 1.0,
-        _ if mean <= 0.0 => 0.0,
-        count => gamma_lr(count as f64, mean),
+    match (count, Poisson::new(mean)) {
+        (0, _) => 1.0,
+        (_, Ok(distribution)) => distribution.sf(count - 1),
+        // Of a mean of 0.
+        (_, Err(_)) => 0.0,
     }
 }
 

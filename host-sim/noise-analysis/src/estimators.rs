@@ -126,7 +126,9 @@ impl RecordEstimators {
         let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
         // Nothing is estimated twice.
         let mut distinct = vec![Exclusion::None];
-        distinct.extend([ruled, both].into_iter().filter(|&of| preprocessing.excludes_any(of)));
+        let is_distinct =
+            |of: Exclusion| preprocessing.excludes_any(of) || (of == both && preprocessing.has_thermal_response());
+        distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
         let parts = in_parallel(&distinct, |&exclusion| halves(exclusion));
         let of = |exclusion: Exclusion| match distinct.iter().position(|of| *of == exclusion) {
             Some(position) => parts[position].clone(),
@@ -194,7 +196,7 @@ fn halves(
             (!of.is_excluded[position]).then(|| {
                 let steps = f64::from(of.channel.counts[position]) * STEPS_PER_COUNT;
                 let profile = of.channel.profile;
-                (steps - STEPS_PER_COUNT * preprocessing.offset(profile, slot) / profile.lsb).round() as i32
+                (steps - STEPS_PER_COUNT * preprocessing.offset(profile, exclusion, slot) / profile.lsb).round() as i32
             })
         }));
     }

@@ -3,8 +3,11 @@
 //! ```text
 //! Measurement ─► preprocessing (sampling_faults, detectors) ─► estimators ─► covariates ─► spectral_lines ─► channel_fit
 //!                      └─► series ─► assessment                                                            │
-//!                                                               report ◄─ naming ◄─ slow_drift ◄───────────┘
+//!                                                    report ◄─ causes ◄─ naming ◄─ slow_drift ◄────────────┘
 //! ```
+//!
+//! Between `channel_fit` and `naming`, `part_filter` gives all channels the one filter of the sensor, and `octave_covariance` the
+//! bounds of the noise behind it. `contradiction` tells where a model fails.
 //!
 //! `analysis` calls all of these; `nonstationarity` is the second entry, for what changes while the record is made.
 //!
@@ -14,24 +17,38 @@
 
 pub mod analysis;
 pub mod assessment;
+mod causes;
 mod channel_fit;
+pub mod comparison;
+pub mod contradiction;
 mod covariates;
 pub mod detectors;
 pub mod distributions;
 mod estimators;
+pub mod figure_data;
 pub mod findings;
+pub mod gauss_markov;
 mod interpolation;
+mod motion;
 mod naming;
 pub mod nonstationarity;
+mod octave_covariance;
+mod part_filter;
+mod part_report;
 mod preprocessing;
 pub mod report;
 mod sampling_faults;
 pub mod series;
+pub mod several;
+#[cfg(test)]
+#[path = "../tests/support/simulated_part.rs"]
+mod simulated_part;
 mod slow_drift;
 pub mod spectra;
 mod spectral_lines;
+mod unexplained;
 pub mod uniform_series;
-mod units;
+pub mod units;
 
 /// Octaves of every estimator of the analysis: averaging factors up to 2²³ samples. The device uses as many.
 pub const OCTAVES: usize = 24;

@@ -1,21 +1,21 @@
 //! Names the effects that the whole record shows in a channel: which of them are reported, with parameters, units and
 //! bounds, and with evidence that a person can check.
 
+use crate::OCTAVES;
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
-use crate::findings::BoundedEstimate;
-use crate::findings::MeasuredValue;
-use crate::findings::{Detection, Effect, Parameter};
+use crate::detectors::random_telegraph::is_reversible;
+use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
-use crate::slow_drift::{BoundedDrift, ChannelsInCommon, bounded_drift};
+use crate::slow_drift::ChannelsInCommon;
 use crate::spectral_lines::MergedLine;
-use crate::units::coefficient_unit;
-use allan_core::Model;
+use crate::uniform_series::UniformSeries;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm};
 use allan_core::trace::AddedTerm;
+use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::PI;
 
@@ -42,13 +42,21 @@ pub(crate) struct ChannelFindings<'a> {
     pub telegraph: Option<&'a Detection>,
     /// Drift that the channel has in common with others.
     pub common: Option<&'a ChannelsInCommon>,
+    /// The samples less the share of the covariates.
+    pub rest: Option<&'a UniformSeries>,
 }
 
 /// The effects of a channel beyond the baseline model, without those that preprocessing found.
 pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) -> Vec<Effect> {
     let &ChannelFindings { channel, resolution, fit, lines, common, .. } = findings;
     let (model, unit, period_s) = (&fit.trace.after, channel.unit, fit.trace.after.sample_period());
-    let mut effects = sensitivity_effects(&findings.sensitivities, unit);
+    let (plausible, implausible): (Vec<_>, Vec<_>) = findings
+        .sensitivities
+        .iter()
+        .copied()
+        .partition(|(regressor, sensitivity)| is_plausible(profile, channel, regressor.quantity, sensitivity));
+    let mut effects = sensitivity_effects(&plausible, unit);
+    effects.extend(implausible.iter().map(|(regressor, of)| shared_drift_effect(profile, channel, *regressor, of)));
     // Without dither the rounding error is no white noise, and the curve shows the steps of the rounding.
     let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
     let is_dithered_at_once = fit.is_dithered(profile, resolution, 1);
@@ -73,6 +81,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
                 effects.push(low_pass_effect(term, markov, found, period_s));
             }
+            NoiseTerm::Markov(Markov { time_constant })
+                if findings.rest.is_some_and(|rest| !is_reversible(rest, time_constant)) =>
+            {
+                effects.push(decaying_effect(found, time_constant, &fit.covariates.curve));
+            }
             NoiseTerm::Markov(markov) => match telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov) {
                 Some(kurtosis) if kurtosis.is_telegraph() => {
                     effects.push(telegraph_effect(term, found, &kurtosis, unit, period_s));
@@ -82,15 +95,23 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             _ => effects.push(term_effect(term, found, unit, period_s)),
         }
     }
-    let is_slow = |effect: &Effect| ["markov", "telegraph", "rate_ramp"].contains(&effect.kind.as_str());
-    if common.is_none() && telegraph.is_none() && !effects.iter().any(is_slow) {
-        let bounded = bounded_drift(&fit.covariates.curve, &fit.trace, channel);
-        effects.extend(bounded.map(|found| bounded_drift_effect(&found, unit)));
-    }
     effects.extend(telegraph.map(|found| found.effect.clone()));
     effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
-    effects.extend(lines.iter().map(|line| line_effect(line, unit)));
+    effects.extend(lines.iter().map(|line| line_effect(line, model, unit)));
+    let duration_s = fit.covariates.curve.samples() as f64 * period_s;
+    effects.retain(|effect| is_shown(effect, duration_s));
     effects
+}
+
+/// Whether the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of
+/// `duration_s` seconds.
+fn is_shown(effect: &Effect, duration_s: f64) -> bool {
+    let is_size = |name: &str| ["deviation", "amplitude", "value", "slope", "sensitivity"].contains(&name);
+    let includes_0 = |of: &Parameter| of.low <= 0.0 && of.high >= 0.0;
+    effect.parameters.iter().all(|(name, parameter)| match name.as_str() {
+        "time_constant" => parameter.value < duration_s,
+        name => !is_size(name) || !includes_0(parameter),
+    })
 }
 
 /// Length of the impulse response of the longest filter in a model, s.
@@ -171,21 +192,25 @@ fn telegraph_effect(
     Effect { kind: "telegraph".to_owned(), parameters, evidence, finding: 0 }
 }
 
-/// A Markov process in place of a random walk that would exceed the initial bias error of the data sheet within an hour.
-fn bounded_drift_effect(found: &BoundedDrift, unit: &str) -> Effect {
+/// A Markov term whose process is not the same when time runs backwards: neither a Gaussian process nor a telegraph signal.
+fn decaying_effect(found: &AddedTerm, time_constant: f64, curve: &Curve<OCTAVES>) -> Effect {
+    let point = curve.points().iter().find(|point| point.n == found.residual.n);
+    // Of the measured deviation at this averaging time; that of the model is taken as exact.
+    let bound = |of: fn(&AllanPoint) -> f64| point.map_or(1.0, |point| (of(point) / point.avar).sqrt());
+    let percent = |factor: f64| 100.0 * ((1.0 + found.residual.excess) * factor - 1.0);
+    let (low, high) = (percent(bound(|point| point.low)), percent(bound(|point| point.high)));
+    let tau = point.map_or(time_constant, |point| point.tau);
     let evidence = format!(
-        "a random walk of {:.1e} {} would take the bias {:.0} times as far in an hour as the biases of parts differ; {}",
-        found.walk.value,
-        coefficient_unit(&found.walk.kind, unit),
-        found.bias_errors_per_hour,
-        meaning(&found.process.kind),
+        "{:+.1} % at tau = {} s ({:.0} sigma) with the spectrum of a process that forgets within {} s, but its changes up and \
+         down differ: disturbances that begin at once and decay",
+        100.0 * found.residual.excess,
+        seconds(tau),
+        found.residual.sigmas.abs(),
+        seconds(time_constant),
     );
-    Effect {
-        kind: found.process.kind.name().to_owned(),
-        parameters: term_parameters(&found.process, unit),
-        evidence,
-        finding: 0,
-    }
+    let parameters =
+        [("tau", Parameter::new(tau, tau, tau, "s")), ("excess_percent", Parameter::new(percent(1.0), low, high, "%"))];
+    Effect::new("unexplained", parameters, evidence)
 }
 
 /// A Markov term in the place of the white noise.
@@ -232,8 +257,45 @@ fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &s
     temperature.into_iter().chain(supply).chain(acceleration).collect()
 }
 
-/// A line of the spectrum.
-fn line_effect(line: &MergedLine, unit: &str) -> Effect {
+/// Whether a sensitivity of a channel may be one by what is known of the sensor: its interval reaches within the largest
+/// plausible multiple of the data sheet's.
+fn is_plausible(
+    profile: &SensorProfile,
+    channel: ChannelProfile,
+    regressor: Quantity,
+    sensitivity: &Sensitivity,
+) -> bool {
+    let (low, high) = sensitivity.bounds();
+    let least = if low * high <= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+    let typical = channel.sensitivities.to(regressor);
+    typical.is_none_or(|typical| least <= profile.largest_sensitivity_multiple * typical)
+}
+
+/// Drift that a channel shares with another one, too large to be caused by what that one measures.
+fn shared_drift_effect(
+    profile: &SensorProfile,
+    channel: ChannelProfile,
+    regressor: ChannelProfile,
+    sensitivity: &Sensitivity,
+) -> Effect {
+    let (low, high) = sensitivity.bounds();
+    let unit = format!("{}/{}", channel.unit, regressor.unit);
+    let evidence = format!(
+        "moves with {} at {:.2e} {unit}, {:.0} sigma, which is more than {:.0} times the data sheet's sensitivity: both share a \
+         drift whose cause was not measured",
+        regressor.name,
+        sensitivity.value,
+        sensitivity.sigmas(),
+        profile.largest_sensitivity_multiple,
+    );
+    Effect::new("shared_drift", [("ratio", Parameter::new(sensitivity.value, low, high, unit))], evidence)
+}
+
+/// A line of the spectrum over the noise of `model`.
+fn line_effect(line: &MergedLine, model: &Model, unit: &str) -> Effect {
+    if line.shape_p_value < SIGNIFICANCE {
+        return unexplained_band(line, model);
+    }
     let (kind, root) = (line.kind(), 2f64.sqrt());
     let parameters = match kind {
         NoiseTerm::Resonance(_) => {
@@ -257,6 +319,29 @@ fn line_effect(line: &MergedLine, unit: &str) -> Effect {
         meaning(&kind),
     );
     Effect::new(kind.name(), parameters.into_iter().chain([frequency]), evidence)
+}
+
+/// A band of the spectrum that stands out of the noise and has not the form of a resonance.
+fn unexplained_band(line: &MergedLine, model: &Model) -> Effect {
+    let (centre, half) = (line.frequency.value, 0.5 * line.width.value);
+    let is_noise = |kind: &NoiseTerm| !matches!(kind, NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_));
+    let noise = Model::new(model.sample_period(), model.terms().iter().copied().filter(|term| is_noise(&term.kind)));
+    // One-sided densities: the mean of the band that holds half of a line's power, and that of the noise.
+    let density = 0.5 * line.deviation.value.powi(2) / line.width.value;
+    let excess = |times: f64| 100.0 * ((1.0 + times * density / (2.0 * noise.density(centre))).sqrt() - 1.0);
+    let relative = NORMAL_975 * 2.0 * line.deviation.error / line.deviation.value;
+    let evidence = format!(
+        "a band around {centre:.4} Hz, {:.4} Hz wide, stands out of the noise ({:.0} sigma) and has not the spectrum of a \
+         resonance, by chance {:.0e}: a frequency or a strength that changes",
+        line.width.value,
+        line.statistic.sqrt(),
+        line.shape_p_value,
+    );
+    let parameters = [
+        ("frequency", Parameter::new(centre, (centre - half).max(0.0), centre + half, "Hz")),
+        ("excess_percent", Parameter::new(excess(1.0), excess((1.0 - relative).max(0.0)), excess(1.0 + relative), "%")),
+    ];
+    Effect::new("unexplained", parameters, evidence)
 }
 
 /// Drift that `channel` has in common with others.

@@ -52,7 +52,7 @@ pub struct Explanation {
     pub time_base: Vec<String>,
     /// Inertial channels that were recorded; [`RelatedLine::channel`] is a position in this list.
     pub searched: Vec<ChannelProfile>,
-    /// Those whose counts change.
+    /// Those whose counts change in every epoch.
     pub channels: Vec<ChannelExplanation>,
     /// Regression of these channels on each other.
     pub common_mode: Option<CommonModeRegression>,
@@ -106,14 +106,19 @@ pub struct ModelDeviances {
     pub beyond_drift: f64,
 }
 
-/// Explains the inertial channels of a recording, without those that never change or are too short to be cut into epochs.
+/// Explains the inertial channels of a recording, without those that do not change for a whole epoch or are too short to be
+/// cut into epochs.
 #[must_use]
 pub fn explain(measurement: &Measurement) -> Explanation {
     let inertial = measurement.profiles().filter(|channel| channel.quantity.is_inertial());
     let (searched, series): (Vec<ChannelProfile>, Vec<Series>) =
         inertial.map(|channel| (channel, Series::from_measurement(measurement, &channel))).unzip();
     let explained = |position: usize| {
-        let mut explained = explain_channel(searched[position], &series[position], &measurement.profile.filters)?;
+        let mut explained = explain_channel(
+            searched[position],
+            &series[position],
+            &measurement.profile.filters_read_at(measurement.sample_rate_hz),
+        )?;
         explained.related_line = RelatedLine::find(&series, position, &explained.tracked_model, &explained.curves);
         Some(explained)
     };
@@ -135,7 +140,8 @@ fn explain_channel(
     filters: &[MovingAverageFilter],
 ) -> Option<ChannelExplanation> {
     let curves = EpochCurves::from_series(series)?;
-    if curves.quarters.iter().chain([&curves.unseen]).any(|part| part.points().iter().all(|point| point.avar == 0.0)) {
+    let parts = [&curves.quarters[..], &curves.fitted_epochs, &curves.unseen_epochs].concat();
+    if parts.iter().any(|part| part.points().iter().all(|point| point.avar == 0.0)) {
         return None;
     }
     let trace = trace(&curves.fitted, LineCandidates::Curve, filters);

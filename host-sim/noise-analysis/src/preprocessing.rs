@@ -1,7 +1,7 @@
 //! Preprocessing: what the detectors find in the samples of each channel, and the series without it.
 //!
 //! Repeated samples become gaps of every channel, knocks and spikes gaps of the channel that shows them; a bias step is
-//! subtracted. A ramp is reported and stays in the samples, because
+//! subtracted, and so is a response to temperature behind a lag or with a curvature. A ramp is reported and stays in the samples, because
 //! the noise model has a term for it. A sensitivity to temperature or supply stays in them too, and is kept for the
 //! regression on covariates.
 
@@ -9,10 +9,13 @@ use crate::detectors::bias::{BiasChanges, BiasSensitivity};
 use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::spikes::{self, SpikeRule};
-use crate::detectors::{bias, effective_lsb};
+use crate::detectors::thermal_response::ThermalResponse;
+use crate::detectors::{bias, effective_lsb, output_range};
 use crate::findings::{Correction, Detection, Effect};
 use crate::sampling_faults;
 use crate::series::Series;
+use crate::spectra;
+use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
 
@@ -47,6 +50,8 @@ pub(crate) struct Preprocessing {
     exclusions: Vec<(ChannelProfile, ChannelExclusion)>,
     /// By channel: the first sample period from which on an offset is subtracted, and the offset in the channel's unit.
     offsets: Vec<(ChannelProfile, u64, f64)>,
+    /// By channel: a response to temperature that is subtracted, as the first half and as the whole record show it.
+    thermal: Vec<(ChannelProfile, [Option<ThermalResponse>; 2])>,
     /// A channel, the temperature or supply that it depends on, and how much.
     sensitivities: Vec<(ChannelProfile, ChannelProfile, BiasSensitivity)>,
     /// Channels whose values are all multiples of several counts, and of how many.
@@ -56,9 +61,13 @@ pub(crate) struct Preprocessing {
 /// What was found in one channel.
 struct ChannelFindings {
     lsb: Option<Detection>,
+    /// Values that are cut off, or noise below a count.
+    range: Option<Detection>,
     knocks: Vec<Detection>,
     spikes: Option<Detection>,
     bias_changes: BiasChanges,
+    /// As the first half shows it, if the whole record shows one.
+    thermal_of_first_half: Option<ThermalResponse>,
     /// Channels that the bias may depend on, in the order of the sensitivities in `bias_changes`.
     regressors: Vec<ChannelProfile>,
     exclusion: ChannelExclusion,
@@ -92,7 +101,11 @@ impl Preprocessing {
         let numbered: Vec<usize> = (0..traced.len()).collect();
         let found = in_parallel(&numbered, |&at| {
             let quiet = knocks.removed_from(&series[at], at);
-            let spikes = spikes::find(&quiet);
+            let saturation = output_range::find_saturation(&series[at], traced[at].range);
+            // What is cut off is no noise around which a sample could be a spike.
+            let spikes = if saturation.is_none() { spikes::find(&quiet) } else { None };
+            let dithered = measurement.profile.dithered_avar_counts2;
+            let range = saturation.or_else(|| output_range::find_noise_below_count(&series[at], dithered));
             let mut exclusion = ChannelExclusion {
                 spikes: spikes.as_ref().map(|finding| excluded(&finding.correction)).unwrap_or_default(),
                 knocks: slots_within(&series[at], &knocks.by_whole[at]),
@@ -105,18 +118,40 @@ impl Preprocessing {
                 .filter(|(regressor, _)| may_depend(traced[at], *regressor))
                 .map(|(regressor, series)| (*regressor, series))
                 .unzip();
+            let bias_changes = bias::find(&without_slow_lines(quiet.without(&exclusion.spikes)), &others, noise_grids);
+            let thermal_of_first_half = bias_changes.thermal.as_ref().and_then(|_| {
+                let middle = measurement.middle();
+                let halves: Vec<Series> = others.iter().map(|other| other.before(middle)).collect();
+                let half = series[at].before(middle).without(&exclusion.by_first_half);
+                bias::find(&half, &halves.iter().collect::<Vec<_>>(), noise_grids).thermal
+            });
             ChannelFindings {
                 lsb: effective_lsb::find(&measured(traced[at])),
+                range,
                 knocks: knocks.detections(&series[at], at, traced),
-                bias_changes: bias::find(&quiet.without(&exclusion.spikes), &others, noise_grids),
+                thermal_of_first_half,
+                bias_changes,
                 regressors: profiles,
                 spikes,
                 exclusion,
             }
         });
         for (&channel, found) in traced.iter().zip(found) {
-            let ChannelFindings { lsb, knocks, spikes, bias_changes, regressors, exclusion } = found;
-            let BiasChanges { step, ramp, sensitivities } = bias_changes;
+            let ChannelFindings {
+                lsb,
+                range,
+                knocks,
+                spikes,
+                bias_changes,
+                thermal_of_first_half,
+                regressors,
+                exclusion,
+            } = found;
+            let BiasChanges { step, ramp, sensitivities, thermal } = bias_changes;
+            if let Some(thermal) = thermal {
+                preprocessing.channel_effects.push((channel, thermal.effect.clone()));
+                preprocessing.thermal.push((channel, [thermal_of_first_half, Some(thermal)]));
+            }
             if let Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) = &step {
                 preprocessing.offsets.push((channel, *from, *size));
             }
@@ -125,7 +160,7 @@ impl Preprocessing {
             let slow = sensitivities.into_iter().map(|(place, sensitivity)| (channel, regressors[place], sensitivity));
             preprocessing.sensitivities.extend(slow.filter(|(_, regressor, _)| regressor.quantity.is_environment()));
             preprocessing.exclusions.push((channel, exclusion));
-            let findings = lsb.into_iter().chain(knocks).chain(spikes).chain(step).chain(ramp);
+            let findings = lsb.into_iter().chain(range).chain(knocks).chain(spikes).chain(step).chain(ramp);
             preprocessing.channel_effects.extend(findings.map(|finding| (channel, finding.effect)));
         }
         preprocessing
@@ -169,8 +204,26 @@ impl Preprocessing {
     }
 
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
-    pub(crate) fn offset(&self, channel: ChannelProfile, slot: u64) -> f64 {
-        self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from).map(|(.., size)| size).sum()
+    pub(crate) fn offset(&self, channel: ChannelProfile, exclusion: Exclusion, slot: u64) -> f64 {
+        let steps = self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from);
+        let thermal = self.thermal_response(channel, exclusion).map_or(0.0, |response| response.bias(slot));
+        steps.map(|(.., size)| size).sum::<f64>() + thermal
+    }
+
+    /// The response of a channel to temperature that is subtracted from its samples.
+    fn thermal_response(&self, channel: ChannelProfile, exclusion: Exclusion) -> Option<&ThermalResponse> {
+        let (_, [first_half, whole]) = self.thermal.iter().find(|(of, _)| *of == channel)?;
+        if exclusion == Exclusion::ByWhole { whole.as_ref() } else { first_half.as_ref() }
+    }
+
+    /// Whether the first half shows another response to temperature than the whole record.
+    pub(crate) fn has_thermal_response(&self) -> bool {
+        !self.thermal.is_empty()
+    }
+
+    /// Whether a channel responds to temperature behind a lag or with a curvature.
+    pub(crate) fn responds_to_temperature(&self, channel: ChannelProfile) -> bool {
+        self.thermal.iter().any(|(of, _)| *of == channel)
     }
 
     /// A channel's series after preprocessing.
@@ -179,6 +232,9 @@ impl Preprocessing {
             Series::from_measurement(measurement, &channel).with_counts_per_step(self.counts_per_step(channel));
         for &(_, from, size) in self.offsets.iter().filter(|(of, ..)| *of == channel) {
             series = series.lowered_from(from, size);
+        }
+        if let Some(response) = self.thermal_response(channel, exclusion) {
+            series.values.iter_mut().zip(&series.slots).for_each(|(value, slot)| *value -= response.bias(*slot));
         }
         series.without(&self.excluded(channel, exclusion))
     }
@@ -251,6 +307,22 @@ impl KnocksInChannels {
         };
         self.by_whole[at].iter().map(detection).collect()
     }
+}
+
+/// A series without sinusoids of a few periods, which the regressions on its block means would take for ramps and steps; the
+/// series itself where there are none, or where a long gap splits it.
+fn without_slow_lines(series: Series) -> Series {
+    let uniform = UniformSeries::from_series(&series);
+    if uniform.values().len() as u64 != series.span.end.saturating_sub(series.span.start) {
+        return series;
+    }
+    let (without, lines) = spectra::without_slow_sines(uniform);
+    if lines.is_empty() {
+        return series;
+    }
+    let value = |slot: &u64| without.values()[(slot - series.span.start) as usize];
+    let values = series.slots.iter().map(value).collect();
+    Series { values, ..series }
 }
 
 /// Sample periods of the samples of a series within knocks, in ascending order.

@@ -4,6 +4,7 @@
 //! over the bus give the same bytes.
 
 use crate::assessment::Assessment;
+pub use crate::contradiction::Contradiction;
 pub use crate::findings::{Effect, Finding, Parameter, Validation};
 use crate::units::coefficient_unit;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
@@ -88,11 +89,14 @@ pub struct ChannelReport {
     /// data that it has not seen.
     #[serde(rename = "final")]
     pub refitted: ModelReport,
-    /// Stretches in which the sensor was at rest, which the models were fitted to.
+    /// Stretches in which the sensor was at rest: those without a motion of any channel.
     pub at_rest: Vec<Stretch>,
     /// Assessment of the model for use in navigation.
     #[serde(rename = "practice")]
     pub assessment: Assessment,
+    /// What the figures show beside the Allan deviation.
+    #[serde(flatten)]
+    pub figure_data: FigureData,
 }
 
 /// Samples that are missing in a channel, counted apart: lost on the way, refused by cause, replaced by the estimator.
@@ -177,7 +181,7 @@ pub struct SlopeMethodValue {
 /// A fitted model and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelReport {
-    /// The terms, with their parameters.
+    /// The terms, with their parameters; none of a channel that never changes or has no samples.
     pub terms: Vec<TermReport>,
     /// The model's Allan deviation at each point of the curve, in the channel's unit.
     pub adev: Vec<f64>,
@@ -215,6 +219,64 @@ pub struct ModelErrorReport {
     pub worst_tau_s: Option<f64>,
     /// Modelled over measured Allan deviation of that point.
     pub worst_ratio: Option<f64>,
+    /// The octave at which the measured variance is least probable under the model; absent where chance explains it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contradiction: Option<Contradiction>,
+}
+
+/// What the figures of a channel show beside its Allan deviation.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FigureData {
+    /// Typical noise by the data sheet; absent where it says nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data_sheet: Option<DataSheetReport>,
+    /// Measured spectrum; absent where the record is too short.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spectrum: Option<SpectrumReport>,
+    /// Bias over time; absent where the record is too short.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bias_over_time: Option<BiasOverTime>,
+}
+
+/// Typical noise of a channel by its data sheet, in the channel's unit and seconds; `None` where it says nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DataSheetReport {
+    /// Angle or velocity random walk, unit·√s.
+    pub angle_random_walk: Option<f64>,
+    /// The Allan deviation at the minimum of its curve, in the channel's unit.
+    pub in_run_bias_stability: Option<f64>,
+    /// Rate random walk, unit/√s.
+    pub rate_random_walk: Option<f64>,
+}
+
+/// Root of the one-sided power spectral density of a channel as it was recorded, unit/√Hz, by ascending frequency. Lines that
+/// stand out of a band have a point of their own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpectrumReport {
+    /// Frequency, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Measured.
+    pub density: Vec<f64>,
+    /// Lower 95 % bound of `density`.
+    pub low: Vec<f64>,
+    /// Upper 95 % bound of `density`.
+    pub high: Vec<f64>,
+    /// By the model `final`, without its sinusoids and without what follows a covariate.
+    pub model: Vec<f64>,
+}
+
+/// Means of successive blocks of a channel, less the mean of them all, in the channel's unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BiasOverTime {
+    /// Length of a block, s.
+    pub block_s: f64,
+    /// Middle of each block, s from the first sample. Blocks without half of their samples are left out.
+    pub time_s: Vec<f64>,
+    /// Measured.
+    pub mean: Vec<f64>,
+    /// What the channel's findings explain of it: steps, a ramp, and the share of temperature, supply and specific force. Empty
+    /// where they explain nothing.
+    pub followed: Vec<f64>,
 }
 
 impl SlopeMethodReport {
@@ -245,6 +307,13 @@ impl TermReport {
     }
 }
 
+/// The terms of a model of a channel in `unit`, without those of which the record says nothing, as of a channel that never
+/// changes: their upper bound is 0.
+#[must_use]
+pub fn term_reports(model: &Model, unit: &str) -> Vec<TermReport> {
+    model.terms().iter().filter(|term| term.high > 0.0).map(|term| TermReport::new(term, unit)).collect()
+}
+
 /// The parameters of a term by name, of a channel in `unit`: those of its shape, and its coefficient.
 #[must_use]
 pub fn term_parameters(term: &allan_core::model::FittedTerm, unit: &str) -> BTreeMap<String, Parameter> {
@@ -273,6 +342,7 @@ impl ModelErrorReport {
             worst_sigma: error.and_then(|error| finite(error.worst_sigma)),
             worst_tau_s: error.and_then(|error| finite(error.worst_tau)),
             worst_ratio: error.and_then(|error| finite(error.worst_ratio.sqrt())),
+            contradiction: error.and_then(|_| Contradiction::find(model, curve)),
         }
     }
 }

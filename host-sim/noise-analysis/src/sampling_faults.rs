@@ -1,7 +1,7 @@
 //! Detectors of faults of the sampling: lost samples, repeated samples, and a sample rate other than the nominal one.
 
 use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
-use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::findings::{Correction, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use measurement::{Measurement, SensorProfile};
 
 /// How many times more often than in independent channels equal neighbours may occur by chance.
@@ -110,10 +110,37 @@ fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
 
 /// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
 /// can be set to or that hosts usually read at.
-///
-/// The standard deviation of the comparison is that of the segments' rates and [`SensorProfile::host_clock_error`].
 #[must_use]
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
+    let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
+    let nominal = measurement.stated_rate_hz.unwrap_or_else(|| nearest_usual_rate(&measurement.profile, measured));
+    let off = measured / nominal - 1.0;
+    let z = off.abs() * measured / error;
+    let p_value = 2.0 * upper_tail(z);
+    let unusual = measurement.stated_rate_hz.is_none() && off.abs() > MAX_RATE_DEVIATION;
+    if unusual || p_value > SIGNIFICANCE {
+        return None;
+    }
+    let half = NORMAL_975 * error;
+    let evidence = format!(
+        "{measured:.4} Hz by the time stamps, {:+.1} ppm from the nominal {nominal:.4} Hz, {z:.1} σ of an ordinary host's \
+         clock; the tolerance of the part's oscillator",
+        1e6 * off,
+    );
+    Some(Detection {
+        effect: Effect::new(
+            "sample_clock",
+            [("rate_hz", Parameter::new(measured, measured - half, measured + half, "Hz"))],
+            evidence,
+        ),
+        correction: None,
+    })
+}
+
+/// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
+/// [`SensorProfile::host_clock_error`]. `None` without time stamps or with fewer than [`MIN_SAMPLES`].
+#[must_use]
+pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
     let times = measurement.times_s.as_ref()?;
     let slots: Vec<f64> = measurement.slots.iter().map(|&slot| slot as f64).collect();
     if slots.len() < MIN_SAMPLES {
@@ -129,30 +156,9 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let measured = rate(&slots, times)?;
     let mean = rates.iter().sum::<f64>() / SEGMENTS as f64;
     let scatter = rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>() / (SEGMENTS * (SEGMENTS - 1)) as f64;
-    let nominal = measurement.stated_rate_hz.unwrap_or_else(|| nearest_usual_rate(&measurement.profile, measured));
     let host = measurement.profile.host_clock_error;
     let error = (scatter / (measured * measured) + host * host).sqrt();
-    let off = measured / nominal - 1.0;
-    let z = off.abs() / error;
-    let p_value = 2.0 * upper_tail(z);
-    let unusual = measurement.stated_rate_hz.is_none() && off.abs() > MAX_RATE_DEVIATION;
-    if unusual || p_value > SIGNIFICANCE {
-        return None;
-    }
-    let half = NORMAL_975 * error * measured;
-    let evidence = format!(
-        "{measured:.4} Hz by the time stamps, {:+.1} ppm from the nominal {nominal:.4} Hz, {z:.1} σ of an ordinary host's \
-         clock; the tolerance of the part's oscillator",
-        1e6 * off,
-    );
-    Some(Detection {
-        effect: Effect::new(
-            "sample_clock",
-            [("rate_hz", Parameter::new(measured, measured - half, measured + half, "Hz"))],
-            evidence,
-        ),
-        correction: None,
-    })
+    Some(MeasuredValue { value: measured, error: error * measured })
 }
 
 /// The nearest rate, in Hz, that the sensor can be set to or that is round.

@@ -24,8 +24,8 @@ mod white_noise;
 
 pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
-pub(crate) use lines::find_lines_over;
 pub use lines::{SpectralLine, find_lines};
+pub(crate) use lines::{find_lines_over, without_slow_sines};
 pub use smooth_shape::{SpectralBand, SpectralShape};
 pub use welch::Welch;
 pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};

@@ -28,6 +28,8 @@ const BROAD: f64 = 0.1;
 const MIN_PHASE_CHANGES: f64 = 30.0;
 /// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
 const MIN_OWN_DEVIATION: f64 = 0.5;
+/// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
+const FEW_PERIODS: f64 = 8.0;
 /// Power gain of a filter below which the spectrum holds leakage from other frequencies.
 const LEAKAGE_GAIN: f64 = 0.1;
 
@@ -44,6 +46,8 @@ pub(crate) struct MergedLine {
     pub statistic: f64,
     /// Probability that a record without lines shows the strongest peak at any frequency.
     pub p_value: f64,
+    /// Probability that the strongest peak, were it a resonance, would deviate as far from the spectrum of one.
+    pub shape_p_value: f64,
     duration_s: f64,
 }
 
@@ -66,12 +70,13 @@ pub(crate) fn fit_with_lines(
         lines.retain(|line| left.iter().any(|left| is_own(line, left)));
     }
     let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
-    let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &profile.filters);
+    let filters = profile.filters_read_at(1.0 / covariates.curve.sample_period());
+    let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &filters);
     if fit.correlation_times().next().is_some() && lines.iter().any(MergedLine::is_broad) {
         // A broad line may be a part of a Markov process, which the background of the first search has no form for.
         lines.retain(|line| !line.is_broad());
         lines.extend(find(series, Some(&fit.trace.after), rate_error).into_iter().filter(MergedLine::is_broad));
-        fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &profile.filters);
+        fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
     lines.retain(|line| line.is_sinusoid() || !is_leakage(&fit.trace.after, line.frequency.value));
     (fit, lines)
@@ -161,6 +166,7 @@ impl MergedLine {
             width: MeasuredValue { value: own_width.hypot(2.35 * spread), error: width_error.hypot(spread) },
             statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
+            shape_p_value: strongest.shape_p_value,
             duration_s,
         }
     }
@@ -173,6 +179,11 @@ impl MergedLine {
 
     fn is_sinusoid(&self) -> bool {
         matches!(self.kind(), NoiseTerm::Sinusoid(_))
+    }
+
+    /// Whether it has a few periods in the record.
+    pub(crate) fn is_slow(&self) -> bool {
+        self.frequency.value * self.duration_s < FEW_PERIODS
     }
 
     fn is_broad(&self) -> bool {

@@ -3,50 +3,67 @@
 use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::series::Series;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Samples one period apart; `NaN` marks a missing sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UniformSeries {
     sample_period: f64,
     values: Vec<f64>,
+    /// One-sided density of the error of rounding the samples that the values are made of, unit²/Hz.
+    rounding_density: f64,
 }
+
+/// Gaps of up to so many samples never split a series.
+const SHORT_GAP: u64 = 16;
+/// Least number of samples of a part for each sample of its longest gap. The gap leaves side lobes of an eighth of a
+/// sinusoid's amplitude or less.
+const SAMPLES_PER_GAP: u64 = 8;
 
 impl UniformSeries {
     /// `values` taken every `sample_period` seconds; a value that is not finite counts as missing.
     #[must_use]
     pub fn new(sample_period: f64, values: Vec<f64>) -> Self {
-        Self { sample_period, values }
+        Self { sample_period, values, rounding_density: 0.0 }
     }
 
     /// The samples of a channel over the whole span of its record, with a `NaN` for each missing one.
     ///
-    /// A gap of more samples than the channel has splits it, and only the longest part is returned: the result would
-    /// otherwise be mostly `NaN`.
+    /// Long gaps split it, and only the part with the most samples is returned: drift and lines of a record that is mostly
+    /// gaps leak to all frequencies. A gap is long if it has more than an eighth of the samples of the longest part between
+    /// such gaps.
     #[must_use]
     pub fn from_series(series: &Series) -> Self {
-        let longest_gap = series.values.len() as u64;
-        let mut values = Vec::with_capacity(series.values.len());
-        let mut longest = Vec::new();
-        let mut next = series.span.start;
-        for (&slot, &value) in series.slots.iter().zip(&series.values) {
-            let missing = slot - next;
-            if missing > longest_gap {
-                let ended = std::mem::take(&mut values);
-                if ended.len() > longest.len() {
-                    longest = ended;
-                }
-            } else {
-                values.resize(values.len() + missing as usize, f64::NAN);
-            }
-            values.push(value);
-            next = slot + 1;
+        let slots = &series.slots;
+        let (part, longest_gap) = longest_part(slots);
+        let missing = |from: u64, to: u64| {
+            let missing = to.saturating_sub(from);
+            if missing <= longest_gap { missing as usize } else { 0 }
+        };
+        let mut values = Vec::with_capacity(part.len());
+        let mut next = if part.start == 0 { series.span.start } else { slots[part.start] };
+        for at in part.clone() {
+            values.resize(values.len() + missing(next, slots[at]), f64::NAN);
+            values.push(series.values[at]);
+            next = slots[at] + 1;
         }
-        let missing = series.span.end.saturating_sub(next);
-        if !values.is_empty() && missing <= longest_gap {
-            values.resize(values.len() + missing as usize, f64::NAN);
+        if part.end == slots.len() && !values.is_empty() {
+            values.resize(values.len() + missing(next, series.span.end), f64::NAN);
         }
-        let values = if values.len() >= longest.len() { values } else { longest };
-        Self::new(series.period_s, values)
+        // Rounding to steps of q has the variance q²/12, up to half the sample rate.
+        let rounding_density = 2.0 * series.period_s * series.resolution.powi(2) / 12.0;
+        Self { rounding_density, ..Self::new(series.period_s, values) }
+    }
+
+    /// One-sided density of the error of rounding the samples to counts, unit²/Hz, where it acts as white noise; 0 where the
+    /// values are not known to be rounded.
+    pub(crate) fn rounding_density(&self) -> f64 {
+        self.rounding_density
+    }
+
+    /// The series with other values at the same times.
+    pub(crate) fn with_values(&self, values: Vec<f64>) -> Self {
+        Self { values, ..*self }
     }
 
     /// Seconds between samples.
@@ -119,7 +136,7 @@ impl UniformSeries {
                 replaced += 1;
             }
         }
-        (Self { sample_period: self.sample_period, values }, replaced as f64 / self.values.len() as f64)
+        (self.with_values(values), replaced as f64 / self.values.len() as f64)
     }
 
     /// Autocovariance around `level`, of the pairs that are there.
@@ -145,8 +162,7 @@ impl UniformSeries {
         });
         let slope = if xx > 0.0 { xy / xx } else { 0.0 };
         let line = |at: usize| mean + slope * (at as f64 - middle - mean_position);
-        let values = self.values.iter().enumerate().map(|(at, value)| value - line(at)).collect();
-        Self { sample_period: self.sample_period, values }
+        self.with_values(self.values.iter().enumerate().map(|(at, value)| value - line(at)).collect())
     }
 
     /// Block averages at a rate at which rounding acts as noise. The block is the smallest power of two such that fewer
@@ -182,8 +198,39 @@ impl UniformSeries {
         Self {
             sample_period: self.sample_period * size as f64,
             values: self.values.chunks_exact(size).map(average).collect(),
+            // An average has less of the error, at a lower rate.
+            rounding_density: self.rounding_density,
         }
     }
+}
+
+/// The positions of the longest part without a long gap, and the length of the gaps up to which none is long, samples.
+fn longest_part(slots: &[u64]) -> (Range<usize>, u64) {
+    let longest_without = |longest_gap: u64| {
+        let mut longest = 0..0;
+        let mut start = 0;
+        for end in 1..=slots.len() {
+            if end == slots.len() || slots[end] - slots[end - 1] - 1 > longest_gap {
+                if end - start > longest.len() {
+                    longest = start..end;
+                }
+                start = end;
+            }
+        }
+        longest
+    };
+    let mut longest_gap = slots.len() as u64 / SAMPLES_PER_GAP;
+    while longest_gap > SHORT_GAP {
+        let part = longest_without(longest_gap);
+        let (samples, first) = (part.len() as u64, part.start);
+        // Nor may many shorter gaps make up nearly all of it.
+        let is_filled = part.end > first && slots[part.end - 1] - slots[first] <= SHORT_GAP * samples;
+        if is_filled && samples >= SAMPLES_PER_GAP * longest_gap {
+            return (part, longest_gap);
+        }
+        longest_gap /= 2;
+    }
+    (longest_without(SHORT_GAP), SHORT_GAP)
 }
 
 /// Mean of the finite values; 0 if there are none.
@@ -259,5 +306,11 @@ mod tests {
         let far = UniformSeries::from_series(&series(vec![0, 1 << 40, (1 << 40) + 1]));
         assert_eq!(far.values(), [2.0, 3.0]);
         assert!(UniformSeries::from_series(&series(vec![])).values().is_empty());
+        // Stretches of 1000 samples: gaps of up to 125 samples leave them together.
+        let stretches = |gap: u64| (0..5000).map(|at: u64| at + at / 1000 * gap).collect();
+        assert_eq!(UniformSeries::from_series(&series(stretches(125))).values().len(), 5500);
+        assert_eq!(UniformSeries::from_series(&series(stretches(1000))).values().len(), 1000);
+        // A sample of each thousand is no record that is mostly gaps.
+        assert!(UniformSeries::from_series(&series((0..5000).map(|at| 1000 * at).collect())).values().len() < 20);
     }
 }

@@ -11,7 +11,7 @@ pub(crate) const GRAVITY: f64 = 9.806_65;
 
 /// A unit and the factor to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Conversion {
+pub struct Conversion {
     /// Such as `deg/sqrt(h)`.
     pub unit: &'static str,
     /// What the coefficient of a channel in deg/s, g or gauss, with times in s, is multiplied by.
@@ -48,7 +48,7 @@ pub(crate) fn coefficient_unit(kind: &NoiseTerm, unit: &str) -> String {
 /// Empty for other kinds and channels than N, B and K of a gyroscope, an accelerometer or a magnetometer. The discrete form
 /// of a random walk is its step from one sample to the next.
 #[must_use]
-pub(crate) fn conversions(kind: &str, unit: &str, rate_hz: f64) -> Vec<Conversion> {
+pub fn conversions(kind: &str, unit: &str, rate_hz: f64) -> Vec<Conversion> {
     const RAD: f64 = std::f64::consts::PI / 180.0;
     let root_rate = rate_hz.sqrt();
     match (unit, kind) {
@@ -77,6 +77,7 @@ pub(crate) fn conversions(kind: &str, unit: &str, rate_hz: f64) -> Vec<Conversio
         ("g", "bias_instability") => vec![continuous("ug", 1e6), continuous("m/s^2", GRAVITY)],
         ("g", "rate_random_walk") => vec![
             continuous("ug/sqrt(s)", 1e6),
+            continuous("ug/sqrt(h)", 1e6 * 60.0),
             continuous("m/s^3/sqrt(Hz)", GRAVITY),
             discrete("m/s^2", GRAVITY / root_rate),
         ],

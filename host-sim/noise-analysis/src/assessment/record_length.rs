@@ -1,8 +1,8 @@
 //! How long to record: the standard error of a coefficient by the length of the record.
 
-use allan_core::Model;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
+use allan_core::{Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 
 /// Relative half-width of the 95 % bounds that is required.
@@ -14,11 +14,16 @@ const LONGEST_S: f64 = 30.0 * 86_400.0;
 /// within ±[`REQUIRED_HALF_WIDTH`].
 ///
 /// By [`relative_error`], times the factor by which the bounds that the fit gave for `duration` s are wider, if they are.
+/// The bounds of a sinusoid or a ramp, which have no density, narrow at least with the square root of the length.
 /// `None` for a term that the data does not show, or where more than 30 days are required.
 #[must_use]
 pub fn required_length(model: &Model, term: usize, duration: f64) -> Option<f64> {
     let present = model.terms().get(term).filter(|term| term.value > 0.0 && term.low > 0.0)?;
     let today = (present.high - present.low) / 2.0 / present.value;
+    if !has_density(&present) {
+        let length = duration * (today / REQUIRED_HALF_WIDTH).powi(2).max(1.0);
+        return (length <= LONGEST_S).then_some(length);
+    }
     let inefficiency = (today / (NORMAL_975 * relative_error(model, term, duration)?)).max(1.0);
     let width = |length: f64| relative_error(model, term, length).map(|error| NORMAL_975 * inefficiency * error);
     let mut length = duration;
@@ -32,10 +37,12 @@ pub fn required_length(model: &Model, term: usize, duration: f64) -> Option<f64>
 }
 
 /// Smallest relative standard deviation of the coefficient at position `term` of `model` that is estimated together with the
-/// others from `duration` s of samples, by Whittle's information; `None` for a term of 0.
+/// others from `duration` s of samples, by Whittle's information; `None` for a term of 0 or without a density.
+///
+/// Sinusoids and ramps take a few ordinates of the spectrum from the others, which is neglected.
 #[must_use]
 pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> {
-    let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
+    let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).filter(has_density).collect();
     let position = present.iter().position(|of| std::ptr::eq(*of, &model.terms()[term]))?;
     let period = model.sample_period();
     let mut information = DMatrix::zeros(present.len(), present.len());
@@ -58,10 +65,15 @@ pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> 
     Some(information.cholesky()?.inverse()[(position, position)].sqrt() / 2.0)
 }
 
+/// Whether a term is noise, with a density: not a sinusoid or a ramp.
+fn has_density(term: &&FittedTerm) -> bool {
+    !matches!(term.kind, NoiseTerm::Sinusoid(_) | NoiseTerm::RateRamp)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use allan_core::NoiseTerm;
+    use allan_core::term::Sinusoid;
 
     fn model(n: f64, k: f64) -> Model {
         let terms = [FittedTerm::exact(NoiseTerm::AngleRandomWalk, n), FittedTerm::exact(NoiseTerm::RateRandomWalk, k)];
@@ -77,6 +89,23 @@ mod tests {
         // resolutions is 55.1·π/8 − ¼ = 21.4, of K², and N costs little.
         let error = relative_error(&model(2e-3, 3.464e-5), 1, 1e4).expect("an error");
         assert!((error / (0.5 / 21.4f64.sqrt()) - 1.0).abs() < 0.02, "{error}");
+    }
+
+    /// A line takes nothing from what the record says of N and K. Its own bounds of ±30 % are ±20 % after 1.5² times as long.
+    #[test]
+    fn a_model_with_a_sinusoid_has_lengths_as_well() {
+        let noise = model(2e-3, 3.464e-5);
+        let line = FittedTerm {
+            low: 0.7e-3,
+            high: 1.3e-3,
+            ..FittedTerm::exact(NoiseTerm::Sinusoid(Sinusoid { frequency: 20.0 }), 1e-3)
+        };
+        let with_line = Model::new(0.01, noise.terms().iter().copied().chain([line]));
+        for term in 0..2 {
+            assert_eq!(required_length(&with_line, term, 1e4), required_length(&noise, term, 1e4));
+        }
+        let length = required_length(&with_line, 2, 1e4).expect("a length");
+        assert!((length / 2.25e4 - 1.0).abs() < 1e-9, "{length}");
     }
 
     #[test]

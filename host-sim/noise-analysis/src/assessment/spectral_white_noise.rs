@@ -26,24 +26,18 @@ pub(super) struct SpectralWhiteNoise {
 
 /// N by the spectrum of `whole`, whose values are multiples of `count` and in `unit`.
 ///
-/// `shapes` is the model of the whole record, whose lines and Markov processes the spectrum has as well; `fitted` is the one
-/// whose N is reported.
-pub(super) fn estimate(
-    whole: &UniformSeries,
-    shapes: &Model,
-    fitted: &Model,
-    count: f64,
-    unit: &str,
-) -> SpectralWhiteNoise {
+/// `fitted` is the model of the whole record, whose N is reported and whose lines and Markov processes the spectrum has as
+/// well.
+pub(super) fn estimate(whole: &UniformSeries, fitted: &Model, count: f64, unit: &str) -> SpectralWhiteNoise {
     let without = |reason: String| SpectralWhiteNoise { angle_random_walk: None, note: Some(reason) };
     let Some(welch) = Welch::estimate(whole, WELCH_SAMPLES) else {
         return without(format!("the record has no {WELCH_SAMPLES} samples in a row for a spectrum"));
     };
-    let is_read_slowly = shapes.terms().iter().any(|term| match term.kind {
+    let is_read_slowly = fitted.terms().iter().any(|term| match term.kind {
         NoiseTerm::Filtered(filter) => filter.decimation != 1.0,
         _ => false,
     });
-    let Some(fit) = fit_white_noise(&welch, &KnownShapes { model: shapes, is_read_slowly }) else {
+    let Some(fit) = fit_white_noise(&welch, &KnownShapes { model: fitted, is_read_slowly }) else {
         return without("drift, lines or rounding hide the white noise in the spectrum".to_owned());
     };
     let in_counts = fit.sample_deviation / count;
@@ -78,10 +72,7 @@ fn note(fit: &WhiteNoiseFit, fitted: &Model) -> Option<String> {
         return misfit;
     }
     let percent = 100.0 * (n.value / by_fit.value - 1.0);
-    let reason = misfit.unwrap_or_else(|| {
-        "its noise is not the same in the whole record as in the first half, or the fitted model lacks something"
-            .to_owned()
-    });
+    let reason = misfit.unwrap_or_else(|| "the fitted model lacks something".to_owned());
     Some(format!("{percent:+.1} % from the fit, more than the two intervals allow: {reason}"))
 }
 

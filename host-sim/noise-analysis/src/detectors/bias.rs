@@ -7,6 +7,7 @@
 use super::bias_step::{self, StepPosition};
 use super::block_means::{BlockMeans, NoiseGrid, NoiseGrids};
 use super::gls_regression::{GlsRegression, RegressionEstimate};
+use super::thermal_response::{self, Lag, TemperatureCourse, ThermalResponse};
 use crate::distributions::NORMAL_975;
 use crate::findings::{Detection, Effect, Parameter};
 use crate::series::Series;
@@ -38,6 +39,8 @@ pub struct BiasChanges {
     pub ramp: Option<Detection>,
     /// Indices of the regressors that the bias depends on, with the sensitivity to each.
     pub sensitivities: Vec<(usize, BiasSensitivity)>,
+    /// A response to temperature behind a lag or with a curvature.
+    pub thermal: Option<ThermalResponse>,
 }
 
 /// A candidate that may explain changes of the bias.
@@ -45,6 +48,10 @@ enum Candidate {
     Ramp,
     Regressor(usize),
     Step(StepPosition),
+    /// The temperature behind a lag.
+    Lagged(Lag),
+    /// The square of the temperature.
+    Squared,
 }
 
 /// A candidate that was accepted.
@@ -86,6 +93,7 @@ fn covers(regressor: &Series, series: &Series) -> bool {
 fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grids: &NoiseGrids) -> BiasChanges {
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
     let grid = grids.get(&blocks);
+    let series_of = |index: usize| regressors.iter().find(|(of, _)| *of == index).map(|(_, series)| *series);
     let regressors: Vec<(usize, DVector<f64>)> = regressors
         .iter()
         .filter_map(|&(index, regressor)| {
@@ -93,13 +101,17 @@ fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grid
             varies(&means, regressor).then_some((index, means))
         })
         .collect();
+    let temperature = regressors
+        .iter()
+        .find_map(|(index, _)| Some((*index, TemperatureCourse::new(series_of(*index)?, blocks.width)?)));
     let mut accepted: Vec<Accepted> = Vec::new();
     while accepted.len() < MOST
-        && let Some(next) = best_candidate(series, &blocks, &grid, &regressors, &accepted)
+        && let Some(next) = best_candidate(series, &blocks, &grid, &regressors, temperature.as_ref(), &accepted)
     {
         accepted.push(next);
     }
     let mut changes = BiasChanges::default();
+    let (mut linear, mut lagged, mut squared) = (None, None, None);
     for (at, Accepted { candidate, regressor, p_value }) in accepted.iter().enumerate() {
         let others = accepted.iter().enumerate().filter(|(other, _)| *other != at);
         let others: Vec<DVector<f64>> = others.map(|(_, other)| other.regressor.clone()).collect();
@@ -112,8 +124,18 @@ fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grid
             Candidate::Regressor(index) => {
                 let RegressionEstimate { size: sensitivity, error, .. } = estimate;
                 changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error }));
+                if temperature.as_ref().is_some_and(|(of, _)| of == index) {
+                    linear = Some(estimate);
+                }
             }
+            Candidate::Lagged(lag) => lagged = Some((lag, estimate)),
+            Candidate::Squared => squared = Some(estimate),
         }
+    }
+    if let Some((_, course)) = &temperature {
+        let curved = squared.map(|estimate| course.squared_response(linear.as_ref(), &estimate, series.unit));
+        let behind_lag = lagged.map(|(lag, estimate)| course.lag_response(lag, &estimate, series.unit));
+        changes.thermal = behind_lag.or(curved);
     }
     changes
 }
@@ -129,6 +151,7 @@ fn best_candidate(
     blocks: &BlockMeans,
     grid: &NoiseGrid,
     regressors: &[(usize, DVector<f64>)],
+    temperature: Option<&(usize, TemperatureCourse)>,
     accepted: &[Accepted],
 ) -> Option<Accepted> {
     let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
@@ -143,6 +166,28 @@ fn best_candidate(
             && p_value < SIGNIFICANCE
         {
             rivals.push((deviance, Accepted { candidate, regressor: regressor.clone(), p_value }));
+        }
+    }
+    let is_thermal = |of: &Accepted| matches!(of.candidate, Candidate::Lagged(_) | Candidate::Squared);
+    if let Some((index, course)) = temperature
+        && !accepted.iter().any(is_thermal)
+    {
+        let regressor = course.squared_regressor(blocks);
+        if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate(&regressor)
+            && p_value < SIGNIFICANCE
+        {
+            rivals.push((deviance, Accepted { candidate: Candidate::Squared, regressor, p_value }));
+        }
+        // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself.
+        let is_followed =
+            |(_, rival): &(f64, Accepted)| matches!(rival.candidate, Candidate::Regressor(of) if of == *index);
+        if rivals.iter().any(is_followed)
+            && let Some(lag) = course.likeliest_lag(blocks, &regression)
+        {
+            let regressor = course.lagged_regressor(lag.time_constant, blocks);
+            let RegressionEstimate { p_value, deviance, .. } = lag.estimate;
+            let accepted = Accepted { candidate: Candidate::Lagged(lag), regressor, p_value };
+            rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
         }
     }
     let has_step = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Step(_)));

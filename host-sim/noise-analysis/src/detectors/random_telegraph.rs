@@ -5,8 +5,8 @@
 //! variance and correlation time, on means of equal parts of the record.
 
 use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood};
-use crate::distributions::NORMAL_975;
-use crate::findings::{Detection, Effect, Parameter};
+use crate::distributions::{NORMAL_975, quantile};
+use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
 use crate::uniform_series::UniformSeries;
 
 /// Numbers of parts into which the record is divided: few parts for long correlation times, many for short ones.
@@ -25,6 +25,8 @@ const LEAST_OCCUPANCY: f64 = 0.05;
 /// distance for slow noise. A clipped sinusoid has about ten times as much.
 const WHITE_FACTOR: f64 = 1.5;
 const SLOW_FRACTION: f64 = 0.01;
+/// Parts of a time constant over which a change is taken: a decay loses a fifth in it.
+const PER_CHANGE: f64 = 4.0;
 
 /// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
 /// in s.
@@ -47,6 +49,24 @@ pub(crate) fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]
         }
     }
     found
+}
+
+/// Whether a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
+/// quarter of `time_constant` s. Disturbances that begin at once and decay do not.
+///
+/// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
+/// root of the sum of their sixth powers is about a standard normal number; neighbouring changes have correlations below 0,
+/// which lower it.
+#[must_use]
+pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
+    let size = ((time_constant / PER_CHANGE / series.sample_period()) as usize).max(1);
+    let means = PartMeans::new(series, size).means;
+    let changes = means.windows(2).map(|pair| pair[1] - pair[0]).filter(|change| change.is_finite());
+    let (cubes, sixths) = changes.fold((0.0_f64, 0.0_f64), |(cubes, sixths), change| {
+        let cube = change.powi(3);
+        (cubes + cube, sixths + cube * cube)
+    });
+    sixths <= 0.0 || cubes.abs() < quantile(0.5 * SIGNIFICANCE) * sixths.sqrt()
 }
 
 /// Means of equal parts of a record, minus the mean of the record; `NaN` where half of the samples or more are missing.

@@ -8,6 +8,7 @@ use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_
 use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
 use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::series::Series;
+use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
 
 /// Fewest neighbours that must be there on either side.
@@ -253,35 +254,14 @@ fn covariance(series: &Series, values: &[f64], mean: f64) -> Autocovariance {
 /// The weights `a` that minimise the variance of the error: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)` with the autocovariance `r`.
 /// `None` for a channel that never changes.
 fn weights(covariance: &Autocovariance) -> Option<[f64; REACH]> {
-    let mut matrix = [[0.0; REACH + 1]; REACH];
-    for (j, row) in matrix.iter_mut().enumerate() {
-        for (i, entry) in row[..REACH].iter_mut().enumerate() {
-            *entry = covariance[i.abs_diff(j)] + covariance[i + j + 2];
-        }
+    let entry = |j: usize, i: usize| {
         // A little white noise keeps the equations solvable for a pure sinusoid.
-        row[j] += 1e-9 * covariance[0];
-        row[REACH] = covariance[j + 1];
-    }
-    // Gaussian elimination of a positive definite matrix. It is not left to nalgebra yet, whose order of operations changes
-    // the last digits of the reported sizes.
-    for pivot in 0..REACH {
-        if matrix[pivot][pivot] <= 0.0 {
-            return None;
-        }
-        for row in pivot + 1..REACH {
-            let (above, below) = matrix.split_at_mut(row);
-            let factor = below[0][pivot] / above[pivot][pivot];
-            for (entry, over) in below[0].iter_mut().zip(&above[pivot]) {
-                *entry -= factor * over;
-            }
-        }
-    }
-    let mut weights = [0.0; REACH];
-    for row in (0..REACH).rev() {
-        let known: f64 = (row + 1..REACH).map(|column| matrix[row][column] * weights[column]).sum();
-        weights[row] = (matrix[row][REACH] - known) / matrix[row][row];
-    }
-    Some(weights)
+        let white = if i == j { 1e-9 * covariance[0] } else { 0.0 };
+        covariance[i.abs_diff(j)] + covariance[i + j + 2] + white
+    };
+    let matrix = SMatrix::<f64, REACH, REACH>::from_fn(entry);
+    let weights = matrix.cholesky()?.solve(&SVector::from_fn(|j, _| covariance[j + 1]));
+    Some(weights.into())
 }
 
 /// Size of the spikes with 95 % bounds, and the fraction of them that exceeds the threshold for each.

@@ -110,12 +110,13 @@ fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<
 /// It differs from the figure of the report in the degrees of freedom: here they are those of the kind of noise that the
 /// curve itself shows, and the same for all models, so that a model with uncertain points gains nothing by them.
 pub(crate) fn deviance_per_point<const POINTS: usize>(curve: &Curve<POINTS>, modelled: impl Fn(u64) -> f64) -> f64 {
-    let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8);
+    // A variance of 0, of counts that repeat with this averaging time, has no logarithm.
+    let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
     let of = |point: &AllanPoint| {
         let ratio = point.avar / modelled(point.n);
         point.edf * (ratio - 1.0 - ratio.ln())
     };
-    points().map(of).sum::<f64>() / points().count() as f64
+    points().map(of).sum::<f64>() / points().count().max(1) as f64
 }
 
 /// Comparison of two stretches of a channel, at the octave at which they differ most.
@@ -149,9 +150,13 @@ impl Stationarity {
         let longest = earlier.samples().min(later.samples()) / 8;
         let compare = |(before, after): (&AllanPoint, &AllanPoint)| {
             let ratio = after.avar / before.avar;
+            // Counts that repeat with an averaging time have no variance at it.
+            if !(ratio.is_finite() && ratio > 0.0) {
+                return None;
+            }
             let fisher = FisherSnedecor::new(model.edf(after), model.edf(before)).ok()?;
             let p_value = (2.0 * fisher.cdf(ratio).min(fisher.sf(ratio))).min(1.0);
-            ratio.is_finite().then_some(Self { n: before.n, ratio, p_value })
+            Some(Self { n: before.n, ratio, p_value })
         };
         let pairs = earlier.points().iter().zip(later.points()).filter(|(point, _)| point.n <= longest);
         let octaves: Vec<Self> = pairs.filter_map(compare).collect();

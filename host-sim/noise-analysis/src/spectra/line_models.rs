@@ -74,7 +74,7 @@ impl Sine {
         for_each_phase(series, self.frequency, |_, value, cosine, sine| {
             values.push(value - self.cosine * cosine - self.sine * sine);
         });
-        UniformSeries::new(series.sample_period(), values)
+        series.with_values(values)
     }
 }
 
@@ -118,6 +118,8 @@ pub(super) struct Lorentz {
     pub height_and_width: f64,
     /// −2 log-likelihood ratio of the level alone against level and line.
     pub statistic: f64,
+    /// Probability that ordinates around this very curve deviate from it as far.
+    pub shape_p_value: f64,
 }
 
 /// The mean of some neighbouring ordinates.
@@ -193,6 +195,7 @@ impl Lorentz {
             errors: [1, 2, 3].map(|at| covariance[(at, at)].sqrt()),
             height_and_width: covariance[(1, 3)],
             statistic: 2.0 * (likelihood - level_alone),
+            shape_p_value: shape_p_value(&groups, &parameters),
         })
     }
 
@@ -253,6 +256,25 @@ fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
         -group.ordinates * (density.ln() + group.density / density)
     };
     groups.iter().map(of_group).sum()
+}
+
+/// Probability that ordinates of the modelled density deviate from it as far: Bartlett's test of the cumulative periodogram.
+///
+/// Ordinates over their density are exponential variables, whose cumulative sums over the total are distributed as the
+/// ordered values of uniform ones, so that the largest distance from a straight line has Kolmogorov's distribution (M.
+/// Bartlett, "An introduction to stochastic processes", 1955). That the parameters were fitted lowers the distance.
+fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
+    let ratio = |group: &Group| group.ordinates * group.density / modelled(group, parameters).0;
+    let (total, count) =
+        groups.iter().fold((0.0, 0.0), |(total, count), group| (total + ratio(group), count + group.ordinates));
+    let (mut sum, mut position, mut largest) = (0.0, 0.0, 0.0_f64);
+    for group in groups {
+        sum += ratio(group) / total;
+        position += group.ordinates / count;
+        largest = largest.max((sum - position).abs());
+    }
+    // The first term of Kolmogorov's series, which is exact where it matters.
+    (2.0 * (-2.0 * count * largest * largest).exp()).min(1.0)
 }
 
 /// Fisher's information and the score.

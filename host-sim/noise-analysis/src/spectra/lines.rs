@@ -35,6 +35,19 @@ const REFITTED: usize = 2;
 const SKIRTS: f64 = 20.0;
 const RESIDUE: f64 = 0.02;
 
+/// Neighbouring samples over which the level of the noise is estimated, to see whether it changes. The square of such a level
+/// has a relative error of 15 %, and a disturbance of a second or more is several of them.
+const LEVEL_BLOCK: usize = 128;
+/// Fewest periods of a sinusoid in a record, where it is all of the slow variation.
+const FEWEST_SLOW_PERIODS: usize = 2;
+/// Least part of the slow variation, over what it leaves, of such a sinusoid. A random walk has most of its variation in the
+/// lowest ordinates: that one of two periods or more holds all but a thousandth has a probability below 10⁻⁶.
+const SLOW_GAIN: f64 = 1000.0;
+/// Most such sinusoids, and rounds in which each is fitted together with the straight line of the record; a round takes at
+/// least nine tenths off what the line has of a sinusoid of two periods.
+const MOST_SLOW: usize = 2;
+const SLOW_ROUNDS: usize = 6;
+
 /// A line that stands out of the background.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralLine {
@@ -48,6 +61,8 @@ pub struct SpectralLine {
     pub statistic: f64,
     /// Probability that a record without lines shows such a peak at any frequency.
     pub p_value: f64,
+    /// Probability that a line with the spectrum of a resonance deviates as far from it; 1 of a sinusoid.
+    pub shape_p_value: f64,
 }
 
 impl SpectralLine {
@@ -73,8 +88,8 @@ pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
 #[must_use]
 pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
     let known: &dyn Fn(f64) -> f64 = &known;
-    let mut rest = series.clone().averaged_until_dithered().detrended();
-    let mut sines = Vec::new();
+    let (rest, mut sines) = without_slow_sines(series.clone().averaged_until_dithered());
+    let mut rest = rest.detrended();
     let mut resonances: Vec<Resonance> = Vec::new();
     while sines.len() + resonances.len() < MOST
         && let Some(spectrum) = WhitenedSpectrum::new(&rest, known, &resonances, None)
@@ -99,6 +114,79 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
     let all = found.clone();
     found.retain(|line| !all.iter().any(|strong| is_residue(line, strong)));
     found
+}
+
+/// The series without sinusoids of fewer periods than are searched, each of which is nearly all of the slow variation beside a
+/// straight line; and these sinusoids. Their leakage would be taken for lines, and they themselves for ramps and steps.
+pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, Vec<SpectralLine>) {
+    let mut found = Vec::new();
+    let slow = |spectrum: &Periodogram| spectrum.independent()[1..=FEWEST_PERIODS].iter().sum::<f64>();
+    while found.len() < MOST_SLOW {
+        let level = series.detrended();
+        let Some(spectrum) = Periodogram::new(&level).filter(|of| of.padded().len() > 2 * PADDING * FEWEST_PERIODS)
+        else {
+            break;
+        };
+        let searched = PADDING * FEWEST_SLOW_PERIODS..=PADDING * FEWEST_PERIODS;
+        let Some(at) = searched.max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b])) else { break };
+        let spacing = spectrum.resolution() / PADDING as f64;
+        let mut sine = Sine::fit_near(&level, at as f64 * spacing, spacing);
+        for _ in 0..SLOW_ROUNDS {
+            let without = sine.subtracted_from(&series);
+            let lines =
+                without.values().iter().zip(without.detrended().values()).map(|(a, b)| a - b).collect::<Vec<_>>();
+            let lineless = series.values().iter().zip(lines).map(|(value, line)| value - line).collect();
+            sine = Sine::fit_near(&series.with_values(lineless), sine.frequency, 0.3 * spacing);
+        }
+        let without = sine.subtracted_from(&series);
+        let Some(left) = Periodogram::new(&without.detrended()).map(|spectrum| slow(&spectrum)) else { break };
+        let part = left / slow(&spectrum);
+        if part.is_nan() || part * SLOW_GAIN > 1.0 {
+            break;
+        }
+        let ratio = sine.density(&level) / (left / FEWEST_PERIODS as f64).max(series.rounding_density());
+        // What is left has two degrees of freedom an ordinate, less the sinusoid's and the line's.
+        let p_value = part.powi(FEWEST_PERIODS as i32 - 2);
+        found.push(sine_line(&sine, series.duration(), ratio, p_value));
+        series = without;
+    }
+    (series, found)
+}
+
+/// A sinusoid whose ordinate is `ratio` times the background, in a record of `duration` s.
+fn sine_line(sine: &Sine, duration: f64, ratio: f64, p_value: f64) -> SpectralLine {
+    let amplitude = sine.amplitude();
+    SpectralLine {
+        // Cramér-Rao bound for a sinusoid in white noise.
+        frequency: MeasuredValue { value: sine.frequency, error: 1.5f64.sqrt() / (PI * duration * ratio.sqrt()) },
+        deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
+        width: None,
+        statistic: 2.0 * ratio,
+        p_value,
+        shape_p_value: 1.0,
+    }
+}
+
+/// The part of the ordinates of a spectrum that are as good as independent. Where samples are missing, or where the level of
+/// the noise changes, neighbouring ordinates are correlated: the mean of many varies as that of `(Σv)²/Σv²` of them, `v` being
+/// the variance of each sample and 0 of a missing one.
+fn independent_part(series: &UniformSeries) -> f64 {
+    let present = series.present() as f64 / series.values().len().max(1) as f64;
+    let level = |block: &[f64]| {
+        let squares = block.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).filter(|square| square.is_finite());
+        let (sum, count) = squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
+        (2 * count > LEVEL_BLOCK).then(|| sum / count as f64)
+    };
+    let levels: Vec<f64> = series.values().chunks_exact(LEVEL_BLOCK).filter_map(level).collect();
+    let count = levels.len() as f64;
+    let mean = levels.iter().sum::<f64>() / count;
+    if levels.len() < 2 || mean <= 0.0 {
+        return present;
+    }
+    let variance = levels.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / count;
+    // Neighbouring levels differ by the scatter of their estimates, in whatever way the noise is correlated.
+    let scatter = levels.windows(2).map(|pair| 0.5 * (pair[1] - pair[0]).powi(2)).sum::<f64>() / (count - 1.0);
+    present / (1.0 + (variance - scatter).max(0.0) / (mean * mean))
 }
 
 /// Refits each resonance over the background without any of them: a strong one biases the first estimate of it.
@@ -142,6 +230,10 @@ struct WhitenedSpectrum<'a> {
     padded: Vec<f64>,
     /// Factor by which resonances were removed from each of the `padded` ordinates.
     deflation: Vec<f64>,
+    /// Part of the ordinates that are independent of each other.
+    independent: f64,
+    /// Least density of the background: that of the rounding to counts, below which a spectrum shows the rounding itself.
+    floor: f64,
 }
 
 impl<'a> WhitenedSpectrum<'a> {
@@ -170,7 +262,9 @@ impl<'a> WhitenedSpectrum<'a> {
         };
         let padded: Vec<f64> = periodogram.padded().iter().zip(&deflation).enumerate().map(over_shape).collect();
         let whitened = padded.iter().copied().step_by(PADDING).collect();
-        Some(Self { resolution: periodogram.resolution(), background, whitened, padded, deflation })
+        let resolution = periodogram.resolution();
+        let (independent, floor) = (independent_part(series), series.rounding_density());
+        Some(Self { resolution, background, whitened, padded, deflation, independent, floor })
     }
 
     /// The most significant line, if one is significant.
@@ -203,23 +297,12 @@ impl<'a> WhitenedSpectrum<'a> {
             let sine = Sine::fit_near(series, at as f64 * spacing, spacing);
             let bin = sine.frequency / self.resolution;
             let level = self.background.level(&self.whitened, at / PADDING);
-            let ratio = sine.density(series) * self.deflation[at] / (level.value * self.background.shape_at(bin));
+            let background = (level.value * self.background.shape_at(bin)).max(self.floor);
+            let ratio = sine.density(series) * self.deflation[at] / background;
             (ratio, level, sine)
         });
         let (ratio, level, sine) = candidates.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let amplitude = sine.amplitude();
-        let line = SpectralLine {
-            // Cramér-Rao bound for a sinusoid in white noise.
-            frequency: MeasuredValue {
-                value: sine.frequency,
-                error: 1.5f64.sqrt() / (PI * series.duration() * ratio.sqrt()),
-            },
-            deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
-            width: None,
-            statistic: 2.0 * ratio,
-            p_value: self.sine_p_value(ratio, level),
-        };
-        Some((line, sine))
+        Some((sine_line(&sine, series.duration(), ratio, self.sine_p_value(ratio, level)), sine))
     }
 
     /// Local maxima of the padded ordinates above four times the local level, over that level, with their positions.
@@ -235,7 +318,8 @@ impl<'a> WhitenedSpectrum<'a> {
                 until = bin + (bin / 16).clamp(1, 32);
             }
             let [left, here, right] = [self.padded[at - 1], self.padded[at], self.padded[at + 1]];
-            if here >= left && here > right && here > 4.0 * level {
+            let is_peak = here >= left && here > right && here > 4.0 * level;
+            if is_peak && here * self.background.shape_at(at as f64 / PADDING as f64) > 4.0 * self.floor {
                 peaks.push((here / level, at));
             }
         }
@@ -243,9 +327,10 @@ impl<'a> WhitenedSpectrum<'a> {
     }
 
     /// Probability of a peak of `ratio` times the background at any frequency: Baluev's bound, for a background that is
-    /// estimated from `level.ordinates` ordinates.
+    /// estimated from `level.ordinates` ordinates, of which a part is independent.
     fn sine_p_value(&self, ratio: f64, level: LocalLevel) -> f64 {
-        let one = (1.0 + ratio / level.ordinates).powf(-level.ordinates);
+        let ordinates = self.independent * level.ordinates;
+        let one = (1.0 + ratio / ordinates).powf(-ordinates);
         let frequencies = self.whitened.len() as f64 * (PI / 3.0).sqrt();
         (one * (1.0 + frequencies * ratio.sqrt())).min(1.0)
     }
@@ -267,10 +352,11 @@ impl<'a> WhitenedSpectrum<'a> {
             for (offset, values) in [(0, &averages), (size / 2, &shifted)] {
                 for (at, &value) in values.iter().enumerate() {
                     let level = neighbourhood(&averages, at, size);
-                    let excess = value / level.value;
+                    let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
+                    let excess = value / level.value.max(self.floor / self.background.shape_at(centre));
                     if excess > 1.0 + LEAST_EXCESS {
-                        let p_value = trials * mean_ratio_tail(excess, size as f64, level.ordinates);
-                        let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
+                        let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
+                        let p_value = trials * mean_ratio_tail(excess, own, others);
                         peaks.push((centre, size as f64, p_value));
                     }
                 }
@@ -298,6 +384,7 @@ impl<'a> WhitenedSpectrum<'a> {
             width: Some(MeasuredValue { value: width, error: width * relative_width }),
             statistic: lorentz.statistic,
             p_value,
+            shape_p_value: lorentz.shape_p_value,
         }
     }
 }

@@ -1,0 +1,301 @@
+//! Periodic causes: lines of several channels at one frequency, and the harmonics and sidebands of one fundamental.
+
+use super::cause::{Cause, Shown};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Effect, Parameter};
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_4, SQRT_2};
+
+/// Quantile of the normal distribution for a two-sided level of 1 %: equal frequencies are farther apart once in a hundred.
+const NORMAL_995: f64 = 2.576;
+/// Probability of chance below which lines at multiples of a frequency are its harmonics.
+const BY_CHANCE: f64 = 0.01;
+/// Standard deviations within which the harmonics of a square wave have the amplitudes of one.
+const SQUARE_SIGMAS: f64 = 3.0;
+/// Largest part by which an amplitude may differ from that of a square wave beyond its error: edges that take a tenth of a
+/// period lower the fifth harmonic by `1 − sinc(5/10)` = 0.36.
+const SQUARE_TOLERANCE: f64 = 0.36;
+
+/// Whether an effect is a line of the spectrum.
+pub(super) fn is_line(effect: &Effect) -> bool {
+    matches!(effect.kind.as_str(), "sinusoid" | "resonance")
+}
+
+/// A line of one channel.
+#[derive(Clone)]
+struct Line {
+    channel: usize,
+    effect: Effect,
+    frequency: f64,
+    /// Standard deviation of the frequency, Hz.
+    error: f64,
+    /// Full width at half maximum, Hz.
+    width: f64,
+}
+
+impl Line {
+    fn new(channel: usize, effect: &Effect) -> Option<Self> {
+        let frequency = effect.parameters.get("frequency")?;
+        Some(Self {
+            channel,
+            effect: effect.clone(),
+            frequency: frequency.value,
+            error: (frequency.high - frequency.low) / (2.0 * NORMAL_975),
+            width: effect.parameters.get("bandwidth").map_or(0.0, |bandwidth| bandwidth.value),
+        })
+    }
+
+    /// Amplitude of a sinusoid of the line's power, as a parameter.
+    fn amplitude(&self) -> Option<Parameter> {
+        let parameters = &self.effect.parameters;
+        let of_deviation = |of: &Parameter| scaled(of, SQRT_2);
+        parameters.get("amplitude").cloned().or_else(|| parameters.get("deviation").map(of_deviation))
+    }
+}
+
+fn scaled(of: &Parameter, factor: f64) -> Parameter {
+    Parameter::new(factor * of.value, factor * of.low, factor * of.high, of.unit.clone())
+}
+
+/// Lines of several channels at one frequency.
+struct Frequency {
+    lines: Vec<Line>,
+}
+
+impl Frequency {
+    /// The line whose frequency is known best.
+    fn best(&self) -> &Line {
+        self.lines[1..].iter().fold(&self.lines[0], |best, next| if next.error < best.error { next } else { best })
+    }
+}
+
+/// How far a multiple of a frequency and a line may be apart: their joint error, half their widths, and the
+/// resolution of the record.
+fn reach(fundamental: &Line, multiple: f64, line: &Line, duration_s: f64) -> f64 {
+    let width = 0.5 * (multiple * fundamental.width).max(line.width);
+    NORMAL_995 * (multiple * fundamental.error).hypot(line.error) + width + 1.0 / duration_s
+}
+
+/// The periodic causes of the effects of all channels, each with its unit.
+pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
+    let lines = channels.iter().enumerate().flat_map(|(channel, (_, effects))| {
+        effects.iter().filter(|effect| is_line(effect)).filter_map(move |effect| Line::new(channel, effect))
+    });
+    let mut frequencies: Vec<Frequency> = Vec::new();
+    for line in lines {
+        let is_same = |known: &&mut Frequency| {
+            let known = known.best();
+            (known.frequency - line.frequency).abs() < reach(known, 1.0, &line, duration_s)
+        };
+        match frequencies.iter_mut().find(is_same) {
+            Some(known) => known.lines.push(line),
+            None => frequencies.push(Frequency { lines: vec![line] }),
+        }
+    }
+    frequencies.sort_by(|a, b| a.best().frequency.total_cmp(&b.best().frequency));
+    let mut causes = Vec::new();
+    while let Some(series) = most_certain(&frequencies, duration_s) {
+        let mut members = Vec::new();
+        let mut others = Vec::new();
+        for (number, frequency) in frequencies.into_iter().enumerate() {
+            match series.members.iter().find(|(member, _)| *member == number) {
+                Some(&(_, multiple)) => members.push((multiple, frequency)),
+                None => others.push(frequency),
+            }
+        }
+        causes.push(harmonic_cause(members));
+        frequencies = others;
+    }
+    causes.extend(frequencies.into_iter().map(|frequency| harmonic_cause(vec![(Multiple::Harmonic(1), frequency)])));
+    causes
+}
+
+/// What a line is to the fundamental.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Multiple {
+    /// The line at so many times its frequency.
+    Harmonic(u32),
+    /// One of a pair of lines at equal distances from such a multiple.
+    Sideband,
+}
+
+/// A fundamental and its harmonics: positions in the list of frequencies.
+struct HarmonicSeries {
+    members: Vec<(usize, Multiple)>,
+    /// Probability that as many lines lie at multiples by chance.
+    p_value: f64,
+}
+
+/// The series that is least likely by chance, if chance is unlikely.
+fn most_certain(frequencies: &[Frequency], duration_s: f64) -> Option<HarmonicSeries> {
+    let series = (0..frequencies.len()).filter_map(|fundamental| series_of(frequencies, fundamental, duration_s));
+    let best = series.min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
+    // Each frequency was tried as the fundamental.
+    (best.p_value * (frequencies.len() as f64) < BY_CHANCE).then_some(best)
+}
+
+/// The lines at multiples of the frequency at `fundamental`.
+///
+/// An unrelated line lies within a distance d of a multiple of f₀ with the probability 2d/f₀, so that of m other lines the
+/// number that do has at most the binomial distribution with the largest of these probabilities.
+fn series_of(frequencies: &[Frequency], fundamental: usize, duration_s: f64) -> Option<HarmonicSeries> {
+    let first = frequencies[fundamental].best();
+    let mut members = vec![(fundamental, Multiple::Harmonic(1))];
+    let mut largest = 0.0_f64;
+    let others: Vec<usize> = (0..frequencies.len()).filter(|number| *number != fundamental).collect();
+    for &number in &others {
+        let line = frequencies[number].best();
+        let multiple = (line.frequency / first.frequency).round();
+        let within = reach(first, multiple, line, duration_s);
+        if multiple >= 2.0 && (line.frequency - multiple * first.frequency).abs() < within {
+            members.push((number, Multiple::Harmonic(multiple as u32)));
+            largest = largest.max(2.0 * within / first.frequency);
+        }
+    }
+    let harmonics = members.len() - 1;
+    if harmonics == 0 || largest >= 1.0 {
+        return None;
+    }
+    let p_value = binomial_tail(harmonics, others.len(), largest);
+    let sidebands = sidebands(frequencies, first, &members, duration_s);
+    members.extend(sidebands);
+    Some(HarmonicSeries { members, p_value })
+}
+
+/// Pairs of lines at equal distances on either side of a member: an amplitude or a frequency that is modulated.
+fn sidebands(
+    frequencies: &[Frequency],
+    first: &Line,
+    members: &[(usize, Multiple)],
+    duration_s: f64,
+) -> Vec<(usize, Multiple)> {
+    let is_free = |number: &usize| members.iter().all(|(member, _)| member != number);
+    let free: Vec<usize> = (0..frequencies.len()).filter(is_free).collect();
+    let pairs = free.iter().enumerate().flat_map(|(at, &low)| free[at + 1..].iter().map(move |&high| (low, high)));
+    let near: Vec<(usize, usize)> = pairs
+        .filter(|&(low, high)| {
+            frequencies[high].best().frequency - frequencies[low].best().frequency < 2.0 * first.frequency
+        })
+        .collect();
+    // By chance for any pair and any member.
+    let trials = (near.len() * members.len()) as f64;
+    let mut found = Vec::new();
+    for &(low, high) in &near {
+        let (below, above) = (frequencies[low].best(), frequencies[high].best());
+        let is_centre = |(member, _): &(usize, Multiple)| {
+            let centre = frequencies[*member].best();
+            let distance = (0.5 * (below.frequency + above.frequency) - centre.frequency).abs();
+            let error = centre.error.hypot(0.5 * below.error.hypot(above.error));
+            let width = 0.5 * centre.width.max(0.5 * (below.width + above.width));
+            let within = NORMAL_995 * error + width + 1.0 / duration_s;
+            distance < within && 2.0 * within / first.frequency * trials < BY_CHANCE
+        };
+        if members.iter().any(is_centre) {
+            found.extend([(low, Multiple::Sideband), (high, Multiple::Sideband)]);
+        }
+    }
+    found.sort_by_key(|(number, _)| *number);
+    found.dedup_by_key(|(number, _)| *number);
+    found
+}
+
+/// Probability that of `count` independent events of `probability` each at least `least` occur.
+fn binomial_tail(least: usize, count: usize, probability: f64) -> f64 {
+    if probability <= 0.0 {
+        return 0.0;
+    }
+    statrs::function::beta::beta_reg(least as f64, (count + 1 - least) as f64, probability.min(1.0))
+}
+
+/// The cause with these frequencies: a square wave if the amplitudes of a channel say so, else its fundamental line with the
+/// number of its harmonics.
+fn harmonic_cause(members: Vec<(Multiple, Frequency)>) -> Cause {
+    let mut by_channel: BTreeMap<usize, Vec<(Multiple, Line)>> = BTreeMap::new();
+    for (multiple, frequency) in members {
+        for line in frequency.lines {
+            by_channel.entry(line.channel).or_default().push((multiple, line));
+        }
+    }
+    let is_square = by_channel.values().any(|lines| is_square(lines));
+    let shown = by_channel.into_iter().map(|(channel, mut lines)| {
+        lines.sort_by(|a, b| a.1.frequency.total_cmp(&b.1.frequency));
+        let parts = lines.iter().map(|(_, line)| line.effect.clone()).collect();
+        let effect = if is_square { square_wave(&lines) } else { None }.unwrap_or_else(|| periodic(&lines));
+        Shown { channel, effect, parts }
+    });
+    Cause { shown: shown.collect() }
+}
+
+fn amplitude_of(lines: &[(Multiple, Line)], harmonic: u32) -> Option<Parameter> {
+    lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(harmonic))?.1.amplitude()
+}
+
+/// Whether the lines of a channel have the amplitudes of a square wave: 1/k at the odd multiples k, the first and the third
+/// among them, and none at even ones that a wave with two unequal halves would have to show.
+fn is_square(lines: &[(Multiple, Line)]) -> bool {
+    let Some(first) = amplitude_of(lines, 1) else { return false };
+    let error = |of: &Parameter| (of.high - of.low) / (2.0 * NORMAL_975);
+    let has_size = |(multiple, line): &(Multiple, Line)| {
+        let Multiple::Harmonic(multiple) = *multiple else { return true };
+        let Some(amplitude) = line.amplitude() else { return false };
+        let expected = first.value / f64::from(multiple);
+        if multiple.is_multiple_of(2) {
+            return amplitude.value < SQUARE_TOLERANCE * expected;
+        }
+        let joint = error(&amplitude).hypot(error(&first) / f64::from(multiple));
+        (amplitude.value - expected).abs() < SQUARE_TOLERANCE * expected + SQUARE_SIGMAS * joint
+    };
+    amplitude_of(lines, 3).is_some() && lines.iter().all(has_size)
+}
+
+/// The square wave whose lowest odd harmonic in a channel is among `lines`. A square wave of amplitude A, half the distance of
+/// its levels, has the harmonics 4A/(πk).
+fn square_wave(lines: &[(Multiple, Line)]) -> Option<Effect> {
+    let (harmonic, line) = lines.iter().find_map(|(multiple, line)| match *multiple {
+        Multiple::Harmonic(harmonic) if !harmonic.is_multiple_of(2) => Some((harmonic, line)),
+        _ => None,
+    })?;
+    let amplitude = scaled(&line.amplitude()?, FRAC_PI_4 * f64::from(harmonic));
+    let frequency = scaled(line.effect.parameters.get("frequency")?, 1.0 / f64::from(harmonic));
+    let evidence = format!(
+        "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic; {}",
+        harmonics(lines),
+        frequency.value,
+        line.effect.evidence,
+    );
+    Some(Effect::new("square_wave", [("frequency", frequency), ("amplitude", amplitude)], evidence))
+}
+
+/// The lowest of the lines of a channel, with the number of all.
+fn periodic(lines: &[(Multiple, Line)]) -> Effect {
+    let effect = &lines[0].1.effect;
+    if lines.len() == 1 {
+        return effect.clone();
+    }
+    let count = lines.len() as f64;
+    let mut effect = effect.clone();
+    effect.parameters.insert("harmonics".to_owned(), Parameter::new(count, count, count, ""));
+    effect.evidence = format!("{} of one periodic signal; {}", harmonics(lines), effect.evidence);
+    effect
+}
+
+/// Such as `harmonics 1, 3 and 5 and 2 sidebands`.
+fn harmonics(lines: &[(Multiple, Line)]) -> String {
+    let numbers: Vec<String> = lines
+        .iter()
+        .filter_map(|(multiple, _)| match multiple {
+            Multiple::Harmonic(number) => Some(number.to_string()),
+            Multiple::Sideband => None,
+        })
+        .collect();
+    let harmonics = match numbers.as_slice() {
+        [] => String::new(),
+        [one] => format!("harmonic {one}"),
+        [others @ .., last] => format!("harmonics {} and {last}", others.join(", ")),
+    };
+    match lines.len() - numbers.len() {
+        0 => harmonics,
+        count if numbers.is_empty() => format!("{count} sidebands"),
+        count => format!("{harmonics} with {count} sidebands"),
+    }
+}

@@ -1,0 +1,115 @@
+//! Causes of effects that are given, not found.
+
+use super::cause::Cause;
+use super::{merged, validation};
+use crate::findings::{Effect, Parameter, Validation};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::f64::consts::PI;
+
+const DURATION_S: f64 = 1000.0;
+
+fn parameter(value: f64, error: f64, unit: &str) -> Parameter {
+    Parameter::new(value, value - 1.96 * error, value + 1.96 * error, unit)
+}
+
+fn line(frequency: f64, amplitude: f64) -> Effect {
+    let parameters =
+        [("frequency", parameter(frequency, 1e-5, "Hz")), ("amplitude", parameter(amplitude, 0.01 * amplitude, "g"))];
+    Effect::new("sinusoid", parameters, String::new())
+}
+
+fn knock(from: f64, to: f64) -> Effect {
+    let parameters = [("from", parameter(from, 1.0, "s")), ("to", parameter(to, 1.0, "s"))];
+    Effect::new("knock", parameters, String::new())
+}
+
+/// Kind and channels of each cause.
+fn causes(channels: &[Vec<Effect>]) -> Vec<(String, Vec<usize>)> {
+    let channels: Vec<(&str, &[Effect])> = channels.iter().map(|effects| ("g", effects.as_slice())).collect();
+    let name =
+        |cause: &Cause| (cause.shown[0].effect.kind.clone(), cause.shown.iter().map(|shown| shown.channel).collect());
+    merged(&channels, DURATION_S).iter().map(name).collect()
+}
+
+#[test]
+fn the_harmonics_of_a_square_wave_in_three_channels_are_one_cause() {
+    // Fourier: a square wave of amplitude A has the odd harmonics 4A/(πk).
+    let wave = |size: f64, harmonics: &[u32]| -> Vec<Effect> {
+        harmonics.iter().map(|&k| line(0.5021 * f64::from(k), 4.0 * size / (PI * f64::from(k)))).collect()
+    };
+    let mut channels = vec![wave(0.02, &[1, 3, 5]), wave(0.01, &[1, 3, 5, 7]), wave(0.004, &[3])];
+    channels[1].push(line(7.7, 0.003));
+    let found = causes(&channels);
+    assert_eq!(found, [("square_wave".to_owned(), vec![0, 1, 2]), ("sinusoid".to_owned(), vec![1])]);
+    let borrowed: Vec<(&str, &[Effect])> = channels.iter().map(|effects| ("g", effects.as_slice())).collect();
+    let cause = &merged(&borrowed, DURATION_S)[0];
+    for (shown, (size, parts)) in cause.shown.iter().zip([(0.02, 3), (0.01, 4), (0.004, 1)]) {
+        let of = &shown.effect.parameters;
+        assert!((of["amplitude"].value / size - 1.0).abs() < 1e-9, "{:?}", of["amplitude"]);
+        assert!((of["frequency"].value - 0.5021).abs() < 1e-9, "{:?}", of["frequency"]);
+        assert_eq!(shown.parts.len(), parts);
+    }
+}
+
+#[test]
+fn a_sawtooth_is_one_line_with_its_harmonics() {
+    // A sawtooth has every harmonic, with amplitudes that fall as 1/k.
+    let effects: Vec<Effect> = (1..=3).map(|k| line(2.0 * f64::from(k), 0.1 / f64::from(k))).collect();
+    let found = merged(&[("g", &effects)], DURATION_S);
+    assert_eq!(found.len(), 1);
+    let effect = &found[0].shown[0].effect;
+    assert_eq!((effect.kind.as_str(), effect.parameters["harmonics"].value), ("sinusoid", 3.0));
+    assert_eq!(effect.parameters["frequency"].value, 2.0);
+}
+
+#[test]
+fn sidebands_belong_to_their_line_and_other_lines_do_not() {
+    // 10 Hz with its second harmonic, modulated at 0.7 Hz.
+    let effects = vec![line(10.0, 1.0), line(20.0, 0.5), line(9.3, 0.2), line(10.7, 0.2), line(13.37, 0.3)];
+    assert_eq!(causes(&[effects]), [("sinusoid".to_owned(), vec![0]), ("sinusoid".to_owned(), vec![0])]);
+}
+
+#[test]
+fn wide_lines_are_near_a_multiple_by_chance() {
+    let wide = |frequency: f64, width: f64| {
+        let parameters = [
+            ("frequency", parameter(frequency, 0.01, "Hz")),
+            ("bandwidth", parameter(width, 0.01, "Hz")),
+            ("deviation", parameter(0.1, 0.001, "g")),
+        ];
+        Effect::new("resonance", parameters, String::new())
+    };
+    assert_eq!(causes(&[vec![wide(4.0, 1.0), wide(8.3, 1.5)]]).len(), 2);
+    assert_eq!(causes(&[vec![wide(4.0, 1.0)], vec![wide(4.2, 1.0)]]).len(), 1, "one line in two channels");
+}
+
+#[test]
+fn knocks_at_one_time_are_one_cause() {
+    let channels = [vec![knock(10.0, 20.0)], vec![knock(15.0, 18.0), knock(100.0, 110.0)]];
+    assert_eq!(causes(&channels), [("knock".to_owned(), vec![0, 1]), ("knock".to_owned(), vec![1])]);
+}
+
+/// A size in the first half and in the whole record, as a mean of two halves with errors of 1: the whole has an error of
+/// 1/√2.
+fn validated(random: &mut ChaCha8Rng, sizes: [f64; 2]) -> Validation {
+    let [first, second] = sizes.map(|size| size + random.sample::<f64, _>(StandardNormal));
+    let effect = |size: f64, error: f64| {
+        Effect::new("temperature", [("sensitivity", parameter(size, error, "g/degC"))], String::new())
+    };
+    validation::compare(&[(&effect(0.5 * (first + second), 0.5f64.sqrt()), &effect(first, 1.0))])
+}
+
+#[test]
+fn an_effect_that_holds_is_validated_and_one_that_ends_is_not() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let runs = 10_000;
+    let mut count = |sizes: [f64; 2]| (0..runs).filter(|_| validated(&mut random, sizes) == Validation::No).count();
+    // Stated: once in a hundred. 100 ± 10 of 10,000; four standard deviations.
+    assert!((60..140).contains(&count([20.0, 20.0])));
+    // The difference has half the size and an error of 1/√2: 20 is 14 standard deviations, against a limit of 2.6.
+    assert_eq!(count([20.0, 0.0]), runs);
+    assert_eq!(validation::compare(&[]), Validation::Untestable);
+    assert_eq!(validation::compare(&[(&knock(1.0, 2.0), &knock(1.0, 2.0))]), Validation::Untestable);
+}

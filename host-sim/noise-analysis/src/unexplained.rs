@@ -1,0 +1,102 @@
+//! What a model leaves beyond chance: the point of the curve that contradicts it most.
+
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::distributions::upper_tail;
+use crate::findings::{Effect, Parameter, SIGNIFICANCE};
+use allan_core::{AllanPoint, Model};
+use measurement::SensorProfile;
+use statrs::function::gamma::{gamma_lr, gamma_ur};
+
+/// Smallest deviation of the Allan deviation that is reported, as a part of it: a sensor's scale factor, in which every
+/// figure is given, has a tolerance of 1 % by the data sheet.
+const MIN_EXCESS: f64 = 0.01;
+/// Degrees of freedom from which the χ² distribution is taken for that of the cube of a normal variable (E. Wilson and M.
+/// Hilferty, PNAS 17, 1931), which is then exact to 10⁻³ of the tail beyond five standard deviations.
+const MANY: f64 = 1e4;
+/// Variance of a rounding error that is not dithered, at most, in squares of the resolution.
+const ROUNDING: f64 = 1.0 / 12.0;
+
+/// A point of a curve and what the model says of it.
+struct Residual<'a> {
+    point: &'a AllanPoint,
+    /// Measured over modelled Allan variance.
+    ratio: f64,
+    /// Two-sided probability of a ratio as far from 1 or farther if the model is true.
+    p_value: f64,
+}
+
+/// The deviation of the curve of a channel of this `resolution` from the model with its added terms that is least likely by
+/// chance, if it is by less than [`SIGNIFICANCE`] anywhere in the curve.
+pub(crate) fn by_curve(fit: &ChannelFit, profile: &SensorProfile, resolution: f64) -> Option<Effect> {
+    let (curve, model) = (&fit.covariates.curve, &fit.trace.after);
+    // Without dither the rounding error is no white noise.
+    let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
+    let rounding = if is_dithered { 0.0 } else { ROUNDING * resolution * resolution };
+    let residuals: Vec<Residual> = curve.points().iter().filter_map(|point| residual(point, model, rounding)).collect();
+    // Neighbouring octaves are nearly independent.
+    let limit = SIGNIFICANCE / residuals.len() as f64;
+    let is_unexplained = |of: &&Residual| of.p_value < limit && (of.ratio.sqrt() - 1.0).abs() > MIN_EXCESS;
+    let (at, worst) = residuals
+        .iter()
+        .enumerate()
+        .filter(|(_, of)| is_unexplained(of))
+        .min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value))?;
+    // The octaves around it that deviate in the same direction, each by itself.
+    let is_part = |of: &&Residual| of.p_value < SIGNIFICANCE && (of.ratio > 1.0) == (worst.ratio > 1.0);
+    let first = residuals[..at].iter().rev().take_while(is_part).last().unwrap_or(worst);
+    let last = residuals[at..].iter().take_while(is_part).last().unwrap_or(worst);
+    let percent = |avar: f64| 100.0 * ((avar / model.avar(worst.point.n)).sqrt() - 1.0);
+    let excess = Parameter::new(percent(worst.point.avar), percent(worst.point.low), percent(worst.point.high), "%");
+    let tau = Parameter::new(worst.point.tau, first.point.tau, last.point.tau, "s");
+    let evidence = format!(
+        "{:+.0} % of the model's Allan deviation at tau = {:.3} s, by chance anywhere in the curve {:.0e}; no effect that \
+         is known here explains it",
+        excess.value,
+        worst.point.tau,
+        (worst.p_value * residuals.len() as f64).min(1.0),
+    );
+    Some(Effect::new("unexplained", [("tau", tau), ("excess_percent", excess)], evidence))
+}
+
+/// The deviation of a point, less what a rounding error of this variance can add or take away.
+fn residual<'a>(point: &'a AllanPoint, model: &Model, rounding: f64) -> Option<Residual<'a>> {
+    let modelled = model.avar(point.n);
+    let change = point.avar - modelled;
+    let ratio = 1.0 + change.signum() * (change.abs() - rounding).max(0.0) / modelled;
+    let edf = model.edf(point);
+    let p_value = two_sided(ratio, edf);
+    (modelled > 0.0 && p_value.is_finite()).then_some(Residual { point, ratio, p_value })
+}
+
+/// Probability of a χ² variable over its `edf` degrees of freedom as far from 1 as `ratio` on the same side, twice.
+fn two_sided(ratio: f64, edf: f64) -> f64 {
+    let tail = if edf > MANY {
+        let variance = 2.0 / (9.0 * edf);
+        let z = (ratio.cbrt() - (1.0 - variance)) / variance.sqrt();
+        upper_tail(z.abs())
+    } else {
+        let half = 0.5 * edf;
+        if ratio > 1.0 { gamma_ur(half, half * ratio) } else { gamma_lr(half, half * ratio) }
+    };
+    (2.0 * tail).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::two_sided;
+
+    /// Quantiles of χ² from tables (Abramowitz and Stegun, table 26.8): 0.5 % on either side.
+    #[test]
+    fn tails_are_those_of_the_tables() {
+        for (edf, low, high) in [(1.0, 0.000_039_3, 7.879_44), (10.0, 2.155_86, 25.188_2), (100.0, 67.327_6, 140.169)] {
+            for quantile in [low, high] {
+                let p_value = two_sided(quantile / edf, edf);
+                assert!((p_value / 0.01 - 1.0).abs() < 1e-3, "{edf}, {quantile}: {p_value}");
+            }
+        }
+        // Both forms at the border: the normal deviate of 5 standard deviations.
+        let (below, above) =
+            (two_sided(1.0 + 5.0 * (2e-4f64).sqrt(), 9_999.0), two_sided(1.0 + 5.0 * (2e-4f64).sqrt(), 10_001.0));
+        assert!((below / above - 1.0).abs() < 0.01, "{below} {above}");
+    }
+}

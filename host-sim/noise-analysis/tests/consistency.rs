@@ -1,0 +1,217 @@
+//! Nothing in a report contradicts anything else in it: every figure that a report gives twice is compared, within the joint
+//! scatter of the two.
+
+use adis16405_driver::GyroRange;
+use measurement::Measurement;
+use noise_analysis::analysis::analyze;
+use noise_analysis::report::{ChannelReport, CurvePoint, ModelReport, Parameter, Report, TermReport};
+use recordings::count_table;
+use recordings::time_base::measurement;
+use simulation::Simulation;
+use std::f64::consts::{LN_2, PI};
+use std::path::PathBuf;
+
+/// A 95 % interval is 1.96 standard deviations to either side.
+const NORMAL_975: f64 = 1.96;
+/// Standard deviations of a difference that are no contradiction. Of some 2,000 independent pairs one exceeds four by chance
+/// with a probability of 12 %; the simulations are seeded, so the outcome is the same every time.
+const CONTRADICTION: f64 = 4.0;
+/// Kinds of terms whose Allan variance is a power of the averaging time.
+const POWERS: [&str; 5] = ["angle_random_walk", "bias_instability", "rate_random_walk", "quantization", "rate_ramp"];
+
+fn deviation(of: &Parameter) -> f64 {
+    (of.high - of.low) / (2.0 * NORMAL_975)
+}
+
+/// Whether two estimates differ by more than both scatter.
+fn contradict(a: &Parameter, b: &Parameter) -> bool {
+    let scatter = deviation(a).hypot(deviation(b));
+    // What is known to a part in 10⁹ is printed with fewer digits.
+    (a.value - b.value).abs() > CONTRADICTION * scatter + 1e-9 * a.value.abs()
+}
+
+fn value<'a>(model: &'a ModelReport, kind: &str) -> Option<&'a Parameter> {
+    model.terms.iter().find(|term| term.kind == kind)?.parameters.get("value")
+}
+
+/// N of a model, behind its filter or not.
+fn angle_random_walk(model: &ModelReport) -> Option<&Parameter> {
+    value(model, "filter_bandwidth").or_else(|| value(model, "angle_random_walk"))
+}
+
+/// Allan variance of a term at the averaging time `tau_s` by its formula in IEEE Std 952, for the terms of [`POWERS`].
+fn variance(term: &TermReport, tau_s: f64) -> f64 {
+    let of = |name: &str| term.parameters.get(name).map_or(0.0, |parameter| parameter.value.powi(2));
+    match term.kind.as_str() {
+        "angle_random_walk" => of("value") / tau_s,
+        "bias_instability" => of("value") * 2.0 * LN_2 / PI,
+        "rate_random_walk" => of("value") * tau_s / 3.0,
+        "quantization" => 3.0 * of("value") / (tau_s * tau_s),
+        _ => of("slope") * tau_s * tau_s / 2.0,
+    }
+}
+
+/// The contradictions in a report, a line each.
+fn contradictions(report: &Report) -> Vec<String> {
+    let mut found = Vec::new();
+    for channel in &report.channels {
+        let mut add = |what: String| found.push(format!("{}: {what}", channel.name));
+        white_noise(channel, &mut add);
+        curve_of_terms(channel, &mut add);
+        curve_by_spectrum(channel, &mut add);
+        effects_and_terms(channel, &mut add);
+        effects_and_findings(report, channel, &mut add);
+        filter_of_the_part(report, channel, &mut add);
+    }
+    found
+}
+
+/// N of the model of the whole record, in the coefficients and by the spectrum.
+fn white_noise(channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    let Some(fitted) = angle_random_walk(&channel.refitted) else { return };
+    let practice = &channel.assessment;
+    let same_unit = |of: &&noise_analysis::assessment::Coefficient| {
+        of.kind == "angle_random_walk" && !of.discrete && of.value.unit == fitted.unit
+    };
+    if let Some(of) = practice.coefficients.iter().find(same_unit)
+        && contradict(fitted, &of.value)
+    {
+        add(format!("N of the coefficients {:?}, of the model {fitted:?}", of.value));
+    }
+    if let (Some(of), None) = (&practice.angle_random_walk_by_spectrum, &practice.angle_random_walk_by_spectrum_note)
+        && contradict(fitted, of)
+    {
+        add(format!("N by the spectrum {of:?}, of the model {fitted:?}"));
+    }
+}
+
+/// The model's curve from its terms, where all of them have a formula. Sampled flicker noise and quantization differ from the
+/// formulas at a few samples.
+fn curve_of_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    let has_covariates =
+        channel.effects.iter().any(|of| ["temperature", "supply", "acceleration"].contains(&of.kind.as_str()));
+    for (name, model) in [("before", &channel.before), ("final", &channel.refitted)] {
+        if (name == "final" && has_covariates) || model.terms.iter().any(|term| !POWERS.contains(&term.kind.as_str())) {
+            continue;
+        }
+        for (point, adev) in channel.curve.iter().zip(&model.adev).filter(|(point, _)| point.n >= 16) {
+            let of_terms = model.terms.iter().map(|term| variance(term, point.tau_s)).sum::<f64>().sqrt();
+            if (of_terms - adev).abs() > 0.02 * adev {
+                add(format!("{name}: {adev} at {} s, its terms {of_terms}", point.tau_s));
+            }
+        }
+    }
+}
+
+/// The measured curve and equation (5).
+fn curve_by_spectrum(channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    for &CurvePoint { tau_s, adev, edf, adev_by_spectrum, replaced_percent, .. } in &channel.curve {
+        let Some(by_spectrum) = adev_by_spectrum.filter(|_| adev > 0.0 && replaced_percent == 0.0) else { continue };
+        // Both are estimates from the same samples; the spectrum has about as many degrees of freedom.
+        let scatter = (1.0 / edf).sqrt();
+        if (by_spectrum / adev).ln().abs() > CONTRADICTION * scatter + 0.02 {
+            add(format!("{adev} at {tau_s} s, by the spectrum {by_spectrum} ({edf:.1} degrees of freedom)"));
+        }
+    }
+}
+
+/// A parameter of an effect and that of the model's term of the same kind.
+fn effects_and_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    for effect in &channel.effects {
+        let of_kind: Vec<&TermReport> = channel.refitted.terms.iter().filter(|term| term.kind == effect.kind).collect();
+        // Several lines are told apart by their frequency.
+        let [term] = of_kind[..] else { continue };
+        if channel.effects.iter().filter(|other| other.kind == effect.kind).count() > 1 {
+            continue;
+        }
+        for (name, parameter) in &effect.parameters {
+            if let Some(of) = term.parameters.get(name)
+                && contradict(parameter, of)
+            {
+                add(format!("effect {} {name} {parameter:?}, its term {of:?}", effect.kind));
+            }
+        }
+    }
+}
+
+/// Each effect and the finding that it refers to.
+fn effects_and_findings(report: &Report, channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    for effect in &channel.effects {
+        match report.findings.get(effect.finding) {
+            None => add(format!("{} refers to finding {}, which is absent", effect.kind, effect.finding)),
+            Some(finding) if finding.kind != effect.kind || !finding.channels.contains(&channel.name) => {
+                add(format!("{} refers to the finding {} of {:?}", effect.kind, finding.kind, finding.channels));
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+/// The filter of a channel's model and that of the part.
+fn filter_of_the_part(report: &Report, channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    let Some(term) = channel.refitted.terms.iter().find(|term| term.kind == "filter_bandwidth") else { return };
+    let pairs = [("taps", &report.part.taps), ("decimation", &report.part.decimation)];
+    for (name, of_part) in pairs {
+        if let (Some(of_channel), Some(of_part)) = (term.parameters.get(name), of_part)
+            && contradict(of_channel, of_part)
+        {
+            add(format!("filter {name} {of_channel:?}, of the part {of_part:?}"));
+        }
+    }
+    if report.part.filter.as_deref() == Some("none") {
+        add("a filter, where the part has none".to_owned());
+    }
+}
+
+fn simulated(seconds: f64, seed: u64) -> Measurement {
+    let simulation = if seed.is_multiple_of(2) {
+        Simulation::paper(seconds, seed)
+    } else {
+        Simulation::demonstration(seconds, seed)
+    };
+    measurement(&simulation.run(|_| ()).expect("a simulation"), None).expect("a time base")
+}
+
+#[test]
+#[ignore = "long: four simulated recordings"]
+fn reports_of_simulated_recordings_do_not_contradict_themselves() {
+    let found: Vec<String> = (0..4)
+        .flat_map(|seed| {
+            contradictions(&analyze(&simulated(300.0, seed))).into_iter().map(move |of| format!("{seed}: {of}"))
+        })
+        .collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+#[ignore = "long: a hundred simulated recordings"]
+fn reports_of_a_hundred_simulated_recordings_do_not_contradict_themselves() {
+    let found: Vec<String> = (0..100)
+        .flat_map(|seed| {
+            contradictions(&analyze(&simulated(900.0, seed))).into_iter().map(move |of| format!("{seed}: {of}"))
+        })
+        .collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+#[ignore = "long: the measured recordings in the folder that ADIS_RECORDINGS names"]
+fn reports_of_measured_recordings_do_not_contradict_themselves() {
+    let folder = std::env::var_os("ADIS_RECORDINGS").map(PathBuf::from).expect("the folder of the recordings");
+    let mut files: Vec<PathBuf> = ["adis16405-static", "adis16405-burst"]
+        .iter()
+        .flat_map(|name| std::fs::read_dir(folder.join(name)).expect("a folder"))
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.to_string_lossy().ends_with(".csv.gz"))
+        .collect();
+    files.sort();
+    let mut found = Vec::new();
+    for file in files {
+        let recording = count_table::read(&file, GyroRange::Dps300).expect("a recording");
+        // The static recordings have no time stamps; their authors give the rate.
+        let rate_hz = file.to_string_lossy().contains("static").then_some(100.0);
+        let report = analyze(&measurement(&recording, rate_hz).expect("a time base"));
+        found.extend(contradictions(&report).into_iter().map(|of| format!("{}: {of}", file.display())));
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}

@@ -1,0 +1,266 @@
+//! Recordings that a careless or unlucky user makes: what the analysis says of them is right, or it says nothing.
+//!
+//! White noise of 20 counts on a gyro at 100 Hz has N = 20·0.05 °/s·√0.01 s = 0.1 °/√s.
+
+use measurement::adis16405::profile;
+use measurement::{MeasuredChannel, Measurement};
+use noise_analysis::analysis::analyze;
+use noise_analysis::nonstationarity::explain;
+use noise_analysis::report::{ChannelReport, ModelReport, Parameter, Report};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// N of 20 counts, °/√s.
+const N: f64 = 0.1;
+const RATE_HZ: f64 = 100.0;
+
+/// Counts of one channel at the sample periods `slots`.
+fn recording(name: &str, rate_hz: f64, slots: Vec<u64>, counts: Vec<i32>) -> Measurement {
+    let profile = profile(0.05);
+    let channel = profile.channel(name).expect("a channel of the part");
+    let missing = slots.last().map_or(0, |last| last + 1) - slots.len() as u64;
+    Measurement {
+        profile,
+        sample_rate_hz: rate_hz,
+        stated_rate_hz: Some(rate_hz),
+        slots,
+        times_s: None,
+        channels: vec![MeasuredChannel::new(channel, counts)],
+        dropped: if missing > 0 { BTreeMap::from([("gap", missing)]) } else { BTreeMap::new() },
+        flagged: BTreeMap::new(),
+    }
+}
+
+/// Without a gap, of a gyro at 100 Hz.
+fn gyro(counts: Vec<i32>) -> Measurement {
+    recording("gyro_x", RATE_HZ, (0..counts.len() as u64).collect(), counts)
+}
+
+/// Normal numbers of standard deviation 1.
+fn normal(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    move || random.sample(StandardNormal)
+}
+
+/// White noise of so many counts.
+fn white(seed: u64, samples: usize, counts: f64) -> Vec<i32> {
+    let mut normal = normal(seed);
+    (0..samples).map(|_| (counts * normal()).round() as i32).collect()
+}
+
+fn only(report: &Report) -> &ChannelReport {
+    let [channel] = &report.channels[..] else { panic!("one channel was recorded") };
+    channel
+}
+
+fn kinds(report: &Report) -> Vec<&str> {
+    only(report).effects.iter().map(|effect| effect.kind.as_str()).collect()
+}
+
+fn coefficient<'a>(model: &'a ModelReport, kind: &str) -> &'a Parameter {
+    &model.terms.iter().find(|term| term.kind == kind).expect("a term of the baseline").parameters["value"]
+}
+
+/// Every interval of a report holds its value, and none that was estimated is without width.
+fn assert_bounds_hold(report: &Report, what: &str) {
+    let channel = only(report);
+    let models = [&channel.before, &channel.after, &channel.refitted];
+    let terms = models.into_iter().flat_map(|model| &model.terms);
+    let of_terms = terms.flat_map(|term| term.parameters.iter().map(move |(name, of)| (&term.kind, name, of)));
+    let of_effects = channel
+        .effects
+        .iter()
+        .flat_map(|effect| effect.parameters.iter().map(move |(name, of)| (&effect.kind, name, of)));
+    for (kind, name, Parameter { value, low, high, .. }) in of_terms.chain(of_effects) {
+        assert!(low <= value && value <= high, "{what}: {kind} {name}: {value} is not in [{low}, {high}]");
+    }
+}
+
+/// Two minutes on, ten minutes off, and one gap as long as the record.
+#[test]
+fn long_gaps_are_no_lines() {
+    for seed in 0..20 {
+        let counts = white(seed, 60_000, 20.0);
+        let on_and_off = (0..60_000).map(|i: u64| i + 60_000 * (i / 12_000)).collect();
+        let halves = (0..60_000).map(|i: u64| if i < 30_000 { i } else { i + 60_000 }).collect();
+        for (what, slots) in [("two minutes of twelve", on_and_off), ("a gap as long as the record", halves)] {
+            let report = analyze(&recording("gyro_x", RATE_HZ, slots, counts.clone()));
+            assert_eq!(kinds(&report), ["dropped_samples"], "{what}, seed {seed}");
+            // 60,000 samples know N to 0.3 %.
+            let of = coefficient(&only(&report).refitted, "angle_random_walk");
+            assert!((of.value / N - 1.0).abs() < 0.02, "{what}, seed {seed}: {of:?}");
+        }
+    }
+}
+
+/// Fewer octaves than terms determine no term.
+#[test]
+fn a_few_samples_have_no_effect_and_no_narrow_bounds() {
+    for seed in 0..20 {
+        for samples in 4..=10 {
+            let report = analyze(&gyro(white(seed, samples, 20.0)));
+            let what = format!("{samples} samples, seed {seed}");
+            assert_bounds_hold(&report, &what);
+            assert!(kinds(&report).is_empty(), "{what}: {:?}", only(&report).effects);
+            // A standard deviation from m samples has a relative error of 1/√(2(m − 1)), 24 % at m = 10: the interval of N
+            // holds the truth, or N is not known at all.
+            let of = coefficient(&only(&report).refitted, "angle_random_walk");
+            assert!(of.high - of.low > 0.2 * of.value, "{what}: {of:?}");
+            for kind in ["bias_instability", "rate_random_walk"] {
+                let of = coefficient(&only(&report).refitted, kind);
+                assert!(of.high > of.value && of.low == 0.0, "{what}: {kind} {of:?}");
+            }
+        }
+    }
+}
+
+/// Stretches of two to five samples, ten sample periods apart.
+#[test]
+fn stretches_of_a_few_samples_have_no_effect_and_no_narrow_bounds() {
+    for seed in 0..12 {
+        for length in 2..=5 {
+            let slots = (0..20_000).map(|i: u64| i / length * (length + 10) + i % length).collect();
+            let report = analyze(&recording("gyro_x", RATE_HZ, slots, white(seed, 20_000, 20.0)));
+            let what = format!("stretches of {length}, seed {seed}");
+            assert_bounds_hold(&report, &what);
+            assert_eq!(kinds(&report), ["dropped_samples"], "{what}");
+            let of = coefficient(&only(&report).refitted, "angle_random_walk");
+            assert!(of.low <= 1.02 * N && of.high >= 0.98 * N, "{what}: {of:?}");
+            let of = coefficient(&only(&report).refitted, "rate_random_walk");
+            assert!(of.high > of.value && of.low == 0.0, "{what}: {of:?}");
+        }
+    }
+}
+
+#[test]
+fn intervals_hold_their_value() {
+    let steps = (0..198).map(|i| 1 + i / 30).collect();
+    assert_bounds_hold(&analyze(&recording("gyro_x", 290.0, (0..198).collect(), steps)), "a staircase");
+    for seed in 0..12 {
+        let mut normal = normal(seed);
+        let mut angle = 0.0;
+        let walk: Vec<i32> = (0..10_000 << (seed % 3))
+            .map(|_| {
+                angle += 3.0 * normal();
+                f64::round(angle) as i32
+            })
+            .collect();
+        assert_bounds_hold(&analyze(&gyro(walk)), &format!("a walk, seed {seed}"));
+    }
+}
+
+#[test]
+fn a_channel_at_the_end_of_its_range_is_saturated() {
+    for seed in 0..12 {
+        // An accelerometer at the largest count of its 14 bits: half of the samples are cut off.
+        let counts: Vec<i32> = white(seed, 30_000, 20.0).iter().map(|noise| (8191 + noise).min(8191)).collect();
+        let at_end = counts.iter().filter(|&&count| count == 8191).count() as f64 / 30_000.0;
+        let slots = || (0..30_000).collect();
+        let report = analyze(&recording("accl_x", RATE_HZ, slots(), counts));
+        let [effect] = &only(&report).effects[..] else { panic!("seed {seed}: {:?}", kinds(&report)) };
+        assert_eq!(effect.kind, "saturated");
+        assert!((effect.parameters["share"].value - at_end).abs() < 1e-3, "{effect:?}");
+        assert!((effect.parameters["level"].value - 8191.0 * 3.33e-3).abs() < 0.5, "{effect:?}");
+        // A gyro that something before the output clips at ±6000 counts.
+        let mut normal = normal(seed);
+        let wave = |i: i32| 6500.0 * (TAU * f64::from(i) / 5000.0).sin();
+        let clipped = (0..30_000).map(|i| (wave(i) + 20.0 * normal()).round().clamp(-6000.0, 6000.0) as i32).collect();
+        let report = analyze(&recording("gyro_x", RATE_HZ, slots(), clipped));
+        assert!(kinds(&report).contains(&"saturated"), "seed {seed}: {:?}", kinds(&report));
+        // Noise within the range is not saturated, whatever its largest count.
+        let report = analyze(&recording("gyro_x", RATE_HZ, slots(), white(seed, 30_000, 20.0)));
+        assert!(kinds(&report).is_empty(), "seed {seed}: {:?}", kinds(&report));
+    }
+}
+
+/// The last tenth is three times as loud; or six seconds are thirty times as loud.
+#[test]
+fn a_change_of_the_noise_level_is_no_line() {
+    for seed in 0..12 {
+        let counts = white(seed, 60_000, 20.0);
+        let louder: Vec<i32> = counts.iter().enumerate().map(|(i, n)| if i < 54_000 { *n } else { 3 * n }).collect();
+        let knocked: Vec<i32> =
+            counts.iter().enumerate().map(|(i, n)| if (30_000..30_600).contains(&i) { 30 * n } else { *n }).collect();
+        for (what, counts) in [("a louder tenth", louder), ("six loud seconds", knocked)] {
+            let report = analyze(&gyro(counts));
+            let lines = ["sinusoid", "resonance", "telegraph", "markov", "square_wave"];
+            let found = kinds(&report);
+            assert!(!found.iter().any(|kind| lines.contains(kind)), "{what}, seed {seed}: {found:?}");
+        }
+    }
+}
+
+/// 100 counts are 5 °/s.
+#[test]
+fn a_slow_sinusoid_is_right_or_unnamed() {
+    for frequency in [0.01, 0.005] {
+        for seed in 0..12 {
+            let mut normal = normal(seed);
+            let wave = |i: i32| 100.0 * (TAU * frequency * f64::from(i) / RATE_HZ).sin();
+            let report = analyze(&gyro((0..60_000).map(|i| (wave(i) + 20.0 * normal()).round() as i32).collect()));
+            for effect in &only(&report).effects {
+                let what = format!("{frequency} Hz, seed {seed}: {effect:?}");
+                assert!(["sinusoid", "unexplained"].contains(&effect.kind.as_str()), "{what}");
+                if effect.kind == "sinusoid" {
+                    assert!((effect.parameters["frequency"].value / frequency - 1.0).abs() < 0.02, "{what}");
+                    assert!((effect.parameters["amplitude"].value / 5.0 - 1.0).abs() < 0.02, "{what}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_below_a_count_is_told() {
+    for seed in 0..12 {
+        let report = analyze(&gyro(white(seed, 30_000, 0.2)));
+        assert_eq!(kinds(&report), ["noise_below_count"], "seed {seed}");
+    }
+    let report = analyze(&gyro(vec![17; 30_000]));
+    assert_eq!(kinds(&report), ["noise_below_count"], "a constant channel");
+    // Of 0.3 counts N is right, and nothing is to be told.
+    let report = analyze(&gyro(white(1, 30_000, 0.5)));
+    assert!(kinds(&report).is_empty(), "{:?}", kinds(&report));
+}
+
+/// The line of 5 Hz is there; whatever else is named is no smaller than a thousandth of a count.
+#[test]
+fn a_sinusoid_without_noise_is_one_line() {
+    let report = analyze(&gyro(
+        (0..60_000).map(|i| (100.0 * (TAU * 5.0 * f64::from(i) / RATE_HZ).sin()).round() as i32).collect(),
+    ));
+    let lines: Vec<_> = only(&report).effects.iter().filter(|effect| effect.kind == "sinusoid").collect();
+    let near = |effect: &&&noise_analysis::report::Effect| (effect.parameters["frequency"].value - 5.0).abs() < 0.01;
+    let five = lines.iter().find(near).unwrap_or_else(|| panic!("{:?}", only(&report).effects));
+    assert!((five.parameters["amplitude"].value / 5.0 - 1.0).abs() < 0.01, "{five:?}");
+    for effect in &only(&report).effects {
+        let size = ["amplitude", "deviation"].iter().find_map(|name| effect.parameters.get(*name));
+        assert!(size.is_none_or(|size| size.value > 1e-3 * 0.05), "{effect:?}");
+    }
+}
+
+#[test]
+fn periodic_counts_and_silence_are_explained_without_a_panic() {
+    for period in [2, 8, 1024] {
+        let counts = (0..40_000).map(|i| if period == 2 { i % 2 * 2 - 1 } else { i % period }).collect();
+        let explanation = explain(&gyro(counts));
+        assert_eq!(explanation.samples, 40_000, "period {period}");
+    }
+    // Noise, then silence: no epoch of the silence has a variance.
+    for silence in [1_000, 30_000, 300_000] {
+        let counts = [white(7, 160_000, 20.0), vec![0; silence]].concat();
+        let explanation = explain(&gyro(counts));
+        for channel in &explanation.channels {
+            let errors = channel.errors;
+            let all = [errors.baseline, errors.traced, errors.predictive].concat();
+            assert!(
+                all.iter().chain([&errors.first_half_curve, &errors.beyond_drift]).all(|of| of.is_finite()),
+                "{errors:?}"
+            );
+            assert!(channel.drift.iter().all(|of| of.is_finite()), "{:?}", channel.drift);
+        }
+    }
+}
