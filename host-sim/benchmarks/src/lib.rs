@@ -3,4 +3,5 @@
 pub mod losses;
 mod parallel;
 pub mod reproduction;
+mod spectral_noise;
 pub mod undeclared;

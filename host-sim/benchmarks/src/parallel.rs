@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Results of `work` on each item, in the order of the items, by `jobs` threads. `progress` is called with the number of
+/// Results of `work` on each item, in the order of the items, by `jobs` threads, at most one an item. `progress` is called with the number of
 /// finished items and of all. After an error no further item is begun.
 ///
 /// # Errors
@@ -17,7 +17,7 @@ pub(crate) fn map<I: Sync, T: Send, E: Send>(
     let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
     let results = Mutex::new(Vec::with_capacity(items.len()));
     std::thread::scope(|scope| {
-        for _ in 0..jobs.max(1) {
+        for _ in 0..jobs.clamp(1, items.len().max(1)) {
             scope.spawn(|| {
                 while !failed.load(Ordering::Relaxed) {
                     let at = next.fetch_add(1, Ordering::Relaxed);

@@ -1,14 +1,11 @@
 //! The noises of the benchmark, generated from their definitions: white noise and a walk sample by sample, flicker noise
 //! by its spectrum.
 
+use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
 use allan_core::NoiseTerm;
 use allan_core::term::MovingAverageFilter;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
-use std::f64::consts::PI;
 use std::fmt;
 
 /// Samples per second of the simulated records.
@@ -103,7 +100,11 @@ impl TestNoise {
         let (deviation, step) = (n * RATE_HZ.sqrt(), k / RATE_HZ.sqrt());
         let stages = if self.filtered { 2 } else { 0 };
         let length = samples + stages * usize::from(TAPS - 1);
-        let flicker = if b > 0.0 { flicker_noise(b, length, &mut random) } else { vec![0.0; length] };
+        let flicker = if b > 0.0 {
+            gaussian_noise(|frequency| flicker_density(b, frequency), RATE_HZ, length, &mut random)
+        } else {
+            vec![0.0; length]
+        };
         let mut walk = 0.0;
         let sum = |flicker: f64| {
             walk += step * normal(&mut random);
@@ -116,34 +117,6 @@ impl TestNoise {
         // A walk of hours stays far within 32 bits.
         signal.into_iter().map(|value| value.round() as i32).collect()
     }
-}
-
-fn normal(random: &mut impl Rng) -> f64 {
-    StandardNormal.sample(random)
-}
-
-/// Flicker noise with the one-sided density `B²/(πf)`: half of a periodic record of twice the length.
-fn flicker_noise(b: f64, samples: usize, random: &mut impl Rng) -> Vec<f64> {
-    let length = 2 * samples.next_power_of_two();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
-    let mut spectrum = transform.make_input_vec();
-    // The inverse transform sums without a factor: a density S at frequency f takes the amplitude √(S·Δf/2)/√2 in each of
-    // the real and the imaginary part, Δf being the distance of the frequencies.
-    let spacing = RATE_HZ / length as f64;
-    for (k, value) in spectrum.iter_mut().enumerate().skip(1) {
-        let density = b * b / (PI * k as f64 * spacing);
-        let amplitude = (density * spacing / 4.0).sqrt();
-        *value = Complex::new(amplitude * normal(random), amplitude * normal(random));
-    }
-    if let Some(highest) = spectrum.last_mut() {
-        highest.im = 0.0;
-    }
-    let mut record = transform.make_output_vec();
-    transform
-        .process(&mut spectrum, &mut record)
-        .unwrap_or_else(|error| panic!("a transform of its own length: {error}"));
-    record.truncate(samples);
-    record
 }
 
 impl fmt::Display for TestNoise {

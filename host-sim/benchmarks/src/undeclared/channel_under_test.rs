@@ -1,9 +1,11 @@
 //! Two-sided power spectral densities of the channel in which an effect is to be detected, and Whittle's likelihood ratio
 //! of an effect in it.
 
+use super::generator::TrueRecording;
 use adis16405_driver::GyroRange;
+use simulation::SAMPLE_RATE_HZ;
 use std::f64::consts::PI;
-use virtual_sensor::{ChannelNoise, Environment, InjectedEffect, NoiseModel, OutputRegister};
+use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister};
 
 /// Iterations of the fit of N, B and K. Each halves the remaining distance to the optimum, roughly.
 const ITERATIONS: usize = 60;
@@ -17,6 +19,13 @@ const LEAST_GAIN: f64 = 1e-3;
 pub(super) struct RecordLength {
     pub(super) seconds: f64,
     pub(super) period_s: f64,
+}
+
+impl RecordLength {
+    /// Of a recording.
+    pub(super) fn new(recording: &TrueRecording) -> Self {
+        Self { seconds: recording.seconds, period_s: 1.0 / SAMPLE_RATE_HZ }
+    }
 }
 
 /// Two-sided density of N, B and K of `noise`, sampled, unit²/Hz.
@@ -167,30 +176,18 @@ impl RecordLength {
     }
 }
 
-/// What is known of a recording before effects are hidden in it.
-pub(super) struct RecordingConditions<'a> {
-    pub(super) noise: &'a NoiseModel,
-    pub(super) environment: Environment,
-    pub(super) record: RecordLength,
-    pub(super) seed: u64,
-}
-
 /// A channel with its noise and the effects that are already hidden. The test of the detection limit knows all
 /// parameters of these other effects.
 pub(super) struct ChannelUnderTest<'a> {
-    pub(super) channel: OutputRegister,
+    channel: OutputRegister,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: RecordLength,
     others: &'a [InjectedEffect],
 }
 
 impl<'a> ChannelUnderTest<'a> {
-    pub(super) fn new(
-        conditions: &RecordingConditions<'a>,
-        channel: OutputRegister,
-        others: &'a [InjectedEffect],
-    ) -> Self {
-        Self { channel, noise: conditions.noise.channel(channel), record: conditions.record, others }
+    pub(super) fn new(recording: &'a TrueRecording, channel: OutputRegister, others: &'a [InjectedEffect]) -> Self {
+        Self { channel, noise: recording.noise.channel(channel), record: RecordLength::new(recording), others }
     }
 
     /// Size of a count, in the unit of the channel.
@@ -277,6 +274,12 @@ impl<'a> ChannelUnderTest<'a> {
     pub(super) fn density(&self, frequency: f64) -> f64 {
         let baseline = baseline_density(self.noise, self.record.period_s, frequency);
         self.gain(frequency) * baseline + self.known_density(frequency)
+    }
+
+    /// Whether the white noise of a sample, behind the filter, is less than half a count, so that rounding is no white noise.
+    pub(super) fn is_below_a_count(&self) -> bool {
+        let of_sample = |frequency: f64| self.gain(frequency) * self.white_density() / self.record.period_s;
+        self.record.mean(of_sample) < (0.5 * self.resolution()).powi(2)
     }
 
     /// Density of the output divided by the gain of the filter: effects are added before the filter.

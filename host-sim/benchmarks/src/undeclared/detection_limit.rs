@@ -13,28 +13,26 @@
 //! | common mode | Whittle's, one process in all channels against independent processes |
 //! | telegraph | hidden Markov chain against Kalman filter, on a simulated signal |
 //! | sinusoid, acceleration | matched filter, with the density of the noise at their frequencies |
-//! | ramp, step, temperature, supply | regression on block means with the covariance of the noise |
+//! | ramp, step, temperature, supply | block means in noise of the exact covariance |
 //! | spikes | mixture of normal distributions |
 //! | dropped and repeated samples | Poisson counts |
-//! | sample clock | normal, with the tolerance of the host's clock |
+//! | sample clock | what exceeds the tolerance of the host's clock |
 
+use super::block_covariance::{BLOCKS, BlockNoise, BlockNoises, environment_means, ratio_of_waveform};
 use super::channel_under_test::{
-    ChannelUnderTest, RecordLength, RecordingConditions, filter_gain, markov_density, quantization_density,
-    resonance_density,
+    ChannelUnderTest, RecordLength, filter_gain, markov_density, quantization_density, resonance_density,
 };
 use super::effect::GYROS;
-use measurement::adis16405::HOST_CLOCK_ERROR;
-use nalgebra::DVector;
-use noise_analysis::detectors::block_means::BLOCKS;
-use noise_analysis::detectors::block_means::{NoiseCovariance, flicker_covariance, markov_covariance};
-use noise_analysis::distributions::quantile;
+use super::generator::TrueRecording;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use statrs::distribution::{ContinuousCDF, DiscreteCDF, Normal, Poisson};
 use std::f64::consts::{LN_2, PI};
-use virtual_sensor::EffectSource;
-use virtual_sensor::{InjectedEffect, OutputRegister, SensorScenario};
+use virtual_sensor::{InjectedEffect, OutputRegister};
 
+/// Largest relative error of a host's clock: a crystal of the usual ±50 ppm. Every error within is as likely.
+pub(super) const HOST_CLOCK_TOLERANCE: f64 = 50e-6;
 /// Probability of a false alarm at the limit.
 const FALSE_ALARM: f64 = 0.01;
 /// Number of distinguishable time constants: octaves in half an hour.
@@ -49,15 +47,11 @@ const TELEGRAPH_STEPS: f64 = 20.0;
 const TELEGRAPH_LENGTH: usize = 20_000;
 
 /// Size at the detection limit of an effect with the parameters of `unit`, beside the effects `others`.
-pub(super) fn smallest_size(
-    unit: &InjectedEffect,
-    conditions: &RecordingConditions<'_>,
-    others: &[InjectedEffect],
-) -> f64 {
-    let record = conditions.record;
+pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
+    let record = RecordLength::new(recording);
     let (seconds, period_s) = (record.seconds, record.period_s);
     let samples = seconds / period_s;
-    let in_channel = |channel: OutputRegister| ChannelUnderTest::new(conditions, channel, others);
+    let in_channel = |channel: OutputRegister| ChannelUnderTest::new(recording, channel, others);
     match *unit {
         InjectedEffect::Sinusoid { channel, frequency_hz, .. } => {
             let noise = in_channel(channel).density_before_filter(frequency_hz);
@@ -72,7 +66,7 @@ pub(super) fn smallest_size(
             smallest_markov(&in_channel(channel), time_constant_s)
         }
         InjectedEffect::Telegraph { channel, time_constant_s, .. } => {
-            smallest_telegraph(&in_channel(channel), time_constant_s, conditions.seed)
+            smallest_telegraph(&in_channel(channel), time_constant_s, recording.seed)
         }
         InjectedEffect::CommonMode { time_constant_s, .. } => {
             let gyros = GYROS.map(in_channel);
@@ -106,15 +100,15 @@ pub(super) fn smallest_size(
             smallest_waveform(TIMES, &in_channel(channel), |block| (1.0 - (at - block as f64)).clamp(0.0, 1.0))
         }
         InjectedEffect::Temperature { channel, .. } => {
-            let means = environment_means(conditions, OutputRegister::Temp);
+            let [means, _] = environment_means(&recording.environment(recording.samples()));
             smallest_waveform(1.0, &in_channel(channel), |block| means[block])
         }
         InjectedEffect::Supply { channel, .. } => {
-            let means = environment_means(conditions, OutputRegister::Supply);
+            let [_, means] = environment_means(&recording.environment(recording.samples()));
             smallest_waveform(1.0, &in_channel(channel), |block| means[block])
         }
         InjectedEffect::Acceleration { channel, .. } => {
-            let (place, motion) = (in_channel(channel), conditions.environment.motion);
+            let (place, motion) = (in_channel(channel), recording.scenario.environment.motion);
             let force = |frequency: f64| {
                 motion.deviation_g.powi(2) * markov_density(motion.time_constant_s, period_s, frequency)
             };
@@ -132,9 +126,8 @@ pub(super) fn smallest_size(
             let equal = |&channel: &OutputRegister| in_channel(channel).equal_probability();
             smallest_count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
         }
-        InjectedEffect::SampleClock { .. } => {
-            solve_size(required_ratio(1.0), |off| ratio_of_clock(off * HOST_CLOCK_ERROR)) * HOST_CLOCK_ERROR
-        }
+        // A larger difference than the tolerance cannot be the host's; half of the hosts err in its direction.
+        InjectedEffect::SampleClock { .. } => HOST_CLOCK_TOLERANCE,
     }
 }
 
@@ -179,7 +172,7 @@ fn ratio_against_baseline(place: &ChannelUnderTest<'_>, peak: Option<(f64, f64)>
 
 /// Log likelihood ratio `z²/2` at which an effect that could be at `places` places is detected in half of the recordings.
 pub(super) fn required_ratio(places: f64) -> f64 {
-    let z = quantile(FALSE_ALARM / places.max(1.0));
+    let z = Normal::standard().inverse_cdf(1.0 - FALSE_ALARM / places.max(1.0));
     0.5 * z * z
 }
 
@@ -255,19 +248,15 @@ pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 
 /// Mean number of events at the limit, in addition to a mean of `by_chance` other events: the number at which the median
 /// count is the smallest count that chance alone exceeds or reaches with a probability of at most 1 %.
 pub(super) fn smallest_count(by_chance: f64) -> f64 {
-    let mut fewest = 1u64;
-    while noise_analysis::distributions::poisson_tail(fewest, by_chance) > FALSE_ALARM {
+    // The probability of more than none, one, two … events.
+    let exceeds = |count: u64| Poisson::new(by_chance).map_or(0.0, |distribution| distribution.sf(count));
+    let mut fewest = 1_u64;
+    while exceeds(fewest - 1) > FALSE_ALARM {
         fewest += 1;
     }
     // The median of a Poisson variable is about its mean less 1/3. At least one event has a probability of ½ at a mean of
     // ln 2.
     if fewest == 1 { LN_2 } else { fewest as f64 - 1.0 / 3.0 - by_chance }
-}
-
-/// Expected log likelihood ratio of a sample clock whose rate differs by the fraction `off` from the nominal one, measured
-/// with a host's clock.
-fn ratio_of_clock(off: f64) -> f64 {
-    0.5 * (off / HOST_CLOCK_ERROR).powi(2)
 }
 
 /// Size at the limit of a waveform that has the block means `unit` for a size of 1 and could be at `places` places.
@@ -283,38 +272,13 @@ fn block_s(record: RecordLength) -> f64 {
 
 /// Expected log likelihood ratio of the block means `values` against a constant, in noise of known covariance.
 pub(super) fn ratio_of_block_means(values: &[f64], place: &ChannelUnderTest<'_>) -> f64 {
-    let block_s = block_s(place.record);
-    // Variance of the mean of a block.
-    let white = (place.white_density() + place.resolution().powi(2) / 12.0 * place.record.period_s) / block_s;
-    let walk = place.noise.rate_random_walk.powi(2) * block_s / white;
-    let mut coloured = flicker_covariance();
-    coloured.iter_mut().for_each(|entry| *entry *= place.noise.bias_instability.powi(2) / white);
-    for (time_s, variance) in place.processes() {
-        for (entry, unit) in coloured.iter_mut().zip(markov_covariance(time_s / block_s)) {
-            *entry += variance / white * unit;
-        }
-    }
-    let numbers: Vec<usize> = (0..BLOCKS).collect();
-    let fills = vec![1.0; BLOCKS];
-    let values = DVector::from_column_slice(values);
-    let energy = |noise: NoiseCovariance| values.dot(&noise.weighted(&values));
-    0.5 * NoiseCovariance::with_coloured(&numbers, &fills, &coloured, walk).map_or(0.0, energy) / white
-}
-
-/// Block means of the change that the environment makes in `channel`.
-fn environment_means(conditions: &RecordingConditions<'_>, channel: OutputRegister) -> Vec<f64> {
-    let RecordLength { seconds, period_s } = conditions.record;
-    let environment = SensorScenario { environment: conditions.environment, effects: Vec::new() };
-    let mut source = EffectSource::new(&environment, conditions.seed);
-    let width = (seconds / period_s / BLOCKS as f64) as usize;
-    (0..BLOCKS)
-        .map(|block| {
-            let value = |at: usize| {
-                let mut values = [0.0; 12];
-                source.disturb(&mut values, (block * width + at) as f64 * period_s, period_s);
-                values[channel as usize]
-            };
-            (0..width).map(value).sum::<f64>() / width as f64
-        })
-        .collect()
+    let rounding = place.resolution().powi(2) / 12.0 * place.record.period_s;
+    let processes: Vec<(f64, f64)> = place.processes().collect();
+    let noise = BlockNoise {
+        white: place.white_density() + rounding,
+        flicker: place.noise.bias_instability,
+        walk: place.noise.rate_random_walk,
+        processes: &processes,
+    };
+    ratio_of_waveform(values, BlockNoises::new(place.record.seconds).covariance(&noise))
 }

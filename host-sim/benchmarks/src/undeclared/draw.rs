@@ -3,27 +3,27 @@
 //! Each recording has its own noise, a changing temperature and supply voltage, a host with its own clock error, and
 //! sometimes a motion. The analysis must not report these as effects, and must find those effects that depend on them.
 
-use super::channel_under_test::{RecordLength, RecordingConditions};
-use super::detection_limit::smallest_size;
-use super::effect::{EffectKind, draw_unit, log_uniform, scaled, size};
-use measurement::adis16405::HOST_CLOCK_ERROR;
-use rand::seq::IndexedRandom;
+use super::channel_under_test::{ChannelUnderTest, RecordLength};
+use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size};
+use super::effect::{EffectKind, draw_unit, scaled, size};
+use super::environment::log_uniform;
+use super::generator::TrueRecording;
+use super::outside::{OutsideEffect, OutsideKind};
+use super::outside_limit::smallest_outside_size;
+use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use serde::Serialize;
-use simulation::{HostClock, SAMPLE_RATE_HZ, Simulation};
+use simulation::SAMPLE_RATE_HZ;
 use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
 /// Range of the strength (size over detection limit) of a single effect.
 const STRENGTH: (f64, f64) = (0.3, 30.0);
-/// Range of the strength of each effect of a pair, above the limit.
+/// Range of the strength of each effect of a pair or a triple, and of one outside the vocabulary, above the limit.
 const STRENGTH_OF_PAIR: (f64, f64) = (2.0, 30.0);
 /// Fraction of the recordings with a motion although no effect depends on it.
 const MOVED: f64 = 0.2;
-/// Mean delay of a host's time stamps, s.
-const LATENCY_S: f64 = 50e-6;
 
 /// Largest quantum of the angle, over the standard deviation of the white angle increment of a sample. The error of a
 /// coarser quantum is not white.
@@ -45,6 +45,10 @@ pub enum RecordingGroup {
     Single(EffectKind),
     /// Two effects.
     Pair,
+    /// Three effects.
+    Triple,
+    /// One effect that no kind of the report describes.
+    Outside(OutsideKind),
 }
 
 /// A recording to be simulated, with its true effects.
@@ -54,10 +58,10 @@ pub struct DrawnRecording {
     pub seed: u64,
     /// Kinds of the hidden effects, in the order of those of `simulation`.
     pub kinds: Vec<EffectKind>,
-    /// Size of each effect over its detection limit.
+    /// Size of each effect over its detection limit; of the one outside the vocabulary, where there is one.
     pub strengths: Vec<f64>,
-    /// The simulation with the hidden effects.
-    pub simulation: Simulation,
+    /// What the recording is made of.
+    pub simulation: TrueRecording,
 }
 
 impl DrawnRecording {
@@ -67,8 +71,29 @@ impl DrawnRecording {
         match group {
             RecordingGroup::Nothing => Self::draw(&[], seconds, seed),
             RecordingGroup::Single(kind) => Self::draw(&[kind], seconds, seed),
-            RecordingGroup::Pair => Self::draw(&Self::pair(seed), seconds, seed),
+            RecordingGroup::Pair => Self::draw(&Self::several::<2>(seed), seconds, seed),
+            RecordingGroup::Triple => Self::draw(&Self::several::<3>(seed), seconds, seed),
+            RecordingGroup::Outside(kind) => Self::draw_outside(kind, seconds, seed),
         }
+    }
+
+    /// A recording of `seconds` seconds with an effect that no kind of the report describes.
+    #[must_use]
+    pub fn draw_outside(kind: OutsideKind, seconds: f64, seed: u64) -> Self {
+        let nothing = Self::draw(&[], seconds, seed);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(u64::MAX - 3);
+        let mut simulation = nothing.simulation;
+        // In a moving accelerometer the motion hides any other effect.
+        let gyros = &OutputRegister::INERTIAL[..3];
+        let channel = gyros.choose(&mut random).copied().unwrap_or(OutputRegister::GyroX);
+        let strength = log_uniform(&mut random, STRENGTH_OF_PAIR.0, STRENGTH_OF_PAIR.1);
+        let mut effect = OutsideEffect::draw_unit(kind, channel, seconds, &mut random);
+        let environment = simulation.environment(simulation.samples());
+        let place = ChannelUnderTest::new(&simulation, channel, &[]);
+        effect.size = strength * smallest_outside_size(&effect, &environment, &place);
+        simulation.outside.push(effect);
+        Self { simulation, strengths: vec![strength], ..nothing }
     }
 
     /// A recording of `seconds` seconds with effects of `kinds`.
@@ -78,12 +103,9 @@ impl DrawnRecording {
         random.set_stream(u64::MAX);
         let noise = noise(&mut random);
         let environment = environment(&mut random, kinds.contains(&EffectKind::Acceleration));
-        let host = HostClock {
-            latency_s: LATENCY_S,
-            clock_ratio: 1.0 + HOST_CLOCK_ERROR * random.sample::<f64, _>(StandardNormal),
-        };
-        let record = RecordLength { seconds, period_s: 1.0 / SAMPLE_RATE_HZ };
-        let conditions = RecordingConditions { noise: &noise, environment, record, seed };
+        let host_clock_ratio = 1.0 + random.random_range(-HOST_CLOCK_TOLERANCE..HOST_CLOCK_TOLERANCE);
+        let scenario = SensorScenario { environment, effects: Vec::new() };
+        let mut simulation = TrueRecording { seconds, seed, noise, scenario, outside: Vec::new(), host_clock_ratio };
         // In a moving accelerometer the motion hides any other effect.
         let channels = if environment.motion.deviation_g > 0.0 {
             &OutputRegister::INERTIAL[..3]
@@ -91,23 +113,23 @@ impl DrawnRecording {
             &OutputRegister::INERTIAL
         };
         let channel = |random: &mut ChaCha8Rng| channels.choose(random).copied().unwrap_or(OutputRegister::GyroX);
-        // Half of the pairs are in one channel.
+        // Half of the pairs and triples are in one channel.
         let shared = random.random_bool(0.5).then(|| channel(&mut random));
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
         let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
-        let (effects, strengths) = draw_effects(kinds, range, at_least, &conditions, channel, &mut random);
-        let scenario = SensorScenario { environment, effects };
-        Self { seed, kinds: kinds.to_vec(), strengths, simulation: Simulation { seconds, seed, noise, scenario, host } }
+        let (effects, strengths) = draw_effects(kinds, range, at_least, &simulation, channel, &mut random);
+        simulation.scenario.effects = effects;
+        Self { seed, kinds: kinds.to_vec(), strengths, simulation }
     }
 
-    /// The two different kinds of the pair of a seed.
+    /// The different kinds of the pair or the triple of a seed.
     #[must_use]
-    pub fn pair(seed: u64) -> [EffectKind; 2] {
+    pub fn several<const KINDS: usize>(seed: u64) -> [EffectKind; KINDS] {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX - 1);
-        let first = random.random_range(0..EffectKind::ALL.len());
-        let second = (first + random.random_range(1..EffectKind::ALL.len())) % EffectKind::ALL.len();
-        [EffectKind::ALL[first], EffectKind::ALL[second]]
+        let mut all = EffectKind::ALL;
+        let (chosen, _) = all.partial_shuffle(&mut random, KINDS);
+        std::array::from_fn(|at| chosen[at])
     }
 }
 
@@ -118,7 +140,7 @@ fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
     at_least: f64,
-    conditions: &RecordingConditions<'_>,
+    recording: &TrueRecording,
     channel: impl Fn(&mut ChaCha8Rng) -> OutputRegister,
     random: &mut ChaCha8Rng,
 ) -> (Vec<InjectedEffect>, Vec<f64>) {
@@ -128,11 +150,11 @@ fn draw_effects(
         for &kind in kinds {
             let channel = channel(random);
             let strength = log_uniform(random, range.0, range.1);
-            let unit = draw_unit(kind, channel, conditions.record, random);
-            let limit = smallest_size(&unit, conditions, &effects);
-            effects.push(with_strength(unit, strength, limit, conditions));
+            let unit = draw_unit(kind, channel, RecordLength::new(recording), random);
+            let limit = smallest_size(&unit, recording, &effects);
+            effects.push(with_strength(unit, strength, limit, recording));
         }
-        let strengths = (0..effects.len()).map(|at| strength(&effects, at, conditions)).collect();
+        let strengths = (0..effects.len()).map(|at| strength(&effects, at, recording)).collect();
         drawn = (effects, strengths);
         if drawn.1.iter().all(|strength| *strength >= at_least) {
             break;
@@ -142,24 +164,19 @@ fn draw_effects(
 }
 
 /// Strength of the effect at the index `at` beside the others.
-fn strength(effects: &[InjectedEffect], at: usize, conditions: &RecordingConditions<'_>) -> f64 {
+fn strength(effects: &[InjectedEffect], at: usize, recording: &TrueRecording) -> f64 {
     let others: Vec<InjectedEffect> =
         effects.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, effect)| effect.clone()).collect();
-    size(&effects[at]) / smallest_size(&effects[at], conditions, &others)
+    size(&effects[at]) / smallest_size(&effects[at], recording, &others)
 }
 
 /// `unit` at `strength` times `limit`, or at the largest size of its kind.
-fn with_strength(
-    unit: InjectedEffect,
-    strength: f64,
-    limit: f64,
-    conditions: &RecordingConditions<'_>,
-) -> InjectedEffect {
+fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &TrueRecording) -> InjectedEffect {
     // The significance of a number of events grows with its square root.
     let squared = strength * strength * limit;
     let size = match unit {
         InjectedEffect::Quantization { channel, .. } => {
-            let white = conditions.noise.channel(channel).angle_random_walk * conditions.record.period_s.sqrt();
+            let white = recording.noise.channel(channel).angle_random_walk * SAMPLE_RATE_HZ.sqrt().recip();
             (strength * limit).min(LARGEST_QUANTUM * white / 12f64.sqrt())
         }
         InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => squared.min(LARGEST_FRACTION),

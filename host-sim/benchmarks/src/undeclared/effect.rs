@@ -1,6 +1,7 @@
 //! The effects that are hidden: their kinds, how their parameters are drawn, and their sizes.
 
 use super::channel_under_test::RecordLength;
+use super::environment::log_uniform;
 use clap::ValueEnum;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -77,11 +78,6 @@ impl EffectKind {
             Self::SampleClock => "sample_clock",
         }
     }
-}
-
-/// A random value between `low` and `high` whose logarithm is uniformly distributed.
-pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
-    low * (random.random::<f64>() * (high / low).ln()).exp()
 }
 
 /// An effect of `kind` of size 1 with random parameters, in `channel`, or in another gyro where `channel` does not

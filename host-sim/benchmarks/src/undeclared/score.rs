@@ -1,7 +1,9 @@
 //! The score of one recording: it is simulated, analysed without its truth, and the report is compared with the truth.
 
+use super::channel_under_test::ChannelUnderTest;
 use super::draw::DrawnRecording;
 use super::effect::{EffectKind, parameters};
+use super::outside::{OutsideEffect, OutsideKind};
 use super::sample_loss::lose_samples;
 use super::truth::{detects_known_waveform, true_model_errors};
 use adis16405_driver::Channel;
@@ -9,7 +11,6 @@ use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, ModelReport, Report};
 use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
-use simulation::SimulationError;
 use virtual_sensor::InjectedEffect;
 
 /// Channels that the analysis is given: those that are scored, and those that effects depend on.
@@ -24,18 +25,13 @@ const RECORDED: [Channel; 8] = [
     Channel::Temp,
 ];
 
+/// Kind of an effect in a report that no other kind describes.
+const UNEXPLAINED: &str = "unexplained";
+
 /// Why a recording could not be scored.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreError {
-    /// It could not be simulated.
-    #[error("seed {seed}: {reason}")]
-    Record {
-        /// Seed of the recording.
-        seed: u64,
-        /// The cause.
-        reason: SimulationError,
-    },
     /// It has no timeline.
     #[error("seed {seed}: {reason}")]
     Timeline {
@@ -107,32 +103,43 @@ pub struct RecordingScore {
     pub estimates: Vec<ParameterScore>,
     /// Absent where nothing is hidden, or where an error is not finite.
     pub unseen: Option<UnseenErrors>,
+    /// Of the effect outside the vocabulary that is hidden, if any.
+    pub outside: Option<OutsideScore>,
 }
 
-/// Simulates a recording, of which the share `loss` of the samples is lost at random, analyses it and compares the report
+/// A hidden effect that no kind of the report describes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutsideScore {
+    /// Kind of the effect.
+    pub kind: OutsideKind,
+    /// Size over the detection limit.
+    pub strength: f64,
+    /// Whether the report says that something is unexplained in its channel.
+    pub unexplained: bool,
+}
+
+/// Generates a recording, of which the share `loss` of the samples is lost at random, analyses it and compares the report
 /// with the truth.
 ///
 /// # Errors
-/// The recording cannot be simulated, or has no timeline.
+/// The recording has no timeline.
 pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingScore, ScoreError> {
     let seed = drawn.seed;
-    let failed = |reason| ScoreError::Record { seed, reason };
-    let mut recording = drawn.simulation.run(|_| ()).map_err(failed)?;
+    let mut recording = drawn.simulation.record();
     recording.channels.retain(|channel| RECORDED.contains(channel));
     let mut measurement = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
     lose_samples(&mut measurement, loss, seed);
     let report = analyze(&measurement);
-    let begin_s = recording.samples.first().and_then(|sample| sample.time_stamp.time_s).unwrap_or(0.0);
-    let mut score = compare(drawn, &report, begin_s, loss);
+    let mut score = compare(drawn, &report, loss);
     let effects = &drawn.simulation.scenario.effects;
     if let ([answer], [effect]) = (&mut score.answers[..], &effects[..]) {
-        answer.shape_known = detects_known_waveform(effect, &measurement, begin_s);
+        answer.shape_known = detects_known_waveform(effect, &drawn.simulation, &recording);
     }
     if let Some(channel) = effects
         .first()
         .map(|effect| effect.channels().first().map_or(Channel::GyroX, |&output| simulation::channel(output)))
     {
-        let truth = true_model_errors(drawn, channel).map_err(failed)?;
+        let truth = true_model_errors(drawn, channel);
         let of = report.channels.iter().find(|report| report.name == channel.name());
         score.unseen = of.zip(truth).and_then(|(report, truth)| {
             // Without the spikes that the first half's rule excludes: the true model has none either.
@@ -149,9 +156,8 @@ pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingSco
     Ok(score)
 }
 
-/// Compares a report with the truth. `begin_s` is the time from the start of the sensor to the first sample, `loss` the share
-/// of the samples that was lost beside the hidden effects.
-pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64, loss: f64) -> RecordingScore {
+/// Compares a report with the truth; `loss` is the share of the samples that was lost beside the hidden effects.
+pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> RecordingScore {
     let moved = drawn.simulation.scenario.environment.motion.deviation_g > 0.0;
     // Accelerometers are not scored during a motion: its effect on them can resemble any kind.
     let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
@@ -168,9 +174,21 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64, los
         .zip(&drawn.strengths)
         .map(|((&kind, effect), &strength)| score_effect(kind, effect, strength, &scored))
         .collect();
+    let outside = drawn.simulation.outside.first();
     let is_true = |channel: Channel, kind: &str| {
         let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
-        is_lost || effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel))
+        // Where something is hidden, a part of it that is said to be unexplained is no wrong name.
+        let is_unexplained = kind == UNEXPLAINED
+            && (outside.is_some_and(|effect| simulation::channel(effect.channel()) == channel)
+                || effects.iter().any(|effect| shows_in(effect, channel)));
+        let is_below_a_count = kind == "noise_below_count" && {
+            let output = simulation::output_register(channel);
+            ChannelUnderTest::new(&drawn.simulation, output, effects).is_below_a_count()
+        };
+        is_lost
+            || is_unexplained
+            || is_below_a_count
+            || effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel))
     };
     let false_alarms = scored
         .iter()
@@ -182,9 +200,17 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, begin_s: f64, los
         .kinds
         .iter()
         .zip(effects)
-        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, begin_s, loss))
+        .flat_map(|(&kind, effect)| score_parameters(kind, effect, &scored, loss))
         .collect();
-    RecordingScore { seed: drawn.seed, answers, false_alarms, estimates, unseen: None }
+    let strength = drawn.strengths.first().copied().unwrap_or(0.0);
+    let outside = outside.map(|effect| score_outside(effect, strength, &scored));
+    RecordingScore { seed: drawn.seed, answers, false_alarms, estimates, unseen: None, outside }
+}
+
+fn score_outside(effect: &OutsideEffect, strength: f64, scored: &[(Channel, &ChannelReport)]) -> OutsideScore {
+    let own = scored.iter().filter(|(channel, _)| *channel == simulation::channel(effect.channel()));
+    let unexplained = own.flat_map(|(_, report)| &report.effects).any(|found| found.kind == UNEXPLAINED);
+    OutsideScore { kind: effect.kind(), strength, unexplained }
 }
 
 /// Whether `effect` is in `channel`. Effects without channels concern the samples of all channels.
@@ -220,7 +246,6 @@ fn score_parameters(
     kind: EffectKind,
     effect: &InjectedEffect,
     scored: &[(Channel, &ChannelReport)],
-    begin_s: f64,
     loss: f64,
 ) -> Vec<ParameterScore> {
     let found = scored
@@ -233,7 +258,6 @@ fn score_parameters(
     let score = |&(name, truth): &(&'static str, f64)| {
         let estimate = found.parameters.get(name)?;
         let truth = match kind {
-            EffectKind::BiasStep if name == "time" => truth - begin_s,
             // What is dropped cannot be lost once more.
             EffectKind::DroppedSamples => truth + (1.0 - truth) * loss,
             _ => truth,

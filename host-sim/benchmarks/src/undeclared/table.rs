@@ -2,7 +2,8 @@
 
 use super::draw::RecordingGroup;
 use super::effect::EffectKind;
-use super::score::{EffectScore, ParameterScore, RecordingScore, UnseenErrors};
+use super::outside::OutsideKind;
+use super::score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, UnseenErrors};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -83,12 +84,29 @@ impl ScoreTable {
         Proportion::count(self.singles().map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
-    /// Pairs of which both were named.
+    /// Recordings of several effects of which all were named: [`RecordingGroup::Pair`] or [`RecordingGroup::Triple`].
     #[must_use]
-    pub fn both(&self) -> Proportion {
-        Proportion::count(
-            self.outcomes(RecordingGroup::Pair).map(|outcome| outcome.answers.iter().all(|answer| answer.named)),
-        )
+    pub fn all_named(&self, group: RecordingGroup) -> Proportion {
+        Proportion::count(self.outcomes(group).map(|outcome| outcome.answers.iter().all(|answer| answer.named)))
+    }
+
+    /// Recordings of all groups in which an effect is reported that was not hidden.
+    #[must_use]
+    pub fn wrong_names(&self) -> Proportion {
+        Proportion::count(self.outcomes.iter().map(|(_, outcome)| !outcome.false_alarms.is_empty()))
+    }
+
+    /// Effects outside the vocabulary, of a strength of at least [`STRONG`], that are reported as unexplained.
+    #[must_use]
+    pub fn unexplained(&self) -> Proportion {
+        let strong = self.outcomes.iter().filter_map(|(_, outcome)| outcome.outside.as_ref());
+        Proportion::count(strong.filter(|score| score.strength >= STRONG).map(|score| score.unexplained))
+    }
+
+    /// Scores of the effects of one kind outside the vocabulary, each with what was reported instead.
+    fn outside(&self, kind: OutsideKind) -> impl Iterator<Item = (&OutsideScore, &[String])> {
+        let of = self.outcomes(RecordingGroup::Outside(kind));
+        of.filter_map(|outcome| Some((outcome.outside.as_ref()?, outcome.false_alarms.as_slice())))
     }
 
     /// Parameters of strong single effects within the required accuracy: 2 % for frequencies and the sample rate, 10 % for
@@ -163,6 +181,7 @@ impl ScoreTable {
         self.write_confusion(out)?;
         self.write_parameters(out)?;
         self.write_unseen(out)?;
+        self.write_outside(out)?;
         self.write_summary(out)
     }
 
@@ -279,13 +298,43 @@ impl ScoreTable {
         Ok(())
     }
 
+    fn write_outside(&self, out: &mut dyn Write) -> io::Result<()> {
+        if OutsideKind::ALL.into_iter().all(|kind| self.outside(kind).next().is_none()) {
+            return Ok(());
+        }
+        writeln!(out, "\nEffects that no kind of the report describes\n")?;
+        writeln!(out, "{:<18}{:>12}{:>14}{:>14}   wrong names", "", "number", "unexplained", "no wrong name")?;
+        for kind in OutsideKind::ALL {
+            let unexplained = Proportion::count(self.outside(kind).map(|(score, _)| score.unexplained));
+            let unnamed = Proportion::count(self.outside(kind).map(|(_, wrong)| wrong.is_empty()));
+            let mut names: BTreeMap<&str, usize> = BTreeMap::new();
+            for wrong in self.outside(kind).flat_map(|(_, wrong)| wrong) {
+                *names.entry(wrong.split_once(": ").map_or(wrong.as_str(), |(_, name)| name)).or_insert(0) += 1;
+            }
+            let names: Vec<String> = names.into_iter().map(|(name, count)| format!("{name} × {count}")).collect();
+            writeln!(
+                out,
+                "{:<18}{:>12}{:>14}{:>14}   {}",
+                kind.name(),
+                unexplained.all,
+                unexplained.yes,
+                unnamed.yes,
+                names.join(", ")
+            )?;
+        }
+        Ok(())
+    }
+
     fn write_summary(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out)?;
         let lines = [
             ("named: single effects of twice the limit or more", self.named()),
             ("an effect reported although nothing was hidden", self.false_alarms()),
             ("another effect reported although one was hidden", self.something_else()),
-            ("both effects of a pair named", self.both()),
+            ("both effects of a pair named", self.all_named(RecordingGroup::Pair)),
+            ("all three effects of a triple named", self.all_named(RecordingGroup::Triple)),
+            ("wrong names, over all recordings", self.wrong_names()),
+            ("effects outside the vocabulary unexplained", self.unexplained()),
             ("parameters within 10 % (frequencies 2 %)", self.near()),
             ("95 % intervals that contain the true value", self.coverage()),
             ("error on unseen data within 1.5 times the true model's", self.unseen(UnseenErrors::is_near_truth)),

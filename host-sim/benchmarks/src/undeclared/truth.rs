@@ -1,24 +1,24 @@
 //! Reference results from the truth: the error of the true model on unseen data, and whether a test that is given the
 //! channel and the waveform of an effect detects it.
 
+use super::block_covariance::{BLOCKS, BlockNoises, block_means, environment_means, p_value};
+use super::channel_under_test::ChannelUnderTest;
 use super::draw::DrawnRecording;
+use super::generator::TrueRecording;
 use adis16405_driver::{Channel, GyroRange};
 use allan_core::fit::fit_shapes;
 use allan_core::model::Discrepancy;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Cascade, Model, NoiseTerm};
-use measurement::Measurement;
-use noise_analysis::detectors::bias::SIGNIFICANCE;
-use noise_analysis::detectors::block_means::BlockMeans;
-use noise_analysis::detectors::block_means::NoiseGrids;
-use noise_analysis::detectors::gls_regression::GlsRegression;
-use noise_analysis::series::Series;
 use noise_analysis::{OCTAVES, OVERLAP};
-use recordings::recording::RecordedSample;
-use simulation::output_register;
-use simulation::{SAMPLE_RATE_HZ, Simulation, SimulationError};
+use recordings::recording::{RecordedSample, Recording};
+use simulation::{SAMPLE_RATE_HZ, output_register};
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister, SensorScenario};
+
+/// Probability of a false alarm of the test that is given the waveform: that of the analysis for one channel, which its
+/// documentation promises.
+const FALSE_ALARM: f64 = 2e-4;
 
 /// Whether an estimator could remove the effect from the data. Other effects are terms of the true model.
 fn is_removable(effect: &InjectedEffect) -> bool {
@@ -45,13 +45,7 @@ pub(super) struct TrueModelErrors {
 }
 
 /// The errors in `channel`; `None` where the recording is too short.
-///
-/// # Errors
-/// The recording without the removable effects cannot be simulated.
-pub(super) fn true_model_errors(
-    drawn: &DrawnRecording,
-    channel: Channel,
-) -> Result<Option<TrueModelErrors>, SimulationError> {
+pub(super) fn true_model_errors(drawn: &DrawnRecording, channel: Channel) -> Option<TrueModelErrors> {
     let effects: Vec<InjectedEffect> =
         drawn.simulation.scenario.effects.iter().filter(|effect| !is_removable(effect)).cloned().collect();
     let model = model(drawn.simulation.noise.channel(output_register(channel)), channel, &effects);
@@ -60,14 +54,14 @@ pub(super) fn true_model_errors(
         effects: drawn.simulation.scenario.effects.iter().map(zero_if_removable).collect(),
         ..drawn.simulation.scenario.clone()
     };
-    let recording = Simulation { scenario: hidden, ..drawn.simulation.clone() }.run(|_| ())?;
+    let recording = TrueRecording { scenario: hidden, ..drawn.simulation.clone() }.record();
     let (first, second) = recording.samples.split_at(recording.samples.len() / 2);
     let curve = |samples: &[RecordedSample]| curve(samples, channel, recording.range);
     let mut kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
     kinds.dedup();
     let fitted = fit_shapes(&curve(first), &kinds);
     let error = |model: &Model| Some(Discrepancy::between(model, &curve(second))?.deviance_per_point);
-    Ok(error(&model).zip(error(&fitted)).map(|(model, fitted)| TrueModelErrors { model, fitted }))
+    error(&model).zip(error(&fitted)).map(|(model, fitted)| TrueModelErrors { model, fitted })
 }
 
 fn zero_if_removable(effect: &InjectedEffect) -> InjectedEffect {
@@ -125,26 +119,33 @@ fn curve(samples: &[RecordedSample], channel: Channel, range: GyroRange) -> alla
 }
 
 /// Whether a test that is given channel and waveform of `effect`, but estimates the noise, detects it at the significance
-/// level of the analysis; `None` for effects that are not a known waveform of the bias. `begin_s` is the time from the start
-/// of the sensor to the first sample.
+/// level of the analysis; `None` for effects that are not a known waveform of the bias.
 ///
-/// The slowest noise has few periods in a recording, from which the test estimates both its size and the effect: Student's
-/// distribution with few degrees of freedom. This is an upper limit for methods that have to find channel and waveform too.
-pub(super) fn detects_known_waveform(effect: &InjectedEffect, measurement: &Measurement, begin_s: f64) -> Option<bool> {
-    let series =
-        |channel: Channel| Series::from_measurement(measurement, &measurement.profile.channels[channel as usize]);
-    let own = series(simulation::channel(*effect.channels().first()?));
-    let blocks = BlockMeans::from_series(&own)?;
-    let waveform = match effect {
-        InjectedEffect::RateRamp { .. } => blocks.ramp(),
-        InjectedEffect::BiasStep { time_s, .. } => blocks.step_at(((time_s - begin_s) / own.period_s).max(0.0) as u64),
-        InjectedEffect::Temperature { .. } => BlockMeans::from_series(&series(Channel::Temp))?.means,
-        InjectedEffect::Supply { .. } => BlockMeans::from_series(&series(Channel::Supply))?.means,
+/// The slowest noise has few periods in a recording, from which the test estimates its size. This is an upper limit for methods
+/// that have to find channel and waveform too.
+pub(super) fn detects_known_waveform(
+    effect: &InjectedEffect,
+    truth: &TrueRecording,
+    recording: &Recording,
+) -> Option<bool> {
+    let channel = simulation::channel(*effect.channels().first()?);
+    let course = || environment_means(&truth.environment(truth.samples()));
+    let shape: Vec<f64> = match effect {
+        InjectedEffect::RateRamp { .. } => (0..BLOCKS).map(|block| block as f64).collect(),
+        InjectedEffect::BiasStep { time_s, .. } => {
+            let at = time_s / truth.seconds * BLOCKS as f64;
+            (0..BLOCKS).map(|block| (1.0 - (at - block as f64)).clamp(0.0, 1.0)).collect()
+        }
+        InjectedEffect::Temperature { .. } => course()[0].clone(),
+        InjectedEffect::Supply { .. } => course()[1].clone(),
         _ => return None,
     };
-    let noises = NoiseGrids::default().get(&blocks);
-    let estimate = GlsRegression::new(&blocks, &noises, &[]).estimate(&waveform)?;
-    Some(estimate.p_value < SIGNIFICANCE)
+    let lsb = channel.lsb(recording.range);
+    let values: Vec<f64> = recording.samples.iter().map(|sample| f64::from(sample.counts.get(channel)) * lsb).collect();
+    let place = ChannelUnderTest::new(truth, output_register(channel), &[]);
+    let white = place.white_density() + lsb * lsb / 12.0 / SAMPLE_RATE_HZ;
+    let p_value = p_value(&block_means(&values), &shape, &BlockNoises::new(truth.seconds), white);
+    Some(p_value < FALSE_ALARM)
 }
 
 #[cfg(test)]
@@ -157,8 +158,7 @@ mod tests {
         let detected = |effect: &InjectedEffect| {
             let mut simulation = DrawnRecording::from_group(RecordingGroup::Nothing, 100.0, 3).simulation;
             simulation.scenario.effects = vec![effect.clone()];
-            let recording = simulation.run(|_| ()).unwrap();
-            detects_known_waveform(effect, &recordings::time_base::measurement(&recording, None).unwrap(), 0.2)
+            detects_known_waveform(effect, &simulation, &simulation.record())
         };
         let channel = OutputRegister::GyroX;
         let step = |size: f64| InjectedEffect::BiasStep { channel, time_s: 50.0, size };

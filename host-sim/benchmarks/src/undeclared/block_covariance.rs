@@ -1,0 +1,191 @@
+//! Covariance of the means of the blocks of a record, from the definitions of the noises, and the two tests of a waveform of
+//! the bias that it allows: with the noise known, and with the noise estimated.
+
+use super::environment::EnvironmentCourse;
+use crate::spectral_noise::flicker_density;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::f64::consts::{PI, TAU};
+
+/// Number of blocks of a record. A waveform that changes within one of them is not one of those that are tested here.
+pub(super) const BLOCKS: usize = 128;
+/// Frequencies of flicker noise that are added up, in periods per record: its block means have next to none above.
+const HIGHEST: usize = 8 * BLOCKS;
+/// Lowest frequency in periods per record: the generator's own record is at least twice as long.
+const SUBDIVISION: usize = 2;
+
+/// Noises of a bias, per unit of their coefficients.
+pub(super) struct BlockNoises {
+    block_s: f64,
+    flicker: DMatrix<f64>,
+}
+
+/// Coefficients of the noises of one channel.
+pub(super) struct BlockNoise<'a> {
+    /// Two-sided density of all white noise, unit²/Hz.
+    pub(super) white: f64,
+    /// B, unit.
+    pub(super) flicker: f64,
+    /// K, unit/√s.
+    pub(super) walk: f64,
+    /// Correlation time in s and variance of each exponentially correlated process.
+    pub(super) processes: &'a [(f64, f64)],
+}
+
+impl BlockNoises {
+    /// Of a record of `seconds` s.
+    pub(super) fn new(seconds: f64) -> Self {
+        let block_s = seconds / BLOCKS as f64;
+        let spacing = 1.0 / (SUBDIVISION as f64 * seconds);
+        let of_lag = |lag: usize| {
+            let of_line = |k: usize| {
+                let frequency = k as f64 * spacing;
+                let phase = PI * frequency * block_s;
+                let gain = (phase.sin() / phase).powi(2);
+                flicker_density(1.0, frequency) * spacing * gain * (TAU * frequency * lag as f64 * block_s).cos()
+            };
+            (1..=SUBDIVISION * HIGHEST).map(of_line).sum::<f64>()
+        };
+        let lags: Vec<f64> = (0..BLOCKS).map(of_lag).collect();
+        Self { block_s, flicker: DMatrix::from_fn(BLOCKS, BLOCKS, |i, j| lags[i.abs_diff(j)]) }
+    }
+
+    /// Covariance of the block means of noise with these coefficients.
+    pub(super) fn covariance(&self, noise: &BlockNoise) -> DMatrix<f64> {
+        let block_s = self.block_s;
+        let entry = |i: usize, j: usize| {
+            let white = if i == j { noise.white / block_s } else { 0.0 };
+            // Of the mean of a walk over a block with that over a later one: the variance at the middle of the first.
+            let walk = match i == j {
+                true => i as f64 + 1.0 / 3.0,
+                false => i.min(j) as f64 + 0.5,
+            };
+            let processes = noise
+                .processes
+                .iter()
+                .map(|&(time_s, variance)| variance * exponential(block_s / time_s, i.abs_diff(j)));
+            white + noise.walk.powi(2) * block_s * walk + processes.sum::<f64>()
+        };
+        DMatrix::from_fn(BLOCKS, BLOCKS, entry) + noise.flicker.powi(2) * &self.flicker
+    }
+}
+
+/// Covariance of the means over two blocks, `lag` blocks apart and each of `length` correlation times, of a process of
+/// variance 1.
+fn exponential(length: f64, lag: usize) -> f64 {
+    let decay = (-length).exp();
+    match lag {
+        0 => 2.0 * (length - 1.0 + decay) / (length * length),
+        lag => (1.0 - decay).powi(2) / (length * length) * (-length * (lag as f64 - 1.0)).exp(),
+    }
+}
+
+/// Expected log likelihood ratio of a waveform of the block means `values` in noise of this covariance, with a free mean.
+pub(super) fn ratio_of_waveform(values: &[f64], covariance: DMatrix<f64>) -> f64 {
+    let Some(factor) = covariance.cholesky() else { return 0.0 };
+    0.5 * energy(&factor, &DVector::from_column_slice(values))
+}
+
+/// `sᵀC⁻¹s` of what a waveform `s` has beside a constant.
+fn energy(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> f64 {
+    let ones = DVector::from_element(values.len(), 1.0);
+    let weighted = factor.solve(&ones);
+    let along = weighted.dot(values);
+    values.dot(&factor.solve(values)) - along * along / weighted.dot(&ones)
+}
+
+/// p-value of the waveform `shape` in the block means `means`, by the likelihood ratio with the three noises estimated
+/// with and without it (χ² of one degree of freedom); `white` is the density of the white noise, which the samples tell.
+pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white: f64) -> f64 {
+    let (means, shape) = (DVector::from_column_slice(means), DVector::from_column_slice(shape));
+    let ones = DVector::from_element(means.len(), 1.0);
+    // Block-mean variances of flicker noise and walk over that of the white noise.
+    let ratios = || (-2..=12).map(|power| if power == -2 { 0.0 } else { 4f64.powi(power - 4) });
+    let mut best = [f64::INFINITY; 2];
+    for flicker in ratios() {
+        for walk in ratios() {
+            let white_s = white / noises.block_s;
+            let noise = BlockNoise {
+                white,
+                flicker: (flicker * white_s).sqrt(),
+                walk: (walk * white_s / noises.block_s).sqrt(),
+                processes: &[],
+            };
+            let Some(factor) = noises.covariance(&noise).cholesky() else { continue };
+            let logarithm = 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>();
+            // Least squares on the constant alone, and on the constant and the waveform.
+            let (a, b) = (factor.solve(&ones), factor.solve(&shape));
+            let rest = means.dot(&factor.solve(&means)) - a.dot(&means).powi(2) / a.dot(&ones);
+            let (along, length) =
+                (b.dot(&means) - b.dot(&ones) * a.dot(&means) / a.dot(&ones), energy(&factor, &shape));
+            for (best, rest) in best.iter_mut().zip([rest, rest - along * along / length.max(f64::MIN_POSITIVE)]) {
+                *best = best.min(logarithm + rest);
+            }
+        }
+    }
+    let fall = (best[0] - best[1]).max(0.0);
+    ChiSquared::new(1.0).map_or(1.0, |distribution| distribution.sf(fall))
+}
+
+/// Block means of a course over time.
+pub(super) fn block_means(course: &[f64]) -> Vec<f64> {
+    let at = |block: usize| course.len() * block / BLOCKS;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    (0..BLOCKS).map(|block| mean(&course[at(block)..at(block + 1)])).collect()
+}
+
+/// Block means of the temperature and of the supply voltage.
+pub(super) fn environment_means(course: &EnvironmentCourse) -> [Vec<f64>; 2] {
+    [block_means(&course.temperature_c), block_means(&course.supply_v)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectral_noise::gaussian_noise;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    /// Half the sum of squared differences of neighbouring block means of flicker noise is its Allan variance, (2 ln 2/π)·B².
+    #[test]
+    fn the_flicker_covariance_has_the_allan_variance_of_the_standard() {
+        let noises = BlockNoises::new(1280.0);
+        let covariance = &noises.flicker;
+        let allan = covariance[(0, 0)] - covariance[(0, 1)];
+        let expected = 2.0 * std::f64::consts::LN_2 / PI;
+        // The frequencies beyond 8 periods a block, which are left out, hold a few thousandths.
+        assert!((allan / expected - 1.0).abs() < 0.01, "{allan}, {expected}");
+    }
+
+    /// The Allan variances of a walk over one block, K²·τ/3, and of a Gauss-Markov process of a long correlation time.
+    #[test]
+    fn walk_and_process_have_their_allan_variances() {
+        let noises = BlockNoises::new(1280.0);
+        let noise =
+            |walk: f64, processes: &'static [(f64, f64)]| BlockNoise { white: 0.0, flicker: 0.0, walk, processes };
+        let allan = |noise: BlockNoise| {
+            let c = noises.covariance(&noise);
+            0.5 * (c[(4, 4)] + c[(5, 5)] - 2.0 * c[(4, 5)])
+        };
+        assert!((allan(noise(0.3, &[])) / (0.09 * 10.0 / 3.0) - 1.0).abs() < 1e-9);
+        // 2σ²τ/(3T) in first order of τ/T.
+        assert!((allan(noise(0.0, &[(1e5, 2.0)])) / (2.0 * 2.0 / 3.0 * 1e-4) - 1.0).abs() < 1e-3);
+    }
+
+    /// Under the hypothesis the p-values of 40 records are uniform: the mean is ½ with a standard deviation of 0.046.
+    #[test]
+    fn the_test_of_a_waveform_keeps_its_level() {
+        let noises = BlockNoises::new(BLOCKS as f64);
+        let ramp: Vec<f64> = (0..BLOCKS).map(|block| block as f64).collect();
+        let p_of_seed = |seed: u64, slope: f64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let white = gaussian_noise(|_| 2.0, 1.0, BLOCKS, &mut random);
+            let means: Vec<f64> = white.iter().zip(&ramp).map(|(noise, ramp)| noise + slope * ramp).collect();
+            p_value(&means, &ramp, &noises, 1.0)
+        };
+        let mean = (0..40).map(|seed| p_of_seed(seed, 0.0)).sum::<f64>() / 40.0;
+        assert!((mean - 0.5).abs() < 4.0 * 0.046, "{mean}");
+        // 128³/12·slope² = 29² standard deviations.
+        assert!(p_of_seed(1, 0.07) < 2e-4, "{}", p_of_seed(1, 0.07));
+    }
+}

@@ -1,0 +1,272 @@
+//! The generator of the recordings: noise by its spectrum, the effects by their definitions, the filter, the rounding and the
+//! host's time stamps. It shares no code with the analysis and none with the virtual sensor, of which it takes the
+//! description of a scenario alone.
+
+use super::environment::{EnvironmentCourse, gauss_markov, two_levels};
+use super::outside::OutsideEffect;
+use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
+use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Exp1};
+use recordings::recording::{Recorder, Recording, TimeStamp};
+use simulation::SAMPLE_RATE_HZ;
+use std::f64::consts::{PI, TAU};
+use virtual_sensor::{ChannelNoise, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
+
+/// Largest count of the 14-bit registers of the inertial channels.
+const LARGEST_COUNT: f64 = 8191.0;
+/// Supply voltage, V, and specific force along z, g.
+const SUPPLY_V: f64 = 5.0;
+const GRAVITY_G: f64 = 1.0;
+/// Mean delay of a host's time stamps, s.
+const LATENCY_S: f64 = 50e-6;
+
+/// Random streams of a seed; the noise of channel `n` has the stream `n`, the effect of index `n` `EFFECTS + n`.
+const ENVIRONMENT: u64 = 32;
+const REPEATED: u64 = 33;
+const HOST: u64 = 34;
+const EFFECTS: u64 = 64;
+
+/// Everything that a recording is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueRecording {
+    /// Length at the nominal sample rate, s.
+    pub seconds: f64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// N, B and K of every channel.
+    pub noise: NoiseModel,
+    /// Environment and hidden effects.
+    pub scenario: SensorScenario,
+    /// Hidden effects that no kind of the report describes.
+    pub outside: Vec<OutsideEffect>,
+    /// Seconds that the host counts in a true second.
+    pub host_clock_ratio: f64,
+}
+
+impl TrueRecording {
+    fn random(&self, stream: u64) -> ChaCha8Rng {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(stream);
+        random
+    }
+
+    /// Number of samples that the part takes.
+    pub(super) fn samples(&self) -> usize {
+        (self.seconds * SAMPLE_RATE_HZ).round() as usize
+    }
+
+    /// The environment at each of so many samples.
+    pub(super) fn environment(&self, samples: usize) -> EnvironmentCourse {
+        let mut random = self.random(ENVIRONMENT);
+        EnvironmentCourse::new(&self.scenario.environment, samples, 1.0 / SAMPLE_RATE_HZ, &mut random)
+    }
+
+    /// The recording as a host reads it.
+    #[must_use]
+    pub fn record(&self) -> Recording {
+        let samples = self.samples();
+        let counts: Vec<Vec<i16>> = self.counts(samples);
+        let effects = &self.scenario.effects;
+        let share = |of: fn(&InjectedEffect) -> Option<f64>| effects.iter().find_map(of).unwrap_or(0.0);
+        let repeated = share(|effect| match effect {
+            InjectedEffect::RepeatedSamples { fraction } => Some(*fraction),
+            _ => None,
+        });
+        let dropped = share(|effect| match effect {
+            InjectedEffect::DroppedSamples { fraction } => Some(*fraction),
+            _ => None,
+        });
+        let clock = effects.iter().find_map(|effect| match effect {
+            InjectedEffect::SampleClock { ratio } => Some(*ratio),
+            _ => None,
+        });
+        let period_s = 1.0 / (SAMPLE_RATE_HZ * clock.unwrap_or(1.0));
+        let (mut repeats, mut host) = (self.random(REPEATED), self.random(HOST));
+        let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
+        let (mut shown, mut latest_s) = (0, 0.0_f64);
+        for at in 0..samples {
+            if at == 0 || !repeats.random_bool(repeated) {
+                shown = at;
+            }
+            let is_missed = host.random_bool(dropped);
+            let latency: f64 = Exp1.sample(&mut host);
+            if is_missed {
+                continue;
+            }
+            // A delayed sample waits in a queue: no time stamp is earlier than the one before.
+            latest_s = latest_s.max((at as f64 * period_s + LATENCY_S * latency) * self.host_clock_ratio);
+            let words = Counts::new(std::array::from_fn(|channel| counts[channel][shown]));
+            recorder.push(TimeStamp::from_time(latest_s), &Burst::from_counts(&words));
+        }
+        recorder.finish()
+    }
+
+    /// Register counts of every channel, in the order of the burst.
+    fn counts(&self, samples: usize) -> Vec<Vec<i16>> {
+        let period_s = 1.0 / SAMPLE_RATE_HZ;
+        let taps = self.scenario.effects.iter().find_map(|effect| match effect {
+            InjectedEffect::FilterBandwidth { taps_log2 } => Some(1_usize << taps_log2),
+            _ => None,
+        });
+        // The filter has run before the first sample.
+        let lead = taps.map_or(0, |taps| 2 * (taps - 1));
+        let length = samples + lead;
+        let environment = self.environment(samples);
+        let channel = |output: &OutputRegister| {
+            let output = *output;
+            let channel = simulation::channel(output);
+            let mut random = self.random(output as u64);
+            let mut values = baseline(self.noise.channel(output), length, &mut random);
+            let level = match channel {
+                Channel::Supply => SUPPLY_V,
+                Channel::AcclZ => GRAVITY_G,
+                _ => 0.0,
+            };
+            let own = match channel {
+                Channel::Temp => Some(&environment.temperature_c),
+                Channel::Supply => Some(&environment.supply_v),
+                Channel::AcclX => Some(&environment.force_g[0]),
+                Channel::AcclY => Some(&environment.force_g[1]),
+                Channel::AcclZ => Some(&environment.force_g[2]),
+                _ => None,
+            };
+            // Before the first sample the environment is as at the first.
+            let of = |course: &[f64], at: usize| course[at.saturating_sub(lead)];
+            for (at, value) in values.iter_mut().enumerate() {
+                *value += level + own.map_or(0.0, |own| of(own, at));
+            }
+            for (number, effect) in self.scenario.effects.iter().enumerate() {
+                if effect.channels().contains(&output) {
+                    let mut random = self.random(EFFECTS + number as u64);
+                    add_sensed(effect, &mut values, lead, &environment, &mut random);
+                }
+            }
+            for effect in self.outside.iter().filter(|effect| effect.channel() == output) {
+                let signal = effect.signal(&environment, samples, period_s);
+                values[lead..].iter_mut().zip(signal).for_each(|(value, added)| *value += added);
+            }
+            if let Some(taps) = taps.filter(|_| Channel::INERTIAL.contains(&channel)) {
+                values = moving_average(&moving_average(&values, taps), taps);
+            } else {
+                values.drain(..lead);
+            }
+            for effect in &self.scenario.effects {
+                if let InjectedEffect::Quantization { channel, coefficient } = effect
+                    && *channel == output
+                {
+                    values = quantized_angle(&values, 12f64.sqrt() * coefficient, period_s);
+                }
+            }
+            let lsb = channel.lsb(GyroRange::Dps300);
+            let count = |value: f64| (value / lsb).round().clamp(-LARGEST_COUNT, LARGEST_COUNT) as i16;
+            values.into_iter().map(count).collect()
+        };
+        Channel::ALL.map(simulation::output_register).iter().map(channel).collect()
+    }
+}
+
+/// White noise, flicker noise by its spectrum, and the sum of white steps.
+fn baseline(noise: &ChannelNoise, samples: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
+    let rate_hz = SAMPLE_RATE_HZ;
+    let mut values: Vec<f64> = match noise.bias_instability {
+        0.0 => vec![0.0; samples],
+        b => gaussian_noise(|frequency| flicker_density(b, frequency), rate_hz, samples, random),
+    };
+    let (deviation, step) = (noise.angle_random_walk * rate_hz.sqrt(), noise.rate_random_walk / rate_hz.sqrt());
+    let mut walk = 0.0;
+    for value in &mut values {
+        walk += step * normal(random);
+        *value += deviation * normal(random) + walk;
+    }
+    values
+}
+
+/// Adds what an effect changes before the filter; `lead` of the values are before the first sample.
+fn add_sensed(
+    effect: &InjectedEffect,
+    values: &mut [f64],
+    lead: usize,
+    environment: &EnvironmentCourse,
+    random: &mut ChaCha8Rng,
+) {
+    let (length, period_s) = (values.len(), 1.0 / SAMPLE_RATE_HZ);
+    let time_s = |at: usize| (at as f64 - lead as f64) * period_s;
+    let mut add = |signal: &mut dyn FnMut(usize) -> f64| {
+        values.iter_mut().enumerate().for_each(|(at, value)| *value += signal(at));
+    };
+    let scaled = |size: f64, course: &[f64], at: usize| size * course[at.saturating_sub(lead)];
+    match *effect {
+        InjectedEffect::Sinusoid { frequency_hz, amplitude, phase_rad, .. } => {
+            add(&mut |at| amplitude * (TAU * frequency_hz * time_s(at) + phase_rad).sin());
+        }
+        InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
+            // The two quadratures of the band around its centre.
+            let time_constant_s = 1.0 / (PI * bandwidth_hz);
+            let [cosine, sine] = [(); 2].map(|()| gauss_markov(time_constant_s, length, period_s, random));
+            add(&mut |at| {
+                let phase = TAU * frequency_hz * time_s(at);
+                deviation * (cosine[at] * phase.cos() + sine[at] * phase.sin())
+            });
+        }
+        InjectedEffect::Markov { time_constant_s, deviation, .. }
+        | InjectedEffect::CommonMode { time_constant_s, deviation, .. } => {
+            let unit = gauss_markov(time_constant_s, length, period_s, random);
+            add(&mut |at| deviation * unit[at]);
+        }
+        InjectedEffect::Telegraph { time_constant_s, amplitude, .. } => {
+            let levels = two_levels(time_constant_s, length, period_s, random);
+            add(&mut |at| if levels[at] { 0.5 * amplitude } else { -0.5 * amplitude });
+        }
+        InjectedEffect::RateRamp { slope, .. } => add(&mut |at| slope * time_s(at)),
+        InjectedEffect::BiasStep { time_s: step_s, size, .. } => {
+            add(&mut |at| if time_s(at) >= step_s { size } else { 0.0 });
+        }
+        InjectedEffect::Temperature { sensitivity, .. } => {
+            add(&mut |at| scaled(sensitivity, &environment.temperature_c, at));
+        }
+        InjectedEffect::Supply { sensitivity, .. } => add(&mut |at| scaled(sensitivity, &environment.supply_v, at)),
+        InjectedEffect::Acceleration { sensitivity, .. } => {
+            add(&mut |at| {
+                let axes = sensitivity.iter().zip(&environment.force_g);
+                axes.map(|(sensitivity, force)| scaled(*sensitivity, force, at)).sum()
+            });
+        }
+        InjectedEffect::Spikes { rate_per_hour, size, .. } => {
+            let mean_s = 3600.0 / rate_per_hour;
+            let wait = |random: &mut ChaCha8Rng| mean_s * <Exp1 as Distribution<f64>>::sample(&Exp1, random);
+            let mut next_s = time_s(0) + wait(random);
+            add(&mut |at| {
+                let mut sum = 0.0;
+                while next_s <= time_s(at) {
+                    sum += if random.random_bool(0.5) { size } else { -size };
+                    next_s += wait(random);
+                }
+                sum
+            });
+        }
+        // Behind the filter, in the converter's clock, or in the host.
+        InjectedEffect::Quantization { .. }
+        | InjectedEffect::FilterBandwidth { .. }
+        | InjectedEffect::DroppedSamples { .. }
+        | InjectedEffect::RepeatedSamples { .. }
+        | InjectedEffect::SampleClock { .. } => {}
+    }
+}
+
+/// Means of so many neighbouring values; one for each window.
+fn moving_average(values: &[f64], taps: usize) -> Vec<f64> {
+    values.windows(taps).map(|window| window.iter().sum::<f64>() / taps as f64).collect()
+}
+
+/// The rate that is differenced from an angle which is kept in steps of `quantum`.
+fn quantized_angle(rates: &[f64], quantum: f64, period_s: f64) -> Vec<f64> {
+    let (mut angle, mut shown) = (0.0, 0.0);
+    let rate = |rate: &f64| {
+        angle += rate * period_s;
+        let rounded = (angle / quantum).round() * quantum;
+        (rounded - std::mem::replace(&mut shown, rounded)) / period_s
+    };
+    rates.iter().map(rate).collect()
+}
