@@ -4,7 +4,9 @@ use adis16405_driver::GyroRange;
 use benchmarks::losses::LossPlan;
 use benchmarks::undeclared::{self, EffectKind, UndeclaredPlan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use recordings::serial;
+use reports::export::{AxisChoice, ExportFormat};
 use simulation::Simulation;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -13,7 +15,7 @@ use std::path::PathBuf;
 ///
 /// Without a command: one simulated hour of the virtual sensor, its report here and as a page in `report`.
 #[derive(Debug, Parser)]
-#[command(name = "host-sim", version)]
+#[command(name = "host-sim", version, args_conflicts_with_subcommands = true)]
 pub(crate) struct Cli {
     /// The subcommand.
     #[command(subcommand)]
@@ -29,10 +31,11 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Analyse a table of register counts (CSV, plain or gzip).
-    Analyze(RecordingArguments),
+    /// Analyse a recording: a table of counts or in any units, an array, a bag, a flight log, an SPI log; or compare the noise
+    /// of several.
+    Analyze(AnalyzeArguments),
     /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
-    Replay(RecordingArguments),
+    Replay(ReplayArguments),
     /// Explain recordings of hours: added effects, parameters that change, common-mode drift, and what compensation gains.
     Explain(ExplainArguments),
     /// Write every bus transaction of the virtual sensor, or the raw bursts of a device on a serial port, to an SPI frame
@@ -49,6 +52,22 @@ pub(crate) enum Command {
         /// What to simulate.
         #[command(flatten)]
         simulate: SimulationArguments,
+        /// Where the report goes besides the terminal.
+        #[command(flatten)]
+        output: OutputArguments,
+    },
+    /// Write the noise of a report in the file format of another program.
+    Export(ExportArguments),
+    /// Compare the coefficients of a report with those of another, or with the data sheet.
+    Compare(CompareArguments),
+    /// Write a recording in another format: table, SPI frame log or NumPy array.
+    Convert(ConvertArguments),
+    /// Write a recording of the virtual sensor, with the noise, the effects and the faults that are described.
+    Simulate(Box<SimulateArguments>),
+    /// Print the completions for a shell.
+    Completions {
+        /// The shell.
+        shell: Shell,
     },
     /// Show the messages of a device that runs the firmware.
     Monitor {
@@ -76,21 +95,27 @@ pub(crate) enum Command {
     /// Repeat the published characterisation on simulated hours whose noise is known: slope method beside the fit.
     Paper {
         /// Hours to simulate; a scatter needs two.
-        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=MOST_RECORDINGS))]
         seeds: u64,
         /// Seed of the first.
         #[arg(long, default_value_t = 1)]
         first_seed: u64,
+        /// Where the result goes besides the terminal.
+        #[command(flatten)]
+        output: JsonArgument,
     },
     /// Take samples out of simulated records and compare variance and coefficients with those of the complete records.
     Losses(LossArguments),
 }
 
+/// Most recordings of a benchmark: each has a seed of its own, and its result is kept until the end.
+const MOST_RECORDINGS: u64 = 100_000;
+
 /// The benchmark of lost samples.
 #[derive(Debug, Args)]
 pub(crate) struct LossArguments {
     /// Records of each noise.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=100_000))]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=MOST_RECORDINGS))]
     records: u64,
     /// Binary logarithm of the number of samples of a record, at 204.8 SPS; 20 is 1.4 hours.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(14..=24))]
@@ -101,6 +126,9 @@ pub(crate) struct LossArguments {
     /// Threads [default: as many as the machine has cores].
     #[arg(long)]
     jobs: Option<NonZeroUsize>,
+    /// Where the result goes besides the terminal.
+    #[command(flatten)]
+    pub(crate) output: JsonArgument,
 }
 
 impl LossArguments {
@@ -127,14 +155,20 @@ pub(crate) struct UndeclaredArguments {
     #[arg(long, value_enum)]
     pub(crate) kind: Vec<EffectKind>,
     /// Recordings a kind.
-    #[arg(long, default_value_t = 40)]
+    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub(crate) per_kind: u64,
     /// Recordings with nothing hidden.
-    #[arg(long, default_value_t = 200)]
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub(crate) nothing: u64,
     /// Recordings with two effects.
-    #[arg(long, default_value_t = 200)]
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub(crate) pairs: u64,
+    /// Recordings with three effects.
+    #[arg(long, default_value_t = 100)]
+    pub(crate) triples: u64,
+    /// Recordings of each kind of effect that no kind of the report describes.
+    #[arg(long, value_name = "PER_KIND", default_value_t = 20)]
+    pub(crate) outside: u64,
     /// Length of a recording, s.
     #[arg(long, default_value_t = 1800.0)]
     pub(crate) seconds: f64,
@@ -150,6 +184,9 @@ pub(crate) struct UndeclaredArguments {
     /// Take the seeds that are kept for the end.
     #[arg(long)]
     pub(crate) sealed: bool,
+    /// Where the result goes besides the terminal.
+    #[command(flatten)]
+    pub(crate) output: JsonArgument,
 }
 
 impl UndeclaredArguments {
@@ -160,6 +197,8 @@ impl UndeclaredArguments {
             per_kind: self.per_kind,
             empty: self.nothing,
             pairs: self.pairs,
+            triples: self.triples,
+            outside: self.outside,
             seconds: self.seconds,
             loss_percent: self.loss,
             seed: self.seed,
@@ -177,17 +216,196 @@ fn loss_percent(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A recording.
+/// Recordings to analyse, and where the report goes.
 #[derive(Debug, Args)]
-pub(crate) struct RecordingArguments {
+pub(crate) struct AnalyzeArguments {
+    /// The first recording, and how to read it and the others.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArguments,
+    /// More recordings of the same sensor: one summary, and whether they show the same noise.
+    #[arg(value_name = "FILE")]
+    pub(crate) more: Vec<PathBuf>,
+    /// A recording with motors running: its noise over that of the others, by channel and octave.
+    #[arg(long, value_name = "RUNNING")]
+    pub(crate) against: Option<PathBuf>,
+    /// Where the report goes besides the terminal.
+    #[command(flatten)]
+    pub(crate) output: OutputArguments,
+}
+
+/// A recording to replay, and where the report goes.
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArguments {
     /// The recording.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArguments,
+    /// Where the report goes besides the terminal.
+    #[command(flatten)]
+    pub(crate) output: OutputArguments,
+}
+
+/// Reports to compare.
+#[derive(Debug, Args)]
+pub(crate) struct CompareArguments {
+    /// A report that `analyze --json` wrote.
+    #[arg(value_name = "REPORT")]
+    pub(crate) first: PathBuf,
+    /// Another, which is called better or worse than the first.
+    #[arg(value_name = "REPORT", required_unless_present = "data_sheet")]
+    pub(crate) second: Option<PathBuf>,
+    /// Compare with the typical values of the ADIS16405's data sheet.
+    #[arg(long, conflicts_with = "second")]
+    pub(crate) data_sheet: bool,
+    /// Where the result goes besides the terminal.
+    #[command(flatten)]
+    pub(crate) output: JsonArgument,
+}
+
+/// How a recording is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RecordingFormat {
+    /// Register counts in CSV, gzip if the name ends in .gz.
+    Table,
+    /// Bus transactions in CSV, gzip if the name ends in .gz.
+    Frames,
+    /// A NumPy array of doubles in SI units.
+    Npy,
+}
+
+/// A recording to convert.
+#[derive(Debug, Args)]
+pub(crate) struct ConvertArguments {
+    /// A table of register counts or an SPI frame log, plain or gzip.
+    pub(crate) file: PathBuf,
+    /// The file to write.
+    pub(crate) out: PathBuf,
+    /// Its format [default: by its name, npy or table].
+    #[arg(long, value_enum)]
+    pub(crate) to: Option<RecordingFormat>,
+    /// Gyro range in which the recording was taken, deg/s.
+    #[arg(long, value_enum, default_value = "300")]
+    pub(crate) range: GyroRangeArgument,
+}
+
+/// What to simulate.
+///
+/// Coefficients are N in deg/√s or g/√Hz, B in deg/s or g, K in deg/s/√s or g/√s; without them they are those of a published
+/// ADIS16405. An effect is KIND[:CHANNEL]:KEY=VALUE,… with the names of the report, such as
+/// sinusoid:gyro_z:frequency=20.5,amplitude=0.2.
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArguments {
+    /// The file to write.
+    pub(crate) out: PathBuf,
+    /// Its format [default: by its name, npy or table].
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<RecordingFormat>,
+    /// Virtual time in s [default: 3600].
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) seconds: Option<f64>,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Sample rate, Hz; the nearest one that the part has.
+    #[arg(long, value_name = "HZ", default_value_t = simulation::SAMPLE_RATE_HZ, allow_negative_numbers = true)]
+    pub(crate) rate: f64,
+    /// Full scale of the gyros, deg/s.
+    #[arg(long, value_enum, default_value = "300")]
+    pub(crate) range: GyroRangeArgument,
+    /// Taps of each stage of the part's filter: 1 to 64, a power of two [default: the fewest that the range allows].
+    #[arg(long)]
+    pub(crate) taps: Option<u32>,
+    /// Coefficients of all gyros.
+    #[arg(long, value_name = "N,B,K")]
+    gyro: Option<String>,
+    /// Coefficients of gyro x.
+    #[arg(long, value_name = "N,B,K")]
+    gyro_x: Option<String>,
+    /// Coefficients of gyro y.
+    #[arg(long, value_name = "N,B,K")]
+    gyro_y: Option<String>,
+    /// Coefficients of gyro z.
+    #[arg(long, value_name = "N,B,K")]
+    gyro_z: Option<String>,
+    /// Coefficients of all accelerometers.
+    #[arg(long, value_name = "N,B,K")]
+    accl: Option<String>,
+    /// Coefficients of accelerometer x.
+    #[arg(long, value_name = "N,B,K")]
+    accl_x: Option<String>,
+    /// Coefficients of accelerometer y.
+    #[arg(long, value_name = "N,B,K")]
+    accl_y: Option<String>,
+    /// Coefficients of accelerometer z.
+    #[arg(long, value_name = "N,B,K")]
+    accl_z: Option<String>,
+    /// Effect that the noise does not declare; may be repeated.
+    #[arg(long, value_name = "EFFECT")]
+    pub(crate) effect: Vec<String>,
+    /// Profile of temperature, supply or motion, such as temperature:rise=8,time_constant=900; may be repeated.
+    #[arg(long, value_name = "PROFILE")]
+    pub(crate) environment: Vec<String>,
+    /// Fault of the bus, such as stuck_low:from=10,bursts=5; may be repeated.
+    #[arg(long, value_name = "FAULT")]
+    pub(crate) fault: Vec<String>,
+}
+
+impl SimulateArguments {
+    /// Beginnings of the names of channels, and their coefficients; those of one axis come after those of all.
+    pub(crate) fn coefficients(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let all = [
+            ("gyro_", &self.gyro),
+            ("accl_", &self.accl),
+            ("gyro_x", &self.gyro_x),
+            ("gyro_y", &self.gyro_y),
+            ("gyro_z", &self.gyro_z),
+            ("accl_x", &self.accl_x),
+            ("accl_y", &self.accl_y),
+            ("accl_z", &self.accl_z),
+        ];
+        all.into_iter().filter_map(|(prefix, text)| Some((prefix, text.as_deref()?)))
+    }
+}
+
+/// A report to write in the format of another program.
+#[derive(Debug, Args)]
+pub(crate) struct ExportArguments {
+    /// The program.
+    #[arg(long, value_enum)]
+    pub(crate) format: ExportFormat,
+    /// What stands for the three axes, where the program has one number a sensor.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) axis: AxisChoice,
+    /// A report that `analyze --json` wrote.
+    pub(crate) report: PathBuf,
+    /// The file to write.
+    pub(crate) out: PathBuf,
+}
+
+/// A recording.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RecordingArguments {
+    /// The recording, of a format that its content tells; - for standard input.
     pub(crate) file: PathBuf,
     /// Sample rate in Hz; overrides what the time stamps say.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Gyro range in which the recording was taken, deg/s.
+    /// Gyro range of an ADIS16405 in which the recording was taken, deg/s.
     #[arg(long, value_enum, default_value = "300")]
     pub(crate) range: GyroRangeArgument,
+    /// The sensor: adis16405, generic, adis16470, bmi088, mpu6050, or a profile file [default: adis16405 for register counts
+    /// and SPI logs, else generic].
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) sensor: Option<String>,
+    /// Columns of the channels, as in gyro_x=wx,gyro_y=wy,time=t; a number for a column without a name, from 0; gyro.0 for
+    /// column 0 of the array gyro [default: by their names].
+    #[arg(long, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
+    pub(crate) columns: Vec<String>,
+    /// Units of the columns, one for each quantity, as in rad/s,m/s^2,us [default: by the names of the columns].
+    #[arg(long, value_name = "UNIT", value_delimiter = ',')]
+    pub(crate) units: Vec<String>,
+    /// Topic, message or array of a file with several.
+    #[arg(long)]
+    pub(crate) topic: Option<String>,
 }
 
 /// Recordings to explain.
@@ -199,12 +417,12 @@ pub(crate) struct ExplainArguments {
     /// Sample rate in Hz; overrides what the time stamps say.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Write a figure of each channel into this folder.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) pictures: Option<PathBuf>,
     /// Gyro range in which the recordings were taken, deg/s.
     #[arg(long, value_enum, default_value = "300")]
     pub(crate) range: GyroRangeArgument,
+    /// Write the figure of every channel as SVG into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pictures: Option<PathBuf>,
 }
 
 /// Full scale of the gyros.
@@ -256,13 +474,30 @@ impl SimulationArguments {
 /// Where the report goes.
 #[derive(Debug, Args)]
 pub(crate) struct OutputArguments {
-    /// Write the report as JSON.
-    #[arg(long, value_name = "OUT", global = true)]
+    /// Print every table of every channel instead of one screen.
+    #[arg(long, conflicts_with = "quiet")]
+    pub(crate) full: bool,
+    /// Print nothing.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+    /// Write every figure as SVG and PNG into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pictures: Option<PathBuf>,
+    /// Write the report as JSON; - for standard output.
+    #[arg(long, value_name = "OUT")]
     pub(crate) json: Option<PathBuf>,
     /// Write the report as a page into this folder.
-    #[arg(long, value_name = "DIR", global = true)]
+    #[arg(long, value_name = "DIR")]
     pub(crate) page: Option<PathBuf>,
     /// Write the noise model of the accelerometers and gyros as Kalibr's YAML.
-    #[arg(long, value_name = "OUT", global = true)]
+    #[arg(long, value_name = "OUT")]
     pub(crate) kalibr: Option<PathBuf>,
+}
+
+/// Where a result goes that is no report.
+#[derive(Debug, Args)]
+pub(crate) struct JsonArgument {
+    /// Write the result as JSON.
+    #[arg(long, value_name = "OUT")]
+    pub(crate) json: Option<PathBuf>,
 }

@@ -2,16 +2,21 @@
 
 mod analyze;
 mod cli;
+mod compare;
+mod convert;
 mod explain;
+mod export;
 mod losses;
 mod output;
 mod paper;
 mod record;
+mod recording_file;
+mod simulate;
 mod undeclared;
 
 use anyhow::{Context, Result};
-use clap::Parser;
-use cli::{Cli, Command};
+use clap::{CommandFactory, Parser};
+use cli::{Cli, Command, ReplayArguments};
 use host_sim::{monitor, uf2};
 use recordings::Printable;
 use recordings::serial::{self, SerialLink};
@@ -39,36 +44,47 @@ fn main() -> ExitCode {
 }
 
 fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
-    if command.is_none() {
-        output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
-    }
-    let inputs: Vec<&Path> = match &command {
-        Some(Command::Analyze(arguments) | Command::Replay(arguments)) => vec![&arguments.file],
-        Some(Command::Record { out, .. }) => vec![out],
-        _ => Vec::new(),
-    };
-    output::check(&output, &inputs)?;
-    let report = match command {
-        None => record::simulate(&simulate.simulation(3600.0))?,
-        Some(Command::Analyze(arguments)) => analyze::analyze_table(&arguments)?,
-        Some(Command::Replay(arguments)) => analyze::analyze_replay(&arguments)?,
-        Some(Command::Record { out, port: Some(port), baud, simulate }) => {
-            output::check_file(&out, &[]).with_context(|| out.display().to_string())?;
-            record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?
+    match command {
+        None => {
+            output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
+            output::check(&output, &[])?;
+            output::write_report(&record::simulate(&simulate.simulation(3600.0))?, &output)
         }
-        Some(Command::Record { out, simulate, .. }) => {
-            record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?
+        Some(Command::Analyze(arguments)) => analyze::run(&arguments),
+        Some(Command::Replay(ReplayArguments { recording, output })) => {
+            output::check(&output, &[&recording.file])?;
+            output::write_report(&analyze::analyze_replay(&recording)?, &output)
         }
-        Some(Command::Explain(arguments)) => return explain::run(&arguments, &output),
-        Some(Command::Undeclared(arguments)) => return undeclared::run(&arguments.plan(), &output),
-        Some(Command::Paper { seeds, first_seed }) => return paper::run(seeds, first_seed, &output),
-        Some(Command::Losses(arguments)) => return losses::run(&arguments.plan(), &output),
+        Some(Command::Record { out, port, baud, simulate, output }) => {
+            output::check(&output, &[&out])?;
+            let report = match port {
+                Some(port) => {
+                    output::check_file(&out, &[]).with_context(|| out.display().to_string())?;
+                    record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?
+                }
+                None => record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?,
+            };
+            output::write_report(&report, &output)
+        }
+        Some(Command::Export(arguments)) => export::run(&arguments),
+        Some(Command::Compare(arguments)) => compare::run(&arguments),
+        Some(Command::Convert(arguments)) => convert::run(&arguments),
+        Some(Command::Simulate(arguments)) => simulate::run(&arguments),
+        Some(Command::Completions { shell }) => {
+            // Into memory first: the generator panics where its output is closed.
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
+            output::print(|out| out.write_all(&script))
+        }
+        Some(Command::Explain(arguments)) => explain::run(&arguments),
+        Some(Command::Undeclared(arguments)) => undeclared::run(&arguments.plan(), &arguments.output),
+        Some(Command::Paper { seeds, first_seed, output }) => paper::run(seeds, first_seed, &output),
+        Some(Command::Losses(arguments)) => losses::run(&arguments.plan(), &arguments.output),
         Some(Command::Monitor { port, baud, send, seconds }) => {
-            return show_messages(&port, baud, &send, seconds).with_context(|| port.clone());
+            show_messages(&port, baud, &send, seconds).with_context(|| port.clone())
         }
-        Some(Command::Uf2 { elf, out }) => return convert_image(&elf, &out),
-    };
-    output::write_report(&report, &output)
+        Some(Command::Uf2 { elf, out }) => convert_image(&elf, &out),
+    }
 }
 
 fn show_messages(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Result<()> {

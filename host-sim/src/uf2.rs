@@ -30,6 +30,12 @@ pub enum Uf2Error {
     /// The contents of a segment lie outside of the file.
     #[error("the ELF is cut short: the segment at {0:#010x} is not in it")]
     CutShort(u32),
+    /// A segment ends beyond the flash of an RP2040.
+    #[error("the segment at {0:#010x} ends beyond the flash at 0x11000000")]
+    BeyondFlash(u32),
+    /// Two segments fill the same bytes.
+    #[error("the segment at {0:#010x} overlaps another")]
+    Overlap(u32),
     /// No segment is loaded to the flash of an RP2040.
     #[error("nothing in it is for the flash at 0x10000000: is it an image for the Pico?")]
     NoFlash,
@@ -39,20 +45,37 @@ pub enum Uf2Error {
 /// addresses. Bytes of a page that no segment fills are zero.
 ///
 /// # Errors
-/// The file is no complete ELF, or nothing in it is for the flash of an RP2040.
+/// The file is no complete ELF, nothing in it is for the flash of an RP2040, or its segments overlap or do not fit there.
 pub fn from_elf(elf: &[u8]) -> Result<Vec<u8>, Uf2Error> {
     let header = FileHeader32::<object::Endianness>::parse(elf)?;
     let endian = header.endian()?;
     if endian != Little {
         return Err(Uf2Error::NoFlash);
     }
-    let mut pages = BTreeMap::<u32, [u8; PAGE_BYTES]>::new();
+    let mut segments: Vec<(u32, &[u8])> = Vec::new();
     for segment in header.program_headers(endian, elf)? {
         let address = segment.p_paddr(endian);
         if segment.p_type(endian) != PT_LOAD || !FLASH.contains(&address) {
             continue;
         }
         let bytes = segment.data(endian, elf).map_err(|()| Uf2Error::CutShort(address))?;
+        if bytes.len() > (FLASH.end - address) as usize {
+            return Err(Uf2Error::BeyondFlash(address));
+        }
+        segments.push((address, bytes));
+    }
+    // Before a byte is copied: so many headers may name the same bytes of a small file that copying them would take minutes.
+    segments.sort_by_key(|(address, bytes)| (*address, bytes.len()));
+    for pair in segments.windows(2) {
+        if let [(first, bytes), (second, others)] = pair
+            && !others.is_empty()
+            && (*second as usize) < *first as usize + bytes.len()
+        {
+            return Err(Uf2Error::Overlap(*second));
+        }
+    }
+    let mut pages = BTreeMap::<u32, [u8; PAGE_BYTES]>::new();
+    for (address, bytes) in segments {
         for (at, &byte) in (address..FLASH.end).zip(bytes) {
             let page = pages.entry(at & !(PAGE_BYTES as u32 - 1)).or_insert([0; PAGE_BYTES]);
             page[at as usize % PAGE_BYTES] = byte;
@@ -120,6 +143,29 @@ mod tests {
         for length in 0..whole.len() {
             assert!(from_elf(&whole[..length]).is_err(), "{length} bytes");
         }
+    }
+
+    /// An ELF with `count` segments, each of the same `bytes` of the file at `address`.
+    fn repeated(count: u16, address: u32, bytes: u32) -> Vec<u8> {
+        let mut elf = elf(address, &[]);
+        let offset = 52 + 32 * u32::from(count);
+        let header: Vec<u8> =
+            [1, offset, address, address, bytes, bytes, 5, 4].into_iter().flat_map(u32::to_le_bytes).collect();
+        elf.truncate(52);
+        elf[44..46].copy_from_slice(&count.to_le_bytes());
+        (0..count).for_each(|_| elf.extend(&header));
+        elf.resize((offset + bytes) as usize, 0xA5);
+        elf
+    }
+
+    #[test]
+    fn segments_that_overlap_or_do_not_fit_are_refused_at_once() {
+        let began = std::time::Instant::now();
+        assert_eq!(from_elf(&repeated(2000, 0x1000_0000, 4 << 20)), Err(Uf2Error::Overlap(0x1000_0000)));
+        // Copying 8 GB byte by byte takes a minute.
+        assert!(began.elapsed().as_secs() < 10, "{:?}", began.elapsed());
+        assert_eq!(from_elf(&elf(0x10FF_FFFE, &[1, 2, 3])), Err(Uf2Error::BeyondFlash(0x10FF_FFFE)));
+        assert!(from_elf(&elf(0x10FF_FFFD, &[1, 2, 3])).is_ok());
     }
 
     /// Damage gives an error or another image, never a panic.

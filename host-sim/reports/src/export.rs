@@ -1,56 +1,76 @@
-//! The coefficients in the file formats of calibration and navigation programs.
+//! The noise of a sensor in the file formats of calibration, navigation and simulation programs.
+//!
+//! Every format says in a comment whether its numbers belong to the continuous process or to samples at the record's rate.
+//! The page `docs/exports.md` has the source of each.
 
-use noise_analysis::report::{ChannelReport, Parameter, Report};
+mod exported_file;
+mod filters;
+mod inertial_noise;
+mod simulators;
+mod visual_inertial;
+
+pub use exported_file::{AxisChoice, Export, ExportError};
+
+use crate::saved_report::SavedReport;
 use std::fmt::Write;
 
-/// The four numbers of Kalibr's IMU model: key, prefix of the channel names, kind of coefficient, unit. All are those of
-/// the continuous process.
-const KALIBR: [(&str, &str, &str, &str); 4] = [
-    ("accelerometer_noise_density", "accl_", "angle_random_walk", "m/s^2/sqrt(Hz)"),
-    ("accelerometer_random_walk", "accl_", "rate_random_walk", "m/s^3/sqrt(Hz)"),
-    ("gyroscope_noise_density", "gyro_", "angle_random_walk", "rad/s/sqrt(Hz)"),
-    ("gyroscope_random_walk", "gyro_", "rate_random_walk", "rad/s^2/sqrt(Hz)"),
-];
-
-/// The IMU noise model in the YAML of Kalibr, which VINS-Fusion and others read too: of each sensor the root mean square
-/// over its axes.
-///
-/// These programs divide by every number, so the upper bound stands for a term whose estimate is zero. A sensor without
-/// channels in the report is left out, with a comment.
-#[must_use]
-pub fn kalibr(report: &Report) -> String {
-    let mut text = String::from(
-        "# Noise of the continuous process: the discrete deviation at a rate f is density·sqrt(f), the step walk/sqrt(f).\n",
-    );
-    // Writing to a string cannot fail.
-    for (key, channels, kind, unit) in KALIBR {
-        let axes: Vec<(&ChannelReport, f64, bool)> = report
-            .channels
-            .iter()
-            .filter(|channel| channel.name.starts_with(channels))
-            .filter_map(|channel| coefficient(channel, kind, unit).map(|parameter| (channel, parameter)))
-            .map(|(channel, parameter)| {
-                if parameter.value > 0.0 { (channel, parameter.value, true) } else { (channel, parameter.high, false) }
-            })
-            .collect();
-        if axes.is_empty() {
-            let _ = writeln!(text, "# {key}: no channel of the record tells it");
-            continue;
-        }
-        let mean_square = axes.iter().map(|(_, value, _)| value * value).sum::<f64>() / axes.len() as f64;
-        let _ = writeln!(text, "{key}: {:.6e}  # {unit}", mean_square.sqrt());
-        for (channel, value, shown) in axes {
-            let bound = if shown { "" } else { ", an upper bound" };
-            let _ = writeln!(text, "#   {}: {value:.6e}{bound}", channel.name);
-        }
-    }
-    let _ = writeln!(text, "update_rate: {}  # Hz\nrostopic: /imu0", report.sample_rate_hz);
-    text
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum ExportFormat {
+    /// `imu.yaml` of Kalibr.
+    Kalibr,
+    /// `kalibr_imu_chain.yaml` of OpenVINS.
+    #[value(name = "openvins")]
+    OpenVins,
+    /// The lines on the IMU in the configuration of VINS-Mono and VINS-Fusion.
+    Vins,
+    /// The lines on the IMU in the settings of ORB-SLAM3.
+    #[value(name = "orbslam3")]
+    OrbSlam3,
+    /// A script for MATLAB that makes `gyroparams` and `accelparams`.
+    Matlab,
+    /// The block `imunoise` in the configuration of KF-GINS.
+    KfGins,
+    /// A Python module that makes GTSAM's `PreintegrationCombinedParams`.
+    Gtsam,
+    /// A Gazebo model with an IMU sensor, in SDF.
+    Gazebo,
+    /// A table of every parameter of every channel with its bounds.
+    Csv,
 }
 
-/// The coefficient of the continuous process in `unit`, unless its upper bound is zero.
-fn coefficient<'a>(channel: &'a ChannelReport, kind: &str, unit: &str) -> Option<&'a Parameter> {
-    let mut coefficients = channel.assessment.coefficients.iter();
-    let continuous = coefficients.find(|of| of.kind == kind && !of.discrete && of.value.unit == unit)?;
-    Some(&continuous.value).filter(|value| value.high > 0.0)
+/// Writes the noise of a report in a format.
+///
+/// # Errors
+/// See [`ExportError`].
+pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> Result<Export, ExportError> {
+    match format {
+        ExportFormat::Kalibr => visual_inertial::kalibr(report, axes),
+        ExportFormat::OpenVins => visual_inertial::openvins(report, axes),
+        ExportFormat::Vins => visual_inertial::vins(report, axes),
+        ExportFormat::OrbSlam3 => visual_inertial::orbslam3(report, axes),
+        ExportFormat::Matlab => simulators::matlab(report),
+        ExportFormat::Gazebo => simulators::gazebo(report),
+        ExportFormat::KfGins => filters::kf_gins(report),
+        ExportFormat::Gtsam => filters::gtsam(report),
+        ExportFormat::Csv => Ok(Export { text: table(report), missing: Vec::new() }),
+    }
+}
+
+/// Every parameter of every channel's final model.
+fn table(report: &SavedReport) -> String {
+    let mut text = String::from("channel,term,parameter,value,low,high,unit\n");
+    for channel in &report.channels {
+        for term in &channel.refitted.terms {
+            for (name, of) in &term.parameters {
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    text,
+                    "{},{},{name},{:e},{:e},{:e},{}",
+                    channel.name, term.kind, of.value, of.low, of.high, of.unit
+                );
+            }
+        }
+    }
+    text
 }

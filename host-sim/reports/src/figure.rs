@@ -1,248 +1,173 @@
-//! The figure of one channel as SVG: Allan deviation above, what the model leaves of it beneath.
+//! The figures of a report as SVG: the gyros together, and of each channel the Allan deviation, the spectrum and the bias over
+//! time; of each finding a picture of its evidence.
 
-mod panel;
-mod slopes;
+mod axis;
+mod channel;
+mod evidence;
+mod plot;
 
-pub use panel::DARK_COLOURS;
-
-use crate::formatting;
 use allan_core::Model;
+use axis::{Axis, has_logarithm};
+use channel::{allan_deviation_plot, bias_plot, measured, spectrum_plot};
+pub(crate) use evidence::evidence;
 use noise_analysis::nonstationarity::ChannelExplanation;
-use noise_analysis::report::{ChannelReport, CurvePoint, ModelErrorReport, ModelReport, SlopeMethodReport};
-use panel::{
-    AFTER, BEFORE, Canvas, DrawResult, FAINT_TEXT, Frame, MEASURED, MIDDLE_LEFT, Panel, SLOPES, TEXT, has_logarithm,
-    span, text_style,
+use noise_analysis::report::{
+    ChannelReport, CurvePoint, DataSheetReport, ModelErrorReport, ModelReport, Report, SlopeMethodReport,
 };
-use plotters::prelude::*;
-use std::ops::Range;
+pub(crate) use plot::Plot;
+use plot::{LEFT, Line, Look, Panel, RIGHT, frames, heights, places};
 
-/// Width and height of the figure, pixels; large, since the drawing library rounds to whole pixels.
-const SIZE: (u32, u32) = (1600, 1200);
-/// Width and height of a figure without points.
-const EMPTY: (u32, u32) = (1600, 170);
-const LEFT: i32 = 150;
-const RIGHT: i32 = 1570;
-const CURVE: Frame = Frame { left: LEFT, right: RIGHT, top: 112, bottom: 800 };
-const RESIDUAL: Frame = Frame { left: LEFT, right: RIGHT, top: 858, bottom: 1104 };
+/// Colours of a class on a light and on a dark ground: its lines and text are at least 4.5:1 apart from the ground.
+const COLOURS: [(&str, &str, &str); 8] = [
+    ("measured", "#1f5fa8", "#6cb2ff"),
+    ("second", "#a8480d", "#ffab5e"),
+    ("third", "#0b7559", "#3dd6ac"),
+    ("model", "#0b7559", "#3dd6ac"),
+    ("before", "#a8480d", "#ffab5e"),
+    ("term", "#75559f", "#bfa5ea"),
+    ("reference", "#5b6675", "#9aa7b8"),
+    ("followed", "#a8286b", "#ff8fc4"),
+];
+/// Text, faint text, grid, fine grid and ground, light and dark.
+const TEXT: [&str; 2] = ["#1c2430", "#e6eaf0"];
+const GRID: [&str; 2] = ["#ccd4dd", "#364152"];
+const FINE: [&str; 2] = ["#eaeef3", "#222b37"];
+const FRAME: [&str; 2] = ["#5b6675", "#9aa7b8"];
+const PAPER: [&str; 2] = ["#ffffff", "#171e28"];
+const PLACE: [&str; 2] = ["#f6e3ef", "#3d2236"];
 
-/// A figure could not be drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot draw the Allan deviation of {channel}: {reason}")]
-pub struct FigureError {
-    /// The channel's name.
-    pub channel: String,
-    /// What the drawing library said.
-    pub reason: String,
+/// A figure of the page or of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Name of its file, without an ending.
+    pub name: String,
+    /// The figure as an SVG document, on light ground.
+    pub svg: String,
 }
 
-/// The figure of `channel` as an SVG document. Points that a logarithmic axis cannot show (zero, not finite) are left out.
-///
-/// # Errors
-/// The drawing library fails.
-pub fn allan_deviation(channel: &ChannelReport) -> Result<String, FigureError> {
-    let points: Vec<&CurvePoint> =
-        channel.curve.iter().filter(|point| has_logarithm(point.tau_s) && has_logarithm(point.adev)).collect();
-    let size = if points.is_empty() { EMPTY } else { SIZE };
-    let mut svg = String::new();
-    let canvas = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-    let drawn = if points.is_empty() { draw_empty(&canvas, channel) } else { draw(&canvas, channel, &points) };
-    drop(canvas);
-    drawn.map_err(|error| FigureError { channel: channel.name.clone(), reason: error.to_string() })?;
-    Ok(svg)
-}
-
-fn title(canvas: &Canvas<'_>, channel: &ChannelReport) -> DrawResult {
-    let title = format!("{} · Allan deviation", channel.name);
-    canvas.draw(&Text::new(title, (LEFT, 26), text_style(&TEXT, 36)))
-}
-
-/// The reason why there are no points.
-fn draw_empty(canvas: &Canvas<'_>, channel: &ChannelReport) -> DrawResult {
-    title(canvas, channel)?;
-    let text = if channel.curve.is_empty() {
-        "the record is too short for a point of the curve"
-    } else {
-        "no deviation above zero: the channel did not change"
+/// The style sheet of the figures, for a light ground, and what changes on a dark one.
+pub(crate) fn style() -> [String; 2] {
+    let colours = |ground: usize| {
+        let of = |(class, light, dark): &(&str, &str, &str)| {
+            let colour = [light, dark][ground];
+            format!(
+                ".{class} line,.{class} polyline{{stroke:{colour}}}.{class} circle{{fill:{colour}}}\
+                 polygon.{class}{{fill:{colour}}}"
+            )
+        };
+        let lines: String = COLOURS.iter().map(of).collect();
+        format!(
+            "svg text{{fill:{text}}}.grid{{stroke:{grid}}}.fine{{stroke:{fine}}}.frame{{stroke:{frame}}}\
+             .paper{{fill:{paper}}}rect.place{{fill:{place}}}line.place{{stroke:{mark}}}.cursor{{stroke:{text}}}{lines}",
+            text = TEXT[ground],
+            grid = GRID[ground],
+            fine = FINE[ground],
+            frame = FRAME[ground],
+            paper = PAPER[ground],
+            place = PLACE[ground],
+            mark = [COLOURS[7].1, COLOURS[7].2][ground],
+        )
     };
-    canvas.draw(&Text::new(text, (LEFT, 100), text_style(&FAINT_TEXT, 32)))?;
-    canvas.present()
+    const SHAPES: &str = "svg text{font-size:13px;font-family:system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}\
+        svg .axis{font-size:14px}.grid,.fine,.frame{stroke-width:1;fill:none}\
+        svg polyline{fill:none;stroke-width:1.6;stroke-linejoin:round}svg .legend line{stroke-width:2}\
+        .model polyline{stroke-width:2.4}polygon.band{opacity:.2}.cursor{stroke-width:1;stroke-dasharray:3 3}\
+        .before polyline,.before line{stroke-dasharray:7 4}.term polyline,.term line{stroke-width:1.1;stroke-dasharray:2 3}\
+        .reference polyline,.reference line{stroke-dasharray:10 3 2 3}line.place{stroke-width:1.4;stroke-dasharray:4 3}";
+    [format!("{SHAPES}{}", colours(0)), colours(1)]
 }
 
-fn draw(canvas: &Canvas<'_>, channel: &ChannelReport, points: &[&CurvePoint]) -> DrawResult {
-    title(canvas, channel)?;
-    legend(canvas, channel)?;
-    let before = model_line(channel, &channel.before);
-    let after = if effects_added(channel) { model_line(channel, &channel.after) } else { Vec::new() };
-
-    let taus = span(points.iter().map(|point| point.tau_s.log10()), 0.14);
-    let heights = points
-        .iter()
-        // The interval of a point with one degree of freedom spans decades: it is cut off at a factor of three.
-        .flat_map(|p| [p.adev, p.low.max(p.adev / 3.0), p.high.min(p.adev * 3.0)])
-        .chain(before.iter().chain(&after).map(|&(_, adev)| adev))
-        .chain(slopes::floor(&channel.read_off))
-        .filter(|&value| has_logarithm(value))
-        .map(f64::log10);
-    let area = Panel::new(canvas, &CURVE, taus.clone(), span(heights, 0.12));
-    area.decades_across(false)?;
-    area.decades_up()?;
-    area.frame()?;
-    let label = format!("Allan deviation σ(τ), {}", formatting::unit(&channel.unit));
-    area.label_up(&label)?;
-
-    slopes::draw(&area, &channel.read_off)?;
-    let bounds: Vec<(f64, f64, f64)> = points
-        .iter()
-        .filter(|point| has_logarithm(point.low) && has_logarithm(point.high))
-        .map(|point| (point.tau_s.log10(), area.clamp(point.low.log10()), area.clamp(point.high.log10())))
-        .collect();
-    area.intervals(&bounds)?;
-    let logs = |line: &[(f64, f64)]| -> Vec<(f64, f64)> {
-        line.iter().map(|&(tau, adev)| (tau.log10(), adev.log10())).collect()
-    };
-    area.line(logs(&before), BEFORE.stroke_width(4))?;
-    if !after.is_empty() {
-        area.line(logs(&after), AFTER.stroke_width(4))?;
-    }
-    area.markers(points.iter().map(|p| (p.tau_s.log10(), p.adev.log10())))?;
-    draw_residual(canvas, taus, channel)?;
-    canvas.present()
+fn standalone(plot: &Plot) -> Picture {
+    let [light, _] = style();
+    Picture { name: plot.id.clone(), svg: plot.svg(Some(&light)).into_string() }
 }
 
-/// Whether there is a second model to show.
-fn effects_added(channel: &ChannelReport) -> bool {
-    channel.after != channel.before && !channel.after.adev.is_empty()
+/// Every figure of a report, in the order of the page.
+#[must_use]
+pub fn pictures(report: &Report) -> Vec<Picture> {
+    let overview = overview(report).into_iter();
+    let channels = report.channels.iter().flat_map(|channel| channel_plots(report, channel));
+    let findings = (0..report.findings.len()).filter_map(|index| evidence(report, index));
+    overview.chain(channels).chain(findings).map(|plot| standalone(&plot)).collect()
 }
 
-/// The model at the octaves, (τ, σ), without what cannot be shown.
-fn model_line(channel: &ChannelReport, model: &ModelReport) -> Vec<(f64, f64)> {
-    let taus = channel.curve.iter().map(|point| point.tau_s);
-    taus.zip(model.adev.iter().copied()).filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect()
-}
-
-fn legend(canvas: &Canvas<'_>, channel: &ChannelReport) -> DrawResult {
-    const LINE: i32 = 82;
-    const SWATCH: i32 = 46;
-    let mut left = LEFT;
-    let mut entry = |text: &str, colour: RGBColor, shape: Shape| -> DrawResult {
-        let (start, end) = ((left, LINE), (left + SWATCH, LINE));
-        match shape {
-            Shape::DotInBand => {
-                let band = [(left, LINE - 11), (left + SWATCH, LINE + 11)];
-                canvas.draw(&Rectangle::new(band, colour.mix(0.13).filled()))?;
-                let middle = left + SWATCH / 2;
-                let bar = vec![(middle, LINE - 11), (middle, LINE + 11)];
-                canvas.draw(&PathElement::new(bar, colour.mix(0.7).stroke_width(3)))?;
-                canvas.draw(&Circle::new((middle, LINE), 7, colour.filled()))?;
-            }
-            Shape::Line => canvas.draw(&PathElement::new(vec![start, end], colour.stroke_width(4)))?,
-            Shape::Dashes => {
-                for dash in 0..3 {
-                    let from = left + dash * 17;
-                    let path = vec![(from, LINE), (from + 11, LINE)];
-                    canvas.draw(&PathElement::new(path, colour.stroke_width(3)))?;
-                }
-            }
-        }
-        let style = text_style(&TEXT, 30).pos(MIDDLE_LEFT);
-        canvas.draw(&Text::new(text.to_owned(), (left + SWATCH + 14, LINE), style))?;
-        // Sans-serif letters of 24 px are about 12 px wide.
-        left += SWATCH + 14 + 12 * text.chars().count() as i32 + 34;
-        Ok(())
-    };
-    entry("measured, 95 % interval", MEASURED, Shape::DotInBand)?;
-    entry("baseline model (N, B, K)", BEFORE, Shape::Line)?;
-    if effects_added(channel) {
-        entry("with traced effects", AFTER, Shape::Line)?;
-    }
-    let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
-    if [angle_random_walk, bias_instability, rate_random_walk].iter().any(|slope| slope.is_some()) {
-        entry("slope method", SLOPES, Shape::Dashes)?;
-    }
-    Ok(())
-}
-
-/// How the legend shows an entry.
-enum Shape {
-    DotInBand,
-    Line,
-    Dashes,
-}
-
-/// The lower panel: measured over modelled deviation, in percent. The model is that with the traced effects if there is
-/// one; the baseline model is then a line.
-fn draw_residual(canvas: &Canvas<'_>, taus: Range<f64>, channel: &ChannelReport) -> DrawResult {
-    let added = effects_added(channel);
-    let best = if added { &channel.after } else { &channel.before };
-    let points = residuals(channel, best);
-    let baseline = if added { residuals(channel, &channel.before) } else { Vec::new() };
-    let extreme = points.iter().chain(&baseline).map(|r| r.percent.abs()).fold(0.0, f64::max);
-    let limit = (extreme * 1.25).clamp(4.0, 250.0);
-    let area = Panel::new(canvas, &RESIDUAL, taus, -limit..limit);
-    area.decades_across(true)?;
-    area.steps_up(label_distance(limit))?;
-    area.frame()?;
-    area.label_up("σ / model − 1, %")?;
-    area.label_across("averaging time τ, s")?;
-
-    let bounds: Vec<(f64, f64, f64)> = points
-        .iter()
-        .filter(|residual| residual.low.is_finite() && residual.high.is_finite())
-        .map(|residual| (residual.tau, area.clamp(residual.low), area.clamp(residual.high)))
-        .collect();
-    area.intervals(&bounds)?;
-    if added {
-        let line: Vec<(f64, f64)> =
-            baseline.iter().map(|residual| (residual.tau, area.clamp(residual.percent))).collect();
-        area.line(line, BEFORE.stroke_width(3))?;
-    }
-    let colour = if added { AFTER } else { BEFORE };
-    let zero = vec![(area.across.start, 0.0), (area.across.end, 0.0)];
-    area.line(zero, colour.stroke_width(4))?;
-    area.markers(points.iter().map(|residual| (residual.tau, area.clamp(residual.percent))))
-}
-
-/// A point of the lower panel: `tau` is the logarithm of the averaging time, the others are percent.
-struct Residual {
-    tau: f64,
-    percent: f64,
-    low: f64,
-    high: f64,
-}
-
-fn residuals(channel: &ChannelReport, model: &ModelReport) -> Vec<Residual> {
-    let pairs = channel.curve.iter().zip(model.adev.iter().copied());
-    pairs
-        .filter(|(point, adev)| has_logarithm(point.tau_s) && has_logarithm(point.adev) && has_logarithm(*adev))
-        .map(|(point, adev)| Residual::new(point, adev))
-        .filter(|residual| residual.percent.is_finite())
+/// The figures of one channel.
+pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plot> {
+    [Some(allan_deviation_plot(report, channel)), spectrum_plot(report, channel), bias_plot(channel)]
+        .into_iter()
+        .flatten()
         .collect()
 }
 
-impl Residual {
-    fn new(point: &CurvePoint, adev: f64) -> Self {
-        let percent = |deviation: f64| 100.0 * (deviation / adev - 1.0);
-        Residual {
-            tau: point.tau_s.log10(),
-            percent: percent(point.adev),
-            low: percent(point.low),
-            high: percent(point.high),
-        }
-    }
+/// The Allan deviation of `channel` as an SVG document.
+#[must_use]
+pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
+    standalone(&allan_deviation_plot(report, channel)).svg
 }
 
-/// A round distance that puts two or three labels on either side of zero.
-fn label_distance(limit: f64) -> f64 {
-    const ROUND: [f64; 6] = [2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-    ROUND.into_iter().find(|step| limit / step < 3.5).unwrap_or(100.0)
+/// The gyros' curves, or the accelerometers' where there is no gyro, beside the data sheet's. `None` without either.
+pub(crate) fn overview(report: &Report) -> Option<Plot> {
+    let of = |prefix: &str| -> Vec<&ChannelReport> {
+        report
+            .channels
+            .iter()
+            .filter(|channel| channel.name.starts_with(prefix))
+            .filter(|channel| channel.curve.iter().any(|point| has_logarithm(point.adev)))
+            .collect()
+    };
+    let (channels, name) = match of("gyro_") {
+        gyros if !gyros.is_empty() => (gyros, "gyros"),
+        _ => (of("accl_"), "accelerometers"),
+    };
+    let first = channels.first()?;
+    let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
+    let mut lines: Vec<Line> = channels
+        .iter()
+        .zip(looks.into_iter().cycle())
+        .map(|(channel, look)| measured(channel, look, &crate::formatting::words(&channel.name)))
+        .collect();
+    if let Some(sheet) = &first.figure_data.data_sheet {
+        let taus: Vec<f64> = first.curve.iter().map(|point| point.tau_s).filter(|tau| has_logarithm(*tau)).collect();
+        lines.push(Line::new("data sheet", Look::Reference, sheet_curve(sheet, &taus)));
+    }
+    let [frame] = frames([380.0]);
+    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let label = format!("Allan deviation σ(τ), {}", crate::formatting::unit(&first.unit));
+    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
+    let each: Vec<String> = channels
+        .iter()
+        .filter_map(|channel| {
+            let lowest = channel.curve.iter().min_by(|a, b| a.adev.total_cmp(&b.adev))?;
+            let name = crate::formatting::words(&channel.name);
+            let (deviation, tau) =
+                (crate::rounding::quantity(lowest.adev, &channel.unit), crate::rounding::span(lowest.tau_s));
+            Some(format!("{name} is lowest at {tau} with {deviation}"))
+        })
+        .collect();
+    Some(Plot {
+        id: "overview".to_owned(),
+        title: format!("Allan deviation of the {name}, beside the data sheet"),
+        description: format!("Measured with 95 % bounds: {}.", each.join("; ")),
+        panels: vec![Panel::new(across, up, lines)],
+    })
+}
+
+/// The curve that a data sheet promises: its random walk and the minimum, and its rate random walk where it names one.
+fn sheet_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
+    let of = |tau: f64| {
+        let square = |value: Option<f64>| value.map_or(0.0, |value| value * value);
+        let variance = square(sheet.angle_random_walk) / tau
+            + square(sheet.in_run_bias_stability)
+            + square(sheet.rate_random_walk) * tau / 3.0;
+        (tau, variance.sqrt())
+    };
+    taus.iter().map(|&tau| of(tau)).collect()
 }
 
 /// The figure of an explained channel as an SVG document: the curve of the second half, with the baseline model and the
 /// predictive model of the first.
-///
-/// # Errors
-/// The drawing library fails.
-pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError> {
+#[must_use]
+pub fn explained_channel(of: &ChannelExplanation) -> String {
     let unseen = &of.curves.unseen;
     let model = |model: &Model, [fitted, error]: [f64; 2]| ModelReport {
         terms: Vec::new(),
@@ -251,7 +176,8 @@ pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError>
         unseen: ModelErrorReport { deviance_per_point: Some(error), ..Default::default() },
         unseen_excluding: None,
     };
-    allan_deviation(&ChannelReport {
+    let predictive = || model(&of.predictive, of.errors.predictive);
+    let channel = ChannelReport {
         name: format!("{}, second half; models of the first", of.channel.name),
         unit: of.channel.unit.to_owned(),
         samples: unseen.samples(),
@@ -262,21 +188,10 @@ pub fn explained_channel(of: &ChannelExplanation) -> Result<String, FigureError>
         before: model(&of.trace.before, of.errors.baseline),
         assessment: Default::default(),
         effects: Vec::new(),
-        after: model(&of.predictive, of.errors.predictive),
-        refitted: model(&of.predictive, of.errors.predictive),
+        after: predictive(),
+        refitted: predictive(),
         at_rest: Vec::new(),
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::label_distance;
-
-    #[test]
-    fn few_labels_on_either_side() {
-        for limit in [4.0, 6.9, 12.0, 33.0, 60.0, 130.0, 250.0] {
-            let labels = (limit / label_distance(limit)).floor();
-            assert!((1.0..=3.0).contains(&labels), "{limit}: {labels}");
-        }
-    }
+        figure_data: Default::default(),
+    };
+    standalone(&channel::deviation_plot(&channel, 1.0 / of.trace.before.sample_period(), 2)).svg
 }

@@ -2,9 +2,17 @@
 //! and the text that explains a recording.
 
 pub mod coefficients;
+pub mod comparison;
 pub mod explanation;
 pub mod export;
 pub mod figure;
+pub mod finding_text;
 pub mod formatting;
+pub mod full_tables;
 pub mod page;
+pub mod raster;
+pub mod rounding;
+pub mod saved_report;
+pub mod several;
+pub mod summary;
 pub mod terminal;

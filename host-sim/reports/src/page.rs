@@ -1,170 +1,211 @@
-//! The report as one HTML file that needs no other: style and figures are inside. The same report gives the same bytes.
+//! The report as one HTML file that needs no other: style, script, figures and their values are inside, and a policy in it forbids
+//! every request. The same report gives the same bytes.
 
 mod tables;
 
-use crate::figure::{self, FigureError};
+use crate::figure::{self, Plot};
+use crate::finding_text::{FindingText, describe};
 use crate::formatting::{
-    count, duration, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit,
-    words, worst_deviations,
+    count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit, words,
+    worst_deviations,
 };
+use crate::rounding::bounded_quantity;
+use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::assessment::Assessment;
-use noise_analysis::report::{ChannelReport, Report};
+use noise_analysis::report::{ChannelReport, Finding, Report};
 use std::path::{Path, PathBuf};
 
 const STYLE: &str = include_str!("page/style.css");
+const SCRIPT: &str = include_str!("page/script.js");
+/// Only what is in the file itself.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// The page could not be written.
 #[derive(Debug, thiserror::Error)]
-pub enum PageError {
-    /// The folder or the file cannot be written.
-    #[error("cannot write the page {}: {reason}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        reason: std::io::Error,
-    },
-    /// A figure could not be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
+#[error("cannot write the page {}: {reason}", path.display())]
+pub struct PageError {
+    /// The file.
+    pub path: PathBuf,
+    /// The error of the operating system.
+    pub reason: std::io::Error,
 }
 
 /// Writes `index.html` into `dir`, which is made if it is missing, and returns its path.
 ///
 /// # Errors
-/// A figure cannot be drawn, or the file cannot be written.
+/// The folder or the file cannot be written.
 pub fn write(report: &Report, dir: &Path) -> Result<PathBuf, PageError> {
-    let page = render(report)?.into_string();
+    let page = render(report).into_string();
     let path = dir.join("index.html");
     std::fs::create_dir_all(dir)
         .and_then(|()| std::fs::write(&path, page))
-        .map_err(|reason| PageError::Write { path: path.clone(), reason })?;
+        .map_err(|reason| PageError { path: path.clone(), reason })?;
     Ok(path)
 }
 
-fn render(report: &Report) -> Result<Markup, FigureError> {
-    let channels = report
-        .channels
-        .iter()
-        .map(|channel| Ok((channel, figure::allan_deviation(channel)?)))
-        .collect::<Result<Vec<_>, FigureError>>()?;
-    Ok(html! {
+fn render(report: &Report) -> Markup {
+    let [light, dark] = figure::style();
+    let part = if report.part.name.is_empty() { "Sensor" } else { &report.part.name };
+    html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { "ADIS16405 noise report" }
-                style { (PreEscaped(STYLE)) (PreEscaped(dark_figures())) }
+                title { (part) " noise report" }
+                style { (PreEscaped(STYLE)) (PreEscaped(light)) "@media screen and (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
             }
             body {
+                a.skip href="#findings" { "To the findings" }
                 header {
-                    h1 { "ADIS16405 noise report" }
-                    p { "Allan deviation of each channel, the coefficients by the slope method beside the fit, \
-                         and how well the model predicts data it has not seen." }
+                    h1 { (part) " noise report" }
+                    p.headline { (summary::headline(report, None)[1..].join(" · ")) }
                 }
+                (contents(report))
                 main {
-                    (summary(report))
-                    @if !channels.is_empty() {
-                        section { h2 { "Overview" } (tables::overview(report)) }
+                    div.first {
+                        (verdict(report))
+                        @if let Some(plot) = figure::overview(report) { section { (drawing(&plot)) } }
                     }
-                    @for (channel, figure) in &channels { (channel_section(channel, figure)) }
+                    (findings(report))
+                    @for channel in in_reading_order(report) { (channel_section(report, channel)) }
                     (definitions())
                 }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
-    })
+    }
 }
 
-/// The rules that replace every colour of the figures on a dark page.
-fn dark_figures() -> String {
-    let rules: String = figure::DARK_COLOURS
-        .iter()
-        .map(|(light, dark)| format!("svg [fill=\"{light}\"]{{fill:{dark}}}svg [stroke=\"{light}\"]{{stroke:{dark}}}"))
-        .collect();
-    format!("@media (prefers-color-scheme: dark) {{{rules}}}")
+/// Gyros, accelerometers, then the conditions.
+fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
+    let rank = |channel: &ChannelReport| {
+        let known = ["gyro_", "accl_", "magn_"].iter().position(|prefix| channel.name.starts_with(prefix));
+        known.unwrap_or(3)
+    };
+    let mut channels: Vec<&ChannelReport> = report.channels.iter().collect();
+    channels.sort_by_key(|channel| rank(channel));
+    channels.into_iter()
 }
 
-/// Sample rate, numbers of samples and channels, and the samples dropped by cause.
-fn summary(report: &Report) -> Markup {
-    let lost: u64 = report.dropped.values().fold(0, |sum, &samples| sum.saturating_add(samples));
-    let length = duration(report.samples as f64 / report.sample_rate_hz);
-    let names: Vec<&str> = report.channels.iter().map(|channel| channel.name.as_str()).collect();
+/// Links to every section.
+fn contents(report: &Report) -> Markup {
     html! {
-        section.cards aria-label="The record" {
-            (card("Sample rate", &format!("{} Hz", number(report.sample_rate_hz)), ""))
-            (card("Samples used", &count(report.samples), &length))
-            (card("Channels", &count(report.channels.len() as u64), &names.join(", ")))
-            div.card {
-                h2 { "Samples dropped" }
-                p.figure { (count(lost)) }
-                @if report.dropped.is_empty() {
-                    p.note { "none" }
-                } @else {
-                    ul.causes {
-                        @for (cause, samples) in &report.dropped {
-                            li { span { (words(cause)) } " " b { (count(*samples)) } }
-                        }
-                        @for (cause, samples) in &report.flagged {
-                            li { span { (words(cause)) ", used" } " " b { (count(*samples)) } }
-                        }
+        nav aria-label="Sections" {
+            a href="#findings" { "Findings" }
+            @for channel in in_reading_order(report) { a href={ "#" (channel.name) } { (words(&channel.name)) } }
+            a href="#reading" { "How to read this" }
+        }
+    }
+}
+
+/// The record in sentences, the coefficients, and what to do.
+fn verdict(report: &Report) -> Markup {
+    let contradictions = summary::contradictions(report);
+    html! {
+        section.verdict aria-label="Verdict" {
+            @for sentence in summary::record_sentences(report) { p { (sentence) } }
+            @let conditions = summary::conditions(report);
+            @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
+            (tables::coefficients_of_all(report))
+            @if !contradictions.is_empty() {
+                h3 { "What the data contradicts" }
+                ul { @for text in &contradictions { li.warning { (text) "." } } }
+            }
+            @let steps = summary::next_steps(report);
+            @if !steps.is_empty() {
+                h3 { "What to do" }
+                ul { @for step in &steps { li { (step) } } }
+            }
+        }
+    }
+}
+
+/// A figure with its values for the pointer and the keyboard.
+fn drawing(plot: &Plot) -> Markup {
+    html! {
+        figure id=(plot.id) tabindex="0" aria-label={ (plot.title) ". Arrow keys read the values." } {
+            figcaption { (plot.title) }
+            div.drawing { (plot.svg(None)) }
+            output aria-live="polite" { (plot.description) }
+            script.values type="application/json" { (PreEscaped(plot.values())) }
+        }
+    }
+}
+
+/// Every finding with its words, its parameters, the analysis' evidence and a picture.
+fn findings(report: &Report) -> Markup {
+    html! {
+        section id="findings" {
+            h2 { "What was found" }
+            @if report.findings.is_empty() {
+                p { "Nothing: N, B and K describe every channel." }
+            } @else {
+                ol.list {
+                    @for (index, finding) in report.findings.iter().enumerate() {
+                        @let text = describe(finding);
+                        li { a href={ "#evidence-" (index + 1) } { (text.channels) } ": " (text.physics) }
                     }
                 }
             }
         }
-    }
-}
-
-fn card(title: &str, value: &str, note: &str) -> Markup {
-    html! {
-        div.card {
-            h2 { (title) }
-            p.figure { (value) }
-            @if !note.is_empty() { p.note { (note) } }
+        @for (index, finding) in report.findings.iter().enumerate() {
+            (finding_section(report, index, finding, &describe(finding)))
         }
     }
 }
 
-/// One channel with its figure and tables.
-fn channel_section(channel: &ChannelReport, figure: &str) -> Markup {
-    let same = channel.after == channel.before;
+fn finding_section(report: &Report, index: usize, finding: &Finding, text: &FindingText) -> Markup {
+    html! {
+        section.finding id={ "evidence-" (index + 1) } {
+            h3 { (index + 1) ". " (words(&finding.kind)) " " small { (text.channels) } }
+            p { (text.physics) " " (text.advice) }
+            p.faint { @if !finding.evidence.starts_with(&text.weight) { "In the record: " (text.weight) ". " } (finding.evidence) }
+            (parameters(finding))
+            @if let Some(plot) = figure::evidence(report, index) { (drawing(&plot)) }
+        }
+    }
+}
+
+fn parameters(finding: &Finding) -> Markup {
+    html! {
+        p.parameters {
+            @for (name, parameter) in &finding.parameters {
+                span { (parameter_name(name)) " " b { (bounded_quantity(parameter)) } }
+            }
+        }
+    }
+}
+
+/// One channel with its figures and tables.
+fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
     html! {
         section.channel id=(channel.name) {
-            h2 { (channel.name) " " small { (unit(&channel.unit)) " · " (count(channel.samples)) " samples" } }
+            h2 { (words(&channel.name)) " " small { (unit(&channel.unit)) " · " (count(channel.samples)) " samples" } }
             @let missing = missing_samples(&channel.missing);
-            @if !missing.is_empty() { p.note { "Missing: " (missing) "." } }
-            figure role="img" aria-label={ "Allan deviation of " (channel.name) } { (PreEscaped(figure)) }
+            @if !missing.is_empty() { p.faint { "Missing: " (missing) "." } }
+            @if channel.curve.is_empty() { p { "The record is too short for a point of the curve." } }
+            @for plot in figure::channel_plots(report, channel) { (drawing(&plot)) }
             div.tables {
                 div {
-                    h3 { "Coefficients" }
-                    (tables::coefficients(channel))
-                    @if !same {
-                        h3 { "Model with the traced effects" }
-                        (tables::terms(&channel.after))
-                    }
+                    h3 { "Model, fitted to the whole record" }
+                    (tables::terms(&channel.refitted))
                 }
                 div {
-                    h3 { "Model error" }
+                    h3 { "Error, before and after" }
                     (tables::errors(channel))
                     @let far = worst_deviations(channel);
-                    @if !far.is_empty() { ul.effects { @for text in &far { li { (text) "." } } } }
-                    @if channel.effects.is_empty() {
-                        p.note { "No effect was traced"
-                            @if same { ": after equals before" } "." }
+                    @if !far.is_empty() { ul { @for text in &far { li.warning { (text) "." } } } }
+                    @let own: Vec<usize> = (0..report.findings.len())
+                        .filter(|index| report.findings[*index].channels.contains(&channel.name)).collect();
+                    @if own.is_empty() {
+                        p.faint { "No finding concerns this channel." }
                     } @else {
-                        h3 { "Effects traced" }
-                        ul.effects {
-                            @for effect in &channel.effects {
-                                li { b { (words(&effect.kind)) } ": " (effect.evidence)
-                                    @for (name, p) in &effect.parameters {
-                                        span.parameter { (parameter_name(name)) " " (number(p.value))
-                                            " " (unit(&p.unit)) " (" (interval(p.low, p.high)) ")" }
-                                    }
-                                }
-                            }
-                        }
+                        p { "Findings: " @for index in own {
+                            a href={ "#evidence-" (index + 1) } { (index + 1) " " (words(&report.findings[index].kind)) } " " } }
                     }
                 }
             }
@@ -185,7 +226,7 @@ fn assessment(assessment: &Assessment) -> Markup {
     html! {
         @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
         @if !assessment.drift.is_empty() { (tables::drift(&assessment.drift)) }
-        ul.effects {
+        ul {
             @if let Some(innovations) = &assessment.innovations {
                 li { b { "Kalman filter of the model" } ", unseen half: " (filter_consistency(innovations)) "."
                     span.parameter { (count(innovations.count as u64)) " innovations, " (number(innovations.normalised))
@@ -212,36 +253,40 @@ fn assessment(assessment: &Assessment) -> Markup {
 /// What the words and numbers of the page mean.
 fn definitions() -> Markup {
     html! {
-        section.definitions {
+        section.definitions id="reading" {
             h2 { "How to read this" }
             dl {
                 dt { "Intervals" }
                 dd { "have a confidence of 95 %, from the equivalent degrees of freedom (edf) of each point." }
-                dt { "Before and after" }
+                dt { "Before, after, model" }
                 dd { "Before is the baseline model: angle random walk " i { "N" } ", bias instability " i { "B" }
-                     ", rate random walk " i { "K" } ". After adds the effects that were traced." }
-                dt { "Model error" }
-                dd { "Models are fitted to the first half of the samples and checked on the second, unseen half. "
-                     "With " i { "v" } " the measured and " i { "m" } " the modelled Allan variance, over the "
-                     "octaves with " i { "n" } " ≤ " i { "M" } "/8: rms is 100·√(mean (½ ln(" i { "v/m" }
+                     ", rate random walk " i { "K" } ". After adds what was found; both are fitted to the first half. The model is "
+                     "that of after, fitted once more to the whole record: the one to use." }
+                dt { "Error" }
+                dd { "With " i { "v" } " the measured and " i { "m" } " the modelled Allan variance, over the "
+                     "octaves with " i { "n" } " ≤ " i { "M" } "/8 of a half: rms is 100·√(mean (½ ln(" i { "v/m" }
                      "))²) %, deviance a point is mean edf·(ln(" i { "m/v" } ") + " i { "v/m" }
                      " − 1), which is about 1 for a true model. Beneath is the largest deviation of a point over all "
                      "averaging times, in standard deviations σ; beyond ±4 σ it is told in words." }
+                dt { "Residual" }
+                dd { "is the cube root of measured over modelled variance less its mean, in standard deviations of each point "
+                     "(Wilson and Hilferty): of a true model 95 % are between −2 and 2." }
+                dt { "Spectrum" }
+                dd { "is the root of the one-sided power spectral density by Welch's method, in bands of equal width on the "
+                     "logarithmic axis; lines that stand out have a point of their own." }
+                dt { "Bias over time" }
+                dd { "is the mean of each block less that of the record. What it follows are steps, ramps, temperature, supply and "
+                     "specific force with the sensitivities that were found." }
                 dt { "By PSD" }
                 dd { "is the deviation by equation (5), σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df, from the measured "
                      "spectrum instead of differences of means." }
                 dt { "Error after a time" }
                 dd { "is the root mean square of the integral over that time, of a vehicle that took the mean of the 60 s "
                      "before as its bias: an angle of a gyro, a velocity of an accelerometer." }
-                dt { "Innovations" }
-                dd { "are what a Kalman filter of the model does not predict of quarter seconds of the unseen half. Of a true "
-                     "model they are white and of the expected variance." }
                 dt { "Continuous and discrete" }
                 dd { "coefficients belong to the process and to its samples at this rate: they are different numbers." }
-                dt { "Slope method" }
-                dd { i { "N" } " is the −½ slope at 1 s, " i { "B" } " the flat minimum divided by √(2 ln 2/π) = "
-                     "0.664, " i { "K" } " the +½ slope at 3 s. Accuracy is 100/√(2(" i { "N/n" } " − 1)) %, with "
-                     i { "N" } " samples in all." }
+                dt { "Data sheet" }
+                dd { "values are typical. Its in-run bias stability is the minimum of the curve; " i { "B" } " is that over 0.664." }
             }
         }
     }

@@ -1,244 +1,270 @@
-//! The report as text: at most 100 columns, the same in a terminal and in a file.
+//! The report on one screen: at most [`MOST_LINES`] lines. Styles are ANSI sequences, which the writer removes where they are not
+//! wanted.
 
-use crate::coefficients::{self, CoefficientRow};
-use crate::formatting::{
-    NONE, TextTable, count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name,
-    percent, recording_advice, unit, words, worst_deviations, wrap,
-};
-use noise_analysis::assessment::navigation::CALIBRATION_S;
-use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
-use noise_analysis::report::{ChannelReport, Parameter, Report, TermReport};
-use std::collections::BTreeMap;
+use crate::finding_text::FindingText;
+use crate::summary::{self, CoefficientTable};
+use anstyle::{AnsiColor, Style};
+use noise_analysis::report::Report;
 use std::io::{self, Write};
 
-/// Columns of the longest line.
-const WIDTH: u16 = 100;
+/// Lines of the screen at most.
+pub const MOST_LINES: usize = 40;
+/// Columns of the narrowest and of the widest screen. Text is not wider than [`TEXT`].
+const NARROWEST: usize = 80;
+const WIDEST: usize = 200;
+/// Columns of a line of text that is read with ease.
+const TEXT: usize = 110;
+/// Columns of the channel's label, and of the error.
+const LABEL: usize = 7;
+const ERROR: usize = 15;
+/// Columns of the channels of a finding, with its number.
+const CHANNELS: usize = 17;
 
-/// Writes the whole report.
-///
-/// # Errors
-/// `out` cannot be written.
-pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "ADIS16405 noise report")?;
-    writeln!(out, "══════════════════════")?;
-    writeln!(out, "sample rate  {} Hz", number(report.sample_rate_hz))?;
-    let length = duration(report.samples as f64 / report.sample_rate_hz);
-    writeln!(out, "samples      {} used, {length}", count(report.samples))?;
-    writeln!(out, "dropped      {}", by_cause(&report.dropped))?;
-    writeln!(out, "flagged      {}", by_cause(&report.flagged))?;
-    for channel in &report.channels {
-        section(channel, out)?;
-    }
-    writeln!(out)?;
-    writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
-    writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
-    writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")?;
-    writeln!(out, "worst σ: largest deviation of a point over all τ; beyond ±4 it is told in words.")?;
-    writeln!(out, "by PSD: σ(τ) by equation (5), from the measured spectrum instead of differences of means.")?;
-    if report.channels.iter().any(|channel| channel.after.unseen_excluding.is_some()) {
-        writeln!(out, "excluding: without what the first half's rules for spikes and knocks find in the unseen half.")?;
-    }
-    writeln!(
-        out,
-        "error after t: rms of the integral over t when the bias is the mean of the {CALIBRATION_S} s before."
-    )
+const HEADING: Style = Style::new().bold();
+const FAINT: Style = Style::new().dimmed();
+const WARNING: Style = AnsiColor::Yellow.on_default().bold();
+
+/// The screen of a report.
+#[derive(Debug, Clone, Copy)]
+pub struct Screen<'a> {
+    /// The report.
+    pub report: &'a Report,
+    /// Name of the recording, if it has one.
+    pub source: Option<&'a str>,
+    /// Columns of the terminal.
+    pub columns: usize,
 }
 
-/// Numbers of samples by cause, as a list.
-fn by_cause(counts: &BTreeMap<String, u64>) -> String {
-    if counts.values().all(|&samples| samples == 0) {
-        return "none".to_owned();
-    }
-    let causes = counts.iter().filter(|(_, samples)| **samples > 0);
-    let listed: Vec<String> = causes.map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
-    listed.join(", ")
-}
-
-fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
-    let name = format!("{} · {}", channel.name, unit(&channel.unit));
-    let samples = format!("{} samples", count(channel.samples));
-    let used = name.chars().count() + samples.chars().count() + 6;
-    let rule = "─".repeat(usize::from(WIDTH).saturating_sub(used));
-    writeln!(out, "\n── {name} {rule} {samples}\n")?;
-    let missing = missing_samples(&channel.missing);
-    if !missing.is_empty() {
-        writeln!(out, "{}\n", wrap(&format!("Missing: {missing}."), WIDTH.into()))?;
-    }
-
-    writeln!(out, "{}", coefficient_table(channel))?;
-    let same = channel.after == channel.before;
-    if !same {
-        writeln!(out, "{}", term_table(&channel.after.terms))?;
-    }
-    writeln!(out, "{}", error_table(channel))?;
-    for text in worst_deviations(channel) {
-        writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
-    }
-    for effect in &channel.effects {
-        writeln!(out, "{}", wrap(&format!("• {}: {}", words(&effect.kind), effect.evidence), WIDTH.into()))?;
-    }
-    if same && channel.effects.is_empty() {
-        writeln!(out, "No effect was added to the baseline model: after equals before.")?;
-    }
-    write_assessment(&channel.assessment, out)?;
-    if channel.curve.is_empty() {
-        return writeln!(out, "The record is too short for a point of the curve.");
-    }
-    writeln!(out, "{}", curve_table(channel))
-}
-
-/// A table whose first `left` columns are text and the others numbers.
-fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> TextTable {
-    TextTable::new(header.iter().copied(), left, rows).within(WIDTH)
-}
-
-fn coefficient_table(channel: &ChannelReport) -> TextTable {
-    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit", "95 % interval"];
-    let row = |row: CoefficientRow<'_>| {
-        let (by_slope, found) = match (row.slope_value, row.slope) {
-            (Some(value), _) => (number(value.value), interval(value.from_s, value.to_s)),
-            (None, "") => (NONE.to_owned(), NONE.to_owned()),
-            (None, _) => (NONE.to_owned(), "no such slope".to_owned()),
-        };
-        let [fit, bounds] = fitted(row.fit);
-        vec![words(row.kind), unit(row.unit), by_slope, found, fit, bounds]
-    };
-    table(&header, 2, coefficients::rows(channel).into_iter().map(row))
-}
-
-/// Estimate and interval.
-fn fitted(parameter: Option<&Parameter>) -> [String; 2] {
-    match parameter {
-        Some(p) => [number(p.value), interval(p.low, p.high)],
-        None => [NONE.to_owned(), NONE.to_owned()],
-    }
-}
-
-fn term_table(terms: &[TermReport]) -> TextTable {
-    let rows = terms.iter().flat_map(|term| {
-        term.parameters.iter().map(|(name, parameter)| {
-            let [fit, bounds] = fitted(Some(parameter));
-            vec![words(&term.kind), parameter_name(name), unit(&parameter.unit), fit, bounds]
-        })
-    });
-    let header = ["with the effects", "parameter", "unit", "fit", "95 % interval"];
-    table(&header, 3, rows)
-}
-
-fn error_table(channel: &ChannelReport) -> TextTable {
-    let rows = [("before", &channel.before), ("after", &channel.after)].into_iter().flat_map(|(name, model)| {
-        let all = vec![
-            name.to_owned(),
-            percent(model.fitted.rms_percent),
-            percent(model.unseen.rms_percent),
-            optional(model.fitted.deviance_per_point),
-            optional(model.unseen.deviance_per_point),
-            optional(model.fitted.worst_sigma),
-            optional(model.unseen.worst_sigma),
-        ];
-        let excluding = model.unseen_excluding.as_ref().map(|error| {
-            vec![
-                format!("{name}, excluding"),
-                String::new(),
-                percent(error.rms_percent),
-                String::new(),
-                optional(error.deviance_per_point),
-                String::new(),
-                optional(error.worst_sigma),
-            ]
-        });
-        [Some(all), excluding].into_iter().flatten()
-    });
-    let header = ["model error", "rms fitted", "unseen", "deviance fitted", "unseen", "worst σ fitted", "unseen"];
-    table(&header, 1, rows)
-}
-
-fn curve_table(channel: &ChannelReport) -> TextTable {
-    let same = channel.after == channel.before;
-    let mut header = vec!["n", "τ, s", "σ(τ)", "low", "high", "edf", "accuracy, %", "by PSD"];
-    header.extend(if same { &["model"][..] } else { &["before", "after"] });
-    let rows = channel.curve.iter().enumerate().map(|(index, point)| {
-        let mut row = vec![
-            count(point.n),
-            number(point.tau_s),
-            number(point.adev),
-            number(point.low),
-            number(point.high),
-            number(point.edf),
-            number(point.accuracy_percent),
-            optional(point.adev_by_spectrum),
-            optional(channel.before.adev.get(index).copied()),
-        ];
-        if !same {
-            row.push(optional(channel.after.adev.get(index).copied()));
+impl Screen<'_> {
+    /// Writes the screen.
+    ///
+    /// # Errors
+    /// `out` cannot be written.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        for line in self.lines() {
+            writeln!(out, "{line}")?;
         }
-        row
-    });
-    table(&header, 0, rows)
+        Ok(())
+    }
+
+    fn columns(&self) -> usize {
+        self.columns.clamp(NARROWEST, WIDEST)
+    }
+
+    fn text_columns(&self) -> usize {
+        self.columns().min(TEXT)
+    }
+
+    /// The lines, with styles.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let report = self.report;
+        let mut above = self.above();
+        let below = self.below();
+        let (found, unexplained) = summary::findings(report);
+        let mut blocks: Vec<Vec<String>> =
+            found.iter().enumerate().map(|(index, finding)| self.finding(index + 1, finding)).collect();
+        let mut rest: Vec<String> = unexplained
+            .iter()
+            .flat_map(|finding| {
+                self.block("Not explained", &format!("{}: {}", finding.channels, finding.physics), WARNING)
+            })
+            .collect();
+        if blocks.is_empty() && rest.is_empty() {
+            blocks.push(vec![" Nothing: N, B and K describe every channel.".to_owned()]);
+        }
+        let fixed = above.len() + below.len() + 2;
+        rest.truncate(MOST_LINES.saturating_sub(fixed + 2));
+        let room = MOST_LINES.saturating_sub(fixed + rest.len());
+        above.push(String::new());
+        above.push(styled(HEADING, "What was found"));
+        let total: usize = blocks.iter().map(Vec::len).sum();
+        let mut left = if total > room { room.saturating_sub(1) } else { room };
+        let mut shown = 0;
+        for block in &blocks {
+            if block.len() > left {
+                break;
+            }
+            left -= block.len();
+            shown += 1;
+            above.extend(block.iter().cloned());
+        }
+        if shown < blocks.len() {
+            above.push(styled(FAINT, &format!(" … and {} more: --full", blocks.len() - shown)));
+        }
+        above.extend(rest);
+        above.extend(below);
+        above
+    }
+
+    /// Verdict, coefficients and conditions.
+    fn above(&self) -> Vec<String> {
+        let report = self.report;
+        let mut lines =
+            vec![styled(HEADING, &shortened(&summary::headline(report, self.source).join("   "), self.columns()))];
+        lines.extend(wrapped(&summary::record_sentences(report).join(" "), self.text_columns()));
+        let tables = summary::coefficient_tables(report);
+        if !tables.is_empty() {
+            lines.push(String::new());
+        }
+        for (index, table) in tables.iter().enumerate() {
+            lines.extend(self.table(table, index == 0));
+        }
+        let conditions = summary::conditions(report);
+        if !conditions.is_empty() {
+            lines.extend(self.block("Conditions", &format!("{}.", conditions.join("; ")), FAINT));
+        }
+        lines
+    }
+
+    fn table(&self, table: &CoefficientTable, is_first: bool) -> Vec<String> {
+        let width = ((self.columns() - LABEL - ERROR) / 3).min(26);
+        let row = |cells: [&str; 5]| {
+            let [label, n, b, k, error] = cells;
+            let line = format!(
+                "{}{}{}{}{}",
+                padded(&format!(" {label}"), LABEL),
+                padded(n, width),
+                padded(b, width),
+                padded(k, width),
+                left_padded(error, ERROR)
+            );
+            line.trim_end().to_owned()
+        };
+        let mut lines = Vec::new();
+        if is_first {
+            let names = ["angle random walk", "bias instability", "rate random walk"];
+            lines.push(styled(HEADING, &row([table.title, names[0], names[1], names[2], "error on  "])));
+        }
+        let [n, b, k] = &table.units;
+        let units = if is_first { row(["", n, b, k, "unseen half  "]) } else { row([table.title, n, b, k, ""]) };
+        lines.push(if is_first { styled(FAINT, &units) } else { styled(HEADING, &units) });
+        for of in &table.rows {
+            let [n, b, k] = &of.coefficients;
+            let error = if of.is_high { format!("{} !", of.error) } else { format!("{}  ", of.error) };
+            let line = row([&of.label, n, b, k, &error]);
+            lines.push(match (of.is_high, of.channel.is_empty()) {
+                (true, _) => styled(WARNING, &line),
+                (_, true) => styled(FAINT, &line),
+                _ => line,
+            });
+        }
+        lines
+    }
+
+    /// One finding: number, channels, physics and weight.
+    fn finding(&self, number: usize, finding: &FindingText) -> Vec<String> {
+        let text = if finding.weight.is_empty() {
+            finding.physics.clone()
+        } else {
+            format!("{} {}.", finding.physics, capital(&finding.weight))
+        };
+        let label = format!("{number:>2}  {}", finding.channels);
+        // A long list of channels has lines of its own beside the text.
+        let labels = wrapped_to(&label, CHANNELS - 1, "    ");
+        let texts = wrapped(&text, self.text_columns() - CHANNELS);
+        (0..labels.len().max(texts.len()))
+            .map(|line| {
+                let label = labels.get(line).map_or("", String::as_str);
+                let text = texts.get(line).map_or("", String::as_str);
+                format!("{}{text}", padded(label, CHANNELS)).trim_end().to_owned()
+            })
+            .collect()
+    }
+
+    /// What the data contradicts, and what to do.
+    fn below(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let contradictions = summary::contradictions(self.report);
+        if !contradictions.is_empty() {
+            const MOST: usize = 3;
+            let mut told = contradictions.iter().take(MOST).cloned().collect::<Vec<_>>().join("; ");
+            if contradictions.len() > MOST {
+                told += &format!("; {} more: --full", contradictions.len() - MOST);
+            }
+            lines.extend(self.block("Contradicted", &format!("{told}."), WARNING));
+        }
+        let steps = summary::next_steps(self.report);
+        if !steps.is_empty() {
+            lines.push(String::new());
+            lines.extend(self.block("What to do", &steps.join(" "), HEADING));
+        }
+        lines
+    }
+
+    /// A heading with text beside it.
+    fn block(&self, heading: &str, text: &str, style: Style) -> Vec<String> {
+        let texts = wrapped(text, self.text_columns() - CHANNELS);
+        let labelled = |(index, text): (usize, String)| {
+            let label = if index == 0 { heading } else { "" };
+            let space = " ".repeat(CHANNELS.saturating_sub(label.chars().count()));
+            let label = if label.is_empty() { String::new() } else { styled(style, label) };
+            format!("{label}{space}{text}")
+        };
+        texts.into_iter().enumerate().map(labelled).collect()
+    }
 }
 
-/// What the model is good for: other units, drift, a filter's innovations, longer records.
-fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
-    if !assessment.coefficients.is_empty() {
-        writeln!(out, "{}", unit_table(&assessment.coefficients))?;
-    }
-    if !assessment.drift.is_empty() {
-        writeln!(out, "{}", drift_table(&assessment.drift))?;
-    }
-    if let Some(innovations) = &assessment.innovations {
-        let text = format!(
-            "• Kalman filter of the model on the unseen half: {} innovations, {} of the expected variance ({} for a true \
-             model), whiteness p = {}: {}.",
-            innovations.count,
-            number(innovations.normalised),
-            interval(innovations.low, innovations.high),
-            number(innovations.whiteness_p),
-            filter_consistency(innovations)
-        );
-        writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
-    }
-    let by_spectrum = assessment
-        .angle_random_walk_by_spectrum
-        .as_ref()
-        .map(|n| format!("{} {} ({})", number(n.value), unit(&n.unit), interval(n.low, n.high)));
-    let told = match (by_spectrum, &assessment.angle_random_walk_by_spectrum_note) {
-        (Some(value), Some(note)) => Some(format!("{value}; {note}")),
-        (Some(value), None) => Some(value),
-        (None, Some(note)) => Some(format!("none, {note}")),
-        (None, None) => None,
-    };
-    if let Some(told) = told {
-        writeln!(out, "{}", wrap(&format!("• N by the spectrum: {told}."), WIDTH.into()))?;
-    }
-    if let Some(time) = &assessment.markov_time_by_autocorrelation {
-        let value = format!("{} {}", number(time.value), unit(&time.unit));
-        writeln!(out, "• Markov time by the autocorrelation: {value} ({}).", interval(time.low, time.high))?;
-    }
-    assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-fn unit_table(coefficients: &[Coefficient]) -> TextTable {
-    let row = |coefficient: &Coefficient| {
-        let value = &coefficient.value;
-        let sense = if coefficient.discrete { "discrete, of samples" } else { "continuous" };
-        let kind = words(&coefficient.kind);
-        vec![kind, sense.to_owned(), unit(&value.unit), number(value.value), interval(value.low, value.high)]
-    };
-    let header = ["in other units", "", "unit", "value", "95 % interval"];
-    table(&header, 3, coefficients.iter().map(row))
+fn styled(style: Style, text: &str) -> String {
+    format!("{style}{text}{style:#}")
 }
 
-fn drift_table(drifts: &[NavigationDrift]) -> TextTable {
-    let row = |drift: &NavigationDrift| {
-        let observed = drift.observed.as_ref();
-        vec![
-            duration(drift.seconds),
-            unit(&drift.unit),
-            number(drift.predicted),
-            observed.map_or_else(|| "too short".to_owned(), |observed| number(observed.value)),
-            observed.map_or_else(String::new, |observed| interval(observed.low, observed.high)),
-        ]
-    };
-    let header = ["error after", "unit", "predicted", "unseen half", "95 % interval"];
-    table(&header, 1, drifts.iter().map(row))
+/// `text` with spaces after it up to `width` columns, at least one.
+fn padded(text: &str, width: usize) -> String {
+    let space = width.saturating_sub(text.chars().count()).max(usize::from(!text.is_empty()));
+    format!("{text}{}", " ".repeat(space))
+}
+
+fn left_padded(text: &str, width: usize) -> String {
+    format!("{}{text}", " ".repeat(width.saturating_sub(text.chars().count())))
+}
+
+/// `text` cut off behind `width` columns.
+fn shortened(text: &str, width: usize) -> String {
+    if text.chars().count() <= width {
+        return text.to_owned();
+    }
+    text.chars().take(width.saturating_sub(1)).chain(['…']).collect()
+}
+
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    wrapped_to(text, width, "")
+}
+
+/// `text` broken between words into lines of at most `width` columns; all but the first begin with `indent`. A longer word
+/// is broken.
+fn wrapped_to(text: &str, width: usize, indent: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = String::new();
+    // Leading spaces of the text are kept.
+    let lead: String = text.chars().take_while(|letter| *letter == ' ').collect();
+    line.push_str(&lead);
+    let mut is_empty = true;
+    // Two spaces between the number and the channels of a finding are kept too.
+    for word in text.trim_start().split(' ') {
+        let length = line.chars().count() + usize::from(!is_empty) + word.chars().count();
+        if !is_empty && length > width {
+            lines.push(line.trim_end().to_owned());
+            line = indent.to_owned();
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line.push_str(word);
+        is_empty = false;
+        while line.chars().count() > width {
+            let head: String = line.chars().take(width).collect();
+            let tail: String = line.chars().skip(width).collect();
+            lines.push(head);
+            line = format!("{indent}{tail}");
+        }
+    }
+    lines.push(line.trim_end().to_owned());
+    lines
 }

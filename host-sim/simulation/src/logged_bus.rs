@@ -1,16 +1,16 @@
 //! The emulated bus with a frame log of every transaction.
 
+use crate::fault_injector::FaultyBus;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::frame_log::{Frame, FrameLogWriter};
 use std::cell::RefCell;
 use std::io;
 use std::rc::Rc;
-use virtual_sensor::EmulatedBus;
 
 /// The emulated bus; every transaction is written to a frame log.
 #[derive(Debug)]
 pub(crate) struct LoggedBus {
-    bus: EmulatedBus,
+    bus: FaultyBus,
     log: Rc<RefCell<FrameLogWriter>>,
     failure: Rc<RefCell<Option<io::Error>>>,
     frame: Frame,
@@ -28,7 +28,7 @@ impl Error for LoggedBusError {
 
 impl LoggedBus {
     /// Logs the transactions of `bus` to `log`.
-    pub(crate) fn new(bus: EmulatedBus, log: Rc<RefCell<FrameLogWriter>>) -> Self {
+    pub(crate) fn new(bus: FaultyBus, log: Rc<RefCell<FrameLogWriter>>) -> Self {
         Self { bus, log, failure: Rc::default(), frame: Frame::default() }
     }
 
@@ -45,7 +45,7 @@ impl ErrorType for LoggedBus {
 impl SpiDevice<u8> for LoggedBus {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), LoggedBusError> {
         let frame = &mut self.frame;
-        frame.time_s = seconds(self.bus.part().now());
+        frame.time_s = seconds(self.bus.bus().part().now());
         frame.mosi.clear();
         frame.miso.clear();
         // MOSI is copied before the transaction, which overwrites it in place.

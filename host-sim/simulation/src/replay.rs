@@ -3,12 +3,13 @@
 //! Each burst of a frame log, or each row of a table as the burst that the part would have sent, is one transaction. The
 //! driver requests and decodes it as from a part; the decoded samples become the recording.
 
+use crate::bus_timing::CapturedBusTiming;
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::count_table::CountTable;
 use recordings::frame_log::{Frame, FrameLogReader};
-use recordings::recorded_file::RecordedFile;
+use recordings::recorded_file::{FrameReader, RecordedFile};
 use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
 use recordings::{InputError, Reason};
 use std::cell::RefCell;
@@ -22,15 +23,17 @@ pub struct Replay {
     pub recording: Recording,
     /// Number of transactions that were no burst reads; they are not decoded.
     pub other_transactions: u64,
+    /// The times on the bus, as far as the file says them.
+    pub timing: CapturedBusTiming,
 }
 
-/// Replays a table of counts or a frame log, told apart by the header of `file`.
+/// Replays a table of counts, a frame log or an export of a logic analyzer, told apart by the header of `file`.
 ///
 /// # Errors
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
 pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
     match RecordedFile::open(file)? {
-        RecordedFile::FrameLog(frames) => replay_frames(file, frames, range),
+        RecordedFile::Frames(frames) => replay_frames(file, frames, range),
         RecordedFile::Table(rows) => replay_rows(file, rows, range),
     }
 }
@@ -52,7 +55,7 @@ fn replay_rows(file: &Path, mut rows: CountTable, range: GyroRange) -> Result<Re
             player.burst(&BURST_REQUEST, &answer).map_err(|reason| InputError::line(file, rows.line(), reason))?;
         recorder.push(row.time_stamp, &burst);
     }
-    Ok(Replay { recording: recorder.finish(), other_transactions: 0 })
+    Ok(Replay { recording: recorder.finish(), other_transactions: 0, timing: CapturedBusTiming::default() })
 }
 
 /// Replays a frame log. The range is `range` unless a write to SENS_AVG before the first burst selects another.
@@ -60,17 +63,20 @@ fn replay_rows(file: &Path, mut rows: CountTable, range: GyroRange) -> Result<Re
 /// # Errors
 /// As [`replay`], or the log has no burst, or bursts of two ranges.
 pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    replay_frames(file, FrameLogReader::open(file)?, range)
+    replay_frames(file, FrameReader::Log(FrameLogReader::open(file)?), range)
 }
 
-fn replay_frames(file: &Path, mut frames: FrameLogReader, range: GyroRange) -> Result<Replay, InputError> {
+fn replay_frames(file: &Path, mut frames: FrameReader, range: GyroRange) -> Result<Replay, InputError> {
     // As the log last selected it, and of the bursts so far.
     let (mut selected, mut taken_in) = (range, range);
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
     let mut player = Player::new();
     let mut bursts = 0u64;
     let mut other_transactions = 0;
-    while let Some(frame) = frames.next()? {
+    let mut timing = CapturedBusTiming::default();
+    while let Some(captured) = frames.next()? {
+        timing.add(&captured, is_burst(&captured.frame));
+        let frame = captured.frame;
         if is_burst(&frame) {
             if bursts == 0 {
                 recorder.set_range(selected);
@@ -95,7 +101,7 @@ fn replay_frames(file: &Path, mut frames: FrameLogReader, range: GyroRange) -> R
     if bursts == 0 {
         return Err(InputError::file(file, Reason::NoBurst));
     }
-    Ok(Replay { recording: recorder.finish(), other_transactions })
+    Ok(Replay { recording: recorder.finish(), other_transactions, timing })
 }
 
 /// The driver on a replay bus.

@@ -1,5 +1,6 @@
 //! The virtual sensor, read by the real driver over the emulated bus into a recording.
 
+use crate::fault_injector::{FaultEnd, FaultyBus, FrameFault};
 use crate::logged_bus::{LoggedBus, seconds};
 use adis16405_driver::{Adis16405, Channel, Config, ConfigError, GyroRange, SamplePeriod};
 use embedded_hal::spi::SpiDevice;
@@ -39,6 +40,23 @@ pub struct Simulation {
     pub scenario: SensorScenario,
     /// The clock that time-stamps the samples.
     pub host: HostClock,
+    /// Range of the gyroscopes.
+    pub range: GyroRange,
+    /// Sample rate, Hz; the part samples at the nearest rate that it can be set to.
+    pub rate_hz: f64,
+    /// Faults of the bus, in the order of their times.
+    pub faults: Vec<TimedFault>,
+}
+
+/// A fault of the bus that begins at some time and damages so many bursts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedFault {
+    /// Its beginning, s of virtual time.
+    pub from_s: f64,
+    /// What is damaged.
+    pub fault: FrameFault,
+    /// Bursts that it damages.
+    pub bursts: u32,
 }
 
 /// The host's time stamps of the data-ready pulses.
@@ -100,6 +118,9 @@ impl Simulation {
             noise: NoiseModel::paper(),
             scenario: SensorScenario::default(),
             host: HostClock::default(),
+            range: GyroRange::Dps300,
+            rate_hz: SAMPLE_RATE_HZ,
+            faults: Vec::new(),
         }
     }
 
@@ -122,13 +143,21 @@ impl Simulation {
     /// Number of samples that the part takes.
     ///
     /// # Errors
-    /// The duration is not positive, not finite or above [`LONGEST_S`].
+    /// The duration is not positive, not finite or above [`LONGEST_S`], or the rate is none that the part has.
     pub fn samples(&self) -> Result<u64, SimulationError> {
         if self.seconds > 0.0 && self.seconds <= LONGEST_S {
-            Ok((self.seconds * SAMPLE_RATE_HZ).round() as u64)
+            Ok((self.seconds * self.sampled_hz()?).round() as u64)
         } else {
             Err(SimulationError::Duration(self.seconds))
         }
+    }
+
+    /// The rate at which the part samples, Hz.
+    ///
+    /// # Errors
+    /// The part has no rate near [`rate_hz`](Self::rate_hz).
+    pub fn sampled_hz(&self) -> Result<f64, SimulationError> {
+        Ok(SamplePeriod::nearest(self.rate_hz).map_err(SimulationError::Config)?.hz())
     }
 
     /// Runs the simulation. `progress` is called with the number of samples taken, every 1024 samples and at the end.
@@ -137,7 +166,7 @@ impl Simulation {
     /// See [`SimulationError`].
     pub fn run(&self, progress: impl FnMut(u64)) -> Result<Recording, SimulationError> {
         let samples = self.samples()?;
-        let bus = self.bus();
+        let bus = FaultyBus::new(self.bus()?);
         self.read(&bus, bus.clone(), samples, progress)
     }
 
@@ -149,7 +178,7 @@ impl Simulation {
         let samples = self.samples()?;
         let fail = |reason| SimulationError::Log { file: file.to_owned(), reason };
         let log = Rc::new(RefCell::new(FrameLogWriter::create(file).map_err(fail)?));
-        let bus = self.bus();
+        let bus = FaultyBus::new(self.bus()?);
         let logged = LoggedBus::new(bus.clone(), Rc::clone(&log));
         let failure = logged.failure();
         let recording = self.read(&bus, logged, samples, progress);
@@ -162,27 +191,36 @@ impl Simulation {
         recording
     }
 
-    fn bus(&self) -> EmulatedBus {
-        EmulatedBus::new(VirtualAdis16405::with_scenario(&self.scenario, self.noise.clone(), self.seed))
+    /// The bus and the part on it, with the fastest clock for bursts in the part's clock mode: 1 MHz, or 300 kHz in low-power
+    /// mode, which slow rates select.
+    fn bus(&self) -> Result<EmulatedBus, SimulationError> {
+        let mode = SamplePeriod::nearest(self.rate_hz).map_err(SimulationError::Config)?.clock_mode();
+        let part = VirtualAdis16405::with_scenario(&self.scenario, self.noise.clone(), self.seed);
+        Ok(EmulatedBus::with_sck_hz(part, mode.max_burst_sck_hz()))
     }
 
-    /// Reads `samples` samples through `device`, which is `bus` or the logged one over it.
+    /// Reads `samples` samples through `device`, which is `faulty` or the logged one over it.
     fn read<SPI: SpiDevice<u8>>(
         &self,
-        bus: &EmulatedBus,
+        faulty: &FaultyBus,
         device: SPI,
         samples: u64,
         mut progress: impl FnMut(u64),
     ) -> Result<Recording, SimulationError> {
+        let bus = faulty.bus();
         let mut driver = Adis16405::new(device, bus.delay(), self.config().map_err(SimulationError::Config)?);
         driver.init().map_err(|e| SimulationError::Driver(e.to_string()))?;
         let mut recorder = Recorder::new(Channel::ALL.to_vec(), driver.config().range());
         let mut stamps = TimeStamps::new(self.host, self.scenario.missed_fraction(), self.seed);
+        let mut faults = self.faults.iter().peekable();
         for taken in 0..samples {
             if taken % 1024 == 0 {
                 progress(taken);
             }
             let ready_ns = bus.wait_for_data().ok_or(SimulationError::Silent(taken))?;
+            while let Some(due) = faults.next_if(|fault| fault.from_s <= seconds(ready_ns)) {
+                faulty.faults().borrow_mut().frames = Some((due.fault, FaultEnd::Bursts(due.bursts)));
+            }
             if let Some(time_s) = stamps.next(ready_ns) {
                 let burst = driver.burst().map_err(|e| SimulationError::Driver(e.to_string()))?;
                 recorder.push(TimeStamp::from_time(time_s), &burst);
@@ -198,7 +236,7 @@ impl Simulation {
 
     /// The filter is off without [`InjectedEffect::FilterBandwidth`]: the declared noise model has no term for it.
     fn config(&self) -> Result<Config, ConfigError> {
-        Config::new(GyroRange::Dps300, self.scenario.taps_log2(), SamplePeriod::nearest(SAMPLE_RATE_HZ)?)
+        Config::new(self.range, self.scenario.taps_log2(), SamplePeriod::nearest(self.rate_hz)?)
     }
 }
 

@@ -21,12 +21,17 @@ fn error_line(output: &Output) -> String {
 /// Checks that `analyze` and `replay` both refuse `file` with a line that contains its name and each of `names`.
 fn refuses(file: &Path, rate: &[&str], names: &[&str]) {
     for command in ["analyze", "replay"] {
-        let arguments = [&[command, file.to_str().expect("UTF-8")], rate].concat();
-        let line = error_line(&host_sim(&arguments));
-        let file = file.file_name().expect("a name").to_str().expect("UTF-8");
-        for name in names.iter().chain(&[file]) {
-            assert!(line.contains(name), "{command}: {name:?} is not in {line:?}");
-        }
+        refuses_with(command, file, rate, names);
+    }
+}
+
+/// Checks that a command refuses `file` with a line that contains its name and each of `names`.
+fn refuses_with(command: &str, file: &Path, rate: &[&str], names: &[&str]) {
+    let arguments = [&[command, file.to_str().expect("UTF-8")], rate].concat();
+    let line = error_line(&host_sim(&arguments));
+    let file = file.file_name().expect("a name").to_str().expect("UTF-8");
+    for name in names.iter().chain(&[file]) {
+        assert!(line.contains(name), "{command}: {name:?} is not in {line:?}");
     }
 }
 
@@ -45,8 +50,13 @@ fn files_that_are_no_tables_are_refused() {
 #[test]
 fn wrong_headers_are_refused() {
     let dir = tempdir().expect("a folder");
-    refuses(&write(&dir, "none.csv", b"a,b\n1,2\n"), &[], &["line 1", "no known column", "gyro_x_counts"]);
-    refuses(&write(&dir, "clock.csv", b"time_s\n0\n"), &[], &["line 1", "no known column"]);
+    // A table of any sensor may have any names; what is replayed are counts.
+    let none = write(&dir, "none.csv", b"a,b\n1,2\n");
+    refuses_with("replay", &none, &[], &["line 1", "no known column", "gyro_x_counts"]);
+    refuses_with("analyze", &none, &[], &["line 1", "no column is named like a channel", "--columns", "a, b"]);
+    let clock = write(&dir, "clock.csv", b"time_s\n0\n");
+    refuses_with("replay", &clock, &[], &["line 1", "no known column"]);
+    refuses_with("analyze", &clock, &[], &["line 1", "no column is named like a channel"]);
     refuses(
         &write(&dir, "unknown.csv", b"gyro_x_counts,gyro_w_counts\n1,2\n"),
         &[],
@@ -156,9 +166,9 @@ fn wrong_frame_logs_are_refused() {
             assert!(line.contains(reason), "{reason:?} is not in {line:?}");
         }
     }
+    // `analyze` reads a log as `replay` does: one burst is too short for both.
     let file = write(&dir, "log.csv", format!("time_s,mosi,miso\n0,{burst},{burst}\n").as_bytes());
-    let line = error_line(&host_sim(&["analyze", file.to_str().expect("UTF-8")]));
-    assert!(line.contains("frame log") && line.contains("replay"), "{line}");
+    refuses(&file, &[], &["record too short"]);
 }
 
 #[test]
@@ -184,4 +194,26 @@ fn wrong_usage_has_exit_status_2() {
     assert_eq!(host_sim(&["analyze"]).status.code(), Some(2));
     assert_eq!(host_sim(&["measure"]).status.code(), Some(2));
     assert_eq!(host_sim(&["analyze", "x.csv", "--rate", "fast"]).status.code(), Some(2));
+}
+
+/// Each of these ended with a panic, an abort, or threads without number.
+#[test]
+fn benchmarks_have_limits() {
+    for arguments in [
+        &["undeclared", "--nothing", "18446744073709551615"][..],
+        &["undeclared", "--nothing", "1000000000"],
+        &["undeclared", "--per-kind", "1000000000"],
+        &["undeclared", "--pairs", "1000000000"],
+        &["paper", "--seeds", "18446744073709551615"],
+        &["losses", "--records", "18446744073709551615"],
+    ] {
+        let output = host_sim(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let began = std::time::Instant::now();
+    let few = ["--nothing", "2", "--per-kind", "0", "--pairs", "0", "--seconds", "1"];
+    let output = host_sim(&[&["undeclared", "--jobs", "1000000"], &few[..]].concat());
+    // A million threads take most of a minute to begin; two recordings of a second take none of it. The second is too short
+    // to be analysed, which may be the program's answer.
+    assert!(began.elapsed().as_secs() < 20, "{:?}: {}", began.elapsed(), String::from_utf8_lossy(&output.stderr));
 }

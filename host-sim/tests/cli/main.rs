@@ -1,11 +1,16 @@
 //! The command `host-sim`: input errors, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
-//! and a device on a serial port.
+//! exports, conversions, and a device on a serial port.
 
 mod analyze_and_replay;
+mod convert_and_simulate;
 mod damaged_input;
+mod exports;
+mod formats;
 mod input_errors;
 mod measured_recordings;
 mod program;
+mod report_output;
 mod serial_device;
 mod serial_faults;
+mod several_recordings;
 mod simulated_sensor;

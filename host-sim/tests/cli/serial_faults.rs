@@ -109,3 +109,27 @@ fn impossible_durations_are_refused() {
         assert!(errors.contains("duration"), "{seconds}: {errors}");
     }
 }
+
+/// A device may send any bytes: those that a terminal obeys are shown, not sent on.
+#[test]
+fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
+    let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
+    let port = far.name().expect("a name");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(["monitor", &port, "--seconds", "3"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut encoder = link::Encoder::new();
+    while program.try_wait().expect("a status").is_none() {
+        let mut bytes = Vec::new();
+        encoder.encode(link::MessageRef::Log("\x1b]0;title\x07 of a message"), &mut |sent| bytes.extend(sent));
+        let _ = near.write_all(&bytes);
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let output = program.wait_with_output().expect("an end");
+    drop(far);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("title"), "{text:?}");
+    assert!(!output.stdout.contains(&0x1B) && !output.stdout.contains(&0x07), "{text:?}");
+}

@@ -38,4 +38,4 @@ pub use noise::{ChannelNoise, NoiseModel, NoiseSource};
 pub use part::VirtualAdis16405;
 pub use registers::OutputRegister;
 pub use signal_chain::CascadedBoxFilter;
-pub use spi::{Violation, ViolationKind};
+pub use spi::{MAX_SCK_BURST_HZ, MAX_SCK_NORMAL_HZ, MIN_STALL_NORMAL_NS, Violation, ViolationKind};

@@ -4,13 +4,13 @@ use crate::activity::Activity;
 use std::fmt;
 
 /// Least pause between frames in normal mode, ns.
-const MIN_STALL_NORMAL_NS: u64 = 9_000;
+pub const MIN_STALL_NORMAL_NS: u64 = 9_000;
 /// Least pause between frames in low-power mode, ns; no available source confirms it.
 const MIN_STALL_LOW_POWER_NS: u64 = 75_000;
 /// Highest SCK in normal mode, Hz.
-const MAX_SCK_NORMAL_HZ: u32 = 2_000_000;
+pub const MAX_SCK_NORMAL_HZ: u32 = 2_000_000;
 /// Highest SCK in a burst read, Hz.
-const MAX_SCK_BURST_HZ: u32 = 1_000_000;
+pub const MAX_SCK_BURST_HZ: u32 = 1_000_000;
 /// Highest SCK in low-power mode, Hz.
 const MAX_SCK_LOW_POWER_HZ: u32 = 300_000;
 

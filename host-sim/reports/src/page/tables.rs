@@ -1,7 +1,7 @@
 //! The tables of the page.
 
-use crate::coefficients::{self, CoefficientRow};
 use crate::formatting::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
+use crate::summary;
 use maud::{Markup, html};
 use noise_analysis::assessment::{Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Parameter, Report};
@@ -45,71 +45,35 @@ fn estimate_if_any(parameter: Option<&Parameter>) -> Markup {
     parameter.map_or_else(|| html! { (NONE) }, estimate)
 }
 
-/// One row a channel: the fitted coefficients and the error on unseen data.
-pub(super) fn overview(report: &Report) -> Markup {
-    let coefficient = |(kind, symbol, _): &(&str, &str, &str)| (html! { (words(kind)) " " i { (symbol) } }, true);
-    let headings: Vec<Heading> = [text("channel")]
-        .into_iter()
-        .chain(coefficients::SLOPES.iter().map(coefficient))
-        .chain([numbers("rms error, unseen half"), text("effects traced")])
-        .collect();
+/// N, B and K of the gyros and accelerometers in the units of their users, the data sheet's, and the error before and after.
+pub(super) fn coefficients_of_all(report: &Report) -> Markup {
+    let groups = summary::coefficient_tables(report);
+    let headings = [
+        text("channel"),
+        numbers("angle random walk N"),
+        numbers("bias instability B"),
+        numbers("rate random walk K"),
+        numbers("error on the unseen half"),
+    ];
     let rows = html! {
-        @for channel in &report.channels {
-            tr {
-                th scope="row" { a href={ "#" (channel.name) } { (channel.name) } }
-                @for row in coefficients::rows(channel).iter().take(coefficients::SLOPES.len()) {
-                    td.number {
-                        @match row.fit {
-                            Some(p) => { (number(p.value)) " " span.unit { (unit(&p.unit)) } }
-                            None => { (NONE) }
-                        }
+        @for group in &groups {
+            tr.group {
+                th scope="row" { (group.title) }
+                @for unit in &group.units { td.number { (unit) } }
+                td {}
+            }
+            @for row in &group.rows {
+                tr class=[row.channel.is_empty().then_some("sheet")] {
+                    th scope="row" {
+                        @if row.channel.is_empty() { "data sheet" } @else { a href={ "#" (row.channel) } { (row.label) } }
                     }
+                    @for value in &row.coefficients { td.number { (value) } }
+                    td class={ "number" @if row.is_high { " warning" } } { (row.error) @if row.is_high { " !" } }
                 }
-                td.number { (percent(channel.after.unseen.rms_percent)) }
-                td { (effect_names(channel)) }
             }
         }
     };
-    table("", &headings, &rows)
-}
-
-fn effect_names(channel: &ChannelReport) -> String {
-    if channel.effects.is_empty() {
-        return "none".to_owned();
-    }
-    let names: Vec<String> = channel.effects.iter().map(|effect| words(&effect.kind)).collect();
-    names.join(", ")
-}
-
-/// The coefficients by the slope method beside the fit of the baseline model.
-pub(super) fn coefficients(channel: &ChannelReport) -> Markup {
-    let rows = html! {
-        @for row in coefficients::rows(channel) {
-            tr {
-                th scope="row" {
-                    (words(row.kind)) " " i { (row.symbol) }
-                    @if !row.slope.is_empty() { span.under { (row.slope) } }
-                }
-                td { (unit(row.unit)) }
-                td.number { (slope_value(&row)) }
-                td.number { (estimate_if_any(row.fit)) }
-            }
-        }
-    };
-    table("", &[text("coefficient"), text("unit"), numbers("slope method"), numbers("fit")], &rows)
-}
-
-fn slope_value(row: &CoefficientRow<'_>) -> Markup {
-    html! {
-        @match (row.slope_value, row.slope) {
-            (Some(value), _) => {
-                (number(value.value))
-                span.under { "found in " (interval(value.from_s, value.to_s)) " s" }
-            }
-            (None, "") => { (NONE) }
-            (None, _) => { span.absent { "no such slope" } }
-        }
-    }
+    html! { @if !groups.is_empty() { (table("", &headings, &rows)) } }
 }
 
 /// The terms of a model with all their parameters.
@@ -130,7 +94,6 @@ pub(super) fn terms(model: &ModelReport) -> Markup {
 
 /// Errors of both models on the fitted and on the unseen half.
 pub(super) fn errors(channel: &ChannelReport) -> Markup {
-    let same = channel.after == channel.before;
     let cell = |error: &ModelErrorReport| {
         html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) }
         @if let Some(sigma) = error.worst_sigma { span.under { (number(sigma)) " σ" } } } }
@@ -138,7 +101,7 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
     let rows = html! {
         @for (name, model) in [("before", &channel.before), ("after", &channel.after)] {
             tr {
-                th scope="row" { span class={ "key " (if same { "before" } else { name }) } {} (name)
+                th scope="row" { (name)
                     span.under { "rms, deviance a point, largest deviation" } }
                 (cell(&model.fitted))
                 (cell(&model.unseen))

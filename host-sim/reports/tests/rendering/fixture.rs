@@ -100,6 +100,7 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         refitted: baseline,
         at_rest: vec![],
         assessment: assessment(scale),
+        figure_data: Default::default(),
     }
 }
 
@@ -111,6 +112,7 @@ fn error(deviance: f64, rms: f64) -> ModelErrorReport {
         worst_sigma: Some(-1.876),
         worst_tau_s: Some(10.24),
         worst_ratio: Some(1.02),
+        ..ModelErrorReport::default()
     }
 }
 
@@ -151,6 +153,7 @@ fn assessment(scale: f64) -> Assessment {
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
             .map(|(kind, more_hours)| RecordLength { kind: kind.to_owned(), half_s: None, more_hours })
             .into(),
+        ..Assessment::default()
     }
 }
 
@@ -221,4 +224,5 @@ fn trace_sinusoid(channel: &mut ChannelReport) {
     channel.before.fitted.rms_percent = Some(22.03);
     channel.before.unseen.deviance_per_point = Some(4512.0);
     channel.before.fitted.deviance_per_point = Some(4606.0);
+    channel.refitted = channel.after.clone();
 }

@@ -1,0 +1,203 @@
+//! Two reports, or a report and the data sheet, coefficient by coefficient: rows for programs, and a table for the terminal.
+
+use crate::formatting::number;
+use crate::saved_report::{SavedChannel, SavedPoint, SavedReport};
+use noise_analysis::comparison::{Verdict, verdicts};
+use noise_analysis::findings::BoundedEstimate;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// Coefficients that are compared, by their names in a report.
+const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
+/// The lowest point of the measured Allan deviation, which data sheets call in-run bias stability.
+const LOWEST: &str = "lowest_allan_deviation";
+
+/// Why reports cannot be compared.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ComparisonError {
+    /// A channel has other units.
+    #[error("{channel} is in {first} in one report and in {second} in the other")]
+    Units {
+        /// Such as `gyro_x`.
+        channel: String,
+        /// Its unit in the first report.
+        first: String,
+        /// And in the second.
+        second: String,
+    },
+    /// There is no coefficient that both have.
+    #[error("no coefficient of a channel is in both")]
+    Nothing,
+}
+
+/// Values that a data sheet gives for a channel, in its unit and s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpecifiedNoise {
+    /// Such as `gyro_x`.
+    pub channel: String,
+    /// N.
+    pub angle_random_walk: Option<f64>,
+    /// The lowest Allan deviation.
+    pub in_run_bias_stability: Option<f64>,
+    /// K.
+    pub rate_random_walk: Option<f64>,
+}
+
+/// A comparison.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// One row a coefficient.
+    pub coefficients: Vec<ComparedCoefficient>,
+}
+
+/// One coefficient in both.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparedCoefficient {
+    /// Such as `gyro_x`.
+    pub channel: String,
+    /// Such as `angle_random_walk`.
+    pub kind: String,
+    /// Unit of both.
+    pub unit: String,
+    /// What the second is compared with.
+    pub first: Bounded,
+    /// What is compared.
+    pub second: Bounded,
+    /// Whether the second has less noise.
+    pub verdict: Verdict,
+    /// Probability that estimates of one truth differ as much.
+    pub p_value: f64,
+}
+
+/// An estimate with its 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bounded {
+    /// Estimate.
+    pub value: f64,
+    /// Lower bound.
+    pub low: f64,
+    /// Upper bound.
+    pub high: f64,
+}
+
+impl From<BoundedEstimate> for Bounded {
+    fn from(BoundedEstimate { value, low, high }: BoundedEstimate) -> Self {
+        Self { value, low, high }
+    }
+}
+
+/// A coefficient before its verdict: channel, kind, unit, first, second.
+type Pair = (String, &'static str, String, BoundedEstimate, BoundedEstimate);
+
+/// Compares the final models of `second` with those of `first`.
+///
+/// # Errors
+/// A channel has different units, or nothing is in both.
+pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Comparison, ComparisonError> {
+    let mut pairs = Vec::new();
+    for (one, other) in first.channels.iter().filter_map(|one| Some((one, second.channel(&one.name)?))) {
+        if one.unit != other.unit {
+            return Err(ComparisonError::Units {
+                channel: one.name.clone(),
+                first: one.unit.clone(),
+                second: other.unit.clone(),
+            });
+        }
+        for kind in KINDS {
+            if let (Some((a, unit)), Some((b, _))) = (coefficient(one, kind), coefficient(other, kind)) {
+                pairs.push((one.name.clone(), kind, unit, a, b));
+            }
+        }
+    }
+    compared(pairs)
+}
+
+/// Compares a report with the values of a data sheet, which are typical ones without an interval.
+///
+/// # Errors
+/// The data sheet says nothing of the channels of the report.
+pub fn with_data_sheet(data_sheet: &[SpecifiedNoise], report: &SavedReport) -> Result<Comparison, ComparisonError> {
+    let exact = |value: f64| BoundedEstimate { value, low: value, high: value };
+    let mut pairs = Vec::new();
+    for (specified, channel) in data_sheet.iter().filter_map(|of| Some((of, report.channel(&of.channel)?))) {
+        for (kind, value) in [(KINDS[0], specified.angle_random_walk), (KINDS[2], specified.rate_random_walk)] {
+            if let (Some(value), Some((measured, unit))) = (value, coefficient(channel, kind)) {
+                pairs.push((channel.name.clone(), kind, unit, exact(value), measured));
+            }
+        }
+        if let (Some(value), Some(lowest)) = (specified.in_run_bias_stability, lowest(channel)) {
+            pairs.push((channel.name.clone(), LOWEST, channel.unit.clone(), exact(value), lowest));
+        }
+    }
+    compared(pairs)
+}
+
+/// A coefficient with its unit.
+fn coefficient(channel: &SavedChannel, kind: &str) -> Option<(BoundedEstimate, String)> {
+    let of = channel.coefficient(kind)?;
+    Some((BoundedEstimate { value: of.value, low: of.low, high: of.high }, of.unit))
+}
+
+/// The lowest point of the curve. Of many points the lowest is lower than its truth by chance; its interval is that of one.
+fn lowest(channel: &SavedChannel) -> Option<BoundedEstimate> {
+    let positive = channel.curve.iter().filter(|point| point.adev > 0.0);
+    let SavedPoint { adev, low, high, .. } = positive.min_by(|a, b| a.adev.total_cmp(&b.adev))?;
+    Some(BoundedEstimate { value: *adev, low: *low, high: *high })
+}
+
+fn compared(pairs: Vec<Pair>) -> Result<Comparison, ComparisonError> {
+    if pairs.is_empty() {
+        return Err(ComparisonError::Nothing);
+    }
+    let estimates: Vec<(BoundedEstimate, BoundedEstimate)> = pairs.iter().map(|(.., a, b)| (*a, *b)).collect();
+    let row =
+        |((channel, kind, unit, first, second), (verdict, p_value)): (Pair, (Verdict, f64))| ComparedCoefficient {
+            channel,
+            kind: kind.to_owned(),
+            unit,
+            first: first.into(),
+            second: second.into(),
+            verdict,
+            p_value,
+        };
+    Ok(Comparison { coefficients: pairs.into_iter().zip(verdicts(&estimates)).map(row).collect() })
+}
+
+impl Comparison {
+    /// Writes a table, whose columns of values are headed `first` and `second`.
+    ///
+    /// # Errors
+    /// As `out` does.
+    pub fn write(&self, first: &str, second: &str, out: &mut impl Write) -> io::Result<()> {
+        let mut table = comfy_table::Table::new();
+        table.load_preset(comfy_table::presets::NOTHING);
+        table.set_header(["channel", "coefficient", first, second, "unit", second, "p"]);
+        for row in &self.coefficients {
+            let verdict = match row.verdict {
+                Verdict::Better => "better",
+                Verdict::Worse => "worse",
+                Verdict::NotDistinguishable => "not distinguishable",
+            };
+            table.add_row([
+                row.channel.clone(),
+                row.kind.replace('_', " "),
+                bounded(row.first),
+                bounded(row.second),
+                row.unit.clone(),
+                verdict.to_owned(),
+                format!("{:.2e}", row.p_value),
+            ]);
+        }
+        writeln!(out, "{table}")
+    }
+}
+
+/// `value [low, high]`, or the value alone where it is exact.
+fn bounded(Bounded { value, low, high }: Bounded) -> String {
+    if low == value && high == value {
+        number(value)
+    } else {
+        format!("{} [{}, {}]", number(value), number(low), number(high))
+    }
+}

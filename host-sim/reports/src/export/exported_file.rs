@@ -1,0 +1,47 @@
+//! What an exported file is, which axis it takes, and how it writes numbers.
+
+/// The number that stands for three axes, where a format has one number a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum AxisChoice {
+    /// The root mean square over the axes.
+    #[default]
+    Rms,
+    /// The largest of the axes.
+    Worst,
+}
+
+/// Why a report cannot be written in a format.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The report has no gyroscope and no accelerometer in a unit that is known.
+    #[error("no gyroscope and no accelerometer in the report")]
+    NoInertialChannel,
+    /// The format has a number for each axis, and the report lacks one.
+    #[error("{channel} is not in the report, and the format has a number for each axis")]
+    NoAxis {
+        /// Such as `gyro_y`.
+        channel: String,
+    },
+    /// The format has only a Gauss-Markov process for slow noise, and the models have no slow noise.
+    #[error(
+        "no channel of the {0}s shows bias instability, random walk or a Markov process, from which the Gauss-Markov process \
+         of the format is made: the record is too short"
+    )]
+    NoSlowNoise(&'static str),
+}
+
+/// The text of a file, and what it lacks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Export {
+    /// The whole file.
+    pub text: String,
+    /// Fields of the format that the report does not say; they stand in the file as comments.
+    pub missing: Vec<String>,
+}
+
+/// Seven digits and an exponent with its sign: YAML 1.1, which Python's parser reads, takes `4.7e1` for a text.
+pub(super) fn scientific(value: f64) -> String {
+    let text = format!("{value:.6e}");
+    if text.contains("e-") { text } else { text.replace('e', "e+") }
+}

@@ -1,0 +1,141 @@
+//! The noise of gyroscopes and accelerometers in SI units, axis by axis.
+
+use super::exported_file::{AxisChoice, ExportError};
+use crate::saved_report::{SavedChannel, SavedParameter, SavedPoint, SavedReport};
+use allan_core::model::FittedTerm;
+use allan_core::term::Markov;
+use allan_core::{Model, NoiseTerm};
+use noise_analysis::gauss_markov::{self, GaussMarkovFit, SlowNoise, SlowOctave};
+
+/// Standard gravity, m/s².
+pub(super) const GRAVITY: f64 = 9.806_65;
+
+/// Kinds of the three coefficients in a report.
+const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
+
+/// A sensor of three axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sensor {
+    Gyroscope,
+    Accelerometer,
+}
+
+/// A coefficient of one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Coefficient {
+    /// The estimate, or its upper 95 % bound where the estimate is 0, in SI units.
+    pub value: f64,
+    /// The estimate in SI units.
+    pub estimate: f64,
+}
+
+/// The noise of one axis in rad/s or m/s², and s.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct AxisNoise<'a> {
+    pub channel: &'a SavedChannel,
+    /// Factor from the channel's unit to the SI unit.
+    pub to_si: f64,
+    /// N, rad/s/√Hz or m/s²/√Hz.
+    pub white: Option<Coefficient>,
+    /// B, rad/s or m/s².
+    pub bias_instability: Option<Coefficient>,
+    /// K, rad/s²/√Hz or m/s³/√Hz.
+    pub walk: Option<Coefficient>,
+}
+
+impl Sensor {
+    /// Prefix of the names of its channels.
+    pub(super) fn prefix(self) -> &'static str {
+        match self {
+            Self::Gyroscope => "gyro_",
+            Self::Accelerometer => "accl_",
+        }
+    }
+
+    /// In words.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Gyroscope => "gyroscope",
+            Self::Accelerometer => "accelerometer",
+        }
+    }
+
+    /// Factor from a channel's unit to rad/s or m/s².
+    fn to_si(self, unit: &str) -> Option<f64> {
+        match (self, unit) {
+            (Self::Gyroscope, "deg/s") => Some(std::f64::consts::PI / 180.0),
+            (Self::Accelerometer, "g") => Some(GRAVITY),
+            (Self::Gyroscope, "rad/s") | (Self::Accelerometer, "m/s^2") => Some(1.0),
+            _ => None,
+        }
+    }
+
+    /// The axes that the report has, in its order.
+    pub(super) fn axes(self, report: &SavedReport) -> Vec<AxisNoise<'_>> {
+        let own = report.channels.iter().filter(|channel| channel.name.starts_with(self.prefix()));
+        own.filter_map(|channel| self.axis(channel)).collect()
+    }
+
+    /// One axis; `None` where its unit is not known.
+    fn axis(self, channel: &SavedChannel) -> Option<AxisNoise<'_>> {
+        let to_si = self.to_si(&channel.unit)?;
+        let [white, bias_instability, walk] = KINDS.map(|kind| coefficient(channel, kind, to_si));
+        Some(AxisNoise { channel, to_si, white, bias_instability, walk })
+    }
+
+    /// The axes x, y and z.
+    pub(super) fn three_axes(self, report: &SavedReport) -> Result<[AxisNoise<'_>; 3], ExportError> {
+        let axes = self.axes(report);
+        let axis = |letter: &str| {
+            let name = format!("{}{letter}", self.prefix());
+            let found = axes.iter().find(|axis| axis.channel.name == name);
+            found.cloned().ok_or(ExportError::NoAxis { channel: name })
+        };
+        Ok([axis("x")?, axis("y")?, axis("z")?])
+    }
+}
+
+/// A coefficient, unless its upper bound is zero.
+fn coefficient(channel: &SavedChannel, kind: &str, to_si: f64) -> Option<Coefficient> {
+    let SavedParameter { value, high, .. } = channel.coefficient(kind)?;
+    let shown = if value > 0.0 { value } else { high };
+    (shown > 0.0 && shown.is_finite()).then_some(Coefficient { value: shown * to_si, estimate: value * to_si })
+}
+
+/// The number that stands for all axes, of those that have one.
+pub(super) fn combine(values: impl Iterator<Item = f64> + Clone, choice: AxisChoice) -> Option<f64> {
+    let count = values.clone().count();
+    (count > 0).then(|| match choice {
+        AxisChoice::Rms => (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt(),
+        AxisChoice::Worst => values.fold(0.0, f64::max),
+    })
+}
+
+/// The Gauss-Markov process, in SI units, that stands for everything slow in the models of `axes`.
+pub(super) fn gauss_markov(axes: &[AxisNoise<'_>], report: &SavedReport) -> Option<GaussMarkovFit> {
+    let period = 1.0 / report.sample_rate_hz;
+    let slow: Vec<SlowNoise> = axes.iter().map(|axis| slow_noise(axis, period)).collect();
+    gauss_markov::fit(&slow, period)
+}
+
+/// B, K and the Markov process of an axis beside its whole model.
+fn slow_noise(axis: &AxisNoise<'_>, period: f64) -> SlowNoise {
+    let AxisNoise { channel, to_si, bias_instability, walk, .. } = axis;
+    let mut terms = Vec::new();
+    for (kind, of) in [(NoiseTerm::BiasInstability, bias_instability), (NoiseTerm::RateRandomWalk, walk)] {
+        terms.extend(of.map(|of| FittedTerm::exact(kind, of.estimate)));
+    }
+    for term in channel.refitted.terms.iter().filter(|term| term.kind == "markov") {
+        if let (Some(deviation), Some(time)) = (term.parameters.get("deviation"), term.parameters.get("time_constant"))
+        {
+            let kind = NoiseTerm::Markov(Markov { time_constant: time.value });
+            terms.push(FittedTerm::exact(kind, deviation.value * to_si));
+        }
+    }
+    let model = Model::new(period, terms);
+    let octave = |(point, adev): (&SavedPoint, &f64)| {
+        let slow = model.avar(point.n);
+        SlowOctave { n: point.n, model: f64::max(adev * adev * to_si * to_si, slow), slow, edf: point.edf }
+    };
+    SlowNoise { octaves: channel.curve.iter().zip(&channel.refitted.adev).map(octave).collect() }
+}

@@ -1,0 +1,230 @@
+//! The figures of one channel: Allan deviation with its terms and its residual, spectrum, bias over time.
+
+use super::axis::{Axis, has_logarithm};
+use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
+use crate::formatting::{unit, words};
+use crate::rounding::{quantity, quantity_digits, span};
+use allan_core::NoiseTerm;
+use allan_core::model::cube_root_deviation;
+use noise_analysis::figure_data::noise_term;
+use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
+
+/// Standard deviations that the panel of the residual shows at least and at most.
+const RESIDUAL: std::ops::RangeInclusive<f64> = 4.0..=30.0;
+/// Points of a term's line for each octave.
+const PER_OCTAVE: u32 = 2;
+
+/// The Allan deviation with its bounds, the models and each term; beneath, what the models leave.
+pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> Plot {
+    let stages = if report.part.filter.as_deref() == Some("moving_average") { 1 } else { 2 };
+    deviation_plot(channel, report.sample_rate_hz, stages)
+}
+
+pub(super) fn deviation_plot(channel: &ChannelReport, rate_hz: f64, stages: u8) -> Plot {
+    let data = measured(channel, Look::Measured, "measured, 95 % bounds");
+    let has_terms = channel.refitted.adev != channel.before.adev;
+    let mut lines: Vec<Line> = terms(channel, &channel.refitted, stages, rate_hz);
+    if has_terms {
+        lines.push(model_line(channel, &channel.before, "before: N, B, K of the first half", Look::Before));
+    }
+    lines.push(model_line(channel, &channel.refitted, "model", Look::Model));
+    lines.push(data);
+    let [curve, residual] = frames([330.0, 120.0]);
+    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    // The terms may lead out of the panel, but for the flat line of B.
+    let shown = lines.iter().filter(|line| line.look != Look::Term || line.mark == "B").flat_map(heights);
+    let up = Axis::logarithmic(&format!("Allan deviation σ(τ), {}", unit(&channel.unit)), shown, curve);
+    let lower = residual_panel(channel, has_terms, across.clone(), residual);
+    let description = describe(channel);
+    Plot {
+        id: format!("{}-allan", channel.name),
+        title: format!("{} · Allan deviation", words(&channel.name)),
+        description,
+        panels: vec![Panel::new(across, up, lines), lower],
+    }
+}
+
+fn describe(channel: &ChannelReport) -> String {
+    let shown: Vec<_> = channel.curve.iter().filter(|point| has_logarithm(point.adev)).collect();
+    let (Some(first), Some(last)) = (shown.first(), shown.last()) else {
+        return if channel.curve.is_empty() {
+            "The record is too short for a point of the curve.".to_owned()
+        } else {
+            "No deviation above zero: the channel did not change.".to_owned()
+        };
+    };
+    let at = |deviation: f64, tau: f64| format!("{} at {}", quantity(deviation, &channel.unit), span(tau));
+    let lowest = shown.iter().min_by(|a, b| a.adev.total_cmp(&b.adev)).unwrap_or(first);
+    format!(
+        "From {} to {}, lowest {}. Below: measured less modelled in standard deviations of each point.",
+        at(first.adev, first.tau_s),
+        at(last.adev, last.tau_s),
+        at(lowest.adev, lowest.tau_s)
+    )
+}
+
+/// A model at the octaves, without what cannot be shown.
+fn model_line(channel: &ChannelReport, model: &ModelReport, name: &str, look: Look) -> Line {
+    let pairs = channel.curve.iter().map(|point| point.tau_s).zip(model.adev.iter().copied());
+    Line::new(name, look, pairs.filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect())
+}
+
+/// Each term of a model on its own, the first of them in the legend.
+fn terms(channel: &ChannelReport, model: &ModelReport, stages: u8, rate_hz: f64) -> Vec<Line> {
+    let Some(last) = channel.curve.last().map(|point| point.n) else { return Vec::new() };
+    let factors: Vec<u64> = (0..=last.max(1).ilog2() * PER_OCTAVE)
+        .map(|step| 2f64.powf(f64::from(step) / f64::from(PER_OCTAVE)).round() as u64)
+        .collect();
+    let line = |(kind, value): (NoiseTerm, f64)| {
+        let deviation = |n: u64| (n as f64 / rate_hz, value * kind.avar(n, 1.0 / rate_hz).sqrt());
+        let points = factors.iter().map(|&n| deviation(n)).filter(|&(_, of)| has_logarithm(of)).collect();
+        let mark = match kind {
+            NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_) => "N",
+            NoiseTerm::BiasInstability => "B",
+            NoiseTerm::RateRandomWalk => "K",
+            NoiseTerm::Quantization => "Q",
+            NoiseTerm::RateRamp => "R",
+            _ => "",
+        };
+        Line { mark, in_legend: false, ..Line::new(words(kind.name()), Look::Term, points) }
+    };
+    let known = model.terms.iter().filter_map(|term| noise_term(term, stages)).filter(|(_, value)| *value > 0.0);
+    known.map(line).filter(|line| !line.points.is_empty()).collect()
+}
+
+/// What the models leave, in standard deviations of each point.
+fn residual_panel(channel: &ChannelReport, has_terms: bool, across: Axis, frame: [f64; 2]) -> Panel {
+    let of = |model: &ModelReport| -> Vec<(f64, f64)> {
+        let pairs = channel.curve.iter().zip(&model.adev);
+        pairs
+            .filter(|(point, adev)| has_logarithm(point.adev) && has_logarithm(**adev))
+            .map(|(point, adev)| (point.tau_s, cube_root_deviation((point.adev / adev).powi(2), point.edf)))
+            .filter(|(_, sigma)| sigma.is_finite())
+            .collect()
+    };
+    let left = of(&channel.refitted);
+    let before = if has_terms { of(&channel.before) } else { Vec::new() };
+    let largest = left.iter().map(|(_, sigma)| 1.2 * sigma.abs()).fold(*RESIDUAL.start(), f64::max);
+    let limit = largest.min(*RESIDUAL.end());
+    let up = Axis::linear("residual, σ", std::iter::empty(), frame).between(-limit, limit);
+    let zone = |value: f64| {
+        let name = if value == 0.0 { "zero" } else { "±2 σ" };
+        Line::new(name, Look::Reference, vec![(across.from, value), (across.to, value)]).unlisted()
+    };
+    let mut lines = vec![zone(-2.0), zone(0.0), zone(2.0)];
+    if has_terms {
+        lines.push(Line::new("before", Look::Before, before).unlisted());
+    }
+    lines.push(Line::new("residual of the model", Look::Measured, left).with_dots().unjoined().unlisted());
+    Panel::new(across, up, lines)
+}
+
+/// Whether a finding is a line in a spectrum.
+pub(super) fn is_line(finding: &Finding) -> bool {
+    matches!(finding.kind.as_str(), "sinusoid" | "resonance" | "square_wave")
+}
+
+/// Frequencies of the lines that were traced in a channel.
+fn traced_lines(report: &Report, channel: &ChannelReport) -> Vec<Place> {
+    let of = |finding: &Finding| {
+        let frequency = finding.parameters.get("frequency")?.value;
+        Some(Place { label: quantity_digits(frequency, "Hz", 3), from: frequency, to: frequency })
+    };
+    report
+        .findings
+        .iter()
+        .filter(|finding| is_line(finding) && finding.channels.contains(&channel.name))
+        .filter_map(of)
+        .collect()
+}
+
+/// The measured spectrum with its bounds, the traced lines, and the model behind the filter. `None` where there is none.
+pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<Plot> {
+    let spectrum = channel.figure_data.spectrum.as_ref()?;
+    let along = |values: &[f64]| -> Vec<(f64, f64)> {
+        spectrum.frequency_hz.iter().copied().zip(values.iter().copied()).collect()
+    };
+    let bounds = spectrum.low.iter().copied().zip(spectrum.high.iter().copied()).collect();
+    let model = along(&spectrum.model).into_iter().filter(|&(_, density)| has_logarithm(density)).collect();
+    let lines = vec![
+        Line::new("measured, 95 % bounds", Look::Measured, along(&spectrum.density)).with_bounds(bounds),
+        Line::new("model with the filter, without lines", Look::Model, model),
+    ];
+    let [frame] = frames([300.0]);
+    let across = Axis::logarithmic("frequency, Hz", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let label = format!("root of the spectrum, {}/√Hz", unit(&channel.unit));
+    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
+    let traced = traced_lines(report, channel);
+    let names: Vec<&str> = traced.iter().map(|place| place.label.as_str()).collect();
+    let description = if names.is_empty() {
+        "No line was traced in it.".to_owned()
+    } else {
+        format!("Lines were traced at {}.", names.join(", "))
+    };
+    let panel = Panel { places: traced, ..Panel::new(across, up, lines) };
+    Some(Plot {
+        id: format!("{}-spectrum", channel.name),
+        title: format!("{} · spectrum", words(&channel.name)),
+        description,
+        panels: vec![panel],
+    })
+}
+
+/// The bias over time, with what it follows; beneath, what is left. `None` where there is none.
+pub(super) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
+    let bias = channel.figure_data.bias_over_time.as_ref()?;
+    let (scale, per) = time_unit(bias.time_s.last().copied().unwrap_or(0.0));
+    let along = |values: &[f64]| -> Vec<(f64, f64)> {
+        bias.time_s.iter().map(|time| time / scale).zip(values.iter().copied()).collect()
+    };
+    let follows = bias.followed.len() == bias.mean.len();
+    let mean = Line::new(format!("mean of {}", span(bias.block_s)), Look::Measured, along(&bias.mean));
+    let mut upper = vec![mean];
+    if follows {
+        upper.push(Line::new("what it follows", Look::Followed, along(&bias.followed)));
+    }
+    let axis =
+        |label: String, lines: &[Line], frame: [f64; 2]| Axis::linear(&label, lines.iter().flat_map(heights), frame);
+    let across = Axis::linear(&format!("time, {per}"), upper.iter().flat_map(places), [LEFT, RIGHT]);
+    let name = unit(&channel.unit);
+    let mut panels = Vec::new();
+    if follows {
+        let rest: Vec<f64> = bias.mean.iter().zip(&bias.followed).map(|(mean, followed)| mean - followed).collect();
+        let [above, below] = frames([190.0, 150.0]);
+        let lower = vec![Line::new("left", Look::Model, along(&rest))];
+        panels.push(Panel::new(across.clone(), axis(format!("bias, {name}"), &upper, above), upper));
+        panels.push(Panel::new(across, axis(format!("left, {name}"), &lower, below), lower));
+    } else {
+        let [frame] = frames([210.0]);
+        panels.push(Panel::new(across, axis(format!("bias, {name}"), &upper, frame), upper));
+    }
+    let (low, high) = bias.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &of| (a.min(of), b.max(of)));
+    Some(Plot {
+        id: format!("{}-bias", channel.name),
+        title: format!("{} · bias over time", words(&channel.name)),
+        description: format!(
+            "Means of {} less the mean of the record, over a range of {}{}.",
+            span(bias.block_s),
+            quantity(high - low, &channel.unit),
+            if follows { "; with what the findings explain of it, and what is left" } else { "" }
+        ),
+        panels,
+    })
+}
+
+/// The unit of a time axis, and its length in s.
+pub(super) fn time_unit(length_s: f64) -> (f64, &'static str) {
+    match length_s {
+        length if length < 300.0 => (1.0, "s"),
+        length if length < 3.0 * 3600.0 => (60.0, "min"),
+        length if length < 3.0 * 86_400.0 => (3600.0, "h"),
+        _ => (86_400.0, "d"),
+    }
+}
+/// The measured Allan deviation with its bounds, without points that the axis cannot show.
+pub(super) fn measured(channel: &ChannelReport, look: Look, name: &str) -> Line {
+    let shown = || channel.curve.iter().filter(|point| has_logarithm(point.tau_s) && has_logarithm(point.adev));
+    let points = shown().map(|point| (point.tau_s, point.adev)).collect();
+    let bounds = shown().map(|point| (point.low, point.high)).collect();
+    Line::new(name, look, points).with_bounds(bounds).with_dots()
+}

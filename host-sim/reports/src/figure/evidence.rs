@@ -1,0 +1,192 @@
+//! A picture of the evidence for a finding: a line in the spectrum, a place in time, a covariate beside the bias, two levels in a
+//! histogram, or what the baseline model leaves of the curve.
+
+use super::axis::Axis;
+use super::channel::{deviation_plot, is_line, spectrum_plot, time_unit};
+use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
+use crate::finding_text::channel_list;
+use crate::formatting::{unit, words};
+use crate::rounding::{quantity_digits, span};
+use noise_analysis::report::{ChannelReport, Finding, Report};
+
+/// A line is shown with the frequencies from this part of its own to its inverse.
+const AROUND: f64 = 0.5;
+/// Bars of a histogram.
+const BARS: usize = 40;
+
+/// The picture for the finding at `index`; `None` where the report has nothing to show it with.
+pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
+    let finding = report.findings.get(index)?;
+    let shown = clearest(finding);
+    let channel = report.channels.iter().find(|channel| Some(&channel.name) == shown)?;
+    let plot = match finding.kind.as_str() {
+        _ if is_line(finding) => line_in_spectrum(report, channel, finding),
+        "filter_bandwidth" | "sample_clock" => spectrum_plot(report, channel),
+        "bias_step" | "knock" | "motion" | "rate_ramp" | "common_mode" | "shared_drift" | "vibration_rectification" => {
+            in_time(report, channel, finding)
+        }
+        "temperature" | "temperature_squared" | "thermal_lag" => beside(report, channel, "temp"),
+        "supply" => beside(report, channel, "supply"),
+        "acceleration" => ["x", "y", "z"]
+            .iter()
+            .find(|axis| finding.parameters.contains_key(&format!("sensitivity_{axis}")))
+            .and_then(|axis| beside(report, channel, &format!("accl_{axis}"))),
+        "telegraph" => histogram(channel),
+        "unexplained" if finding.parameters.contains_key("time") => in_time(report, channel, finding),
+        "unexplained" if finding.parameters.contains_key("frequency") => line_in_spectrum(report, channel, finding),
+        _ => Some(residual(report, channel)),
+    }?;
+    let title = format!("Evidence {}: {} in {}", index + 1, words(&finding.kind), channel_list(&finding.channels));
+    Some(Plot { id: format!("finding-{}", index + 1), title, ..plot })
+}
+
+/// The channel with the largest share of the cause, else the first.
+fn clearest(finding: &Finding) -> Option<&String> {
+    let most = finding.share_percent.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|(name, _)| name);
+    most.filter(|name| finding.channels.contains(name)).or(finding.channels.first())
+}
+
+/// The spectrum around a line.
+fn line_in_spectrum(report: &Report, channel: &ChannelReport, finding: &Finding) -> Option<Plot> {
+    let frequency = finding.parameters.get("frequency")?.value;
+    let whole = spectrum_plot(report, channel)?;
+    let panel = whole.panels.first()?;
+    let cut = |line: &Line| {
+        let near = |at: &f64| (AROUND * frequency..=frequency / AROUND).contains(at);
+        let kept: Vec<usize> = (0..line.points.len()).filter(|&at| near(&line.points[at].0)).collect();
+        Line {
+            points: kept.iter().map(|&at| line.points[at]).collect(),
+            bounds: kept.iter().filter_map(|&at| line.bounds.get(at).copied()).collect(),
+            ..line.clone()
+        }
+    };
+    let lines: Vec<Line> = panel.lines.iter().map(cut).collect();
+    if lines.iter().all(|line| line.points.len() < 2) {
+        return None;
+    }
+    let [frame] = frames([220.0]);
+    let across = Axis::logarithmic("frequency, Hz", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let up = Axis::logarithmic(&panel.up.label, lines.iter().flat_map(heights), frame);
+    let place = Place { label: quantity_digits(frequency, "Hz", 3), from: frequency, to: frequency };
+    Some(Plot {
+        description: format!(
+            "The spectrum of {} around {}.",
+            words(&channel.name),
+            quantity_digits(frequency, "Hz", 3)
+        ),
+        panels: vec![Panel { places: vec![place], ..Panel::new(across, up, lines) }],
+        ..whole
+    })
+}
+
+/// The bias over time of the channels of a finding, with the place in time.
+fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding) -> Option<Plot> {
+    let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
+    let same_unit =
+        report.channels.iter().filter(|other| other.unit == channel.unit && finding.channels.contains(&other.name));
+    let mut length = 0.0_f64;
+    let series: Vec<(&ChannelReport, &noise_analysis::report::BiasOverTime)> = same_unit
+        .filter_map(|other| Some((other, other.figure_data.bias_over_time.as_ref()?)))
+        .inspect(|(_, bias)| length = length.max(bias.time_s.last().copied().unwrap_or(0.0)))
+        .collect();
+    let (scale, per) = time_unit(length);
+    let lines: Vec<Line> = series
+        .iter()
+        .zip(looks.into_iter().cycle())
+        .map(|((other, bias), look)| {
+            let points = bias.time_s.iter().map(|time| time / scale).zip(bias.mean.iter().copied()).collect();
+            Line::new(words(&other.name), look, points)
+        })
+        .collect();
+    let first = lines.first()?;
+    let across = Axis::linear(&format!("time, {per}"), places(first).into_iter(), [LEFT, RIGHT]);
+    let [frame] = frames([200.0]);
+    let up = Axis::linear(&format!("bias, {}", unit(&channel.unit)), lines.iter().flat_map(heights), frame);
+    let at = |name: &str| finding.parameters.get(name).map(|parameter| parameter.value);
+    let place = match (at("time"), at("from"), at("to")) {
+        (Some(time), ..) => Some(Place { label: span(time), from: time / scale, to: time / scale }),
+        (None, Some(from), Some(to)) => {
+            Some(Place { label: format!("{} … {}", span(from), span(to)), from: from / scale, to: to / scale })
+        }
+        _ => None,
+    };
+    Some(Plot {
+        id: String::new(),
+        title: String::new(),
+        description: place.as_ref().map_or_else(
+            || "The bias over time.".to_owned(),
+            |place| format!("The bias over time, with the place at {}.", place.label),
+        ),
+        panels: vec![Panel { places: place.into_iter().collect(), ..Panel::new(across, up, lines) }],
+    })
+}
+
+/// The means of the channel over those of a covariate, block by block.
+fn beside(report: &Report, channel: &ChannelReport, covariate: &str) -> Option<Plot> {
+    let bias = channel.figure_data.bias_over_time.as_ref()?;
+    let other = report.channels.iter().find(|other| other.name == covariate)?;
+    let along = other.figure_data.bias_over_time.as_ref()?;
+    let at = |time: &f64| along.time_s.iter().position(|of| of == time).map(|index| along.mean[index]);
+    let pairs: Vec<(usize, f64)> =
+        bias.time_s.iter().enumerate().filter_map(|(index, time)| Some((index, at(time)?))).collect();
+    let mut lines = vec![
+        Line::new(
+            format!("means of {}", span(bias.block_s)),
+            Look::Measured,
+            pairs.iter().map(|&(index, x)| (x, bias.mean[index])).collect(),
+        )
+        .with_dots()
+        .unjoined(),
+    ];
+    if bias.followed.len() == bias.mean.len() {
+        let mut followed: Vec<(f64, f64)> = pairs.iter().map(|&(index, x)| (x, bias.followed[index])).collect();
+        followed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        lines.push(Line::new("what the findings explain", Look::Followed, followed).with_dots().unjoined());
+    }
+    let name = if covariate == "temp" { "temperature".to_owned() } else { words(covariate) };
+    let [frame] = frames([240.0]);
+    let label = format!("{name} less its mean, {}", unit(&other.unit));
+    let across = Axis::linear(&label, lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let up = Axis::linear(&format!("bias, {}", unit(&channel.unit)), lines.iter().flat_map(heights), frame);
+    Some(Plot {
+        id: String::new(),
+        title: String::new(),
+        description: format!("The bias of {} over the {name}, block by block.", words(&channel.name)),
+        panels: vec![Panel::new(across, up, lines)],
+    })
+}
+
+/// How often each bias occurs.
+fn histogram(channel: &ChannelReport) -> Option<Plot> {
+    let bias = channel.figure_data.bias_over_time.as_ref()?;
+    let (low, high) = bias.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &of| (a.min(of), b.max(of)));
+    let width = (high - low) / BARS as f64;
+    if width <= 0.0 || !width.is_finite() {
+        return None;
+    }
+    let mut counts = [0.0; BARS];
+    for value in &bias.mean {
+        counts[(((value - low) / width) as usize).min(BARS - 1)] += 1.0;
+    }
+    let outline: Vec<(f64, f64)> = counts
+        .iter()
+        .enumerate()
+        .flat_map(|(bar, &count)| [(low + bar as f64 * width, count), (low + (bar + 1) as f64 * width, count)])
+        .collect();
+    let lines = vec![Line::new(format!("blocks of {}", span(bias.block_s)), Look::Measured, outline)];
+    let [frame] = frames([200.0]);
+    let label = format!("bias, {}", unit(&channel.unit));
+    let across = Axis::linear(&label, lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let up = Axis::linear("blocks", lines.iter().flat_map(heights).chain([0.0]), frame);
+    Some(Plot {
+        id: String::new(),
+        title: String::new(),
+        description: format!("How often each mean of {} occurs.", span(bias.block_s)),
+        panels: vec![Panel::new(across, up, lines)],
+    })
+}
+
+/// The curve with the baseline model and the model, and what they leave.
+fn residual(report: &Report, channel: &ChannelReport) -> Plot {
+    deviation_plot(channel, report.sample_rate_hz, 2)
+}

@@ -1,0 +1,437 @@
+//! A figure: panels with axes, lines, bands and markers, as SVG, with its values for the page's script.
+
+use super::axis::{Axis, has_logarithm};
+use crate::rounding::significant;
+use maud::{Markup, html};
+use std::fmt::Write;
+
+/// Width of every figure, pixels.
+pub(super) const WIDTH: f64 = 760.0;
+/// Edges of the panels, pixels.
+pub(super) const LEFT: f64 = 76.0;
+pub(super) const RIGHT: f64 = 744.0;
+/// Top of the first panel: below the legend.
+pub(super) const TOP: f64 = 34.0;
+/// Distance of two panels, and what is below the last: labels of the axis.
+const BETWEEN: f64 = 22.0;
+const BELOW: f64 = 48.0;
+
+/// How the style sheet draws a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Look {
+    /// Measured, the one that a figure is about.
+    Measured,
+    /// The second and third axis of an overview.
+    SecondAxis,
+    ThirdAxis,
+    /// The model to use.
+    Model,
+    /// The baseline model of the first half.
+    Before,
+    /// One term of a model.
+    Term,
+    /// A data sheet, a limit, zero.
+    Reference,
+    /// What the channel follows.
+    Followed,
+}
+
+impl Look {
+    pub(super) fn class(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::SecondAxis => "second",
+            Self::ThirdAxis => "third",
+            Self::Model => "model",
+            Self::Before => "before",
+            Self::Term => "term",
+            Self::Reference => "reference",
+            Self::Followed => "followed",
+        }
+    }
+}
+
+/// Values of one quantity along a panel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Line {
+    pub name: String,
+    pub look: Look,
+    /// Where the line is, and its values.
+    pub points: Vec<(f64, f64)>,
+    /// Bounds of each value; empty without.
+    pub bounds: Vec<(f64, f64)>,
+    /// Whether each value has a dot.
+    pub has_dots: bool,
+    /// Whether the values are joined.
+    pub is_joined: bool,
+    /// Whether it is in the legend.
+    pub in_legend: bool,
+    /// Letter beside the last visible value; empty without.
+    pub mark: &'static str,
+}
+
+impl Line {
+    /// A line in the legend, without bounds and dots.
+    pub(super) fn new(name: impl Into<String>, look: Look, points: Vec<(f64, f64)>) -> Self {
+        let name = name.into();
+        Self { name, look, points, bounds: Vec::new(), has_dots: false, is_joined: true, in_legend: true, mark: "" }
+    }
+
+    pub(super) fn with_bounds(mut self, bounds: Vec<(f64, f64)>) -> Self {
+        self.bounds = bounds;
+        self
+    }
+
+    pub(super) fn with_dots(mut self) -> Self {
+        self.has_dots = true;
+        self
+    }
+
+    pub(super) fn unjoined(mut self) -> Self {
+        self.is_joined = false;
+        self
+    }
+
+    pub(super) fn unlisted(mut self) -> Self {
+        self.in_legend = false;
+        self
+    }
+}
+
+/// A vertical line, or the area between two places, with a label.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Place {
+    pub label: String,
+    pub from: f64,
+    pub to: f64,
+}
+
+/// One coordinate system.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Panel {
+    pub across: Axis,
+    pub up: Axis,
+    pub lines: Vec<Line>,
+    pub places: Vec<Place>,
+}
+
+/// A figure with what it says to somebody who does not see it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Plot {
+    /// Name of its file and of its element in the page.
+    pub id: String,
+    pub title: String,
+    /// What is to be seen, in words with numbers.
+    pub description: String,
+    pub(super) panels: Vec<Panel>,
+}
+
+/// Tops and bottoms of panels of the given heights.
+pub(super) fn frames<const PANELS: usize>(heights: [f64; PANELS]) -> [[f64; 2]; PANELS] {
+    let mut top = TOP;
+    heights.map(|height| {
+        let frame = [top + height, top];
+        top += height + BETWEEN;
+        frame
+    })
+}
+
+impl Plot {
+    pub(super) fn height(&self) -> f64 {
+        self.panels.last().map_or(TOP, |panel| panel.up.start) + BELOW
+    }
+
+    /// The drawing.
+    pub(crate) fn svg(&self, style: Option<&str>) -> Markup {
+        let view = format!("0 0 {WIDTH} {}", self.height());
+        html! {
+            svg xmlns="http://www.w3.org/2000/svg" viewBox=(view) role="img" aria-label={ (self.title) ". " (self.description) } {
+                title { (self.title) }
+                @if let Some(style) = style {
+                    style { (maud::PreEscaped(style)) }
+                    rect class="paper" width=(WIDTH) height=(self.height()) {}
+                }
+                (self.legend())
+                @for (index, panel) in self.panels.iter().enumerate() {
+                    (panel.svg(&format!("{}-{index}", self.id), index + 1 == self.panels.len()))
+                }
+                line class="cursor" x1="0" x2="0" y1=(TOP) y2=(self.height() - BELOW) visibility="hidden" {}
+            }
+        }
+    }
+
+    /// Swatches and names above the first panel.
+    fn legend(&self) -> Markup {
+        let mut left = LEFT;
+        let mut names: Vec<&str> = Vec::new();
+        let mut entries = Vec::new();
+        for line in self.panels.iter().flat_map(|panel| &panel.lines).filter(|line| line.in_legend) {
+            if names.contains(&line.name.as_str()) {
+                continue;
+            }
+            names.push(&line.name);
+            entries.push((left, line));
+            // Letters of 13 px are up to 7.4 px wide.
+            left += 40.0 + 7.4 * line.name.chars().count() as f64;
+        }
+        html! {
+            g class="legend" {
+                @for (left, line) in entries {
+                    g class=(line.look.class()) {
+                        @if line.is_joined { line x1=(pixel(left)) x2=(pixel(left + 20.0)) y1="16" y2="16" {} }
+                        @if line.has_dots { circle cx=(pixel(left + 10.0)) cy="16" r="3.2" {} }
+                    }
+                    text x=(pixel(left + 25.0)) y="20" { (line.name) }
+                }
+            }
+        }
+    }
+
+    /// The values for the page's script: axes and lines of every panel.
+    pub(crate) fn values(&self) -> String {
+        let panels: Vec<String> = self.panels.iter().map(Panel::values).collect();
+        format!("[{}]", panels.join(","))
+    }
+}
+
+impl Panel {
+    pub(super) fn new(across: Axis, up: Axis, lines: Vec<Line>) -> Self {
+        Self { across, up, lines, places: Vec::new() }
+    }
+
+    fn svg(&self, id: &str, is_last: bool) -> Markup {
+        let (x, y) = (&self.across, &self.up);
+        let clip = format!("clip-{id}");
+        html! {
+            g class="panel" {
+                clipPath id=(clip) {
+                    rect x=(pixel(x.start)) y=(pixel(y.end)) width=(pixel(x.end - x.start)) height=(pixel(y.start - y.end)) {}
+                }
+                @for tick in x.ticks() {
+                    @if let Some(at) = x.at(tick.value) {
+                        line class=(if tick.label.is_some() { "grid" } else { "fine" })
+                            x1=(pixel(at)) x2=(pixel(at)) y1=(pixel(y.start)) y2=(pixel(y.end)) {}
+                        @if let (true, Some(label)) = (is_last, &tick.label) {
+                            text x=(pixel(at)) y=(pixel(y.start + 17.0)) text-anchor="middle" { (label) }
+                        }
+                    }
+                }
+                @for tick in y.ticks() {
+                    @if let Some(at) = y.at(tick.value) {
+                        line class=(if tick.label.is_some() { "grid" } else { "fine" })
+                            x1=(pixel(x.start)) x2=(pixel(x.end)) y1=(pixel(at)) y2=(pixel(at)) {}
+                        @if let Some(label) = &tick.label {
+                            text x=(pixel(x.start - 7.0)) y=(pixel(at + 4.5)) text-anchor="end" { (label) }
+                        }
+                    }
+                }
+                rect class="frame" x=(pixel(x.start)) y=(pixel(y.end))
+                    width=(pixel(x.end - x.start)) height=(pixel(y.start - y.end)) {}
+                @let middle = (y.start + y.end) / 2.0;
+                text class="axis" x="15" y=(pixel(middle)) text-anchor="middle"
+                    transform={ "rotate(-90 15 " (pixel(middle)) ")" } { (y.label) }
+                @if is_last {
+                    text class="axis" x=(pixel((x.start + x.end) / 2.0)) y=(pixel(y.start + 38.0)) text-anchor="middle" { (x.label) }
+                }
+                g clip-path={ "url(#" (clip) ")" } {
+                    @for place in &self.places { (self.place(place)) }
+                    @for line in &self.lines { (self.band(line)) }
+                    @for line in &self.lines { (self.line(line)) }
+                }
+                @for (place, row) in self.places.iter().zip((0..3).cycle()) {
+                    @if let Some(at) = x.at(place.from) {
+                        @let is_right = at > (x.start + x.end) / 2.0;
+                        text class="place" x=(pixel(if is_right { at - 5.0 } else { at + 5.0 }))
+                            y=(pixel(y.end + 15.0 + 15.0 * f64::from(row)))
+                            text-anchor=(if is_right { "end" } else { "start" }) { (place.label) }
+                    }
+                }
+                @for line in self.lines.iter().filter(|line| !line.mark.is_empty()) { (self.mark(line)) }
+            }
+        }
+    }
+
+    fn place(&self, place: &Place) -> Markup {
+        let (from, to) = (self.across.clamped(place.from), self.across.clamped(place.to));
+        let (top, bottom) = (self.up.end, self.up.start);
+        html! {
+            @if let (Some(from), Some(to)) = (from, to) {
+                @if to - from > 1.0 {
+                    rect class="place" x=(pixel(from)) y=(pixel(top)) width=(pixel(to - from)) height=(pixel(bottom - top)) {}
+                } @else {
+                    line class="place" x1=(pixel(from)) x2=(pixel(from)) y1=(pixel(top)) y2=(pixel(bottom)) {}
+                }
+            }
+        }
+    }
+
+    /// The area between the bounds.
+    fn band(&self, line: &Line) -> Markup {
+        let edge = |of: fn(&(f64, f64)) -> f64| -> Vec<(f64, f64)> {
+            let pairs = line.points.iter().zip(&line.bounds);
+            pairs.filter_map(|((x, _), bounds)| Some((self.across.at(*x)?, self.up.clamped(of(bounds))?))).collect()
+        };
+        let (low, high) = (edge(|bounds| bounds.0), edge(|bounds| bounds.1));
+        html! {
+            @if low.len() > 1 && low.len() == high.len() {
+                polygon class={ "band " (line.look.class()) } points=(path(low.into_iter().chain(high.into_iter().rev()))) {}
+            }
+        }
+    }
+
+    fn line(&self, line: &Line) -> Markup {
+        // Values beyond the panel lead out of it: the panel cuts them off.
+        let visible: Vec<(f64, f64)> =
+            line.points.iter().filter_map(|&(x, y)| Some((self.across.at(x)?, self.up.unclipped(y)?))).collect();
+        let inside = |(_, y): &&(f64, f64)| (self.up.end - 0.5..=self.up.start + 0.5).contains(y);
+        html! {
+            g class=(line.look.class()) data-line=(line.name) {
+                @if line.is_joined && visible.len() > 1 { polyline points=(path(visible.iter().copied())) {} }
+                @if line.has_dots {
+                    @for (x, y) in visible.iter().filter(inside) { circle cx=(pixel(*x)) cy=(pixel(*y)) r="3.2" {} }
+                }
+            }
+        }
+    }
+
+    /// The letter of a line at its end.
+    fn mark(&self, line: &Line) -> Markup {
+        let visible = |&(x, y): &(f64, f64)| Some((self.across.at(x)?, self.up.at(y)?));
+        let ends = if line.mark == "K" {
+            line.points.iter().filter_map(visible).next_back()
+        } else {
+            line.points.iter().find_map(visible)
+        };
+        html! {
+            @if let Some((x, y)) = ends {
+                @let is_right = x > (self.across.start + self.across.end) / 2.0;
+                text class="mark" x=(pixel(if is_right { x - 6.0 } else { x + 6.0 })) y=(pixel((y - 6.0).max(self.up.end + 12.0)))
+                    text-anchor=(if is_right { "end" } else { "start" }) { (line.mark) }
+            }
+        }
+    }
+
+    fn values(&self) -> String {
+        // Places that are those of the line before are not repeated.
+        let places = |line: &Line| numbers(line.points.iter().map(|of| of.0));
+        let before = [None].into_iter().chain(self.lines.iter().map(Some));
+        let lines: Vec<String> = self
+            .lines
+            .iter()
+            .zip(before)
+            .map(|(line, before)| {
+                let is_same = before.is_some_and(|before| {
+                    before.points.len() == line.points.len()
+                        && before.points.iter().zip(&line.points).all(|(a, b)| a.0 == b.0)
+                });
+                let x = if is_same { "null".to_owned() } else { places(line) };
+                let bounds = if line.bounds.is_empty() {
+                    String::new()
+                } else {
+                    format!(
+                        ",\"low\":{},\"high\":{}",
+                        numbers(line.bounds.iter().map(|of| of.0)),
+                        numbers(line.bounds.iter().map(|of| of.1))
+                    )
+                };
+                format!(
+                    "{{\"name\":{},\"x\":{},\"y\":{}{bounds}}}",
+                    quoted(&line.name),
+                    x,
+                    numbers(line.points.iter().map(|of| of.1))
+                )
+            })
+            .collect();
+        format!("{{\"x\":{},\"y\":{},\"lines\":[{}]}}", self.across.json(), self.up.json(), lines.join(","))
+    }
+}
+
+impl Axis {
+    /// The pixel of `value`, which may be outside by as much as the axis is long.
+    fn unclipped(&self, value: f64) -> Option<f64> {
+        if self.is_logarithmic && !has_logarithm(value) {
+            return None;
+        }
+        let reach = (self.end - self.start).abs();
+        let part = if self.is_logarithmic {
+            (value / self.from).ln() / (self.to / self.from).ln()
+        } else {
+            (value - self.from) / (self.to - self.from)
+        };
+        let pixel = self.start + part * (self.end - self.start);
+        let (low, high) = (self.start.min(self.end) - reach, self.start.max(self.end) + reach);
+        part.is_finite().then(|| pixel.clamp(low, high))
+    }
+
+    fn json(&self) -> String {
+        format!(
+            "{{\"label\":{},\"log\":{},\"from\":{:e},\"to\":{:e},\"start\":{},\"end\":{}}}",
+            quoted(&self.label),
+            self.is_logarithmic,
+            self.from,
+            self.to,
+            self.start,
+            self.end
+        )
+    }
+}
+
+/// A coordinate with a tenth of a pixel.
+fn pixel(value: f64) -> String {
+    let text = format!("{value:.1}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
+    points.fold(String::new(), |mut path, (x, y)| {
+        if !path.is_empty() {
+            path.push(' ');
+        }
+        // Writing to a string does not fail.
+        let _ = write!(path, "{},{}", pixel(x), pixel(y));
+        path
+    })
+}
+
+/// A list of numbers in JSON with four significant digits.
+fn numbers(values: impl Iterator<Item = f64>) -> String {
+    let number = |value: f64| match value {
+        value if !value.is_finite() => "null".to_owned(),
+        0.0 => "0".to_owned(),
+        value if (1e-3..1e5).contains(&value.abs()) => significant(value, 4).replace(',', "").replace('−', "-"),
+        value => format!("{value:.3e}"),
+    };
+    let list: Vec<String> = values.map(number).collect();
+    format!("[{}]", list.join(","))
+}
+
+/// A text in JSON that is safe inside an element of HTML.
+fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => {
+                out.push('\\');
+                out.push(letter);
+            }
+            '<' | '>' | '&' => {
+                let _ = write!(out, "\\u{:04x}", u32::from(letter));
+            }
+            letter if u32::from(letter) < 32 => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out.push('"');
+    out
+}
+/// Places of the points of a line.
+pub(super) fn places(line: &Line) -> Vec<f64> {
+    line.points.iter().map(|point| point.0).collect()
+}
+
+/// The values of a line, and its bounds as far as a factor of three: those of a point with one degree of freedom span decades.
+pub(super) fn heights(line: &Line) -> Vec<f64> {
+    let bounds = line.points.iter().zip(&line.bounds);
+    let near = bounds.flat_map(|(&(_, y), &(low, high))| [low.max(y / 3.0), high.min(3.0 * y)]);
+    line.points.iter().map(|point| point.1).chain(near).collect()
+}

@@ -1,0 +1,394 @@
+//! Each finding in words: one sentence of physics and one of advice, made of its parameters. `docs/findings.md` explains every
+//! sentence.
+
+use crate::formatting::words;
+use crate::rounding::{bounded_quantity, plain, quantity, significant, span};
+use noise_analysis::report::{Finding, Validation};
+
+/// Every kind of finding that has its own sentences, in the order of `docs/findings.md`.
+pub const KINDS: [&str; 26] = [
+    "filter_bandwidth",
+    "sinusoid",
+    "resonance",
+    "square_wave",
+    "telegraph",
+    "markov",
+    "common_mode",
+    "shared_drift",
+    "rate_ramp",
+    "bias_step",
+    "temperature",
+    "temperature_squared",
+    "thermal_lag",
+    "supply",
+    "acceleration",
+    "vibration_rectification",
+    "quantization",
+    "noise_below_count",
+    "spikes",
+    "knock",
+    "motion",
+    "saturated",
+    "dropped_samples",
+    "repeated_samples",
+    "sample_clock",
+    "unexplained",
+];
+
+/// What is said of a finding.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FindingText {
+    /// The channels that show it, such as `gyro z` or `accel x y`.
+    pub channels: String,
+    /// What it is, with its size.
+    pub physics: String,
+    /// What to do about it, or what to look for.
+    pub advice: String,
+    /// How much of the variance it makes, and whether the second half confirms it; where neither is known, the evidence in short.
+    pub weight: String,
+}
+
+/// The words for `finding`.
+#[must_use]
+pub fn describe(finding: &Finding) -> FindingText {
+    let (physics, advice) = sentences(finding);
+    FindingText { channels: channel_list(&finding.channels), physics, advice, weight: weight(finding) }
+}
+
+/// The largest share of the variance, and what the second half says.
+fn weight(finding: &Finding) -> String {
+    let largest = finding.share_percent.values().copied().filter(|share| share.is_finite()).fold(0.0, f64::max);
+    let share = (largest >= 0.5).then(|| format!("up to {} % of σ²", significant(largest.min(100.0), 2)));
+    let held = match finding.validated {
+        Validation::Yes => Some("the second half confirms it".to_owned()),
+        Validation::No => Some("the second half does not confirm it".to_owned()),
+        Validation::Untestable => None,
+    };
+    let told = share.into_iter().chain(held).collect::<Vec<_>>().join("; ");
+    if told.is_empty() { first_clause(&finding.evidence) } else { told }
+}
+
+/// Characters of the evidence that a line has room for.
+const CLAUSE: usize = 70;
+
+/// The evidence of the analysis up to its first semicolon, or as much of it as there is room for.
+fn first_clause(evidence: &str) -> String {
+    let clause = evidence.split(';').next().unwrap_or_default();
+    let short = clause.split(" before it was added").next().unwrap_or_default().trim_end_matches('.');
+    if short.chars().count() <= CLAUSE {
+        return short.to_owned();
+    }
+    let cut: String = short.chars().take(CLAUSE).collect();
+    let whole = cut.rsplit_once(' ').map_or(cut.as_str(), |(whole, _)| whole);
+    format!("{} …", whole.trim_end_matches([',', ':']))
+}
+
+/// By how much σ falls without a part of the variance, %, of the channel with the largest share; `None` where it is not known.
+fn gain(finding: &Finding) -> Option<String> {
+    let share = finding.share_percent.values().copied().fold(0.0, f64::max) / 100.0;
+    (share > 0.0 && share < 1.0).then(|| significant(100.0 * (1.0 - (1.0 - share).sqrt()), 2))
+}
+
+/// The sentence of physics and the sentence of advice.
+fn sentences(finding: &Finding) -> (String, String) {
+    let parameter = |name: &str| finding.parameters.get(name);
+    let value = |name: &str| parameter(name).map(|parameter| parameter.value);
+    // The parameter with its interval, or words where the finding lacks it.
+    let sized = |name: &str| parameter(name).map_or_else(|| "unknown size".to_owned(), bounded_quantity);
+    let at = |name: &str| value(name).map_or_else(|| "an unknown time".to_owned(), span);
+    let off = || {
+        gain(finding)
+            .map_or_else(String::new, |percent| format!(" It would take {percent} % off σ where it is largest."))
+    };
+    let pair = |physics: String, advice: &str| (physics, advice.to_owned());
+    let are = if finding.channels.len() > 1 { "reaches these channels" } else { "reaches this channel" };
+    match finding.kind.as_str() {
+        "filter_bandwidth" => match (value("taps"), value("decimation")) {
+            (Some(taps), Some(decimation)) if (decimation - 1.0).abs() > 1e-9 => pair(
+                format!(
+                    "The part's low-pass filter of {} taps, read every {} of its samples.",
+                    plain(taps, 3),
+                    parameter("decimation").map_or_else(String::new, bounded_quantity)
+                ),
+                "Nothing to repair; N holds below the corner of the filter, and a model for a Kalman filter at this rate is white.",
+            ),
+            (Some(taps), _) => pair(
+                format!("The part's low-pass filter of {} taps smooths neighbouring samples.", plain(taps, 3)),
+                "Nothing to repair; take N from averaging times longer than the filter, or use fewer taps for more bandwidth.",
+            ),
+            _ => pair(
+                format!("A low-pass filter with a bandwidth of {}.", sized("bandwidth")),
+                "Nothing to repair; N holds below the bandwidth, and the samples are correlated above it.",
+            ),
+        },
+        "sinusoid" => (
+            format!("A vibration or hum at {} {are}: a narrow line of {}.", sized("frequency"), sized("amplitude")),
+            format!("Look for a fan, a motor or the mains; a notch there would help.{}", off()),
+        ),
+        "resonance" => (
+            format!(
+                "A vibration around {}, {} wide, {are}: {} (1 σ).",
+                sized("frequency"),
+                value("bandwidth").map_or_else(|| "some hertz".to_owned(), |width| quantity(width, "Hz")),
+                sized("deviation")
+            ),
+            format!("Look for a fan whose speed wanders or a loose mount; stiffen the mount or notch the band.{}", off()),
+        ),
+        "square_wave" => (
+            format!("A square wave of {} switches by {}.", sized("frequency"), sized("amplitude")),
+            format!("Look for a load on the supply or a heater that switches at this rate.{}", off()),
+        ),
+        "telegraph" => (
+            format!(
+                "The bias jumps between two levels {} apart and stays for {} on average.",
+                sized("amplitude"),
+                at("time_constant")
+            ),
+            "Random telegraph noise lies in the part; try another part, or model it as a Markov process of this time constant."
+                .to_owned(),
+        ),
+        "markov" => (
+            format!(
+                "A noise with a memory of {} and a size of {} (1 σ).",
+                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), bounded_quantity),
+                sized("deviation")
+            ),
+            "Give the filter a first-order Gauss-Markov state of this time constant and size.".to_owned(),
+        ),
+        "common_mode" | "shared_drift" => (
+            format!(
+                "A slow drift of {} that these channels share, and that nothing recorded explains.",
+                ["deviation", "amplitude", "size"].iter().find_map(|name| parameter(name)).map_or_else(
+                    || "unknown size".to_owned(),
+                    bounded_quantity
+                )
+            ),
+            "Record temperature and supply beside the channels; look for a slow change in the room or the mount.".to_owned(),
+        ),
+        "rate_ramp" => (
+            format!("The bias drifts in a straight line by {}.", sized("slope")),
+            "Let the part warm up before recording, or discard the beginning; correct the bias more often than this drift allows."
+                .to_owned(),
+        ),
+        "bias_step" => (
+            format!("The bias stepped by {} at {}.", sized("size"), at("time")),
+            "Look for a shock, a changed supply or a touched cable at that time; cut the record there.".to_owned(),
+        ),
+        "temperature" => (
+            format!("The bias follows the temperature with {}.", sized("sensitivity")),
+            format!("Subtract this sensitivity times the change of temperature.{}", off()),
+        ),
+        "temperature_squared" => (
+            format!(
+                "The bias follows the temperature by a parabola: {} and {}.",
+                sized("sensitivity"),
+                sized("curvature")
+            ),
+            format!("Compensate with the second-order law, or calibrate over the whole range of temperature.{}", off()),
+        ),
+        "thermal_lag" => (
+            format!(
+                "The bias follows the temperature with {} through a lag of {}.",
+                sized("sensitivity"),
+                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), bounded_quantity)
+            ),
+            format!("Compensate with the temperature behind a low-pass filter of this time constant.{}", off()),
+        ),
+        "supply" => (
+            format!("The bias follows the supply voltage with {}.", sized("sensitivity")),
+            format!("Regulate the supply, or subtract this sensitivity times its change.{}", off()),
+        ),
+        "acceleration" => {
+            let axes: Vec<String> = ["x", "y", "z"]
+                .iter()
+                .filter_map(|axis| Some(format!("{} ({axis})", bounded_quantity(parameter(&format!("sensitivity_{axis}"))?))))
+                .collect();
+            (
+                format!("The rate follows the specific force: {}.", axes.join(", ")),
+                format!("Subtract these sensitivities times the accelerometers, or mount the part more stiffly.{}", off()),
+            )
+        }
+        "vibration_rectification" => (
+            format!("The bias follows the strength of the vibration with {}.", sized("sensitivity")),
+            "Isolate the part from vibration, or compensate with the variance of the acceleration.".to_owned(),
+        ),
+        "quantization" => (
+            format!(
+                "Rounding shows: {}.",
+                parameter("step").map_or_else(
+                    || format!("a quantization noise of {}", sized("value")),
+                    |step| format!("only every value {} apart occurs", bounded_quantity(step))
+                )
+            ),
+            "Read the part with more bits or in a smaller range; short averaging times are dominated by rounding.".to_owned(),
+        ),
+        "noise_below_count" => (
+            "The noise is smaller than a count: the samples repeat one value and hide what is below it.".to_owned(),
+            "Take no coefficient from the short averaging times; use a smaller range, or add dither.".to_owned(),
+        ),
+        "spikes" => (
+            format!("Single samples stand out by {}, {}.", sized("size"), sized("rate")),
+            "Check the wiring and the bus for interference; a filter should reject such samples.".to_owned(),
+        ),
+        "knock" => (
+            format!(
+                "The part was knocked from {} to {}: the noise is {} times that beside it.",
+                at("from"),
+                at("to"),
+                value("level").map_or_else(|| "many".to_owned(), |level| significant(level, 2))
+            ),
+            "These samples are left out; keep hands and machines off the bench while recording.".to_owned(),
+        ),
+        "motion" => (
+            format!("The platform moved{}.", interval_words(&at, value("from").is_some())),
+            "These samples are left out; noise needs a part at rest. Record it again on a firm support.".to_owned(),
+        ),
+        "saturated" => (
+            format!(
+                "The channel reached the end of its range{}.",
+                value("fraction").map_or_else(String::new, |of| format!(" in {} % of the samples", significant(100.0 * of, 2)))
+            ),
+            "Use a larger range; what was cut off makes the noise look too small.".to_owned(),
+        ),
+        "dropped_samples" => (
+            format!("{} of the samples never arrived.", share(value("fraction"))),
+            "Check the reader's load and its queue; the curve bridges the gaps and says where it does.".to_owned(),
+        ),
+        "repeated_samples" => (
+            format!("{} of the samples are copies of the one before.", share(value("fraction"))),
+            "Read the part at its data-ready signal; copies make white noise look correlated.".to_owned(),
+        ),
+        "sample_clock" => (
+            format!("The clock of the samples runs at {}.", sized("rate_hz")),
+            "State this rate: every averaging time and N scale with it.".to_owned(),
+        ),
+        "unexplained" => (unexplained(finding), "Look at the channel's figures at that place; a longer record, or temperature and supply beside it, may tell the cause.".to_owned()),
+        kind => (
+            format!("{}: {}.", words(kind), finding.evidence.trim_end_matches('.')),
+            "This version of the report has no words for it; the evidence is that of the analysis.".to_owned(),
+        ),
+    }
+}
+
+/// ` from … to …`, where the times are known.
+fn interval_words(at: &impl Fn(&str) -> String, known: bool) -> String {
+    if known { format!(" from {} to {}", at("from"), at("to")) } else { String::new() }
+}
+
+/// A fraction in percent.
+fn share(fraction: Option<f64>) -> String {
+    fraction.map_or_else(|| "Some".to_owned(), |fraction| format!("{} %", significant(100.0 * fraction, 2)))
+}
+
+/// Where and how much.
+fn unexplained(finding: &Finding) -> String {
+    let value = |name: &str| finding.parameters.get(name).map(|parameter| parameter.value);
+    let place = match (value("tau"), value("frequency"), value("time")) {
+        (Some(tau), ..) => format!("at averaging times around {}", span(tau)),
+        (None, Some(frequency), _) => format!("around {}", quantity(frequency, "Hz")),
+        (None, None, Some(time)) => format!("at {} into the record", span(time)),
+        _ => "somewhere".to_owned(),
+    };
+    match value("excess_percent") {
+        Some(excess) => {
+            let sign = if excess < 0.0 { "−" } else { "+" };
+            format!("{sign}{} % {place} fits no known effect.", significant(excess.abs(), 2))
+        }
+        None => format!("What is measured {place} fits no known effect."),
+    }
+}
+
+/// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
+#[must_use]
+pub fn channel_list(names: &[String]) -> String {
+    let axes = |prefix: &str| -> Vec<&str> { names.iter().filter_map(|name| name.strip_prefix(prefix)).collect() };
+    let (gyros, accelerometers, magnetometers) = (axes("gyro_"), axes("accl_"), axes("magn_"));
+    if gyros.len() == 3 && accelerometers.len() == 3 {
+        return "all channels".to_owned();
+    }
+    let group = |axes: &[&str], one: &str, all: &str| match axes {
+        [] => None,
+        axes if axes.len() == 3 => Some(all.to_owned()),
+        axes => Some(format!("{one} {}", axes.join(" "))),
+    };
+    let groups = [
+        group(&gyros, "gyro", "gyros"),
+        group(&accelerometers, "accel", "accels"),
+        group(&magnetometers, "magn", "magns"),
+    ];
+    let others = names.iter().filter(|name| ["gyro_", "accl_", "magn_"].iter().all(|prefix| !name.starts_with(prefix)));
+    groups.into_iter().flatten().chain(others.map(|name| words(name))).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use noise_analysis::report::Parameter;
+
+    fn names(list: &[&str]) -> Vec<String> {
+        list.iter().map(|name| (*name).to_owned()).collect()
+    }
+
+    fn finding(kind: &str) -> Finding {
+        Finding {
+            kind: kind.to_owned(),
+            channels: vec!["gyro_z".to_owned()],
+            parameters: Default::default(),
+            evidence: "of the analysis".to_owned(),
+            validated: Validation::Untestable,
+            share_percent: Default::default(),
+        }
+    }
+
+    #[test]
+    fn every_kind_has_its_words_and_its_section_in_the_documentation() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/findings.md");
+        let page = std::fs::read_to_string(path).expect("docs/findings.md");
+        for kind in KINDS {
+            let heading = format!("### `{kind}`\n");
+            let section = page.split(&heading).nth(1).unwrap_or_else(|| panic!("{kind} has no section"));
+            let section = section.split("\n### ").next().unwrap_or_default();
+            let section = section.split_whitespace().collect::<Vec<_>>().join(" ");
+            let text = describe(&finding(kind));
+            // Without parameters the sentence still is one, and it is not that of a kind without words.
+            assert!(
+                text.physics.ends_with('.') && !text.physics.contains("of the analysis"),
+                "{kind}: {}",
+                text.physics
+            );
+            let quoted = section.split("Advice: *").nth(1).and_then(|rest| rest.split('*').next()).expect("an advice");
+            assert!(text.advice.starts_with(quoted.trim_end_matches('.')), "{kind}: {} / {quoted}", text.advice);
+        }
+        // A kind without words is told by its evidence.
+        assert!(describe(&finding("something_new")).physics.contains("something new: of the analysis."));
+    }
+
+    #[test]
+    fn a_share_becomes_a_gain_in_sigma() {
+        let mut line = finding("sinusoid");
+        line.parameters.insert("frequency".to_owned(), Parameter::new(20.5, 20.4, 20.6, "Hz"));
+        line.share_percent.insert("gyro_z".to_owned(), 75.0);
+        let text = describe(&line);
+        assert!(
+            text.physics.starts_with("A vibration or hum at 20.50 ± 0.10 Hz reaches this channel"),
+            "{}",
+            text.physics
+        );
+        // 1 − √(1 − 0.75) = 50 %.
+        assert!(text.advice.ends_with("It would take 50 % off σ where it is largest."), "{}", text.advice);
+        assert_eq!(text.weight, "up to 75 % of σ²");
+    }
+
+    #[test]
+    fn channels_are_listed_in_few_words() {
+        for (list, text) in [
+            (&["gyro_z"][..], "gyro z"),
+            (&["gyro_x", "gyro_y", "gyro_z"], "gyros"),
+            (&["gyro_z", "accl_x", "accl_y"], "gyro z, accel x y"),
+            (&["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"], "all channels"),
+            (&["supply"], "supply"),
+        ] {
+            assert_eq!(channel_list(&names(list)), text);
+        }
+    }
+}

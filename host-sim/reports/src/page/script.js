@@ -1,0 +1,106 @@
+"use strict";
+// Values under the pointer and by keyboard, and tables as CSV. Without this script the page shows everything but these.
+(() => {
+  const format = (value) => {
+    if (value === null) return "–";
+    const size = Math.abs(value);
+    if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(3).replace("-", "−");
+    return String(Number(value.toPrecision(4))).replace("-", "−");
+  };
+  const at = (axis, value) => {
+    const part = axis.log ? Math.log(value / axis.from) / Math.log(axis.to / axis.from)
+      : (value - axis.from) / (axis.to - axis.from);
+    return axis.start + part * (axis.end - axis.start);
+  };
+  for (const figure of document.querySelectorAll("figure")) {
+    const panels = JSON.parse(figure.querySelector(".values").textContent);
+    const svg = figure.querySelector("svg");
+    const cursor = svg.querySelector(".cursor");
+    const output = figure.querySelector("output");
+    const described = output.textContent;
+    if (panels.length === 0) continue;
+    // A line without places has those of the line before.
+    for (const { lines } of panels) lines.forEach((line, position) => { line.x ??= lines[position - 1].x; });
+    let panel = 0;
+    let index = -1;
+    // The places of a panel are those of its line with the most of them.
+    const places = (of) => of.lines.reduce((most, line) => line.x.length > most.length ? line.x : most, []);
+    const show = () => {
+      const of = panels[panel];
+      const xs = places(of);
+      if (xs.length === 0) return;
+      index = Math.max(0, Math.min(xs.length - 1, index));
+      const x = at(of.x, xs[index]);
+      cursor.setAttribute("x1", x);
+      cursor.setAttribute("x2", x);
+      cursor.setAttribute("visibility", "visible");
+      const texts = [];
+      for (const line of of.lines) {
+        let nearest = -1;
+        line.x.forEach((value, position) => {
+          if (nearest < 0 || Math.abs(at(of.x, value) - x) < Math.abs(at(of.x, line.x[nearest]) - x)) nearest = position;
+        });
+        if (nearest < 0 || Math.abs(at(of.x, line.x[nearest]) - x) > 3 || line.y[nearest] === null) continue;
+        const bounds = line.low ? ` (${format(line.low[nearest])} … ${format(line.high[nearest])})` : "";
+        texts.push(`${line.name} ${format(line.y[nearest])}${bounds}`);
+      }
+      output.textContent = `${of.x.label} ${format(xs[index])} · ${of.y.label}: ${texts.join(" · ")}`;
+    };
+    const hide = () => {
+      cursor.setAttribute("visibility", "hidden");
+      output.textContent = described;
+    };
+    svg.addEventListener("pointermove", (event) => {
+      const box = svg.getBoundingClientRect();
+      const scale = svg.viewBox.baseVal.width / box.width;
+      const [px, py] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
+      const hit = panels.findIndex((of) => py <= of.y.start + 10);
+      panel = hit < 0 ? panels.length - 1 : hit;
+      const xs = places(panels[panel]);
+      let best = 0;
+      xs.forEach((value, position) => {
+        if (Math.abs(at(panels[panel].x, value) - px) < Math.abs(at(panels[panel].x, xs[best]) - px)) best = position;
+      });
+      index = best;
+      show();
+    });
+    svg.addEventListener("pointerleave", () => { if (document.activeElement !== figure) hide(); });
+    figure.addEventListener("blur", hide);
+    figure.addEventListener("keydown", (event) => {
+      const last = places(panels[panel]).length - 1;
+      const moves = { ArrowRight: index + 1, ArrowLeft: index < 0 ? last : index - 1, Home: 0, End: last };
+      if (event.key in moves) index = moves[event.key];
+      else if (event.key === "PageDown") panel = Math.min(panels.length - 1, panel + 1);
+      else if (event.key === "PageUp") panel = Math.max(0, panel - 1);
+      else if (event.key === "Escape") { hide(); return; }
+      else return;
+      event.preventDefault();
+      show();
+    });
+  }
+  const cell = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  for (const table of document.querySelectorAll("table")) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = "Copy as CSV";
+    button.addEventListener("click", async () => {
+      const rows = [...table.rows].map((row) => [...row.cells].map((of) => cell(of.innerText.trim().replace(/\s+/g, " "))).join(","));
+      const text = rows.join("\n") + "\n";
+      button.dataset.csv = text;
+      try {
+        await navigator.clipboard.writeText(text);
+      } catch {
+        // A page from a file has no clipboard in every browser.
+        const area = document.createElement("textarea");
+        area.value = text;
+        document.body.append(area);
+        area.select();
+        document.execCommand("copy");
+        area.remove();
+      }
+      button.textContent = "Copied";
+      setTimeout(() => { button.textContent = "Copy as CSV"; }, 1500);
+    });
+    table.parentElement.after(button);
+  }
+})();

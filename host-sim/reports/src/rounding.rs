@@ -1,0 +1,232 @@
+//! Estimates as they are printed: rounded to what their interval supports, in units with an SI prefix.
+
+use crate::formatting::{NONE, unit};
+use noise_analysis::report::Parameter;
+
+/// Widest relative half-width at which an interval is written as `± half`, if it is also as wide on either side.
+const SYMMETRIC: f64 = 0.25;
+/// Largest ratio of the wider to the narrower side of such an interval.
+const SKEW: f64 = 1.3;
+
+/// `value` with so many decimals, its thousands separated.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let (sign, digits) = text.strip_prefix('-').map_or(("", text.as_str()), |digits| ("−", digits));
+    let (whole, fraction) = digits.split_once('.').map_or((digits, None), |(whole, fraction)| (whole, Some(fraction)));
+    if whole.bytes().chain(fraction.into_iter().flat_map(str::bytes)).all(|digit| digit == b'0') {
+        return fraction.map_or_else(|| "0".to_owned(), |fraction| format!("0.{fraction}"));
+    }
+    let mut grouped = String::new();
+    for (index, digit) in whole.chars().enumerate() {
+        if index > 0 && (whole.len() - index).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    fraction.map_or_else(|| format!("{sign}{grouped}"), |fraction| format!("{sign}{grouped}.{fraction}"))
+}
+
+/// Decimals with which a number is written whose uncertainty is `half_width`: two digits of it are shown where it begins with
+/// 1 or 2, else one, so that rounding changes it by at most a sixth.
+fn decimals(half_width: f64) -> usize {
+    if !half_width.is_finite() || half_width <= 0.0 {
+        return 3;
+    }
+    let exponent = half_width.log10().floor();
+    let leading = half_width / 10f64.powf(exponent);
+    let digits = if leading < 2.95 { 1.0 } else { 0.0 };
+    (digits - exponent).clamp(0.0, 9.0) as usize
+}
+
+/// `value` rounded to whole multiples of the place that `half_width` supports, left of the decimal point too.
+fn at_place(value: f64, half_width: f64) -> f64 {
+    if half_width >= 29.5 && half_width.is_finite() {
+        let exponent = half_width.log10().floor();
+        let digits = if half_width / 10f64.powf(exponent) < 2.95 { 1.0 } else { 0.0 };
+        let place = 10f64.powf(exponent - digits);
+        return (value / place).round() * place;
+    }
+    value
+}
+
+/// An estimate with its 95 % bounds: `2.43 ± 0.01`, `24.3 (21 … 27)`, `< 190` where only an upper bound is known, `–` without an
+/// estimate.
+#[must_use]
+pub fn estimate(value: f64, low: f64, high: f64) -> String {
+    if !value.is_finite() {
+        return NONE.to_owned();
+    }
+    if !(low.is_finite() && high.is_finite()) || high <= low {
+        return plain(value, 3);
+    }
+    if low <= 0.0 && value <= high / 1e3 {
+        return format!("< {}", significant(high, 2));
+    }
+    let (below, above) = (value - low, high - value);
+    let half = (high - low) / 2.0;
+    let is_symmetric = below.max(above) <= SKEW * below.min(above) && half <= SYMMETRIC * value.abs();
+    if is_symmetric {
+        let decimals = decimals(half);
+        return format!("{} ± {}", fixed(at_place(value, half), decimals), fixed(at_place(half, half), decimals));
+    }
+    if low <= 0.0 {
+        return format!("{} (< {})", significant(value, 2), significant(high, 2));
+    }
+    format!("{} ({} … {})", significant(value, 2), significant(low, 2), significant(high, 2))
+}
+
+/// `value` with so many significant digits, without an exponent.
+#[must_use]
+pub fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return NONE.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Rounded first: 9.96 has the exponent of 10.0.
+    let scaled = format!("{value:.*e}", usize::try_from(digits - 1).unwrap_or(0));
+    let Some((value, exponent)) =
+        scaled.parse::<f64>().ok().zip(scaled.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()))
+    else {
+        return scaled;
+    };
+    fixed(value, usize::try_from(digits - 1 - exponent).unwrap_or(0))
+}
+
+/// The same without zeros at the end: `100`, `8`, `91.4`.
+#[must_use]
+pub fn plain(value: f64, digits: i32) -> String {
+    let text = significant(value, digits);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// Prefixes and their factors.
+const PREFIXES: [(&str, f64); 7] =
+    [("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9), ("p", 1e-12)];
+
+/// The prefix with which `magnitude` is between 1 and 1,000, as far as there is one, and its factor. Prefixes above 1 are
+/// not used where `enlarging` is false: nobody writes k°/h.
+fn prefix(magnitude: f64, enlarging: bool) -> (&'static str, f64) {
+    let mut usable = PREFIXES.iter().filter(|(_, factor)| enlarging || *factor <= 1.0);
+    let fitting = usable.clone().find(|(_, factor)| magnitude >= 0.995 * factor);
+    fitting.or(usable.next_back()).copied().filter(|_| magnitude > 0.0 && magnitude.is_finite()).unwrap_or(("", 1.0))
+}
+
+/// A quantity with three significant digits and a prefix in its unit: `0.27 °/s` is `270 m°/s`, `2.2e-5 g` is `22.0 µg`.
+#[must_use]
+pub fn quantity(value: f64, name: &str) -> String {
+    quantity_digits(value, name, 2)
+}
+
+/// The same with so many significant digits.
+#[must_use]
+pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
+    if !value.is_finite() {
+        return NONE.to_owned();
+    }
+    let spelled = unit(name);
+    if spelled.is_empty() {
+        return significant(value, digits);
+    }
+    // A tenth of a degree is written 0.1 °; µ and m come below that.
+    let takes_prefix = !matches!(spelled.as_str(), "%" | "°C" | "min" | "h");
+    let (prefix, factor) = match value.abs() {
+        magnitude if !takes_prefix || (0.0995..1000.0).contains(&magnitude) => ("", 1.0),
+        magnitude => prefix(magnitude, spelled == "Hz"),
+    };
+    format!("{} {prefix}{spelled}", significant(value / factor, digits))
+}
+
+/// The same for a parameter, with the precision that its interval supports: `20.70 ± 0.10 Hz`.
+#[must_use]
+pub fn bounded_quantity(parameter: &Parameter) -> String {
+    let Parameter { value, low, high, unit: name } = parameter;
+    let spelled = unit(name);
+    let magnitude = value.abs();
+    let (prefix, factor) = if spelled.is_empty() || (0.0995..1000.0).contains(&magnitude) {
+        ("", 1.0)
+    } else {
+        prefix(magnitude, spelled == "Hz")
+    };
+    let text = if *value < 0.0 {
+        format!("−{}", estimate(-value / factor, -high / factor, -low / factor))
+    } else {
+        estimate(value / factor, low / factor, high / factor)
+    };
+    format!("{text} {prefix}{spelled}").trim_end().to_owned()
+}
+
+/// The prefix for a column of a table by the largest of its `values`, and its factor; none from 0.1 on.
+#[must_use]
+pub fn column_prefix(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
+    let largest = values.filter(|value| value.is_finite()).fold(0.0, f64::max);
+    if largest >= 0.1 || largest == 0.0 { ("", 1.0) } else { prefix(largest, false) }
+}
+
+/// A duration in one or two units: `20 ms`, `3 h 02 min`, `9 h`.
+#[must_use]
+pub fn span(seconds: f64) -> String {
+    if !seconds.is_finite() {
+        return NONE.to_owned();
+    }
+    if seconds < 99.5 {
+        return quantity(seconds, "s");
+    }
+    let minutes = (seconds / 60.0).round();
+    if minutes < 60.0 {
+        return format!("{minutes} min");
+    }
+    let (hours, rest) = ((minutes / 60.0).floor(), minutes % 60.0);
+    if hours >= 48.0 {
+        return format!("{} d {} h", (hours / 24.0).floor(), hours % 24.0);
+    }
+    if rest == 0.0 { format!("{hours} h") } else { format!("{hours} h {rest:02} min") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_estimate_has_the_digits_that_its_interval_supports() {
+        for (value, low, high, text) in [
+            (2.4312, 2.4212, 2.4412, "2.431 ± 0.010"),
+            (2.4312, 2.39, 2.47, "2.43 ± 0.04"),
+            (24.3, 20.9, 27.4, "24 ± 3"),
+            (24.3, 14.0, 37.0, "24 (14 … 37)"),
+            (240.0, 60.0, 420.0, "240 (60 … 420)"),
+            (0.0, 0.0, 187.0, "< 190"),
+            (863.2, 820.0, 906.0, "860 ± 40"),
+            (12.0, 0.0, 31.0, "12 (< 31)"),
+            (f64::NAN, 0.0, 1.0, NONE),
+        ] {
+            assert_eq!(estimate(value, low, high), text, "{value} ({low} … {high})");
+        }
+    }
+
+    #[test]
+    fn quantities_have_prefixes_in_their_units() {
+        for (value, name, text) in [
+            (0.27, "deg/s", "0.27 °/s"),
+            (0.012, "deg/s", "12 m°/s"),
+            (22e-6, "g", "22 µg"),
+            (9.96e-4, "g", "1.0 mg"),
+            (20.7, "Hz", "21 Hz"),
+            (0.02, "s", "20 ms"),
+            (-0.0043, "deg/s/degC", "−4.3 m°/s/°C"),
+            (0.0, "g", "0 g"),
+        ] {
+            assert_eq!(quantity(value, name), text, "{value} {name}");
+        }
+    }
+
+    #[test]
+    fn durations_are_short() {
+        for (seconds, text) in
+            [(0.02, "20 ms"), (80.0, "80 s"), (600.0, "10 min"), (10_940.0, "3 h 02 min"), (32_400.0, "9 h")]
+        {
+            assert_eq!(span(seconds), text);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The part of a report that other programs need: sample rate, and each channel's curve and final model. It is read from the
+//! JSON of schema 1 or taken from a report in memory.
+
+use noise_analysis::assessment::sum_of_white_noise;
+use noise_analysis::findings::BoundedEstimate;
+use noise_analysis::report::{ChannelReport, Parameter, Report, SCHEMA, TermReport};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// What a report says of the noise of a sensor.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct SavedReport {
+    /// Hz.
+    pub sample_rate_hz: f64,
+    /// In the order of the burst.
+    pub channels: Vec<SavedChannel>,
+}
+
+/// One output of the sensor.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct SavedChannel {
+    /// Such as `gyro_z`.
+    pub name: String,
+    /// Unit of the deviations, such as `deg/s`.
+    pub unit: String,
+    /// The measured Allan deviation, octave by octave.
+    pub curve: Vec<SavedPoint>,
+    /// The model that was fitted to the whole record.
+    #[serde(rename = "final")]
+    pub refitted: SavedModel,
+}
+
+/// One octave of the measured Allan deviation, with 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct SavedPoint {
+    /// Averaging factor, samples.
+    pub n: u64,
+    /// Averaging time, s.
+    pub tau_s: f64,
+    /// In the channel's unit.
+    pub adev: f64,
+    /// Lower bound of `adev`.
+    pub low: f64,
+    /// Upper bound of `adev`; infinite where the report has none.
+    #[serde(deserialize_with = "unbounded")]
+    pub high: f64,
+    /// Equivalent degrees of freedom.
+    pub edf: f64,
+}
+
+/// A fitted model.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct SavedModel {
+    /// Its terms.
+    pub terms: Vec<SavedTerm>,
+    /// The model's Allan deviation at each point of the curve, in the channel's unit.
+    pub adev: Vec<f64>,
+}
+
+/// One term of a model.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct SavedTerm {
+    /// Such as `angle_random_walk`.
+    pub kind: String,
+    /// By name, as in [`TermReport::parameters`].
+    pub parameters: BTreeMap<String, SavedParameter>,
+}
+
+/// An estimate with its 95 % bounds.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct SavedParameter {
+    /// Estimate.
+    pub value: f64,
+    /// Lower bound.
+    pub low: f64,
+    /// Upper bound; infinite where the report has none.
+    #[serde(deserialize_with = "unbounded")]
+    pub high: f64,
+    /// Unit of all three.
+    pub unit: String,
+}
+
+/// Why a file is not a report that this program can use.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SavedReportError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// It is no JSON object, or has no field `schema`.
+    #[error("no JSON report of this program: {0}")]
+    NoReport(serde_json::Error),
+    /// It has another schema.
+    #[error("schema {0}, where this program reads schema {SCHEMA}")]
+    Schema(u64),
+    /// A field is missing or has another type.
+    #[error("{path}: {reason}")]
+    Field {
+        /// Where, such as `channels[3].final`.
+        path: String,
+        /// What was expected.
+        reason: serde_json::Error,
+    },
+}
+
+/// JSON has no infinity: the report writes `null`.
+fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+}
+
+impl SavedReport {
+    /// Reads the JSON that `analyze --json` writes.
+    ///
+    /// # Errors
+    /// The file cannot be read, has another schema, or lacks a field; the error names the field.
+    pub fn read(file: &Path) -> Result<Self, SavedReportError> {
+        Self::from_json(&fs::read_to_string(file)?)
+    }
+
+    /// As [`read`](Self::read), from the text of the file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn from_json(text: &str) -> Result<Self, SavedReportError> {
+        #[derive(Deserialize)]
+        struct Version {
+            schema: u64,
+        }
+        let Version { schema } = serde_json::from_str(text).map_err(SavedReportError::NoReport)?;
+        if schema != u64::from(SCHEMA) {
+            return Err(SavedReportError::Schema(schema));
+        }
+        serde_path_to_error::deserialize(&mut serde_json::Deserializer::from_str(text)).map_err(|error| {
+            let path = match error.path().to_string() {
+                path if path == "." => "the report".to_owned(),
+                path => path,
+            };
+            SavedReportError::Field { path, reason: error.into_inner() }
+        })
+    }
+
+    /// The channel of this name.
+    #[must_use]
+    pub fn channel(&self, name: &str) -> Option<&SavedChannel> {
+        self.channels.iter().find(|channel| channel.name == name)
+    }
+}
+
+impl SavedChannel {
+    /// The coefficient of the term `kind`. N is that of all white noise, behind a filter and after it.
+    #[must_use]
+    pub fn coefficient(&self, kind: &str) -> Option<SavedParameter> {
+        let is_of = |of: &str| of == kind || (kind == "angle_random_walk" && of == "filter_bandwidth");
+        let terms = self.refitted.terms.iter().filter(|term| is_of(&term.kind));
+        let parts: Vec<&SavedParameter> = terms.filter_map(|term| term.parameters.get("value")).collect();
+        let estimates: Vec<BoundedEstimate> = parts
+            .iter()
+            .map(|&&SavedParameter { value, low, high, .. }| BoundedEstimate { value, low, high })
+            .collect();
+        let unit = parts.first()?.unit.clone();
+        let BoundedEstimate { value, low, high } = sum_of_white_noise(&estimates);
+        Some(SavedParameter { value, low, high, unit })
+    }
+}
+
+impl From<&Report> for SavedReport {
+    fn from(report: &Report) -> Self {
+        Self {
+            sample_rate_hz: report.sample_rate_hz,
+            channels: report.channels.iter().map(SavedChannel::from).collect(),
+        }
+    }
+}
+
+impl From<&ChannelReport> for SavedChannel {
+    fn from(channel: &ChannelReport) -> Self {
+        let parameter = |Parameter { value, low, high, unit }: &Parameter| SavedParameter {
+            value: *value,
+            low: *low,
+            high: *high,
+            unit: unit.clone(),
+        };
+        let term = |TermReport { kind, parameters }: &TermReport| SavedTerm {
+            kind: kind.clone(),
+            parameters: parameters.iter().map(|(name, of)| (name.clone(), parameter(of))).collect(),
+        };
+        let point = |point: &noise_analysis::report::CurvePoint| SavedPoint {
+            n: point.n,
+            tau_s: point.tau_s,
+            adev: point.adev,
+            low: point.low,
+            high: point.high,
+            edf: point.edf,
+        };
+        Self {
+            name: channel.name.clone(),
+            unit: channel.unit.clone(),
+            curve: channel.curve.iter().map(point).collect(),
+            refitted: SavedModel {
+                terms: channel.refitted.terms.iter().map(term).collect(),
+                adev: channel.refitted.adev.clone(),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SavedReport, SavedReportError};
+
+    const POINT: &str = r#"{"n":1,"tau_s":0.01,"adev":0.4,"low":0.3,"high":null,"edf":9.0}"#;
+
+    fn report(terms: &str) -> String {
+        format!(
+            r#"{{"schema":1,"sample_rate_hz":100.0,"channels":[{{"name":"gyro_x","unit":"deg/s","curve":[{POINT}],
+            "final":{{"terms":[{terms}],"adev":[0.4]}}}}]}}"#
+        )
+    }
+
+    #[test]
+    fn what_is_missing_is_named_with_its_place() {
+        let complete = r#"{"kind":"angle_random_walk","parameters":{"value":{"value":1.0,"low":0.9,"high":1.1,"unit":"deg/sqrt(s)"}}}"#;
+        let read = SavedReport::from_json(&report(complete)).expect("complete");
+        assert_eq!(read.channels[0].coefficient("angle_random_walk").map(|n| n.high), Some(1.1));
+        assert_eq!(read.channels[0].curve[0].high, f64::INFINITY);
+        let error = |text: &str| SavedReport::from_json(text).expect_err("incomplete").to_string();
+        let without_low = complete.replace(r#""low":0.9,"#, "");
+        assert!(
+            error(&report(&without_low))
+                .starts_with("channels[0].final.terms[0].parameters.value: missing field `low`")
+        );
+        assert!(
+            error(&report("").replace("sample_rate_hz", "rate"))
+                .starts_with("the report: missing field `sample_rate_hz`")
+        );
+        assert_eq!(error(r#"{"schema":2}"#), "schema 2, where this program reads schema 1");
+        for text in ["", "{}", "sample,gyro_x_counts"] {
+            assert!(matches!(SavedReport::from_json(text), Err(SavedReportError::NoReport(_))), "{text}");
+        }
+    }
+}

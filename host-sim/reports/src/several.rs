@@ -1,0 +1,79 @@
+//! Several recordings of one sensor in the terminal: whether they show the same noise, and the inflation while a machine runs.
+
+use crate::formatting::number;
+use comfy_table::{Table, presets};
+use noise_analysis::several::{NoiseAgreement, NoiseInflation};
+use std::io::{self, Write};
+
+/// Writes one row a channel: the verdict, its p-value, where the recordings differ most, and the joint coefficients.
+///
+/// # Errors
+/// As `out` does.
+pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::Result<()> {
+    let samples: Vec<String> = agreement.samples.iter().map(u64::to_string).collect();
+    writeln!(
+        out,
+        "{} recordings of {} samples at {:.3} Hz",
+        samples.len(),
+        samples.join(", "),
+        agreement.sample_rate_hz
+    )?;
+    let mut table = table(["channel", "noise", "p", "largest ratio", "joint model"]);
+    for channel in &agreement.channels {
+        let ratios = channel.octaves.iter().map(|octave| {
+            let (low, high) =
+                octave.adev.iter().fold((f64::MAX, 0.0_f64), |(low, high), &adev| (low.min(adev), high.max(adev)));
+            (high / low, octave)
+        });
+        let worst = ratios.min_by(|(_, a), (_, b)| a.p_value.total_cmp(&b.p_value));
+        let joint = channel.joint.iter().flat_map(|term| {
+            term.parameters.iter().map(|(name, of)| {
+                let name = if name == "value" { term.kind.as_str() } else { name.as_str() }.replace('_', " ");
+                format!("{name} {} [{}, {}] {}", number(of.value), number(of.low), number(of.high), of.unit)
+            })
+        });
+        table.add_row([
+            channel.name.clone(),
+            match (channel.p_value, channel.agree) {
+                (None, _) => "too few samples",
+                (_, true) => "the same",
+                (_, false) => "differs",
+            }
+            .to_owned(),
+            channel.p_value.map_or_else(String::new, |p| format!("{p:.2e}")),
+            worst.map_or_else(String::new, |(ratio, octave)| {
+                format!("{ratio:.3} at {} s (p {:.1e})", number(octave.tau_s), octave.p_value)
+            }),
+            joint.collect::<Vec<_>>().join("\n"),
+        ]);
+    }
+    writeln!(out, "{table}")
+}
+
+/// Writes one row a channel and octave.
+///
+/// # Errors
+/// As `out` does.
+pub fn write_inflation(inflation: &NoiseInflation, out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "\ninflation: Allan deviation while running over that at rest, with 95 % bounds")?;
+    let mut table = table(["channel", "averaging time", "at rest", "running", "unit", "factor"]);
+    for channel in &inflation.channels {
+        for octave in &channel.octaves {
+            table.add_row([
+                channel.name.clone(),
+                format!("{} s", number(octave.tau_s)),
+                number(octave.still),
+                number(octave.running),
+                channel.unit.clone(),
+                format!("{:.3} [{:.3}, {:.3}]", octave.factor, octave.low, octave.high),
+            ]);
+        }
+    }
+    writeln!(out, "{table}")
+}
+
+fn table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(header);
+    table
+}

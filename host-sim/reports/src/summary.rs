@@ -1,0 +1,405 @@
+//! What a report says in short, for the terminal's screen, the page's first screen and the live view: the record in sentences,
+//! the coefficients in the units of their users, what the data contradicts, and what to do next.
+
+use crate::finding_text::{FindingText, channel_list, describe};
+use crate::formatting::{count, words};
+use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span};
+use noise_analysis::assessment::sum_of_white_noise;
+use noise_analysis::findings::BoundedEstimate;
+use noise_analysis::report::DataSheetReport;
+use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
+use noise_analysis::units::conversions;
+
+/// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
+/// half to the other leaves up to 3.
+const HIGH_DEVIANCE: f64 = 3.0;
+/// Standard deviations from which the largest deviation of a model is told.
+const FAR_OFF: f64 = 4.0;
+/// Part of the record that has to be at rest for "throughout".
+const THROUGHOUT: f64 = 0.999;
+/// Minimum of the Allan deviation over B: `sqrt(2 ln 2/π)`.
+const MINIMUM_OVER_B: f64 = 0.664;
+
+/// Kind, letter and full name of the coefficients of the baseline model.
+const LETTERS: [(&str, &str); 3] = [("angle_random_walk", "N"), ("bias_instability", "B"), ("rate_random_walk", "K")];
+
+/// A group of inertial channels with their units.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CoefficientTable {
+    /// `gyro` or `accel`.
+    pub title: &'static str,
+    /// Units of N, B and K, prefixes included.
+    pub units: [String; 3],
+    /// One row a channel, then that of the data sheet, if it is known.
+    pub rows: Vec<CoefficientTableRow>,
+}
+
+/// One channel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CoefficientTableRow {
+    /// The axis, or `sheet`.
+    pub label: String,
+    /// Name of the channel in the report; empty for the data sheet.
+    pub channel: String,
+    /// N, B and K of the model `final`, with their bounds; `–` where the model lacks them.
+    pub coefficients: [String; 3],
+    /// Deviance a point on the unseen half before and after.
+    pub error: String,
+    /// Whether that of the model with its effects is far above what chance makes.
+    pub is_high: bool,
+}
+
+/// Symbol of a unit, the unit that `conversions` knows, and the factor from that to the symbol's.
+type UnitOfColumn = (&'static str, &'static str, f64);
+
+/// Groups of inertial channels: title, prefix of their names, and the units of N, B and K.
+const GROUPS: [(&str, &str, [UnitOfColumn; 3]); 2] = [
+    ("gyro", "gyro_", [("°/√h", "deg/sqrt(h)", 1.0), ("°/h", "deg/h", 1.0), ("°/h/√h", "deg/h/sqrt(h)", 1.0)]),
+    ("accel", "accl_", [("g/√Hz", "ug/sqrt(Hz)", 1e-6), ("g", "ug", 1e-6), ("g/√h", "ug/sqrt(h)", 1e-6)]),
+];
+
+/// The tables of the gyros and of the accelerometers, without those of which there is no channel.
+#[must_use]
+pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
+    let table = |(title, prefix, units): &(&'static str, &str, [UnitOfColumn; 3])| {
+        let channels: Vec<&ChannelReport> =
+            report.channels.iter().filter(|channel| channel.name.starts_with(prefix)).collect();
+        let first = channels.first()?;
+        let factor = |index: usize| {
+            let known = conversions(LETTERS[index].0, &first.unit, report.sample_rate_hz);
+            known.iter().find(|known| known.unit == units[index].1).map_or(1.0, |known| known.factor) * units[index].2
+        };
+        let factors: [f64; 3] = std::array::from_fn(factor);
+        let of = |channel: &ChannelReport, index: usize| coefficient(channel, LETTERS[index].0);
+        let sheet = first.figure_data.data_sheet.as_ref().map(sheet_coefficients);
+        let prefixes: [(&str, f64); 3] = std::array::from_fn(|index| {
+            let shown = channels.iter().filter_map(|channel| of(channel, index));
+            column_prefix(shown.map(|n| factors[index] * if n.value > 0.0 { n.value } else { n.high }))
+        });
+        let scale = |index: usize| factors[index] / prefixes[index].1;
+        let mut rows: Vec<CoefficientTableRow> = channels
+            .iter()
+            .map(|channel| CoefficientTableRow {
+                label: channel.name.trim_start_matches(prefix).to_owned(),
+                channel: channel.name.clone(),
+                coefficients: std::array::from_fn(|index| {
+                    of(channel, index).map_or_else(
+                        || "–".to_owned(),
+                        |n| estimate(n.value * scale(index), n.low * scale(index), n.high * scale(index)),
+                    )
+                }),
+                error: error_change(channel),
+                is_high: is_high(channel),
+            })
+            .collect();
+        rows.extend(sheet.map(|sheet| CoefficientTableRow {
+            label: "sheet".to_owned(),
+            channel: String::new(),
+            coefficients: std::array::from_fn(|index| {
+                sheet[index].map_or_else(|| "–".to_owned(), |value| significant(value * scale(index), 2))
+            }),
+            error: String::new(),
+            is_high: false,
+        }));
+        let units = std::array::from_fn(|index| format!("{}{}", prefixes[index].0, units[index].0));
+        Some(CoefficientTable { title, units, rows })
+    };
+    GROUPS.iter().filter_map(table).collect()
+}
+
+/// N, B and K of a data sheet in the channel's unit and seconds. The in-run bias stability is the minimum of the curve, B is that over
+/// 0.664.
+#[must_use]
+pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
+    [
+        sheet.angle_random_walk,
+        sheet.in_run_bias_stability.map(|minimum| minimum / MINIMUM_OVER_B),
+        sheet.rate_random_walk,
+    ]
+}
+
+/// A coefficient of the model to use. N is that of all white noise, behind the part's filter and after it.
+#[must_use]
+pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
+    let is_white = kind == LETTERS[0].0;
+    let is_of = |of: &str| of == kind || (is_white && of == "filter_bandwidth");
+    let terms = channel.refitted.terms.iter().filter(|term| is_of(&term.kind));
+    let parts: Vec<&Parameter> = terms.filter_map(|term| term.parameters.get("value")).collect();
+    let estimates: Vec<BoundedEstimate> =
+        parts.iter().map(|&&Parameter { value, low, high, .. }| BoundedEstimate { value, low, high }).collect();
+    let unit = &parts.first()?.unit;
+    let BoundedEstimate { value, low, high } = sum_of_white_noise(&estimates);
+    Some(Parameter::new(value, low, high, unit))
+}
+
+/// The error of a model on the unseen half, without what the first half's rules exclude where they exclude anything.
+fn unseen(model: &noise_analysis::report::ModelReport) -> &ModelErrorReport {
+    model.unseen_excluding.as_ref().unwrap_or(&model.unseen)
+}
+
+/// Deviance a point before and after.
+fn error_change(channel: &ChannelReport) -> String {
+    let deviance = |error: &ModelErrorReport| {
+        error
+            .deviance_per_point
+            .map_or_else(|| "–".to_owned(), |of| if of < 9.95 { format!("{of:.1}") } else { count(of.round() as u64) })
+    };
+    format!("{} → {}", deviance(unseen(&channel.before)), deviance(unseen(&channel.after)))
+}
+
+/// Whether the model with its effects fails on the unseen half.
+fn is_high(channel: &ChannelReport) -> bool {
+    let error = unseen(&channel.after);
+    error.deviance_per_point.is_some_and(|of| of > HIGH_DEVIANCE)
+}
+
+/// Gyros and accelerometers.
+fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> {
+    report.channels.iter().filter(|channel| ["gyro_", "accl_"].iter().any(|prefix| channel.name.starts_with(prefix)))
+}
+
+/// Part, number of samples, length and rate.
+#[must_use]
+pub fn headline(report: &Report, source: Option<&str>) -> Vec<String> {
+    let part = if report.part.name.is_empty() { "Inertial sensor" } else { &report.part.name };
+    let length = span(report_length_s(report));
+    let rate = plain(report.sample_rate_hz, 4);
+    let samples = format!("{} samples", count(report.samples));
+    let record = format!("{length} at {rate} Hz");
+    [Some(part), source, Some(samples.as_str()), Some(record.as_str())]
+        .into_iter()
+        .flatten()
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Length of the record with its gaps, s.
+fn report_length_s(report: &Report) -> f64 {
+    let lost = report.dropped.values().fold(0, |sum: u64, &of| sum.saturating_add(of));
+    let length = report.samples.saturating_add(lost) as f64 / report.sample_rate_hz;
+    if length.is_finite() { length } else { 0.0 }
+}
+
+/// The record in sentences: rest, losses, length.
+#[must_use]
+pub fn record_sentences(report: &Report) -> Vec<String> {
+    let mut sentences = vec![rest(report), losses(report)];
+    sentences.extend(length_advice(report));
+    sentences.extend(report.part.note.as_ref().map(|note| format!("{}.", capitalised(note.trim_end_matches('.')))));
+    sentences.retain(|sentence| !sentence.is_empty());
+    sentences
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn rest(report: &Report) -> String {
+    let length = report_length_s(report);
+    let still = |channel: &ChannelReport| channel.at_rest.iter().map(|of| of.to_s - of.from_s).sum::<f64>();
+    let least = inertial(report).filter(|channel| !channel.at_rest.is_empty()).map(still).fold(f64::INFINITY, f64::min);
+    match least {
+        _ if !least.is_finite() => String::new(),
+        least if least >= THROUGHOUT * length => "At rest throughout.".to_owned(),
+        least => format!("It moved: at rest for {} of {}.", span(least), span(length)),
+    }
+}
+
+fn losses(report: &Report) -> String {
+    let lost = report.dropped.get("gap").copied().unwrap_or(0);
+    let refused: Vec<String> = report
+        .dropped
+        .iter()
+        .filter(|(cause, samples)| cause.as_str() != "gap" && **samples > 0)
+        .map(|(cause, samples)| format!("{} {}", count(*samples), words(cause)))
+        .collect();
+    let all = report.samples.saturating_add(report.dropped.values().sum());
+    let lost = match lost {
+        0 => "No sample lost".to_owned(),
+        lost => {
+            format!("{} samples lost ({} %)", count(lost), significant(100.0 * lost as f64 / all.max(1) as f64, 2))
+        }
+    };
+    if refused.is_empty() { format!("{lost}.") } else { format!("{lost}, refused: {}.", refused.join(", ")) }
+}
+
+/// For which coefficients the record is long enough, and how much longer it should be for the others. `None` without an
+/// inertial channel that says it.
+fn length_advice(report: &Report) -> Option<String> {
+    let (mut enough, mut others): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
+    for (kind, letter) in LETTERS {
+        let said: Vec<(&str, Option<f64>)> = inertial(report)
+            .filter_map(|channel| {
+                let record = channel.assessment.record.iter().find(|record| record.kind == kind)?;
+                Some((channel.name.as_str(), record.more_hours))
+            })
+            .collect();
+        if said.is_empty() {
+            continue;
+        }
+        let hidden: Vec<String> =
+            said.iter().filter(|(_, hours)| hours.is_none()).map(|(name, _)| (*name).to_owned()).collect();
+        let most = said.iter().filter_map(|(_, hours)| *hours).fold(0.0, f64::max);
+        if hidden.len() == said.len() {
+            others.push(format!("{letter} does not show"));
+        } else if most > 0.0 {
+            let not =
+                if hidden.is_empty() { String::new() } else { format!(" (not shown in {})", channel_list(&hidden)) };
+            others.push(format!("{letter} wants {} more{not}", hours(most)));
+        } else if hidden.is_empty() {
+            enough.push(letter);
+        } else {
+            others.push(format!("{letter} is not shown in {}", channel_list(&hidden)));
+        }
+    }
+    let enough = match enough.as_slice() {
+        [] => None,
+        [one] => Some(format!("long enough for {one}")),
+        [first @ .., last] => Some(format!("long enough for {} and {last}", first.join(", "))),
+    };
+    let parts: Vec<String> = enough.into_iter().chain(others).collect();
+    (!parts.is_empty()).then(|| format!("For ±20 %: {}.", parts.join("; ")))
+}
+
+/// Hours with two digits.
+fn hours(hours: f64) -> String {
+    match hours {
+        hours if hours < 1.0 => span(3600.0 * hours),
+        hours if hours < 10.0 => format!("{} h", significant(hours, 2)),
+        hours if hours < 72.0 => format!("{hours:.0} h"),
+        hours => format!("{:.0} days", hours / 24.0),
+    }
+}
+
+/// Magnetometers, temperature and supply: conditions, one text each.
+#[must_use]
+pub fn conditions(report: &Report) -> Vec<String> {
+    let moved = |name: &str, label: &str| {
+        let channel = report.channels.iter().find(|channel| channel.name == name)?;
+        let bias = channel.figure_data.bias_over_time.as_ref()?;
+        let (low, high) = bias
+            .mean
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| (value.min(low), value.max(high)));
+        Some(match high - low {
+            0.0 => format!("{label} did not change"),
+            range => format!("{label} moved by {}", quantity(range, &channel.unit)),
+        })
+    };
+    let magnetometers: Vec<f64> = report
+        .channels
+        .iter()
+        .filter(|channel| channel.name.starts_with("magn_"))
+        .filter_map(|channel| Some(1e3 * coefficient(channel, LETTERS[0].0)?.value))
+        .collect();
+    let magnetometers = (!magnetometers.is_empty()).then(|| {
+        let each: Vec<String> = magnetometers.iter().map(|value| significant(*value, 2)).collect();
+        format!("magnetometers N {} mgauss/√Hz", each.join(", "))
+    });
+    let unknown = report.channels.iter().all(|channel| channel.name != "temp");
+    [
+        moved("temp", "temperature"),
+        unknown.then(|| "temperature was not recorded".to_owned()),
+        moved("supply", "supply"),
+        magnetometers,
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// The findings in words, in the order of the report, those that nothing explains apart.
+#[must_use]
+pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
+    let (unexplained, named): (Vec<_>, Vec<_>) =
+        report.findings.iter().partition(|finding| finding.kind == "unexplained");
+    let of_inertial = |finding: &&&noise_analysis::report::Finding| {
+        finding.channels.iter().any(|name| name.starts_with("gyro_") || name.starts_with("accl_"))
+    };
+    // A cause in a gyro or an accelerometer comes before one in a channel that is a condition.
+    let (inertial, others): (Vec<_>, Vec<_>) = named.into_iter().partition(|finding| of_inertial(&finding));
+    let words = |list: Vec<&noise_analysis::report::Finding>| list.into_iter().map(describe).collect::<Vec<_>>();
+    (words(inertial.into_iter().chain(others).collect()), words(unexplained))
+}
+
+/// What the data contradicts, one text each, the most serious first.
+#[must_use]
+pub fn contradictions(report: &Report) -> Vec<String> {
+    let mut told = Vec::new();
+    let mut far: Vec<(&ChannelReport, &ModelErrorReport, f64)> = inertial(report)
+        .filter_map(|channel| {
+            let error = unseen(&channel.after);
+            let sigma = error.worst_sigma.filter(|sigma| sigma.abs() > FAR_OFF)?;
+            Some((channel, error, sigma))
+        })
+        .collect();
+    far.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    for (channel, error, sigma) in &far {
+        let (Some(tau), Some(ratio)) = (error.worst_tau_s, error.worst_ratio) else { continue };
+        let change = 100.0 * (1.0 / ratio - 1.0);
+        let amount = if change.abs() < 100.0 {
+            format!("{}{} %", if change < 0.0 { "−" } else { "+" }, significant(change.abs(), 2))
+        } else {
+            format!("{} times", significant(1.0 / ratio, 2))
+        };
+        told.push(format!(
+            "{} at τ = {}: measured {amount} against the model ({} σ)",
+            channel_list(std::slice::from_ref(&channel.name)),
+            span(tau),
+            significant(sigma.abs(), 2)
+        ));
+    }
+    for channel in inertial(report) {
+        let Some((spectrum, fit)) =
+            channel.assessment.angle_random_walk_by_spectrum.as_ref().zip(coefficient(channel, LETTERS[0].0))
+        else {
+            continue;
+        };
+        if spectrum.low > fit.high || spectrum.high < fit.low {
+            let percent = 100.0 * (spectrum.value / fit.value - 1.0);
+            told.push(format!(
+                "{}: the spectrum gives N {} % {} than the fit",
+                channel_list(std::slice::from_ref(&channel.name)),
+                significant(percent.abs(), 2),
+                if percent < 0.0 { "lower" } else { "higher" }
+            ));
+        }
+    }
+    let unsure: Vec<String> = inertial(report)
+        .filter(|channel| channel.assessment.innovations.as_ref().is_some_and(|of| of.normalised > of.high))
+        .map(|channel| channel.name.clone())
+        .collect();
+    if !unsure.is_empty() {
+        told.push(format!("a filter with these models would be too sure of itself in {}", channel_list(&unsure)));
+    }
+    told
+}
+
+/// What to do next, the most useful first.
+#[must_use]
+pub fn next_steps(report: &Report) -> Vec<String> {
+    let mut weighed: Vec<(f64, FindingText)> = report
+        .findings
+        .iter()
+        .filter(|finding| finding.kind != "unexplained")
+        .map(|finding| (finding.share_percent.values().copied().fold(0.0, f64::max), describe(finding)))
+        .collect();
+    weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut steps: Vec<String> = Vec::new();
+    for (_, text) in weighed {
+        let first = text.advice.split_inclusive(['.', ';']).next().unwrap_or_default().trim_end_matches([';', '.']);
+        let step = format!("{first}.");
+        if !first.starts_with("Nothing to repair") && !steps.contains(&step) {
+            steps.push(step);
+        }
+    }
+    steps.truncate(3);
+    if inertial(report).any(is_high) {
+        steps.push("! The error on the unseen half is far above 1: see --full.".to_owned());
+    }
+    if inertial(report).next().is_some() {
+        steps.push("For a filter: add --kalibr imu.yaml.".to_owned());
+    }
+    steps
+}

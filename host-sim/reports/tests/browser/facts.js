@@ -1,0 +1,82 @@
+"use strict";
+// What a browser shows of a page: run in the parent of an iframe that holds it. The facts become the text of an element.
+function facts(frame) {
+  const view = frame.contentWindow;
+  const page = frame.contentDocument;
+  const channels = (colour) => (colour.match(/[\d.]+/g) || []).map(Number);
+  const luminance = ([r, g, b]) => {
+    const linear = (of) => { const part = of / 255; return part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4; };
+    return 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  };
+  const ground = (element) => {
+    for (let of = element; of; of = of.parentElement) {
+      const colour = channels(view.getComputedStyle(of).backgroundColor);
+      if (colour.length === 3 || colour[3] > 0.99) return colour;
+    }
+    return [255, 255, 255];
+  };
+  const contrasts = [];
+  for (const element of page.querySelectorAll("body *")) {
+    const own = [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+    if (!own || ["SCRIPT", "STYLE", "title"].includes(element.tagName)) continue;
+    const style = view.getComputedStyle(element);
+    const colour = channels(element instanceof view.SVGElement ? style.fill : style.color);
+    const [one, other] = [luminance(colour), luminance(ground(element))];
+    contrasts.push([(Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05), element.textContent.trim().slice(0, 40)]);
+  }
+  contrasts.sort((a, b) => a[0] - b[0]);
+  const figures = [...page.querySelectorAll("figure")].map((figure) => {
+    const drawn = [...figure.querySelectorAll("g[data-line]")].map((group) => ({
+      name: group.dataset.line,
+      points: (group.querySelector("polyline")?.getAttribute("points") ?? "").split(" ").filter(Boolean)
+        .map((pair) => pair.split(",").map(Number)),
+      dots: [...group.querySelectorAll("circle")].map((dot) => [Number(dot.getAttribute("cx")), Number(dot.getAttribute("cy"))]),
+      visible: [...group.children].every((shape) => {
+        const style = view.getComputedStyle(shape);
+        return shape.tagName === "circle" ? style.fill !== "none" : style.stroke !== "none";
+      }),
+    }));
+    const output = figure.querySelector("output");
+    const before = output.textContent;
+    figure.focus();
+    const focused = page.activeElement === figure;
+    const press = (key) => figure.dispatchEvent(new view.KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
+    press("ArrowRight");
+    const read = output.textContent;
+    const box = figure.querySelector("svg").getBoundingClientRect();
+    figure.blur();
+    const svg = figure.querySelector("svg");
+    svg.dispatchEvent(new view.PointerEvent("pointermove", { clientX: box.left + box.width / 2, clientY: box.top + box.height / 3 }));
+    const pointed = output.textContent;
+    svg.dispatchEvent(new view.PointerEvent("pointerleave"));
+    return {
+      id: figure.id, label: svg.getAttribute("aria-label"), focused, before, read, pointed, after: output.textContent,
+      panels: JSON.parse(figure.querySelector(".values").textContent).map((panel) => {
+        panel.lines.forEach((line, position) => { line.x ??= panel.lines[position - 1].x; });
+        return panel;
+      }), drawn,
+    };
+  });
+  const button = page.querySelector("button");
+  button?.click();
+  return {
+    width: page.documentElement.clientWidth,
+    overflow: page.documentElement.scrollWidth - page.documentElement.clientWidth,
+    contrasts: contrasts.slice(0, 3),
+    dark: view.matchMedia("(prefers-color-scheme: dark)").matches,
+    requests: view.performance.getEntriesByType("resource").map((entry) => entry.name),
+    links: [...page.querySelectorAll("a[href^='#']")].filter((link) => !page.getElementById(link.getAttribute("href").slice(1))).map((link) => link.href),
+    csv: button?.dataset.csv ?? null,
+    figures,
+  };
+}
+window.addEventListener("load", () => {
+  const result = document.createElement("pre");
+  result.id = "facts";
+  try {
+    result.textContent = JSON.stringify([...document.querySelectorAll("iframe")].map(facts));
+  } catch (error) {
+    result.textContent = JSON.stringify({ error: String(error), stack: error.stack });
+  }
+  document.body.append(result);
+});

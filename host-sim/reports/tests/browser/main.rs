@@ -1,0 +1,222 @@
+//! The page in headless Chromium: what is drawn against the report, both colour schemes, two widths, the keyboard, and that nothing
+//! is requested. Where there is no Chromium the tests say so and pass.
+
+#[path = "../rendering/fixture.rs"]
+#[allow(dead_code)]
+mod fixture;
+
+use noise_analysis::report::{BiasOverTime, DataSheetReport, SpectrumReport};
+use noise_analysis::report::{Finding, Parameter, Report, Validation};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+/// Names of the program.
+const CHROMIUM: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+
+fn chromium() -> Option<&'static str> {
+    let runs = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
+    let found = CHROMIUM.into_iter().find(|name| runs(name));
+    if found.is_none() {
+        eprintln!("skipped: no chromium on this machine (apt-get install chromium)");
+    }
+    found
+}
+
+/// The fixture with everything that a figure shows.
+fn report() -> Report {
+    let mut report = fixture::report();
+    report.part.name = "ADIS16405".to_owned();
+    for (index, channel) in report.channels.iter_mut().enumerate() {
+        let data = &mut channel.figure_data;
+        data.data_sheet = Some(DataSheetReport {
+            angle_random_walk: Some(0.0333),
+            in_run_bias_stability: Some(0.007),
+            rate_random_walk: None,
+        });
+        let frequency_hz: Vec<f64> = (0..200).map(|bin| 0.001 * 1.055f64.powi(bin)).collect();
+        let density: Vec<f64> = frequency_hz.iter().map(|f| 0.05 * (1.0 + 0.1 / f).sqrt()).collect();
+        data.spectrum = Some(SpectrumReport {
+            low: density.iter().map(|of| 0.9 * of).collect(),
+            high: density.iter().map(|of| 1.1 * of).collect(),
+            model: density.iter().map(|of| 1.02 * of).collect(),
+            frequency_hz,
+            density,
+        });
+        let time_s: Vec<f64> = (0..250).map(|block| 40.0 * (f64::from(block) + 0.5)).collect();
+        let mean: Vec<f64> = time_s.iter().map(|time| 0.01 * (time / 1500.0 + index as f64).sin()).collect();
+        data.bias_over_time =
+            Some(BiasOverTime { block_s: 40.0, followed: mean.iter().map(|of| 0.8 * of).collect(), time_s, mean });
+    }
+    let parameter = |value: f64, unit: &str| Parameter::new(value, 0.9 * value, 1.1 * value, unit);
+    let finding = |kind: &str, parameters: &[(&str, Parameter)]| Finding {
+        kind: kind.to_owned(),
+        channels: vec!["gyro_z".to_owned()],
+        parameters: parameters.iter().map(|(name, of)| ((*name).to_owned(), of.clone())).collect(),
+        evidence: "<made> for \"this\" test".to_owned(),
+        validated: Validation::Yes,
+        share_percent: [("gyro_z".to_owned(), 40.0)].into(),
+    };
+    report.findings = vec![
+        finding("sinusoid", &[("frequency", parameter(0.7, "Hz")), ("amplitude", parameter(0.09, "deg/s"))]),
+        finding("bias_step", &[("time", parameter(4000.0, "s")), ("size", parameter(0.01, "deg/s"))]),
+        finding("telegraph", &[("amplitude", parameter(0.02, "deg/s")), ("time_constant", parameter(60.0, "s"))]),
+        finding("markov", &[("deviation", parameter(0.02, "deg/s")), ("time_constant", parameter(9.0, "s"))]),
+    ];
+    report
+}
+
+/// What Chromium shows of the page of `report` at each of the widths.
+fn facts(program: &str, report: &Report, is_dark: bool, widths: &[u32]) -> Vec<Value> {
+    let dir = tempfile::tempdir().expect("a folder");
+    let page = reports::page::write(report, dir.path()).expect("a page");
+    let page = std::fs::read_to_string(page).expect("the page");
+    assert!(page.len() < 1_000_000, "{} bytes", page.len());
+    let escaped = page.replace('&', "&amp;").replace('"', "&quot;");
+    let frame =
+        |width: &u32| format!("<iframe style=\"width:{width}px;height:900px;border:0\" srcdoc=\"{escaped}\"></iframe>");
+    let frames: String = widths.iter().map(frame).collect();
+    let harness = format!("<!doctype html><body>{frames}<script>{}</script></body>", include_str!("facts.js"));
+    let file = dir.path().join("harness.html");
+    std::fs::write(&file, harness).expect("a file");
+    let dom = dump(program, &file, is_dark);
+    let start = dom.find("<pre id=\"facts\">").expect("the facts") + "<pre id=\"facts\">".len();
+    let text = &dom[start..start + dom[start..].find("</pre>").expect("the end of the facts")];
+    let text = text.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"").replace("&amp;", "&");
+    let facts: Value = serde_json::from_str(&text).expect("JSON");
+    facts.as_array().unwrap_or_else(|| panic!("{facts}")).clone()
+}
+
+fn dump(program: &str, file: &Path, is_dark: bool) -> String {
+    let mut command = Command::new(program);
+    command.args([
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--virtual-time-budget=10000",
+        "--window-size=1400,1000",
+    ]);
+    command.arg(format!("--user-data-dir={}", file.with_extension("profile").display()));
+    command.arg(format!("--blink-settings=preferredColorScheme={}", if is_dark { 0 } else { 1 }));
+    let output = command.arg("--dump-dom").arg(format!("file://{}", file.display())).output().expect("chromium runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+    value[name].as_array().map_or(&[], Vec::as_slice)
+}
+
+/// The pixel that an axis of the page's data gives a value.
+fn pixel(axis: &Value, value: f64) -> f64 {
+    let of = |name: &str| axis[name].as_f64().expect(name);
+    let part = if axis["log"] == true {
+        (value / of("from")).ln() / (of("to") / of("from")).ln()
+    } else {
+        (value - of("from")) / (of("to") - of("from"))
+    };
+    of("start") + part * (of("end") - of("start"))
+}
+
+/// A tenth of a pixel of rounding, and what four significant digits of a value are on an axis of 330 pixels over a decade.
+const PIXEL: f64 = 0.1 + 330.0 * 0.5e-3 / std::f64::consts::LN_10;
+
+#[test]
+fn what_is_drawn_is_what_was_measured() {
+    let Some(program) = chromium() else { return };
+    let report = report();
+    let facts = facts(program, &report, false, &[1300]);
+    let figures = list(&facts[0], "figures");
+    // The overview, three figures a channel, four of the evidence.
+    assert_eq!(figures.len(), 1 + 3 * 6 + 4);
+    let figure = |id: &str| figures.iter().find(|figure| figure["id"] == id).expect("the figure");
+    let line = |id: &str, name: &str| {
+        let figure = figure(id);
+        let panel = &figure["panels"][0];
+        let values = list(panel, "lines").iter().find(|line| line["name"] == name).expect("its values").clone();
+        let drawn = list(figure, "drawn").iter().find(|line| line["name"] == name).expect("its drawing").clone();
+        (panel.clone(), values, drawn)
+    };
+    let check = |id: &str, name: &str, expected: &[(f64, f64)]| {
+        let (panel, values, drawn) = line(id, name);
+        let points = list(&drawn, "points");
+        assert_eq!(points.len(), expected.len(), "{id} {name}");
+        assert_eq!(drawn["visible"], true, "{id} {name}");
+        for (index, (&(x, y), point)) in expected.iter().zip(points).enumerate() {
+            for (axis, value, at) in [("x", x, 0), ("y", y, 1)] {
+                let read = values[axis][index].as_f64().expect("a value");
+                assert!((read / value - 1.0).abs() < 1e-3, "{id} {name}: {read} for {value}");
+                let distance = (point[at].as_f64().expect("a pixel") - pixel(&panel[axis], value)).abs();
+                assert!(distance < PIXEL, "{id} {name}: {distance} pixels off");
+            }
+        }
+    };
+    for channel in &report.channels {
+        let name = &channel.name;
+        let measured: Vec<(f64, f64)> = channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect();
+        check(&format!("{name}-allan"), "measured, 95 % bounds", &measured);
+        let along = |values: &[f64]| -> Vec<(f64, f64)> {
+            channel.curve.iter().map(|point| point.tau_s).zip(values.iter().copied()).collect()
+        };
+        check(&format!("{name}-allan"), "model", &along(&channel.refitted.adev));
+        let (_, values, _) = line(&format!("{name}-allan"), "measured, 95 % bounds");
+        for (index, point) in channel.curve.iter().enumerate() {
+            for (bound, value) in [("low", point.low), ("high", point.high)] {
+                let read = values[bound][index].as_f64().expect("a bound");
+                assert!((read / value - 1.0).abs() < 1e-3, "{name} {bound}: {read} for {value}");
+            }
+        }
+        let spectrum = channel.figure_data.spectrum.as_ref().expect("a spectrum");
+        let density: Vec<(f64, f64)> =
+            spectrum.frequency_hz.iter().copied().zip(spectrum.density.iter().copied()).collect();
+        check(&format!("{name}-spectrum"), "measured, 95 % bounds", &density);
+        // The record of 10,000 s has its time in minutes.
+        let bias = channel.figure_data.bias_over_time.as_ref().expect("a bias");
+        let mean: Vec<(f64, f64)> = bias.time_s.iter().map(|time| time / 60.0).zip(bias.mean.iter().copied()).collect();
+        let (_, _, drawn) = line(&format!("{name}-bias"), "mean of 40 s");
+        assert_eq!(list(&drawn, "points").len(), mean.len());
+    }
+    // N²/τ + the minimum of the data sheet.
+    let (_, sheet, _) = line("overview", "data sheet");
+    let taus: Vec<f64> = report.channels[0].curve.iter().map(|point| point.tau_s).collect();
+    for (index, tau) in taus.iter().enumerate() {
+        let expected = (0.0333f64.powi(2) / tau + 0.007f64.powi(2)).sqrt();
+        let read = sheet["y"][index].as_f64().expect("a value");
+        assert!((read / expected - 1.0).abs() < 1e-3, "{read} for {expected}");
+    }
+}
+
+#[test]
+fn the_page_fits_and_can_be_read_in_both_colour_schemes() {
+    let Some(program) = chromium() else { return };
+    for is_dark in [false, true] {
+        for facts in facts(program, &report(), is_dark, &[400, 1300]) {
+            let width = &facts["width"];
+            assert_eq!(facts["dark"], is_dark);
+            assert_eq!(facts["overflow"], 0, "at {width} pixels");
+            let worst = &facts["contrasts"][0];
+            assert!(worst[0].as_f64().expect("a contrast") >= 4.5, "{} at {width}, dark {is_dark}", facts["contrasts"]);
+            assert_eq!(list(&facts, "requests").len(), 0, "{}", facts["requests"]);
+            assert_eq!(list(&facts, "links").len(), 0, "links to nowhere: {}", facts["links"]);
+        }
+    }
+}
+
+#[test]
+fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
+    let Some(program) = chromium() else { return };
+    let facts = facts(program, &report(), false, &[1300]);
+    for figure in list(&facts[0], "figures") {
+        let of = |name: &str| figure[name].as_str().unwrap_or_default();
+        assert_eq!(figure["focused"], true, "{}", of("id"));
+        assert!(of("label").chars().count() > 40, "{}: {}", of("id"), of("label"));
+        // The first value of the first panel, with the name of its axis.
+        let axis = figure["panels"][0]["x"]["label"].as_str().expect("a label");
+        assert!(of("read").starts_with(axis) && of("read") != of("before"), "{}: {}", of("id"), of("read"));
+        assert!(of("pointed").starts_with(axis) && of("pointed") != of("read"), "{}: {}", of("id"), of("pointed"));
+        assert_eq!(of("after"), of("before"), "{}", of("id"));
+    }
+    let csv = facts[0]["csv"].as_str().expect("the table");
+    assert!(csv.starts_with("channel,angle random walk N,"), "{csv}");
+    assert!(csv.contains("\nx,2.21 ± 0.14,"), "{csv}");
+}

@@ -1,0 +1,135 @@
+//! The screen of a report whose numbers are known, against the files beside this one. After a change that is meant, delete the file,
+//! run the test, and read what it wrote.
+
+#[path = "../rendering/fixture.rs"]
+#[allow(dead_code)]
+mod fixture;
+
+use noise_analysis::report::{Finding, Parameter, Report, Stretch, Validation};
+use reports::terminal::{MOST_LINES, Screen};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+fn parameter(value: f64, half_width: f64, unit: &str) -> Parameter {
+    Parameter::new(value, value - half_width, value + half_width, unit)
+}
+
+fn finding(kind: &str, channels: &[&str], parameters: &[(&str, Parameter)], share: f64) -> Finding {
+    Finding {
+        kind: kind.to_owned(),
+        channels: channels.iter().map(|name| (*name).to_owned()).collect(),
+        parameters: parameters.iter().map(|(name, of)| ((*name).to_owned(), of.clone())).collect(),
+        evidence: "measured".to_owned(),
+        validated: Validation::Yes,
+        share_percent: BTreeMap::from([(channels[0].to_owned(), share)]),
+    }
+}
+
+fn report() -> Report {
+    let mut report = fixture::report();
+    report.part.name = "ADIS16405".to_owned();
+    for channel in &mut report.channels {
+        channel.at_rest = vec![Stretch { from_s: 0.0, to_s: 10_002.15 }];
+    }
+    // Beyond chance: the screen has to say so.
+    let error = &mut report.channels[4].after.unseen;
+    (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(8.2), Some(81.92), Some(0.8));
+    error.deviance_per_point = Some(33.1);
+    report.findings = vec![
+        finding(
+            "filter_bandwidth",
+            &["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"],
+            &[("taps", Parameter::new(8.0, 8.0, 8.0, "")), ("decimation", parameter(8.95, 0.02, ""))],
+            12.0,
+        ),
+        finding(
+            "sinusoid",
+            &["gyro_z", "accl_x"],
+            &[("frequency", parameter(20.7, 0.1, "Hz")), ("amplitude", parameter(0.27, 0.01, "deg/s"))],
+            62.0,
+        ),
+        finding(
+            "unexplained",
+            &["gyro_z"],
+            &[("tau", parameter(80.0, 1.0, "s")), ("excess_percent", parameter(9.0, 2.0, "%"))],
+            9.0,
+        ),
+    ];
+    report
+}
+
+/// The screen without its styles.
+fn plain(report: &Report, columns: usize) -> Vec<String> {
+    let strip = |line: String| {
+        let mut text = String::new();
+        let mut is_style = false;
+        for letter in line.chars() {
+            match (letter, is_style) {
+                ('\u{1b}', _) => is_style = true,
+                ('m', true) => is_style = false,
+                (_, true) => {}
+                (letter, false) => text.push(letter),
+            }
+        }
+        text
+    };
+    Screen { report, source: Some("run1.csv.gz"), columns }.lines().into_iter().map(strip).collect()
+}
+
+#[test]
+fn the_screen_is_as_it_was_read() {
+    for columns in [80, 120] {
+        let screen = plain(&report(), columns).join("\n") + "\n";
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/screen/{columns}.txt"));
+        match std::fs::read_to_string(&file) {
+            Ok(expected) => assert_eq!(screen, expected, "{columns} columns"),
+            Err(_) => {
+                std::fs::write(&file, &screen).expect("the snapshot");
+                panic!("{} was missing and is written: read it", file.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_screen_keeps_to_its_lines_and_columns() {
+    for columns in [10, 80, 97, 120, 200, 1000] {
+        let mut crowded = report();
+        for number in 0..60 {
+            let frequency = parameter(20.0 + f64::from(number), 0.1, "Hz");
+            let channels = ["gyro_x", "gyro_z", "accl_y", "magn_x", "magn_y"];
+            crowded.findings.push(finding("sinusoid", &channels, &[("frequency", frequency)], 3.0));
+        }
+        for report in [report(), crowded, fixture::report(), fixture::empty()] {
+            let lines = plain(&report, columns);
+            assert!(lines.len() <= MOST_LINES, "{} lines at {columns}", lines.len());
+            for line in &lines {
+                assert!(line.chars().count() <= columns.clamp(80, 200), "{columns}: {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_screen_has_one_value_of_a_coefficient() {
+    // `final` counts, not `before`, `after` or the slopes.
+    let mut report = report();
+    let term = &mut report.channels[0].refitted.terms[0];
+    *term.parameters.get_mut("value").expect("N") = parameter(0.05, 0.0005, "deg/sqrt(s)");
+    let screen = plain(&report, 80).join("\n");
+    // 0.05 deg/√s are 3 deg/√h.
+    assert!(screen.contains("3.00 ± 0.03"), "{screen}");
+}
+
+#[test]
+fn what_is_not_known_is_not_claimed() {
+    let mut report = fixture::report();
+    for channel in &mut report.channels {
+        channel.at_rest.clear();
+        channel.assessment.record.clear();
+    }
+    let screen = plain(&report, 80).join("\n");
+    assert!(!screen.contains("rest throughout") && !screen.contains("For ±20 %"), "{screen}");
+    report.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
+    assert!(plain(&report, 80).join("\n").contains("It moved: at rest for 10 min of 2 h 47 min."));
+}

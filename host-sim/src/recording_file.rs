@@ -1,0 +1,63 @@
+//! A recording written in one of the formats of this program.
+
+use crate::cli::RecordingFormat;
+use crate::output::note;
+use adis16405_driver::{BURST_REQUEST, Burst, GyroRange, Register};
+use anyhow::{Context, Result, bail};
+use recordings::frame_log::{Frame, FrameLogWriter};
+use recordings::recording::{RecordedSample, Recording};
+use recordings::{count_table_writer, numpy_matrix};
+use std::path::Path;
+
+/// The format that the name of `out` stands for, if none is named: `.npy` is a NumPy array, everything else a table.
+pub(crate) fn format_of(out: &Path, named: Option<RecordingFormat>) -> RecordingFormat {
+    let is_npy = out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy"));
+    named.unwrap_or(if is_npy { RecordingFormat::Npy } else { RecordingFormat::Table })
+}
+
+/// Writes `recording` to `out`.
+pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat) -> Result<()> {
+    let written = match format {
+        RecordingFormat::Table => count_table_writer::write(recording, out).map_err(anyhow::Error::from),
+        RecordingFormat::Frames => write_frames(recording, out),
+        RecordingFormat::Npy => numpy_matrix::write(recording, out)
+            .map(|names| note(format_args!("columns of {}: {}", out.display(), names.join(", "))))
+            .map_err(anyhow::Error::from),
+    };
+    written.with_context(|| out.display().to_string())?;
+    if format == RecordingFormat::Table && recording.range != GyroRange::Dps300 {
+        note(format_args!("the table does not say the range: read it with --range {}", full_scale(recording.range)));
+    }
+    Ok(())
+}
+
+/// Writes every sample as the burst that the part would have sent, after the write that selects the range.
+fn write_frames(recording: &Recording, out: &Path) -> Result<()> {
+    let time = |(row, sample): (usize, &RecordedSample)| {
+        sample.time_stamp.time_s.with_context(|| format!("sample {row} has no time, which a frame log needs"))
+    };
+    let first = recording.samples.iter().enumerate().map(time).next();
+    let Some(first_s) = first.transpose()? else { bail!("no samples") };
+    let mut log = FrameLogWriter::create(out)?;
+    let code = match recording.range {
+        GyroRange::Dps300 => 0x0400,
+        GyroRange::Dps150 => 0x0200,
+        GyroRange::Dps75 => 0x0100,
+    };
+    let select = Register::SensAvg.write_high_frame(code).to_vec();
+    log.write(&Frame { time_s: first_s, miso: vec![0; select.len()], mosi: select })?;
+    for entry in recording.samples.iter().enumerate() {
+        let miso = Burst::from_counts(&entry.1.counts).to_bytes().to_vec();
+        log.write(&Frame { time_s: time(entry)?, mosi: BURST_REQUEST.to_vec(), miso })?;
+    }
+    Ok(log.finish()?)
+}
+
+/// Full scale of the gyroscopes, °/s.
+fn full_scale(range: GyroRange) -> u32 {
+    match range {
+        GyroRange::Dps300 => 300,
+        GyroRange::Dps150 => 150,
+        GyroRange::Dps75 => 75,
+    }
+}

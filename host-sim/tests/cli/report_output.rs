@@ -1,0 +1,56 @@
+//! Where a report goes: one screen, every table, nothing, JSON on standard output, pictures.
+
+use crate::program::host_sim;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use tempfile::TempDir;
+
+/// What the program prints for a minute of the virtual sensor.
+fn run(dir: &TempDir, arguments: &[&str]) -> String {
+    let log = dir.path().join("bus.csv");
+    let record = ["record", log.to_str().expect("UTF-8"), "--plain"];
+    let output = host_sim(&[&record, arguments].concat());
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn the_arguments_choose_what_is_printed() {
+    let dir = TempDir::new().expect("a folder");
+    let screen = run(&dir, &[]);
+    // Standard output is no terminal here: 80 columns without colour.
+    assert!(screen.lines().count() <= 40 && screen.starts_with("ADIS16405   "), "{screen}");
+    assert!(screen.lines().all(|line| line.chars().count() <= 80 && !line.contains('\u{1b}')), "{screen}");
+    for heading in ["What was found", "What to do", "gyro", "accel"] {
+        assert!(screen.contains(heading), "{heading}: {screen}");
+    }
+    let full = run(&dir, &["--full"]);
+    assert!(full.contains("── supply") && full.contains("95 % interval"), "{full}");
+    assert_eq!(run(&dir, &["--quiet"]), "");
+    let report: Value = serde_json::from_str(&run(&dir, &["--json", "-"])).expect("JSON alone");
+    assert_eq!(report["schema"], 1);
+    let spectrum = &report["channels"][1]["spectrum"];
+    let points = spectrum["density"].as_array().expect("a spectrum").len();
+    assert!((50..=400).contains(&points), "{points}");
+}
+
+#[test]
+fn every_figure_is_written_as_svg_and_png() {
+    let dir = TempDir::new().expect("a folder");
+    let pictures = dir.path().join("pictures");
+    run(&dir, &["--pictures", pictures.to_str().expect("UTF-8")]);
+    let names: BTreeSet<String> = std::fs::read_dir(&pictures)
+        .expect("the folder")
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
+        .collect();
+    for name in ["overview", "gyro_x-allan", "gyro_x-spectrum", "gyro_x-bias", "accl_z-allan"] {
+        let svg = std::fs::read(pictures.join(format!("{name}.svg"))).expect("an SVG");
+        assert!(svg.starts_with(b"<svg "), "{name}");
+        let png = std::fs::read(pictures.join(format!("{name}.png"))).expect("a PNG");
+        // The signature and the width, twice that of the figure. DEFLATE takes at least a 1032nd of an empty picture, 5 kB.
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png[16..20] == 1520_u32.to_be_bytes(), "{name}");
+        assert!(png.len() > 15_000, "{name}: {} bytes", png.len());
+    }
+    let of = |ending: &str| names.iter().filter(|name| name.ends_with(ending)).count();
+    assert_eq!(of(".svg"), of(".png"));
+}

@@ -1,0 +1,82 @@
+//! `analyze` of several recordings, and `compare`.
+
+use crate::program::{host_sim, json_of};
+use serde_json::Value;
+use tempfile::tempdir;
+
+fn text(arguments: &[&str]) -> String {
+    let output = host_sim(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn equal_parts_agree_a_louder_axis_differs_and_is_called_worse() {
+    let dir = tempdir().expect("a folder");
+    let path = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
+    let [one, two, three] = ["1.csv", "2.csv", "3.csv"].map(path);
+    // Without slow noise, which two minutes do not determine. Gyro y of the third is 1.5 times as loud.
+    let quiet = ["--seconds", "120", "--gyro", "0.04,0,0", "--accl", "0.004,0,0"];
+    for (out, seed, gyro_y) in [(&one, "1", "0.04,0,0"), (&two, "2", "0.04,0,0"), (&three, "3", "0.06,0,0")] {
+        text(&[&["simulate", out, "--seed", seed, "--gyro-y", gyro_y][..], &quiet].concat());
+    }
+    let summary: Value = serde_json::from_slice(&json_of(&dir, &["analyze", &one, &two, &three])).expect("JSON");
+    let channels = summary["agreement"]["channels"].as_array().expect("channels");
+    for channel in channels.iter().filter(|channel| {
+        channel["name"].as_str().is_some_and(|name| name.starts_with("gyro") || name.starts_with("accl"))
+    }) {
+        let same = channel["name"] != "gyro_y";
+        assert_eq!(channel["agree"], same, "{}", channel["p_value"]);
+        assert_eq!(channel["joint"].as_array().map(Vec::is_empty), Some(!same));
+    }
+    let summary: Value =
+        serde_json::from_slice(&json_of(&dir, &["analyze", &one, &two, "--against", &three])).expect("JSON");
+    let inflated = summary["inflation"]["channels"].as_array().expect("channels");
+    let first = |name: &str| {
+        let channel = inflated.iter().find(|channel| channel["name"] == name).expect("the channel");
+        ["low", "factor", "high"].map(|key| channel["octaves"][0][key].as_f64().expect("a number"))
+    };
+    // 24,576 samples: the ratio of two deviations has a standard deviation of √(1/2·(1/16,384 + 1/32,768)) = 0.7 %; rounding
+    // to 0.05 deg/s adds as much to both.
+    let rounding = 0.05_f64.powi(2) / 12.0 / 204.8;
+    let truth = ((0.06_f64.powi(2) + rounding) / (0.04_f64.powi(2) + rounding)).sqrt();
+    let [low, factor, high] = first("gyro_y");
+    assert!((factor / truth - 1.0).abs() < 0.035 && low < factor && factor < high, "{factor} [{low}, {high}]");
+    assert!(text(&["analyze", &one, "--against", &three]).contains("inflation"));
+
+    let [a, b, c] = ["a.json", "b.json", "c.json"].map(path);
+    text(&["analyze", &one, "--json", &a]);
+    text(&["analyze", &three, "--json", &b]);
+    let table = text(&["compare", &a, &b, "--json", &c]);
+    assert!(table.contains("not distinguishable") && table.contains("worse"), "{table}");
+    let rows: Value = serde_json::from_slice(&std::fs::read(&c).expect("a file")).expect("JSON");
+    for row in rows["coefficients"].as_array().expect("rows").iter().filter(|row| row["kind"] == "angle_random_walk") {
+        let expected = if row["channel"] == "gyro_y" { "worse" } else { "not_distinguishable" };
+        assert_eq!(row["verdict"], expected, "{row}");
+    }
+    // The data sheet has 2 deg/√h, 0.0333 deg/√s: 0.06 is worse.
+    let table = text(&["compare", "--data-sheet", &b]);
+    let row = table.lines().find(|line| line.contains("gyro_y") && line.contains("angle random walk")).expect("a row");
+    assert!(row.contains("0.03333") && row.contains("worse"), "{row}");
+}
+
+#[test]
+fn wrong_sets_of_recordings_and_reports_are_refused() {
+    let dir = tempdir().expect("a folder");
+    let path = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
+    let [one, two] = ["1.csv", "2.csv"].map(path);
+    for (out, rate) in [(&one, "100"), (&two, "200")] {
+        text(&["simulate", out, "--seconds", "20", "--rate", rate]);
+    }
+    for (arguments, expected) in [
+        (&["analyze", &one, &two][..], "recordings are compared at one rate"),
+        (&["analyze", &one, &one, "--kalibr", &path("x")], "leave out --page and --kalibr"),
+        (&["analyze", &one, &two, "--json", &two], "it would be overwritten"),
+        (&["compare", &one, &two], "no JSON report"),
+    ] {
+        let output = host_sim(arguments);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && errors.contains(expected), "{arguments:?}: {errors}");
+    }
+    assert_eq!(host_sim(&["compare", "a.json"]).status.code(), Some(2));
+}
