@@ -17,10 +17,11 @@ STEPS=(
     "tools:install what is missing"
     "format:formatting"
     "lint_images:lints of the firmware images"
-    "lint_examples:lints of the driver's examples for microcontrollers"
+    "lint_examples:lints of the libraries' examples for microcontrollers"
     "lint_libraries:lints of the libraries for microcontrollers"
     "lint_host:lints for the host"
     "documentation:documentation of the libraries"
+    "python:the Python module and its tests"
     "build:build for the tests"
     "tests:tests, the images in emulators among them"
 )
@@ -34,7 +35,7 @@ run() { printf '+ %s\n' "$*"; "$@"; }
 # One choice of crates and features, so that nothing is built twice. The emulator rigless asks for a newer Rust than it needs.
 host() {
     run cargo "$1" --locked --workspace --ignore-rust-version \
-        --features adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde "${@:2}"
+        --features adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt "${@:2}"
 }
 lint() { run cargo clippy --locked "$@" -- -D warnings; }
 document() { RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps "$@"; }
@@ -57,7 +58,7 @@ tools() {
     done
     local packages=()
     command -v qemu-system-arm >/dev/null || packages+=(qemu-system-arm)
-    command -v chromium >/dev/null || packages+=(chromium)
+    command -v chromium >/dev/null || packages+=(chromium fonts-dejavu-core)
     command -v sigrok-cli >/dev/null || packages+=(sigrok-cli)
     command -v arm-none-eabi-gcc >/dev/null || packages+=(gcc-arm-none-eabi libnewlib-arm-none-eabi)
     command -v cmake >/dev/null || packages+=(cmake)
@@ -89,11 +90,19 @@ lint_images() { # where the tests build them, so that their build scripts are co
     lint "${image[@]}" --bin observatory-feather --features board-feather --target "$MCU"
     lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
 }
-lint_examples() ( # a workspace of its own
-    cd adis16405-driver/examples-stm32f405
+lint_examples() { # workspaces of their own
+    (
+        cd adis16405-driver/examples-stm32f405
+        run cargo fmt --all --check
+        lint --target "$MCU" --target-dir "$TARGET/examples"
+    )
+    cd allan-core/examples-cortex-m
     run cargo fmt --all --check
-    lint --target "$MCU" --target-dir "$TARGET/examples"
-)
+    for example in plain rtic embassy; do # one by one: their interrupt vectors differ
+        lint --target "$MCU" --target-dir "$TARGET/examples-allan" --package "examples-cortex-m-$example"
+    done
+    cd ../..
+}
 lint_libraries() {
     for target in "$MCU" "$SMALL"; do
         lint --package adis16405-driver --package allan-core --features allan-core/serde --target "$target"
@@ -105,11 +114,17 @@ documentation() {
     document --package adis16405-driver --package allan-core
     document --package adis16405-driver --all-features
 }
+python() { # with the packages of tests/requirements.txt
+    local python=$TARGET/python/bin
+    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET/python-build run "$python/pip" install --quiet --disable-pip-version-check \
+        --no-build-isolation --no-deps --force-reinstall ./allan-core/python
+    (cd allan-core/python && run "$python/pytest" --quiet -p no:cacheprovider) 2>&1 | tee -a "$log"
+}
 build() {
     host test --no-run
     export HOST_SIM=$TARGET/debug/host-sim # the program as just built
 }
-tests() { host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee "$log"; }
+tests() { host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"; }
 
 clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
 row() { table+=$(printf '%5d s  %s' $((SECONDS - began)) "$title$1")$'\n'; }
@@ -121,6 +136,7 @@ conclude() {
     sort -u "$SKIPPED_TESTS" | sed 's/^/skipped: /'
     awk -v skipped="$(cut -d: -f1 "$SKIPPED_TESTS" | sort -u | grep -c .)" '
         /^test result: / { passed += $4; failed += $6; ignored += $8 }
+        /^[0-9]+ passed.* in [0-9.]+s/ { passed += $1 } # pytest; one that failed ends the run
         END { printf "%d passed, %d failed, %d skipped\n", passed - skipped, failed, skipped + ignored }' "$log"
     rm -f "$log" "$SKIPPED_TESTS"
 }

@@ -32,7 +32,9 @@ pub(crate) fn by_curve(fit: &ChannelFit, profile: &SensorProfile, resolution: f6
     // Without dither the rounding error is no white noise.
     let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
     let rounding = if is_dithered { 0.0 } else { ROUNDING * resolution * resolution };
-    let residuals: Vec<Residual> = curve.points().iter().filter_map(|point| residual(point, model, rounding)).collect();
+    // Of a point most of whose samples were replaced from their neighbours, the interpolation has made the greater part.
+    let measured = curve.points().iter().filter(|point| point.replaced < 0.5);
+    let residuals: Vec<Residual> = measured.filter_map(|point| residual(point, model, rounding)).collect();
     // Neighbouring octaves are nearly independent.
     let limit = SIGNIFICANCE / residuals.len() as f64;
     let is_unexplained = |of: &&Residual| of.p_value < limit && (of.ratio.sqrt() - 1.0).abs() > MIN_EXCESS;

@@ -24,6 +24,8 @@ use std::process::Command;
 const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("adis16405-driver", ""),
     ("allan-core", ""),
+    ("allan-core-ffi", "allan-core"),
+    ("allan-core-python", "allan-core"),
     ("link", ""),
     ("firmware", "adis16405-driver allan-core link"),
     ("measurement", "allan-core"),
@@ -35,7 +37,7 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("benchmarks", "adis16405-driver allan-core measurement noise-analysis recordings reports simulation virtual-sensor"),
     ("host-sim", "adis16405-driver benchmarks link measurement noise-analysis recordings reports simulation"),
     ("system-tests", ""),
-    ("driver-footprint", "adis16405-driver"),
+    ("driver-footprint", "adis16405-driver allan-core"),
     ("instruction-counts", "allan-core"),
     ("peers-accuracy", "allan-core noise-analysis virtual-sensor"),
 ];
