@@ -367,7 +367,7 @@ enum allan_status allan_24_8_init(struct allan_24_8 *estimator,
  * Adds the next sample, in counts.
  *
  * # Safety
- * `estimator` is null or points to memory of its type, which nobody else uses during the call.
+ * `estimator` is null or points to memory of its type, which no other code uses during the call.
  */
 enum allan_status allan_24_8_push(struct allan_24_8 *estimator, int32_t sample);
 
@@ -391,7 +391,7 @@ enum allan_status allan_24_8_gap(struct allan_24_8 *estimator, uint32_t missing)
  * Adds the sums of `later`, which has seen a later stretch of the same channel. They must be different objects.
  *
  * # Safety
- * As `allan_24_8_push`; nobody writes `later` during the call.
+ * As `allan_24_8_push`; no other code writes `later` during the call.
  */
 enum allan_status allan_24_8_merge(struct allan_24_8 *estimator,
                                    const struct allan_24_8 *later);
@@ -400,7 +400,7 @@ enum allan_status allan_24_8_merge(struct allan_24_8 *estimator,
  * Samples taken; 0 if `estimator` is not an estimator.
  *
  * # Safety
- * `estimator` is null or points to memory of its type, which nobody writes during the call.
+ * `estimator` is null or points to memory of its type, which no other code writes during the call.
  */
 uint64_t allan_24_8_len(const struct allan_24_8 *estimator);
 
@@ -469,7 +469,7 @@ enum allan_status allan_20_4_init(struct allan_20_4 *estimator,
  * Adds the next sample, in counts.
  *
  * # Safety
- * `estimator` is null or points to memory of its type, which nobody else uses during the call.
+ * `estimator` is null or points to memory of its type, which no other code uses during the call.
  */
 enum allan_status allan_20_4_push(struct allan_20_4 *estimator, int32_t sample);
 
@@ -493,7 +493,7 @@ enum allan_status allan_20_4_gap(struct allan_20_4 *estimator, uint32_t missing)
  * Adds the sums of `later`, which has seen a later stretch of the same channel. They must be different objects.
  *
  * # Safety
- * As `allan_20_4_push`; nobody writes `later` during the call.
+ * As `allan_20_4_push`; no other code writes `later` during the call.
  */
 enum allan_status allan_20_4_merge(struct allan_20_4 *estimator,
                                    const struct allan_20_4 *later);
@@ -502,7 +502,7 @@ enum allan_status allan_20_4_merge(struct allan_20_4 *estimator,
  * Samples taken; 0 if `estimator` is not an estimator.
  *
  * # Safety
- * `estimator` is null or points to memory of its type, which nobody writes during the call.
+ * `estimator` is null or points to memory of its type, which no other code writes during the call.
  */
 uint64_t allan_20_4_len(const struct allan_20_4 *estimator);
 
@@ -561,7 +561,7 @@ enum allan_status allan_20_4_restore(struct allan_20_4 *estimator,
  * Number of points; 0 if `curve` is not a curve.
  *
  * # Safety
- * `curve` is null or points to memory of its type, which nobody writes during the call.
+ * `curve` is null or points to memory of its type, which no other code writes during the call.
  */
 size_t allan_curve_len(const struct allan_curve *curve);
 
@@ -578,7 +578,7 @@ enum allan_status allan_curve_point(const struct allan_curve *curve, size_t inde
  * where it has one the shape are read.
  *
  * # Safety
- * `curve` and `terms` are null or point to a curve and to `count` terms, which nobody writes during the call; `model` is
+ * `curve` and `terms` are null or point to a curve and to `count` terms, which no other code writes during the call; `model` is
  * null or points to memory of its type that the caller may write.
  */
 enum allan_status allan_fit(const struct allan_curve *curve,
@@ -591,7 +591,7 @@ enum allan_status allan_fit(const struct allan_curve *curve,
  * Modelled Allan variance at averaging factor `n`; NaN if `model` is not a model or `n` is 0.
  *
  * # Safety
- * `model` is null or points to a model, which nobody writes during the call.
+ * `model` is null or points to a model, which no other code writes during the call.
  */
 double allan_model_avar(const struct allan_model *model, uint64_t n);
 
@@ -603,7 +603,7 @@ double allan_model_avar(const struct allan_model *model, uint64_t n);
  * ALLAN_CANCELLED. It may be null. It must return: neither longjmp nor an exception may leave it.
  *
  * # Safety
- * `curve` and `filters` are null or point to a curve and to `count` terms, which nobody writes during the call; `result` is
+ * `curve` and `filters` are null or point to a curve and to `count` terms, which no other code writes during the call; `result` is
  * null or points to memory of its type that the caller may write.
  */
 enum allan_status allan_trace(const struct allan_curve *curve,

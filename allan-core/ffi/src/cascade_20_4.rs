@@ -43,7 +43,7 @@ pub unsafe extern "C" fn allan_20_4_init(estimator: *mut allan_20_4, bytes: usiz
 /// Adds the next sample, in counts.
 ///
 /// # Safety
-/// `estimator` is null or points to memory of its type, which nobody else uses during the call.
+/// `estimator` is null or points to memory of its type, which no other code uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_20_4_push(estimator: *mut allan_20_4, sample: i32) -> allan_status {
     status(|| {
@@ -89,7 +89,7 @@ pub unsafe extern "C" fn allan_20_4_gap(estimator: *mut allan_20_4, missing: u32
 /// Adds the sums of `later`, which has seen a later stretch of the same channel. They must be different objects.
 ///
 /// # Safety
-/// As `allan_20_4_push`; nobody writes `later` during the call.
+/// As `allan_20_4_push`; no other code writes `later` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_20_4_merge(estimator: *mut allan_20_4, later: *const allan_20_4) -> allan_status {
     // SAFETY: as the caller promises.
@@ -99,7 +99,7 @@ pub unsafe extern "C" fn allan_20_4_merge(estimator: *mut allan_20_4, later: *co
 /// Samples taken; 0 if `estimator` is not an estimator.
 ///
 /// # Safety
-/// `estimator` is null or points to memory of its type, which nobody writes during the call.
+/// `estimator` is null or points to memory of its type, which no other code writes during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_20_4_len(estimator: *const allan_20_4) -> u64 {
     // SAFETY: as the caller promises.

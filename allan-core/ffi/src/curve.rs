@@ -81,7 +81,7 @@ pub(crate) unsafe fn curve<'a>(memory: *const allan_curve) -> Result<&'a This, a
 /// Number of points; 0 if `curve` is not a curve.
 ///
 /// # Safety
-/// `curve` is null or points to memory of its type, which nobody writes during the call.
+/// `curve` is null or points to memory of its type, which no other code writes during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_curve_len(curve: *const allan_curve) -> usize {
     // SAFETY: as the caller promises.

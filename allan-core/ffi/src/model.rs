@@ -192,7 +192,7 @@ impl allan_model {
 /// where it has one the shape are read.
 ///
 /// # Safety
-/// `curve` and `terms` are null or point to a curve and to `count` terms, which nobody writes during the call; `model` is
+/// `curve` and `terms` are null or point to a curve and to `count` terms, which no other code writes during the call; `model` is
 /// null or points to memory of its type that the caller may write.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_fit(
@@ -226,7 +226,7 @@ pub unsafe extern "C" fn allan_fit(
 /// Modelled Allan variance at averaging factor `n`; NaN if `model` is not a model or `n` is 0.
 ///
 /// # Safety
-/// `model` is null or points to a model, which nobody writes during the call.
+/// `model` is null or points to a model, which no other code writes during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_model_avar(model: *const allan_model, n: u64) -> f64 {
     let avar = || {

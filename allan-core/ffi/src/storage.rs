@@ -76,35 +76,35 @@ pub(crate) unsafe fn initialise<T: Object>(memory: *mut T::Memory, object: T) ->
 /// The object in `memory`, to be read.
 ///
 /// # Safety
-/// `memory` is null or points to memory of its type, which nobody writes during `'a`.
+/// `memory` is null or points to memory of its type, which no other code writes during `'a`.
 pub(crate) unsafe fn object<'a, T: Object>(memory: *const T::Memory) -> Result<&'a T, allan_status> {
     let place = place::<T>(memory)?;
     // SAFETY: not null and aligned, as just checked; the mark is a number, of which every value is valid.
     if unsafe { (&raw const (*place).mark).read() } != T::MARK {
         return Err(ALLAN_ERROR_UNINITIALISED);
     }
-    // SAFETY: with its mark, an object was put there by this library. Nobody writes it, as the caller promises.
+    // SAFETY: with its mark, an object was put there by this library. No other code writes it, as the caller promises.
     Ok(unsafe { &(*place).object })
 }
 
 /// The object in `memory`, to be written.
 ///
 /// # Safety
-/// `memory` is null or points to memory of its type, which nobody else reads or writes during `'a`.
+/// `memory` is null or points to memory of its type, which no other code reads or writes during `'a`.
 pub(crate) unsafe fn object_mut<'a, T: Object>(memory: *mut T::Memory) -> Result<&'a mut T, allan_status> {
     let place = place::<T>(memory)?;
     // SAFETY: as in `object`.
     if unsafe { (&raw const (*place).mark).read() } != T::MARK {
         return Err(ALLAN_ERROR_UNINITIALISED);
     }
-    // SAFETY: as in `object`; nobody else reads or writes it, as the caller promises.
+    // SAFETY: as in `object`; no other code reads or writes it, as the caller promises.
     Ok(unsafe { &mut (*place).object })
 }
 
 /// The `count` elements at `first`; null is allowed if there are none.
 ///
 /// # Safety
-/// `first` is null or points to `count` initialised elements, which nobody writes during `'a`.
+/// `first` is null or points to `count` initialised elements, which no other code writes during `'a`.
 pub(crate) unsafe fn elements<'a, T>(first: *const T, count: usize) -> Result<&'a [T], allan_status> {
     if count == 0 {
         return Ok(&[]);
@@ -132,7 +132,7 @@ pub(crate) unsafe fn store<T>(place: *mut T, value: T) -> Result<(), allan_statu
 /// What `place` points to.
 ///
 /// # Safety
-/// `place` is null or points to an initialised value, which nobody writes during `'a`.
+/// `place` is null or points to an initialised value, which no other code writes during `'a`.
 pub(crate) unsafe fn object_ref<'a, T>(place: *const T) -> Result<&'a T, allan_status> {
     check(place)?;
     // SAFETY: not null and aligned, as just checked; initialised and not written, as the caller promises.

@@ -49,7 +49,7 @@ pub struct allan_trace_result {
 /// ALLAN_CANCELLED. It may be null. It must return: neither longjmp nor an exception may leave it.
 ///
 /// # Safety
-/// `curve` and `filters` are null or point to a curve and to `count` terms, which nobody writes during the call; `result` is
+/// `curve` and `filters` are null or point to a curve and to `count` terms, which no other code writes during the call; `result` is
 /// null or points to memory of its type that the caller may write.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn allan_trace(

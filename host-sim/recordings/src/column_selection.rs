@@ -32,7 +32,7 @@ pub(crate) struct ChosenColumn {
     pub(crate) role: Role,
     /// As the file names it.
     pub(crate) label: String,
-    /// Its unit; `None` for times of which nobody says it.
+    /// Its unit; `None` for times that are stated without one.
     pub(crate) unit: Option<Unit>,
     /// Size of 1 in the unit of the channel.
     pub(crate) factor: f64,
@@ -86,7 +86,7 @@ pub enum SelectionError {
     /// Two units for one quantity.
     #[error("--units {0} and {1} are of one quantity")]
     TwoUnits(&'static str, &'static str),
-    /// A column whose unit nobody says.
+    /// A column without a stated unit.
     #[error("column {column}: no unit of {channel}; give one, as in --units {example}")]
     NoUnit {
         /// The column.

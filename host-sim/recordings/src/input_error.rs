@@ -152,7 +152,7 @@ pub enum Reason {
     /// Columns, units or channels that cannot be chosen.
     #[error("{0}")]
     Selection(Box<SelectionError>),
-    /// A time column whose unit nobody says and that shows none.
+    /// A time column without a stated unit, whose values show none.
     #[error("column {0}: no unit of the time; give one, as in --units us")]
     NoTimeUnit(String),
     /// A clock that was set back so that many rows are out of order.

@@ -201,7 +201,7 @@ pub(crate) fn is_capture(start: &[u8]) -> bool {
 }
 
 /// Writes the bursts of `capture`, the bytes that a device sent while its raw stream was on, to the frame log `file`. A
-/// restart of the device takes no time: nobody knows how long it lasted.
+/// restart of the device takes no time: how long it lasted is not known.
 ///
 /// # Errors
 /// The capture cannot be read or the log cannot be written.

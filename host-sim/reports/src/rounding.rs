@@ -106,7 +106,7 @@ const PREFIXES: [(&str, f64); 7] =
     [("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9), ("p", 1e-12)];
 
 /// The prefix with which `magnitude` is between 1 and 1,000, as far as there is one, and its factor. Prefixes above 1 are
-/// not used where `enlarging` is false: nobody writes k°/h.
+/// not used where `enlarging` is false: k°/h is not a usual unit.
 fn prefix(magnitude: f64, enlarging: bool) -> (&'static str, f64) {
     let mut usable = PREFIXES.iter().filter(|(_, factor)| enlarging || *factor <= 1.0);
     let fitting = usable.clone().find(|(_, factor)| magnitude >= 0.995 * factor);
