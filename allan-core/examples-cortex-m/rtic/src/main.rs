@@ -85,7 +85,13 @@ mod app {
         let snapshot = context.shared.estimator.lock(|estimator| estimator.snapshot());
         let curve = snapshot.curve(1.0).scaled(1.0 / f64::from(CLOCK));
         for point in curve.points() {
-            defmt::println!("{} s: variance of the frequency {} ({} to {})", point.tau, point.avar, point.low, point.high);
+            defmt::println!(
+                "{} s: variance of the frequency {} ({} to {})",
+                point.tau,
+                point.avar,
+                point.low,
+                point.high
+            );
         }
     }
 }
