@@ -164,8 +164,8 @@ impl CovariateFit {
             if covariate.slots == rest.slots {
                 subtract(&mut rest, sensitivity.value, covariate);
             } else {
-                rest = rest.filtered(|slot| covariate.has(slot));
-                let common = covariate.clone().filtered(|slot| rest.has(slot));
+                rest = rest.in_common(&[covariate]);
+                let common = covariate.clone().in_common(&[&rest]);
                 subtract(&mut rest, sensitivity.value, &common);
             }
         }

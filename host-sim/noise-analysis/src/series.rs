@@ -80,9 +80,9 @@ impl Series {
         }
     }
 
-    /// The samples of the sample periods for which `is_kept` holds.
+    /// The samples of the sample periods for which `is_kept` holds, which is asked for each in ascending order.
     #[must_use]
-    pub fn filtered(mut self, is_kept: impl Fn(u64) -> bool) -> Self {
+    pub fn filtered(mut self, mut is_kept: impl FnMut(u64) -> bool) -> Self {
         let kept = self.slots.iter().zip(&self.values).filter(|(slot, _)| is_kept(**slot));
         (self.slots, self.values) = kept.map(|(&slot, &value)| (slot, value)).unzip();
         self
@@ -91,13 +91,22 @@ impl Series {
     /// The samples without those of the sample periods `slots`, which are in ascending order.
     #[must_use]
     pub fn without(self, slots: &[u64]) -> Self {
-        if slots.is_empty() { self } else { self.filtered(|slot| slots.binary_search(&slot).is_err()) }
+        let mut has = membership(slots);
+        if slots.is_empty() { self } else { self.filtered(|slot| !has(slot)) }
     }
 
-    /// Whether the channel has a sample in the sample period `slot`.
+    /// The samples of the sample periods in which each of `others` has one too.
     #[must_use]
-    pub fn has(&self, slot: u64) -> bool {
-        self.slots.binary_search(&slot).is_ok()
+    pub fn in_common(self, others: &[&Series]) -> Self {
+        let mut others: Vec<_> = others.iter().map(|other| membership(&other.slots)).collect();
+        self.filtered(|slot| others.iter_mut().fold(true, |all, has| has(slot) && all))
+    }
+
+    /// Number of sample periods in which both have a sample.
+    #[must_use]
+    pub fn count_common(&self, other: &Series) -> usize {
+        let mut has = membership(&other.slots);
+        self.slots.iter().filter(|slot| has(**slot)).count()
     }
 
     /// The samples from the sample period `slot` on less `offset`.
@@ -120,5 +129,18 @@ impl Series {
     /// Whether the samples from `first` to `last` follow each other without a gap.
     pub fn is_gapless(&self, first: usize, last: usize) -> bool {
         self.slots[last] - self.slots[first] == (last - first) as u64
+    }
+}
+
+/// Whether each of some sample periods is among `slots`; both are in ascending order.
+fn membership(slots: &[u64]) -> impl FnMut(u64) -> bool {
+    let mut rest = slots;
+    move |slot| {
+        while let [first, later @ ..] = rest
+            && *first < slot
+        {
+            rest = later;
+        }
+        rest.first() == Some(&slot)
     }
 }

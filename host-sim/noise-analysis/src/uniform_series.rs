@@ -2,6 +2,7 @@
 
 use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::series::Series;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -103,11 +104,11 @@ impl UniformSeries {
     /// A transform that takes missing samples for zeros spreads their share of the power over all frequencies, and hides what
     /// is small behind a filter or beside drift.
     #[must_use]
-    pub fn interpolated(&self) -> (Self, f64) {
+    pub fn interpolated(&self) -> (Cow<'_, Self>, f64) {
         let level = self.mean();
         let missing: Vec<usize> = (0..self.values.len()).filter(|&at| !self.values[at].is_finite()).collect();
         if missing.is_empty() || missing.len() == self.values.len() {
-            return (self.clone(), 0.0);
+            return (Cow::Borrowed(self), 0.0);
         }
         let covariance = self.autocovariance(level);
         let mut known: BTreeMap<Neighbours, Option<PartialInterpolation>> = BTreeMap::new();
@@ -136,7 +137,7 @@ impl UniformSeries {
                 replaced += 1;
             }
         }
-        (self.with_values(values), replaced as f64 / self.values.len() as f64)
+        (Cow::Owned(self.with_values(values)), replaced as f64 / self.values.len() as f64)
     }
 
     /// Autocovariance around `level`, of the pairs that are there.
@@ -184,10 +185,13 @@ impl UniformSeries {
         while size < self.values.len() && equal_apart(size) {
             size *= 2;
         }
-        if size == 1 {
-            return self;
-        }
-        // Of the samples that are there, where at least half are.
+        if size == 1 { self } else { self.averaged(size) }
+    }
+
+    /// Means of blocks of `size` samples, at `size` times the period: of the samples that are there, where at least half are. An
+    /// incomplete block at the end is left out.
+    #[must_use]
+    pub(crate) fn averaged(&self, size: usize) -> Self {
         let average = |chunk: &[f64]| {
             let (sum, count) = chunk
                 .iter()

@@ -70,10 +70,10 @@ pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> Bias
     let regressors: Vec<(usize, &Series)> =
         regressors.iter().copied().enumerate().filter(|(_, regressor)| covers(regressor, series)).collect();
     if regressors.iter().any(|(_, regressor)| regressor.slots != series.slots) {
-        let is_common = |slot: u64| series.has(slot) && regressors.iter().all(|(_, regressor)| regressor.has(slot));
-        let series = series.clone().filtered(is_common);
+        let others: Vec<&Series> = regressors.iter().map(|(_, regressor)| *regressor).collect();
+        let series = series.clone().in_common(&others);
         let regressors: Vec<(usize, Series)> =
-            regressors.iter().map(|&(index, regressor)| (index, regressor.clone().filtered(is_common))).collect();
+            regressors.iter().map(|&(index, regressor)| (index, regressor.clone().in_common(&[&series]))).collect();
         let regressors: Vec<(usize, &Series)> =
             regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
         return find_on_common_samples(&series, &regressors, grids);
@@ -83,10 +83,8 @@ pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> Bias
 
 /// Whether `regressor` has at least the fraction [`LEAST_COMMON`] of the samples of `series`.
 fn covers(regressor: &Series, series: &Series) -> bool {
-    regressor.slots == series.slots || {
-        let common = series.slots.iter().filter(|slot| regressor.has(**slot)).count();
-        common as f64 >= LEAST_COMMON * series.slots.len() as f64
-    }
+    regressor.slots == series.slots
+        || series.count_common(regressor) as f64 >= LEAST_COMMON * series.slots.len() as f64
 }
 
 /// [`find`] where all have samples in the same sample periods.
