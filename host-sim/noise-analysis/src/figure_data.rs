@@ -166,9 +166,9 @@ fn bands(welch: &Welch, range: std::ops::Range<f64>, ratio: f64) -> Vec<Spectral
         let count = rest.partition_point(|(frequency, _)| *frequency < from * ratio).max(1);
         let (band, after) = rest.split_at(count);
         rest = after;
-        let mut sorted: Vec<f64> = band.iter().map(|(_, density)| *density).collect();
-        sorted.sort_by(f64::total_cmp);
-        let median = sorted[sorted.len() / 2];
+        let mut densities: Vec<f64> = band.iter().map(|(_, density)| *density).collect();
+        let middle = densities.len() / 2;
+        let (_, &mut median, _) = densities.select_nth_unstable_by(middle, f64::total_cmp);
         let is_line = |density: f64| band.len() >= 5 && density > highest * median;
         let (lines, smooth): (Vec<_>, Vec<_>) = band.iter().partition(|(_, density)| is_line(*density));
         let count = smooth.len() as f64;

@@ -18,6 +18,9 @@ use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
+use std::num::NonZero;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Which of the samples that the detectors found are left out. Samples that were read twice always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -348,13 +351,25 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     all
 }
 
-/// Runs `task` for each of `items`, each on its own thread, and returns the results in the order of `items`.
+/// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.
 pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    std::thread::scope(|scope| {
-        let tasks: Vec<_> = items.iter().map(|item| scope.spawn(|| task(item))).collect();
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let taken = std::iter::from_fn(|| {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            Some((at, task(items.get(at)?)))
+        });
+        taken.collect::<Vec<_>>()
+    };
+    let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores.min(items.len())).map(|_| scope.spawn(work)).collect();
         // A panic in a task is passed on to the caller.
-        tasks.into_iter().map(|task| task.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-    })
+        let finished = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        finished.flatten().collect()
+    });
+    results.sort_unstable_by_key(|(at, _)| *at);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 fn excluded(correction: &Option<Correction>) -> Vec<u64> {

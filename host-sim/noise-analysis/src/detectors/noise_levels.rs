@@ -57,12 +57,14 @@ pub(super) struct SquaredDifferences {
 }
 
 impl SquaredDifferences {
+    /// `n` is a power of two.
     pub(super) fn new(series: &Series, n: usize) -> Self {
         let start = series.span.start;
-        let count = (series.span.end.saturating_sub(start) / n as u64) as usize;
+        let shift = n.trailing_zeros();
+        let count = (series.span.end.saturating_sub(start) >> shift) as usize;
         let (mut sums, mut filled) = (vec![0.0; count], vec![0_u32; count]);
         for (&slot, &value) in series.slots.iter().zip(&series.values) {
-            let at = ((slot - start) / n as u64) as usize;
+            let at = ((slot - start) >> shift) as usize;
             if at < count {
                 sums[at] += value;
                 filled[at] += 1;

@@ -31,7 +31,7 @@ const PREFERENCE: f64 = 10.0;
 const LEAST_EXCESS: f64 = 0.1;
 /// Averages on either side that a broad peak is compared with.
 const NEIGHBOURS: usize = 16;
-/// Largest number of resonances that are refitted when one is added: each refit transforms the whole record.
+/// Largest number of resonances that are refitted when one is added: each refit fits the background of the whole spectrum.
 const REFITTED: usize = 2;
 /// A line within this many widths of a resonance, and with less than this fraction of its statistic, is a residue of it.
 const SKIRTS: f64 = 20.0;
@@ -93,20 +93,21 @@ pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
 pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
     let known: &dyn Fn(f64) -> f64 = &known;
     let (rest, mut sines) = without_slow_sines(series.clone().averaged_until_dithered());
-    let mut rest = rest.detrended();
+    let mut rest = Transformed::new(rest.detrended());
     let mut resonances: Vec<Resonance> = Vec::new();
     while sines.len() + resonances.len() < MOST
-        && let Some(spectrum) = WhitenedSpectrum::new(&rest, known, &resonances, None)
+        && let Some(transformed) = &rest
+        && let Some(spectrum) = WhitenedSpectrum::new(transformed, known, &resonances, None)
     {
-        match spectrum.most_significant(&rest) {
+        match spectrum.most_significant(&transformed.series) {
             Some(Candidate::Sine(line, sine)) => {
-                rest = sine.subtracted_from(&rest);
+                rest = Transformed::new(sine.subtracted_from(&transformed.series));
                 sines.push(line);
             }
             Some(Candidate::Resonance(resonance)) => {
                 resonances.push(resonance);
                 if resonances.len() <= REFITTED {
-                    refit(&rest, known, &mut resonances);
+                    refit(transformed, known, &mut resonances);
                 }
             }
             None => break,
@@ -208,7 +209,7 @@ fn independent_part(series: &UniformSeries) -> f64 {
 }
 
 /// Refits each resonance over the background without any of them: a strong one biases the first estimate of it.
-fn refit(rest: &UniformSeries, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
+fn refit(rest: &Transformed, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
     for index in 0..resonances.len() {
         let Some(spectrum) = WhitenedSpectrum::new(rest, known, resonances, Some(index)) else { return };
         let Resonance { line, lorentz } = resonances[index];
@@ -238,6 +239,20 @@ struct Resonance {
     lorentz: Lorentz,
 }
 
+/// A record with its transform.
+struct Transformed {
+    series: UniformSeries,
+    periodogram: Periodogram,
+    /// Part of the ordinates that are independent of each other.
+    independent: f64,
+}
+
+impl Transformed {
+    fn new(series: UniformSeries) -> Option<Self> {
+        Some(Self { periodogram: Periodogram::new(&series)?, independent: independent_part(&series), series })
+    }
+}
+
 /// A record's spectrum divided by its background.
 struct WhitenedSpectrum<'a> {
     resolution: f64,
@@ -255,14 +270,14 @@ struct WhitenedSpectrum<'a> {
 }
 
 impl<'a> WhitenedSpectrum<'a> {
-    /// Transforms the series and removes the `resonances`, except the one with the index `kept`.
+    /// Removes the `resonances`, except the one with the index `kept`, from the spectrum of the record.
     fn new(
-        series: &UniformSeries,
+        record: &Transformed,
         known: &'a dyn Fn(f64) -> f64,
         resonances: &[Resonance],
         kept: Option<usize>,
     ) -> Option<Self> {
-        let periodogram = Periodogram::new(series)?;
+        let Transformed { series, periodogram, independent } = record;
         let deflation = |bin: f64, except: Option<usize>| {
             let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != except);
             others.map(|(_, resonance)| resonance.lorentz.deflation(bin)).product::<f64>()
@@ -281,8 +296,8 @@ impl<'a> WhitenedSpectrum<'a> {
         let padded: Vec<f64> = periodogram.padded().iter().zip(&deflation).enumerate().map(over_shape).collect();
         let whitened = padded.iter().copied().step_by(PADDING).collect();
         let resolution = periodogram.resolution();
-        let (independent, floor) = (independent_part(series), series.rounding_density());
-        Some(Self { resolution, background, whitened, padded, deflation, independent, floor })
+        let floor = series.rounding_density();
+        Some(Self { resolution, background, whitened, padded, deflation, independent: *independent, floor })
     }
 
     /// The most significant line, if one is significant.

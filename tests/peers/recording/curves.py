@@ -1,0 +1,11 @@
+"""The overlapping Allan deviation of every column of a table by pandas and allantools, at octaves: what a script does."""
+
+import sys
+
+import allantools
+import pandas
+
+table = pandas.read_csv(sys.argv[1])
+rate = float(sys.argv[2])
+for name in table.columns:
+    allantools.oadev(table[name].to_numpy(float), rate=rate, data_type="freq", taus="octave")
