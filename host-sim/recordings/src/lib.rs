@@ -32,6 +32,7 @@ mod ros_bag;
 mod sample_slots;
 mod sensor_measurement;
 mod sensor_table;
+mod sensor_table_writer;
 pub mod serial;
 pub mod spi_export;
 mod stamp_alignment;

@@ -1,7 +1,7 @@
 //! Bags of ROS 1 (`.bag`, format 2.0) and of ROS 2 (MCAP and SQLite), with `sensor_msgs/Imu`.
 
 use crate::any_sensor::ReadOptions;
-use crate::imu_message::{FIELDS, TYPES, decode_cdr, decode_ros1};
+use crate::imu_message::{FIELDS, TIME_UNIT, TYPES, decode_cdr, decode_ros1};
 use crate::input_error::{InputError, Reason};
 use crate::message_table::{MessageTable, choose_topic};
 use crate::sensor_table::{Number, SensorTable};
@@ -41,7 +41,7 @@ pub(crate) fn read_ros1(file: &Path, options: &ReadOptions) -> Result<SensorTabl
     }
     let topics: Vec<(String, BTreeSet<u32>)> = topics.into_iter().collect();
     let (_, connections) = choose_topic(ROS1, &topics, options.topic.as_deref()).map_err(fail)?;
-    let mut table = MessageTable::new(file, &FIELDS, options)?;
+    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
     for chunk in bag.chunk_records() {
         let chunk = match chunk {
             Ok(ChunkRecord::Chunk(chunk)) => chunk,
@@ -96,7 +96,7 @@ pub(crate) fn read_mcap(file: &Path, options: &ReadOptions) -> Result<SensorTabl
         ([], Some(damage)) => return Err(fail(damage)),
         (topics, _) => choose_topic(MCAP, topics, options.topic.as_deref()).map_err(fail)?,
     };
-    let mut table = MessageTable::new(file, &FIELDS, options)?;
+    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
     let mut encodings: BTreeMap<u16, bool> = BTreeMap::new();
     let damage = for_each_record(file, |record| {
         match record {
@@ -153,7 +153,7 @@ pub(crate) fn read_sqlite(file: &Path, options: &ReadOptions) -> Result<SensorTa
     let is_imu = |(name, id, kind): (String, i64, String)| TYPES.contains(&kind.as_str()).then_some((name, id));
     let topics: Vec<(String, i64)> = topics.into_iter().filter_map(is_imu).collect();
     let (_, topic) = choose_topic(SQLITE, &topics, options.topic.as_deref()).map_err(fail)?;
-    let mut table = MessageTable::new(file, &FIELDS, options)?;
+    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
     let mut query = database.prepare("SELECT data FROM messages WHERE topic_id = ? ORDER BY id").map_err(failed)?;
     let mut rows = query.query((topic,)).map_err(failed)?;
     loop {
