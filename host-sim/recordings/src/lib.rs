@@ -21,6 +21,7 @@ mod input_error;
 mod lateness_track;
 mod lower_envelope;
 mod matlab;
+mod mcap_file;
 mod message_table;
 mod named_arrays;
 mod numpy;
