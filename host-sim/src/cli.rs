@@ -44,7 +44,7 @@ pub(crate) enum Command {
         /// The log to write; gzip if it ends in .gz.
         out: PathBuf,
         /// Serial port of a device that runs the firmware, such as /dev/ttyUSB0.
-        #[arg(long, conflicts_with = "seed")]
+        #[arg(long, conflicts_with_all = ["seed", "plain"])]
         port: Option<String>,
         /// Baud rate of the port.
         #[arg(long, default_value_t = serial::BAUD, requires = "port")]
@@ -60,7 +60,7 @@ pub(crate) enum Command {
     Export(ExportArguments),
     /// Compare the coefficients of a report with those of another, or with the data sheet.
     Compare(CompareArguments),
-    /// Write a recording in another format: table, SPI frame log or NumPy array.
+    /// Write a recording of any format as a table, a NumPy array or an SPI frame log.
     Convert(ConvertArguments),
     /// Write a recording of the virtual sensor, with the noise, the effects and the faults that are described.
     Simulate(Box<SimulateArguments>),
@@ -236,9 +236,14 @@ pub(crate) struct AnalyzeArguments {
 /// A recording to replay, and where the report goes.
 #[derive(Debug, Args)]
 pub(crate) struct ReplayArguments {
-    /// The recording.
-    #[command(flatten)]
-    pub(crate) recording: RecordingArguments,
+    /// Register counts of an ADIS16405, or a log of its SPI bus.
+    pub(crate) file: PathBuf,
+    /// Sample rate in Hz; overrides what the time stamps say.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub(crate) rate: Option<f64>,
+    /// Gyro range in which the counts were taken, deg/s; a log says it itself.
+    #[arg(long, value_enum, default_value = "300")]
+    pub(crate) range: GyroRangeArgument,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
@@ -253,7 +258,7 @@ pub(crate) struct CompareArguments {
     /// Another, which is called better or worse than the first.
     #[arg(value_name = "REPORT", required_unless_present = "data_sheet")]
     pub(crate) second: Option<PathBuf>,
-    /// Compare with the typical values of the ADIS16405's data sheet.
+    /// Compare with the typical values of the data sheet of the sensor that was analysed.
     #[arg(long, conflicts_with = "second")]
     pub(crate) data_sheet: bool,
     /// Where the result goes besides the terminal.
@@ -264,9 +269,9 @@ pub(crate) struct CompareArguments {
 /// How a recording is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RecordingFormat {
-    /// Register counts in CSV, gzip if the name ends in .gz.
+    /// Register counts of an ADIS16405, or any channels with their units in the header, in CSV; gzip if the name ends in .gz.
     Table,
-    /// Bus transactions in CSV, gzip if the name ends in .gz.
+    /// Bus transactions of an ADIS16405 in CSV, gzip if the name ends in .gz.
     Frames,
     /// A NumPy array of doubles in SI units.
     Npy,
@@ -275,16 +280,14 @@ pub(crate) enum RecordingFormat {
 /// A recording to convert.
 #[derive(Debug, Args)]
 pub(crate) struct ConvertArguments {
-    /// A table of register counts or an SPI frame log, plain or gzip.
-    pub(crate) file: PathBuf,
+    /// The recording.
+    #[command(flatten)]
+    pub(crate) input: InputArguments,
     /// The file to write.
     pub(crate) out: PathBuf,
     /// Its format [default: by its name, npy or table].
     #[arg(long, value_enum)]
     pub(crate) to: Option<RecordingFormat>,
-    /// Gyro range in which the recording was taken, deg/s.
-    #[arg(long, value_enum, default_value = "300")]
-    pub(crate) range: GyroRangeArgument,
 }
 
 /// What to simulate.
@@ -381,14 +384,22 @@ pub(crate) struct ExportArguments {
     pub(crate) out: PathBuf,
 }
 
-/// A recording.
+/// A recording and its sample rate.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RecordingArguments {
-    /// The recording, of a format that its content tells; - for standard input.
-    pub(crate) file: PathBuf,
+    /// The recording.
+    #[command(flatten)]
+    pub(crate) input: InputArguments,
     /// Sample rate in Hz; overrides what the time stamps say.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
+}
+
+/// A recording.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct InputArguments {
+    /// The recording, of a format that its content tells; - for standard input.
+    pub(crate) file: PathBuf,
     /// Gyro range of an ADIS16405 in which the recording was taken, deg/s.
     #[arg(long, value_enum, default_value = "300")]
     pub(crate) range: GyroRangeArgument,
@@ -489,9 +500,32 @@ pub(crate) struct OutputArguments {
     /// Write the report as a page into this folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) page: Option<PathBuf>,
-    /// Write the noise model of the accelerometers and gyros as Kalibr's YAML.
-    #[arg(long, value_name = "OUT")]
-    pub(crate) kalibr: Option<PathBuf>,
+    /// Write the noise of gyros and accelerometers for another program, as in kalibr=imu.yaml, with the formats of `export`; may be
+    /// repeated.
+    #[arg(long = "export", value_name = "FORMAT=OUT", value_parser = export_target)]
+    pub(crate) exports: Vec<ExportTarget>,
+    /// What stands for the three axes, where the program of --export has one number a sensor.
+    #[arg(long, value_enum, default_value_t, requires = "exports")]
+    pub(crate) axis: AxisChoice,
+}
+
+/// A file for another program.
+#[derive(Debug, Clone)]
+pub(crate) struct ExportTarget {
+    /// Its format.
+    pub(crate) format: ExportFormat,
+    /// The file to write.
+    pub(crate) file: PathBuf,
+}
+
+fn export_target(text: &str) -> Result<ExportTarget, String> {
+    let formats = || {
+        let names = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+        names.map(|name| name.get_name().to_owned()).collect::<Vec<_>>().join(", ")
+    };
+    let (name, file) = text.split_once('=').filter(|(_, file)| !file.is_empty()).ok_or("expected FORMAT=OUT, as in kalibr=imu.yaml")?;
+    let format = ExportFormat::from_str(name, true).map_err(|_| format!("`{name}` is none of {}", formats()))?;
+    Ok(ExportTarget { format, file: file.into() })
 }
 
 /// Where a result goes that is no report.

@@ -1,25 +1,34 @@
 //! `convert`: a recording in another format.
 
-use crate::cli::ConvertArguments;
+use crate::analyze::{Recorded, read};
+use crate::cli::{ConvertArguments, RecordingFormat};
 use crate::output::{check_file, note};
 use crate::recording_file;
-use anyhow::{Context, Result};
-use recordings::count_table;
-use recordings::recorded_file::RecordedFile;
+use anyhow::{Context, Result, bail};
+use recordings::any_sensor::SensorRecording;
+use std::path::Path;
 
-/// Reads a table or a frame log and writes it anew.
+/// Reads a recording of any format and writes it anew.
 pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
-    let ConvertArguments { file, out, to, range } = arguments;
-    check_file(out, &[file]).with_context(|| out.display().to_string())?;
-    let recording = match RecordedFile::open(file)? {
-        RecordedFile::Table(_) => count_table::read(file, (*range).into())?,
-        RecordedFile::Frames(_) => {
-            let replayed = simulation::replay(file, (*range).into())?;
-            if replayed.other_transactions > 0 {
-                note(format_args!("{} transactions that are no bursts are left out", replayed.other_transactions));
-            }
-            replayed.recording
+    let ConvertArguments { input, out, to } = arguments;
+    check_file(out, &[&input.file]).with_context(|| out.display().to_string())?;
+    let format = recording_file::format_of(out, *to);
+    match read(input)? {
+        Recorded::Counts(recording) => recording_file::write(&recording, out, format),
+        Recorded::AnySensor(recording) => {
+            recording.notes().iter().for_each(|sentence| note(format_args!("{sentence}")));
+            write(&recording, out, format).with_context(|| out.display().to_string())
         }
-    };
-    recording_file::write(&recording, out, recording_file::format_of(out, *to))
+    }
+}
+
+fn write(recording: &SensorRecording, out: &Path, format: RecordingFormat) -> Result<()> {
+    match format {
+        RecordingFormat::Table => Ok(recording.write_table(out)?),
+        RecordingFormat::Npy => {
+            recording_file::note_columns(out, &recording.write_array(out)?);
+            Ok(())
+        }
+        RecordingFormat::Frames => bail!("an SPI frame log has the register counts of an ADIS16405, which the recording has not"),
+    }
 }

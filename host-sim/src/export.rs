@@ -1,20 +1,15 @@
 //! `export`: the noise of a report in the file format of another program.
 
-use crate::cli::ExportArguments;
-use crate::output::{check_file, note};
+use crate::cli::{ExportArguments, ExportTarget};
+use crate::output::{check_file, write_export};
 use anyhow::{Context, Result};
-use reports::export;
 use reports::saved_report::SavedReport;
-use std::fs;
 
-/// Reads the report, writes the file, and notes what the format wants and the report does not say.
+/// Reads the report and writes the file.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<()> {
     let ExportArguments { report: from, out, format, axis } = arguments;
     check_file(out, &[from]).with_context(|| out.display().to_string())?;
     let report = SavedReport::read(from).with_context(|| from.display().to_string())?;
-    let export = export::export(&report, *format, *axis).with_context(|| from.display().to_string())?;
-    for field in &export.missing {
-        note(format_args!("{}: no {field}: the report has no channel with it", out.display()));
-    }
-    fs::write(out, export.text).with_context(|| out.display().to_string())
+    write_export(&report, &ExportTarget { format: *format, file: out.clone() }, *axis)
+        .with_context(|| from.display().to_string())
 }

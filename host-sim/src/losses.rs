@@ -7,7 +7,7 @@ use benchmarks::losses::LossPlan;
 
 /// Runs the benchmark and prints its tables.
 pub(crate) fn run(plan: &LossPlan, output: &JsonArgument) -> Result<()> {
-    check_result(output)?;
+    check_result(output, &[])?;
     let bar = progress_bar(0, "{wide_bar} {pos}/{len} records, {eta} left");
     let table = plan.run(|done, all| {
         bar.set_length(all as u64);

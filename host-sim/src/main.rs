@@ -48,12 +48,13 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
         None => {
             output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
             output::check(&output, &[])?;
-            output::write_report(&record::simulate(&simulate.simulation(3600.0))?, &output)
+            output::write_report(&record::simulate(&simulate.simulation(3600.0))?, None, &output)
         }
         Some(Command::Analyze(arguments)) => analyze::run(&arguments),
-        Some(Command::Replay(ReplayArguments { recording, output })) => {
-            output::check(&output, &[&recording.file])?;
-            output::write_report(&analyze::analyze_replay(&recording)?, &output)
+        Some(Command::Replay(arguments)) => {
+            let ReplayArguments { file, output, .. } = &arguments;
+            output::check(output, &[file])?;
+            output::write_report(&analyze::analyze_replay(&arguments)?, Some(&output::source_name(file)), output)
         }
         Some(Command::Record { out, port, baud, simulate, output }) => {
             output::check(&output, &[&out])?;
@@ -64,7 +65,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
                 }
                 None => record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?,
             };
-            output::write_report(&report, &output)
+            output::write_report(&report, Some(&output::source_name(&out)), &output)
         }
         Some(Command::Export(arguments)) => export::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
@@ -104,6 +105,7 @@ fn show_messages(port: &str, baud: u32, commands: &[String], seconds: Option<f64
 }
 
 fn convert_image(elf: &Path, out: &Path) -> Result<()> {
+    output::check_file(out, &[elf]).with_context(|| out.display().to_string())?;
     let image = fs::read(elf).with_context(|| elf.display().to_string())?;
     let uf2 = uf2::from_elf(&image).with_context(|| elf.display().to_string())?;
     fs::write(out, uf2).with_context(|| out.display().to_string())

@@ -1,11 +1,11 @@
 //! Where results go: standard output, files, notes and progress on standard error.
 
-use crate::cli::{JsonArgument, OutputArguments};
+use crate::cli::{ExportTarget, JsonArgument, OutputArguments};
 use anyhow::{Context, Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
 use recordings::Printable;
-use reports::export::{self, AxisChoice, ExportFormat};
+use reports::export::{self, AxisChoice};
 use reports::raster::Rasterizer;
 use reports::saved_report::SavedReport;
 use reports::terminal::Screen;
@@ -24,17 +24,20 @@ const USUAL_COLUMNS: usize = 80;
 /// # Errors
 /// Names the file.
 pub(crate) fn check(output: &OutputArguments, inputs: &[&Path]) -> Result<()> {
-    let json = output.json.as_ref().filter(|file| !is_standard_output(file));
-    for file in [json, output.kalibr.as_ref()].into_iter().flatten() {
-        check_file(file, inputs).with_context(|| file.display().to_string())?;
-    }
+    let json = output.json.as_deref().filter(|file| !is_standard_output(file));
+    // A figure that every report has stands for all of them.
+    let [page, picture] =
+        [(&output.page, page::FILE), (&output.pictures, "overview.svg")].map(|(folder, file)| Some(folder.as_ref()?.join(file)));
     for folder in [&output.page, &output.pictures].into_iter().flatten() {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
-    if let (Some(json), Some(kalibr)) = (&output.json, &output.kalibr)
-        && is_same(json, kalibr)
-    {
-        bail!("{}: named twice as an output", json.display());
+    let exports = output.exports.iter().map(|ExportTarget { file, .. }| file.as_path());
+    let files: Vec<&Path> = json.into_iter().chain(exports).chain(page.as_deref()).chain(picture.as_deref()).collect();
+    for (position, file) in files.iter().enumerate() {
+        check_file(file, inputs).with_context(|| file.display().to_string())?;
+        if files[..position].iter().any(|other| is_same(file, other)) {
+            bail!("{}: named twice as an output", file.display());
+        }
     }
     Ok(())
 }
@@ -69,35 +72,44 @@ fn is_same(one: &Path, other: &Path) -> bool {
     matches!((resolved(one), resolved(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// Prints a report and writes the files that the arguments name. A file that cannot be written does not keep the others, or
-/// the report, from being written.
-pub(crate) fn write_report(report: &Report, output: &OutputArguments) -> Result<()> {
+/// Prints a report and writes the files that the arguments name; `source` is the name of the recording. A file that cannot be
+/// written does not keep the others, or the report, from being written.
+pub(crate) fn write_report(report: &Report, source: Option<&str>, output: &OutputArguments) -> Result<()> {
     let json = output.json.as_ref().map_or(Ok(()), |file| write_json(report, file));
-    let kalibr = output.kalibr.as_ref().map_or(Ok(()), |file| write_kalibr(report, file));
+    let exports = write_exports(report, output);
     let page = output.page.as_ref().map(|dir| page::write(report, dir)).transpose();
     let pictures = output.pictures.as_ref().map_or(Ok(()), |folder| write_pictures(report, folder));
-    show(report, output, page.as_ref().ok().and_then(Option::as_deref))?;
-    json.and(kalibr).and(pictures)?;
+    show(report, source, output, page.as_ref().ok().and_then(Option::as_deref))?;
+    json.and(exports).and(pictures)?;
     page?;
     Ok(())
 }
 
+/// How a recording is called in a report: by the name of its file, without the folder.
+pub(crate) fn source_name(file: &Path) -> String {
+    if is_standard_output(file) {
+        return "standard input".to_owned();
+    }
+    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    Printable(&name).to_string()
+}
+
 /// Prints a report, and where its page is.
-fn show(report: &Report, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
+fn show(report: &Report, source: Option<&str>, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
     // Nothing beside JSON on standard output.
     if output.quiet || output.json.as_deref().is_some_and(is_standard_output) {
         return Ok(());
     }
     if output.full {
-        print(|out| full_tables::write(report, out))?;
+        print(|out| full_tables::write(report, source, out))?;
     } else {
         // Without colour where standard output is no terminal, or NO_COLOR is set.
         let mut out = anstream::AutoStream::auto(io::stdout().lock());
-        Screen { report, source: None, columns: columns() }.write(&mut out)?;
+        Screen { report, source, columns: columns() }.write(&mut out)?;
         out.flush()?;
     }
     match page {
-        Some(page) => print(|out| writeln!(out, "page: {}", page.display())),
+        Some(page) => print(|out| writeln!(out, "page: {}", Printable(&page.display().to_string()))),
         None => Ok(()),
     }
 }
@@ -121,13 +133,25 @@ fn write_pictures(report: &Report, folder: &Path) -> Result<()> {
     pictures.iter().try_for_each(|picture| write(&picture.name, "png", &rasterizer.png(&picture.svg)?))
 }
 
-/// Writes the noise model for Kalibr, the root mean square over the axes.
-fn write_kalibr(report: &Report, file: &Path) -> Result<()> {
-    let write = || -> Result<()> {
-        let export = export::export(&SavedReport::from(report), ExportFormat::Kalibr, AxisChoice::Rms)?;
-        Ok(fs::write(file, export.text)?)
-    };
-    write().with_context(|| file.display().to_string())
+/// Writes the noise of a report in the formats that the arguments name, each as far as the others can be written.
+fn write_exports(report: &Report, output: &OutputArguments) -> Result<()> {
+    if output.exports.is_empty() {
+        return Ok(());
+    }
+    let saved = SavedReport::from(report);
+    let write = |target: &ExportTarget| write_export(&saved, target, output.axis);
+    output.exports.iter().map(write).fold(Ok(()), Result::and)
+}
+
+/// Writes the noise of a report in a format, and notes what the format wants and the report does not say.
+pub(crate) fn write_export(report: &SavedReport, target: &ExportTarget, axis: AxisChoice) -> Result<()> {
+    let ExportTarget { format, file } = target;
+    let export = export::export(report, *format, axis).with_context(|| file.display().to_string())?;
+    fs::write(file, export.text).with_context(|| file.display().to_string())?;
+    for field in &export.missing {
+        note(format_args!("{}: no {field}: the report has no channel with it", file.display()));
+    }
+    Ok(())
 }
 
 /// Writes a result to a JSON file; - is standard output.
@@ -152,10 +176,10 @@ pub(crate) fn write_result(result: &impl Serialize, output: &JsonArgument) -> Re
     output.json.as_ref().map_or(Ok(()), |file| write_json(result, file))
 }
 
-/// Checks that the file of a result can be written, before any work is done.
-pub(crate) fn check_result(output: &JsonArgument) -> Result<()> {
+/// Checks that the file of a result can be written and is none of `inputs`, before any work is done.
+pub(crate) fn check_result(output: &JsonArgument, inputs: &[&Path]) -> Result<()> {
     let file = output.json.as_ref().filter(|file| !is_standard_output(file));
-    file.map_or(Ok(()), |file| check_file(file, &[]).with_context(|| file.display().to_string()))
+    file.map_or(Ok(()), |file| check_file(file, inputs).with_context(|| file.display().to_string()))
 }
 
 /// Prints to standard output.

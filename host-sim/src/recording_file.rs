@@ -21,7 +21,7 @@ pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat) 
         RecordingFormat::Table => count_table_writer::write(recording, out).map_err(anyhow::Error::from),
         RecordingFormat::Frames => write_frames(recording, out),
         RecordingFormat::Npy => numpy_matrix::write(recording, out)
-            .map(|names| note(format_args!("columns of {}: {}", out.display(), names.join(", "))))
+            .map(|names| note_columns(out, &names))
             .map_err(anyhow::Error::from),
     };
     written.with_context(|| out.display().to_string())?;
@@ -29,6 +29,11 @@ pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat) 
         note(format_args!("the table does not say the range: read it with --range {}", full_scale(recording.range)));
     }
     Ok(())
+}
+
+/// An array does not name its columns.
+pub(crate) fn note_columns(out: &Path, names: &[String]) {
+    note(format_args!("columns of {}: {}", out.display(), names.join(", ")));
 }
 
 /// Writes every sample as the burst that the part would have sent, after the write that selects the range.

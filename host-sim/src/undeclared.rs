@@ -7,7 +7,7 @@ use benchmarks::undeclared::UndeclaredPlan;
 
 /// Runs the benchmark and prints its table.
 pub(crate) fn run(plan: &UndeclaredPlan, output: &JsonArgument) -> Result<()> {
-    check_result(output)?;
+    check_result(output, &[])?;
     let bar = progress_bar(0, "{wide_bar} {pos}/{len} recordings, {eta} left");
     let table = plan.run(|done, all| {
         bar.set_length(all as u64);

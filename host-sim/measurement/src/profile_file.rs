@@ -192,22 +192,30 @@ fn intern(text: &str) -> &'static str {
 mod tests {
     use super::{included, included_names, parse};
 
-    /// Values from the data sheets, written down again: ADIS16470 8 °/h and 0.34 °/√h, BMI088 0.014 °/s/√Hz and
-    /// 160 µg/√Hz, MPU-6050 0.005 °/s/√Hz and 400 µg/√Hz.
+    /// Values of the data sheets, written down again: ADIS16470 0.34 °/√h and 8 °/h; one-sided densities of 100 µg/√Hz
+    /// (ADIS16470), 0.014 °/s/√Hz, 160 and 190 µg/√Hz (BMI088), 0.005 °/s/√Hz and 400 µg/√Hz (MPU-6050), of which N is
+    /// 1/√2: white noise of the one-sided density S has the Allan variance S/(2τ).
     #[test]
     fn the_included_profiles_state_the_data_sheets() {
+        let one_sided = std::f64::consts::FRAC_1_SQRT_2;
         for (name, channel, noise) in [
             ("adis16470", "gyro_x", 0.34 / 60.0),
-            ("adis16470", "accl_z", 0.037 / 60.0 / 9.80665),
-            ("bmi088", "gyro_z", 0.014),
-            ("bmi088", "accl_x", 160e-6),
-            ("bmi088", "accl_z", 190e-6),
-            ("mpu6050", "gyro_y", 0.005),
-            ("mpu6050", "accl_z", 400e-6),
+            ("adis16470", "accl_z", 100e-6 * one_sided),
+            ("bmi088", "gyro_z", 0.014 * one_sided),
+            ("bmi088", "accl_x", 160e-6 * one_sided),
+            ("bmi088", "accl_z", 190e-6 * one_sided),
+            ("mpu6050", "gyro_y", 0.005 * one_sided),
+            ("mpu6050", "accl_z", 400e-6 * one_sided),
         ] {
             let profile = included(name).expect(name).channel(channel).expect(channel);
             let stated = profile.data_sheet.angle_random_walk.expect("stated");
-            assert!((stated / noise - 1.0).abs() < 2e-4, "{name} {channel}: {stated} for {noise}");
+            assert!((stated / noise - 1.0).abs() < 4e-4, "{name} {channel}: {stated} for {noise}");
+        }
+        // Full scale of 16 bits; of the ADIS16470 the counts reach beyond it.
+        for (name, channel, counts) in [("bmi088", "accl_x", 32_768.0), ("bmi088", "gyro_x", 32_768.0), ("mpu6050", "accl_x", 32_768.0)]
+        {
+            let profile = included(name).expect(name).channel(channel).expect(channel);
+            assert_eq!(profile.range.map(|range| range / profile.lsb), Some(counts), "{name} {channel}");
         }
         let gyro = included("ADIS16470").expect("a name in capitals").channel("gyro_x").expect("gyro");
         assert!((gyro.data_sheet.in_run_bias_stability.expect("stated") * 3600.0 - 8.0).abs() < 0.01);

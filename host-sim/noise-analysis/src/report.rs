@@ -8,7 +8,7 @@ pub use crate::contradiction::Contradiction;
 pub use crate::findings::{Effect, Finding, Parameter, Validation};
 use crate::units::coefficient_unit;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the JSON schema; the field names are fixed within a version.
@@ -239,7 +239,7 @@ pub struct FigureData {
 }
 
 /// Typical noise of a channel by its data sheet, in the channel's unit and seconds; `None` where it says nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DataSheetReport {
     /// Angle or velocity random walk, unit·√s.
     pub angle_random_walk: Option<f64>,

@@ -3,8 +3,11 @@
 use crate::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, SelectionError};
 use crate::sensor_measurement;
 use crate::sensor_table::SensorTable;
+use crate::sensor_table_writer;
 use crate::time_base::{EstimatedTimeBase, TimeBaseError};
 use measurement::SensorProfile;
+use std::io;
+use std::path::Path;
 
 /// What the user says of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,5 +48,29 @@ impl SensorRecording {
     /// are neighbours, or the gaps are more than 64 times as long as the samples.
     pub fn time_base(self, stated_hz: Option<f64>) -> Result<(EstimatedTimeBase, Vec<String>), TimeBaseError> {
         sensor_measurement::time_base(self.table, &self.sensor, stated_hz)
+    }
+
+    /// What the user should know of the rows, one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.table.notes
+    }
+
+    /// Writes the rows as CSV, gzip if the name of `file` ends in `.gz`: `sample` and `time_s`, where the recording has them, and
+    /// the channels with their units in the header, as in `gyro_x [deg/s]`.
+    ///
+    /// # Errors
+    /// The file cannot be created or written.
+    pub fn write_table(&self, file: &Path) -> io::Result<()> {
+        sensor_table_writer::write_table(&self.table, file)
+    }
+
+    /// Writes the rows as a NumPy array of doubles in SI units, the time in s first, if there is one. Returns the names of the
+    /// columns.
+    ///
+    /// # Errors
+    /// The file cannot be created or written.
+    pub fn write_array(&self, file: &Path) -> io::Result<Vec<String>> {
+        sensor_table_writer::write_array(&self.table, file)
     }
 }

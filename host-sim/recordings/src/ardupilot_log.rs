@@ -4,7 +4,7 @@
 
 use crate::any_sensor::ReadOptions;
 use crate::input_error::{InputError, Reason};
-use crate::message_table::{MessageTable, choose_topic};
+use crate::message_table::{ACCELEROMETER, Fields, GYROSCOPE, MessageTable, choose_topic};
 use crate::sensor_table::{Number, SensorTable};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -24,20 +24,11 @@ pub(crate) const MAGIC: [u8; 3] = [START[0], START[1], FMT];
 /// Samples in an ISBD message.
 const BATCH_SAMPLES: usize = 32;
 
-/// What is read: the name of the topic, and fields with their units.
-const IMU: &[(&str, &str)] = &[
-    ("time", "us"),
-    ("gyro_x", "rad/s"),
-    ("gyro_y", "rad/s"),
-    ("gyro_z", "rad/s"),
-    ("accl_x", "m/s^2"),
-    ("accl_y", "m/s^2"),
-    ("accl_z", "m/s^2"),
-    ("temp", "degC"),
-];
+/// What an IMU message has beside its time, and its labels in the log.
+const IMU: &[Fields] = &[GYROSCOPE, ACCELEROMETER, &[("temp", "degC")]];
 const IMU_LABELS: [&str; 8] = ["TimeUS", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ", "T"];
-const GYROSCOPE: &[(&str, &str)] = &[("time", "us"), ("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
-const ACCELEROMETER: &[(&str, &str)] = &[("time", "us"), ("accl_x", "m/s^2"), ("accl_y", "m/s^2"), ("accl_z", "m/s^2")];
+/// Unit of the times.
+const TIME_UNIT: &str = "us";
 
 /// A source of samples in a log; the first that a log has is read where the user names none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,11 +47,11 @@ impl Topic {
         }
     }
 
-    fn fields(self) -> &'static [(&'static str, &'static str)] {
+    fn fields(self) -> &'static [Fields] {
         match self {
-            Self::GyroscopeBatches(_) => GYROSCOPE,
+            Self::GyroscopeBatches(_) => &[GYROSCOPE],
             Self::Imu(_) => IMU,
-            Self::AccelerometerBatches(_) => ACCELEROMETER,
+            Self::AccelerometerBatches(_) => &[ACCELEROMETER],
         }
     }
 }
@@ -76,7 +67,7 @@ pub(crate) fn read(file: &Path, options: &ReadOptions) -> Result<SensorTable, In
     let topics: Vec<(String, Topic)> = counted.keys().map(|&topic| (topic.name(), topic)).collect();
     let wanted = options.topic.as_deref().or(topics.first().map(|(name, _)| name.as_str()));
     let (name, chosen) = choose_topic(FORMAT, &topics, wanted).map_err(fail)?;
-    let mut table = MessageTable::new(file, chosen.fields(), options)?;
+    let mut table = MessageTable::new(file, TIME_UNIT, chosen.fields(), options)?;
     let skipped = for_each_sample(file, |topic, row| if topic == *chosen { table.push(row) } else { Ok(()) })?;
     let mut table = table.finish(None)?;
     let others: Vec<&str> = topics.iter().map(|(name, _)| name.as_str()).filter(|other| other != name).collect();

@@ -15,19 +15,23 @@ use std::path::Path;
 /// # Errors
 /// The file cannot be created or written.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<()> {
-    let out = BufWriter::new(File::create(file)?);
+    write_text(file, |out| write_rows(recording, out))
+}
+
+/// Writes a text, gzip if the name of `file` ends in `.gz`.
+pub(crate) fn write_text(file: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
     if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz")) {
         let mut out = GzEncoder::new(out, Compression::default());
-        write_rows(recording, &mut out)?;
+        write(&mut out)?;
         out.finish()?.flush()
     } else {
-        let mut out = out;
-        write_rows(recording, &mut out)?;
+        write(&mut out)?;
         out.flush()
     }
 }
 
-fn write_rows(recording: &Recording, out: &mut impl Write) -> io::Result<()> {
+fn write_rows(recording: &Recording, out: &mut dyn Write) -> io::Result<()> {
     let has_index = recording.samples.iter().all(|sample| sample.time_stamp.index.is_some());
     let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
     let counts = recording.channels.iter().map(|channel| format!("{}_counts", channel.name()));

@@ -1,21 +1,15 @@
 //! `sensor_msgs/Imu` of ROS 1 and ROS 2, as it is laid out in bags.
 
+use crate::message_table::{ACCELEROMETER, Fields, GYROSCOPE};
 use crate::sensor_table::Number;
 
 /// Names of the message in bags.
 pub(crate) const TYPES: [&str; 2] = ["sensor_msgs/Imu", "sensor_msgs/msg/Imu"];
 
-/// The fields that are read, each with its unit. The time is that of the header: when the sample was taken, not when the
-/// message was written.
-pub(crate) const FIELDS: [(&str, &str); 7] = [
-    ("time", "ns"),
-    ("gyro_x", "rad/s"),
-    ("gyro_y", "rad/s"),
-    ("gyro_z", "rad/s"),
-    ("accl_x", "m/s^2"),
-    ("accl_y", "m/s^2"),
-    ("accl_z", "m/s^2"),
-];
+/// What is read after the time, which is that of the header: when the sample was taken, not when the message was written.
+pub(crate) const FIELDS: [Fields; 2] = [GYROSCOPE, ACCELEROMETER];
+/// Unit of the time.
+pub(crate) const TIME_UNIT: &str = "ns";
 
 /// Doubles of the orientation and its covariance, before the angular velocity.
 const ORIENTATION: usize = 4 + 9;
@@ -24,7 +18,7 @@ const COVARIANCE: usize = 9;
 
 /// Decodes a message of ROS 1: little endian, without padding. `None` for bytes that are too few.
 pub(crate) fn decode_ros1(bytes: &[u8]) -> Option<[Number; 7]> {
-    let mut fields = Fields { bytes, at: 0, origin: 0, big: false };
+    let mut fields = Cursor { bytes, at: 0, origin: 0, big: false };
     let _sequence = fields.word()?;
     let (seconds, nanoseconds) = (i64::from(fields.word()?), i64::from(fields.word()?));
     let name = fields.word()? as usize;
@@ -40,7 +34,7 @@ pub(crate) fn decode_cdr(bytes: &[u8]) -> Option<[Number; 7]> {
         [0, 1] => false,
         _ => return None,
     };
-    let mut fields = Fields { bytes, at: ENCAPSULATION, origin: ENCAPSULATION, big };
+    let mut fields = Cursor { bytes, at: ENCAPSULATION, origin: ENCAPSULATION, big };
     let seconds = i64::from(fields.word()?.cast_signed());
     let nanoseconds = i64::from(fields.word()?);
     let name = fields.word()? as usize;
@@ -49,7 +43,7 @@ pub(crate) fn decode_cdr(bytes: &[u8]) -> Option<[Number; 7]> {
     measured(fields, seconds, nanoseconds)
 }
 
-fn measured(mut fields: Fields, seconds: i64, nanoseconds: i64) -> Option<[Number; 7]> {
+fn measured(mut fields: Cursor, seconds: i64, nanoseconds: i64) -> Option<[Number; 7]> {
     for _ in 0..ORIENTATION {
         fields.double()?;
     }
@@ -69,7 +63,7 @@ fn measured(mut fields: Fields, seconds: i64, nanoseconds: i64) -> Option<[Numbe
 }
 
 /// Reads fields one after the other.
-struct Fields<'a> {
+struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     /// Where alignment counts from.
@@ -77,7 +71,7 @@ struct Fields<'a> {
     big: bool,
 }
 
-impl Fields<'_> {
+impl Cursor<'_> {
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let end = self.at.checked_add(N)?;
         let mut bytes: [u8; N] = self.bytes.get(self.at..end)?.try_into().ok()?;

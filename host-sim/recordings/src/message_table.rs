@@ -1,10 +1,17 @@
-//! Tables from logs of messages: the choice of a topic, and rows from messages whose fields are known.
+//! Tables from logs of messages: the choice of a topic, and rows from messages of a gyroscope, an accelerometer or both.
 
 use crate::any_sensor::ReadOptions;
 use crate::column_selection::AvailableColumn;
 use crate::input_error::{InputError, Reason};
 use crate::sensor_table::{Number, SensorTable, TableBuilder};
 use std::path::Path;
+
+/// Fields of a message, each with its unit.
+pub(crate) type Fields = &'static [(&'static str, &'static str)];
+/// Of a gyroscope, as ROS, PX4 and ArduPilot have them.
+pub(crate) const GYROSCOPE: Fields = &[("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
+/// Of an accelerometer, as ROS, PX4 and ArduPilot have them.
+pub(crate) const ACCELEROMETER: Fields = &[("accl_x", "m/s^2"), ("accl_y", "m/s^2"), ("accl_z", "m/s^2")];
 
 /// The topic to read of `topics`, each with its number of messages where that is known: the one that the user names, else
 /// the only one.
@@ -34,10 +41,15 @@ pub(crate) struct MessageTable<'a> {
 }
 
 impl<'a> MessageTable<'a> {
-    /// Of messages with `fields`, each with its unit.
-    pub(crate) fn new(file: &'a Path, fields: &[(&str, &str)], options: &ReadOptions) -> Result<Self, InputError> {
-        let available: Vec<AvailableColumn> =
-            fields.iter().map(|(name, unit)| AvailableColumn::known(name, unit)).collect();
+    /// Of messages that have a time, in `time_unit`, and then these fields.
+    pub(crate) fn new(
+        file: &'a Path,
+        time_unit: &str,
+        fields: &[Fields],
+        options: &ReadOptions,
+    ) -> Result<Self, InputError> {
+        let fields = std::iter::once(("time", time_unit)).chain(fields.iter().copied().flatten().copied());
+        let available: Vec<AvailableColumn> = fields.map(|(name, unit)| AvailableColumn::known(name, unit)).collect();
         let chosen =
             options.choose(&available).map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
         Ok(Self { file, row: Vec::with_capacity(chosen.len()), builder: TableBuilder::new(chosen), rows: 0 })

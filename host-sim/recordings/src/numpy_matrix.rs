@@ -1,7 +1,6 @@
 //! Recordings written as a NumPy array of doubles in SI units, for programs that know no register counts.
 
 use crate::recording::Recording;
-use adis16405_driver::Channel;
 use npyz::WriterBuilder;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -18,29 +17,52 @@ const GRAVITY: f64 = 9.806_65;
 /// The file cannot be created or written.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
     let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
+    let units: Vec<SiUnit> = recording.channels.iter().map(|channel| SiUnit::of(channel.unit())).collect();
     let mut names: Vec<String> = if has_time { vec!["time_s".to_owned()] } else { Vec::new() };
-    names.extend(recording.channels.iter().map(|channel| format!("{}_{}", channel.name(), si_unit(*channel).0)));
-    let shape = [recording.samples.len() as u64, names.len() as u64];
-    let mut out = BufWriter::new(File::create(file)?);
-    let mut matrix = npyz::WriteOptions::<f64>::new().default_dtype().shape(&shape).writer(&mut out).begin_nd()?;
-    for sample in &recording.samples {
-        matrix.extend(sample.time_stamp.time_s.filter(|_| has_time))?;
-        for &channel in &recording.channels {
+    names.extend(recording.channels.iter().zip(&units).map(|(channel, unit)| format!("{}_{}", channel.name(), unit.suffix)));
+    let values = recording.samples.iter().flat_map(|sample| {
+        let channels = recording.channels.iter().zip(&units).map(|(&channel, unit)| {
             let count = f64::from(sample.counts.get(channel));
-            matrix.push(&((count * channel.lsb(recording.range) + channel.offset()) * si_unit(channel).1))?;
-        }
-    }
-    matrix.finish()?;
-    out.flush()?;
+            (count * channel.lsb(recording.range) + channel.offset()) * unit.factor
+        });
+        sample.time_stamp.time_s.filter(|_| has_time).into_iter().chain(channels)
+    });
+    write_matrix(file, recording.samples.len(), names.len(), values)?;
     Ok(names)
 }
 
-/// The unit of a column and the factor from the channel's unit.
-fn si_unit(channel: Channel) -> (&'static str, f64) {
-    match channel.unit() {
-        "deg/s" => ("rad_s", std::f64::consts::PI / 180.0),
-        "g" => ("m_s2", GRAVITY),
-        unit => (unit, 1.0),
+/// Writes doubles in the order of the rows.
+pub(crate) fn write_matrix(
+    file: &Path,
+    rows: usize,
+    columns: usize,
+    values: impl Iterator<Item = f64>,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
+    let shape = [rows as u64, columns as u64];
+    let mut matrix = npyz::WriteOptions::<f64>::new().default_dtype().shape(&shape).writer(&mut out).begin_nd()?;
+    matrix.extend(values)?;
+    matrix.finish()?;
+    out.flush()
+}
+
+/// The unit of a column in SI.
+pub(crate) struct SiUnit {
+    /// End of the name of the column.
+    pub(crate) suffix: &'static str,
+    /// From the channel's unit.
+    pub(crate) factor: f64,
+}
+
+impl SiUnit {
+    /// For a channel in `unit`; rates and specific forces alone have another unit in SI.
+    pub(crate) fn of(unit: &'static str) -> Self {
+        let (suffix, factor) = match unit {
+            "deg/s" => ("rad_s", std::f64::consts::PI / 180.0),
+            "g" => ("m_s2", GRAVITY),
+            unit => (unit, 1.0),
+        };
+        Self { suffix, factor }
     }
 }
 

@@ -1,12 +1,11 @@
 //! Bags of ROS 1 (`.bag`, format 2.0) and of ROS 2 (MCAP and SQLite), with `sensor_msgs/Imu`.
 
 use crate::any_sensor::ReadOptions;
-use crate::imu_message::{FIELDS, TYPES, decode_cdr, decode_ros1};
+use crate::imu_message::{FIELDS, TIME_UNIT, TYPES, decode_cdr, decode_ros1};
 use crate::input_error::{InputError, Reason};
+use crate::mcap_file::{self, McapRecord};
 use crate::message_table::{MessageTable, choose_topic};
 use crate::sensor_table::{Number, SensorTable};
-use mcap::records::Record;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
 use rusqlite::{Connection, OpenFlags};
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,11 +14,7 @@ use std::io::Read;
 use std::path::Path;
 
 const ROS1: &str = "ROS 1 bag";
-const MCAP: &str = "MCAP";
 const SQLITE: &str = "ROS 2 SQLite bag";
-
-/// Largest record of an MCAP file that is held in memory, bytes.
-const MAX_RECORD: usize = 1 << 30;
 
 /// Where the bag header of ROS 1 states the position of the index, in the first bytes of the file.
 const BAG_HEADER: u64 = 4096 + 64;
@@ -41,7 +36,7 @@ pub(crate) fn read_ros1(file: &Path, options: &ReadOptions) -> Result<SensorTabl
     }
     let topics: Vec<(String, BTreeSet<u32>)> = topics.into_iter().collect();
     let (_, connections) = choose_topic(ROS1, &topics, options.topic.as_deref()).map_err(fail)?;
-    let mut table = MessageTable::new(file, &FIELDS, options)?;
+    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
     for chunk in bag.chunk_records() {
         let chunk = match chunk {
             Ok(ChunkRecord::Chunk(chunk)) => chunk,
@@ -78,14 +73,18 @@ pub(crate) fn read_mcap(file: &Path, options: &ReadOptions) -> Result<SensorTabl
     let fail = |reason| InputError::file(file, reason);
     let mut topics: BTreeMap<String, BTreeSet<u16>> = BTreeMap::new();
     let mut schemas: BTreeSet<u16> = BTreeSet::new();
+    let mut ros1: BTreeSet<u16> = BTreeSet::new();
     // Channels may be declared anywhere: the topics are known after a first pass.
-    let early = for_each_record(file, |record| {
+    let early = mcap_file::for_each_record(file, |record| {
         match record {
-            Record::Schema { header, .. } if TYPES.contains(&header.name.as_str()) => {
-                schemas.insert(header.id);
+            McapRecord::Schema { id, name } if TYPES.contains(&name) => {
+                schemas.insert(id);
             }
-            Record::Channel(channel) if schemas.contains(&channel.schema_id) => {
-                topics.entry(channel.topic).or_default().insert(channel.id);
+            McapRecord::Channel { id, schema, topic, encoding } if schemas.contains(&schema) => {
+                topics.entry(topic.to_owned()).or_default().insert(id);
+                if encoding == "ros1" {
+                    ros1.insert(id);
+                }
             }
             _ => {}
         }
@@ -94,50 +93,16 @@ pub(crate) fn read_mcap(file: &Path, options: &ReadOptions) -> Result<SensorTabl
     let topics: Vec<(String, BTreeSet<u16>)> = topics.into_iter().collect();
     let (_, channels) = match (topics.as_slice(), early) {
         ([], Some(damage)) => return Err(fail(damage)),
-        (topics, _) => choose_topic(MCAP, topics, options.topic.as_deref()).map_err(fail)?,
+        (topics, _) => choose_topic(mcap_file::FORMAT, topics, options.topic.as_deref()).map_err(fail)?,
     };
-    let mut table = MessageTable::new(file, &FIELDS, options)?;
-    let mut encodings: BTreeMap<u16, bool> = BTreeMap::new();
-    let damage = for_each_record(file, |record| {
-        match record {
-            Record::Channel(channel) => {
-                encodings.insert(channel.id, channel.message_encoding == "ros1");
-            }
-            Record::Message { header, data } if channels.contains(&header.channel_id) => {
-                let is_ros1 = encodings.get(&header.channel_id).copied().unwrap_or(false);
-                table.push(&decoded(if is_ros1 { decode_ros1(&data) } else { decode_cdr(&data) }))?;
-            }
-            _ => {}
+    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
+    let damage = mcap_file::for_each_record(file, |record| match record {
+        McapRecord::Message { channel, data } if channels.contains(&channel) => {
+            table.push(&decoded(if ros1.contains(&channel) { decode_ros1(data) } else { decode_cdr(data) }))
         }
-        Ok(())
+        _ => Ok(()),
     })?;
     table.finish(damage)
-}
-
-/// Gives every record, those in chunks included, to `each`; and why there are no more where the file is damaged.
-fn for_each_record(
-    file: &Path,
-    mut each: impl FnMut(Record) -> Result<(), InputError>,
-) -> Result<Option<Reason>, InputError> {
-    let damaged = |error: mcap::McapError| Some(Reason::Format { format: MCAP, error: error.to_string().into() });
-    let mut input = File::open(file).map_err(|error| InputError::file(file, Reason::Io(error)))?;
-    let limits = LinearReaderOptions::default().with_record_length_limit(MAX_RECORD);
-    let mut reader = LinearReader::new_with_options(limits);
-    while let Some(event) = reader.next_event() {
-        match event {
-            Ok(LinearReadEvent::ReadRequest(bytes)) => {
-                let read =
-                    input.read(reader.insert(bytes)).map_err(|error| InputError::file(file, Reason::Io(error)))?;
-                reader.notify_read(read);
-            }
-            Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
-                Ok(record) => each(record)?,
-                Err(error) => return Ok(damaged(error)),
-            },
-            Err(error) => return Ok(damaged(error)),
-        }
-    }
-    Ok(None)
 }
 
 /// Reads a bag of ROS 2 in SQLite.
@@ -153,7 +118,7 @@ pub(crate) fn read_sqlite(file: &Path, options: &ReadOptions) -> Result<SensorTa
     let is_imu = |(name, id, kind): (String, i64, String)| TYPES.contains(&kind.as_str()).then_some((name, id));
     let topics: Vec<(String, i64)> = topics.into_iter().filter_map(is_imu).collect();
     let (_, topic) = choose_topic(SQLITE, &topics, options.topic.as_deref()).map_err(fail)?;
-    let mut table = MessageTable::new(file, &FIELDS, options)?;
+    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
     let mut query = database.prepare("SELECT data FROM messages WHERE topic_id = ? ORDER BY id").map_err(failed)?;
     let mut rows = query.query((topic,)).map_err(failed)?;
     loop {

@@ -2,7 +2,7 @@
 
 use crate::any_sensor::ReadOptions;
 use crate::input_error::{InputError, Reason};
-use crate::message_table::{MessageTable, choose_topic};
+use crate::message_table::{ACCELEROMETER, Fields, GYROSCOPE, MessageTable, choose_topic};
 use crate::sensor_table::{Number, SensorTable};
 use px4_ulog::stream_parser::model::FlattenedFieldType;
 use px4_ulog::stream_parser::{DataMessage, LogParser};
@@ -19,68 +19,174 @@ const BUFFER_BYTES: usize = 1 << 16;
 /// Samples of a FIFO message.
 const FIFO_SAMPLES: usize = 32;
 
-/// The messages that are read: name, and fields with their units. The time is that of the sample, in µs.
-const MESSAGES: [(&str, &[(&str, &str)]); 5] = [
-    ("sensor_gyro_fifo", &GYROSCOPE),
-    ("sensor_gyro", &GYROSCOPE),
-    (
-        "sensor_combined",
-        &[
-            ("time", "us"),
-            ("gyro_x", "rad/s"),
-            ("gyro_y", "rad/s"),
-            ("gyro_z", "rad/s"),
-            ("accl_x", "m/s^2"),
-            ("accl_y", "m/s^2"),
-            ("accl_z", "m/s^2"),
-        ],
-    ),
-    ("sensor_accel_fifo", &ACCELEROMETER),
-    ("sensor_accel", &ACCELEROMETER),
+/// The messages that are read: name, and what they have beside their time.
+const MESSAGES: [(&str, &[Fields]); 5] = [
+    ("sensor_gyro_fifo", &[GYROSCOPE]),
+    ("sensor_gyro", &[GYROSCOPE]),
+    ("sensor_combined", &[GYROSCOPE, ACCELEROMETER]),
+    ("sensor_accel_fifo", &[ACCELEROMETER]),
+    ("sensor_accel", &[ACCELEROMETER]),
 ];
-const GYROSCOPE: [(&str, &str); 4] = [("time", "us"), ("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
-const ACCELEROMETER: [(&str, &str); 4] =
-    [("time", "us"), ("accl_x", "m/s^2"), ("accl_y", "m/s^2"), ("accl_z", "m/s^2")];
+/// Positions in [`MESSAGES`] of gyroscope and accelerometer, which drivers of one part publish with the same times.
+const PAIRS: [[usize; 2]; 2] = [[0, 3], [1, 4]];
+/// Unit of the times, which are those of the samples.
+const TIME_UNIT: &str = "us";
 
-/// Reads a log. Without a topic the first of [`MESSAGES`] that it has is read, in its first instance.
+/// Samples that wait for that of the other sensor at most.
+const MOST_WAITING: usize = 1024;
+/// Share of the samples that must have the time of one of the other sensor if both are to be read as one.
+const MIN_PAIRED: f64 = 0.9;
+
+/// Samples that a log has: of a message by its position in [`MESSAGES`], or of a gyroscope with its accelerometer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Topic {
+    Single { message: usize, instance: u8 },
+    Pair { pair: [usize; 2], instance: u8 },
+}
+
+impl Topic {
+    fn name(self) -> String {
+        let (name, instance) = match self {
+            Self::Single { message, instance } => (MESSAGES[message].0.to_owned(), instance),
+            Self::Pair { pair: [gyroscope, accelerometer], instance } => {
+                (format!("{}+{}", MESSAGES[gyroscope].0, MESSAGES[accelerometer].0), instance)
+            }
+        };
+        if instance == 0 { name } else { format!("{name}:{instance}") }
+    }
+
+    fn fields(self) -> &'static [Fields] {
+        match self {
+            Self::Single { message, .. } => MESSAGES[message].1,
+            Self::Pair { .. } => &[GYROSCOPE, ACCELEROMETER],
+        }
+    }
+}
+
+/// Samples of a gyroscope and an accelerometer that wait for one of the other sensor at the same time.
+#[derive(Debug, Default)]
+struct Pairing {
+    /// By the bits of the time in µs, which sort like the time.
+    waiting: BTreeMap<u64, (usize, [Number; 4])>,
+    paired: u64,
+    /// Samples of which there is no other.
+    alone: u64,
+}
+
+impl Pairing {
+    /// Adds a sample of sensor 0, the gyroscope, or 1, the accelerometer; and gives it with that of the other sensor, once there
+    /// are both.
+    fn add(&mut self, sensor: usize, sample: [Number; 4]) -> Option<[Number; 7]> {
+        let key = sample[0].value().max(0.0).to_bits();
+        match self.waiting.remove(&key) {
+            Some((other, waiting)) if other != sensor => {
+                self.paired += 1;
+                let [rates, forces] = if sensor == 0 { [sample, waiting] } else { [waiting, sample] };
+                let ([time, x, y, z], [_, u, v, w]) = (rates, forces);
+                Some([time, x, y, z, u, v, w])
+            }
+            before => {
+                self.alone += u64::from(before.is_some());
+                self.waiting.insert(key, (sensor, sample));
+                if self.waiting.len() > MOST_WAITING {
+                    self.waiting.pop_first();
+                    self.alone += 1;
+                }
+                None
+            }
+        }
+    }
+}
+
+/// What a first pass over a log finds.
+struct Contents {
+    topics: Vec<(String, Topic)>,
+    /// The gyroscope with the most samples, with its accelerometer; the accelerometer with the most where there is no gyroscope.
+    preferred: Option<String>,
+    damage: Option<Reason>,
+}
+
+impl Contents {
+    fn of(file: &Path) -> Result<Self, InputError> {
+        let mut counted: BTreeMap<(usize, u8), u64> = BTreeMap::new();
+        let mut pairings: BTreeMap<([usize; 2], u8), Pairing> = BTreeMap::new();
+        let damage = for_each_sample(file, |message, instance, sample| {
+            *counted.entry((message, instance)).or_insert(0) += 1;
+            if let (Some((pair, sensor)), Ok(sample)) = (sensor_of_pair(message), sample.try_into()) {
+                pairings.entry((pair, instance)).or_default().add(sensor, sample);
+            }
+            Ok(())
+        })?;
+        let samples = |message: usize, instance: u8| counted.get(&(message, instance)).copied().unwrap_or(0);
+        let is_whole = |(pair, instance): ([usize; 2], u8), pairing: &Pairing| {
+            let most = pair.iter().map(|&message| samples(message, instance)).max().unwrap_or(0);
+            pairing.paired > 0 && pairing.paired as f64 >= MIN_PAIRED * most as f64
+        };
+        let pairs = pairings.iter().filter(|(key, pairing)| is_whole(**key, pairing)).map(|(key, _)| *key);
+        let pairs: Vec<([usize; 2], u8)> = pairs.collect();
+        let singles = counted.keys().map(|&(message, instance)| Topic::Single { message, instance });
+        let topics: Vec<Topic> =
+            singles.chain(pairs.iter().map(|&(pair, instance)| Topic::Pair { pair, instance })).collect();
+        // The message that both sensors share before others with as many samples, and the first instance.
+        let has_gyroscope = |message: usize| MESSAGES[message].1.contains(&GYROSCOPE);
+        let rank = |(key, samples): &(&(usize, u8), &u64)| {
+            (has_gyroscope(key.0), **samples, MESSAGES[key.0].1.len(), std::cmp::Reverse(**key))
+        };
+        let preferred = counted.iter().max_by_key(rank).map(|(&(message, instance), _)| {
+            let with_other = pairs.iter().find(|(pair, of)| pair.contains(&message) && *of == instance);
+            with_other.map_or(Topic::Single { message, instance }, |&(pair, instance)| Topic::Pair { pair, instance })
+        });
+        Ok(Self {
+            topics: topics.into_iter().map(|topic| (topic.name(), topic)).collect(),
+            preferred: preferred.map(Topic::name),
+            damage,
+        })
+    }
+}
+
+/// The pair that a message belongs to, and whether it is its first or second.
+fn sensor_of_pair(message: usize) -> Option<([usize; 2], usize)> {
+    PAIRS.iter().find_map(|pair| Some((*pair, pair.iter().position(|of| *of == message)?)))
+}
+
+/// Reads a log: the topic that the user names, or the one that is preferred.
 pub(crate) fn read(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
     let fail = |reason| InputError::file(file, reason);
-    let mut counted: BTreeMap<(usize, u8), u64> = BTreeMap::new();
-    let damage = for_each_message(file, |number, instance, _| {
-        *counted.entry((number, instance)).or_insert(0) += 1;
-        Ok(())
-    })?;
-    let name = |(number, instance): (usize, u8)| match instance {
-        0 => MESSAGES[number].0.to_owned(),
-        _ => format!("{}:{instance}", MESSAGES[number].0),
-    };
-    let topics: Vec<(String, (usize, u8))> = counted.keys().map(|&key| (name(key), key)).collect();
-    let first = topics.first().map(|(name, _)| name.as_str());
-    let wanted = options.topic.as_deref().or(first);
-    let (topic, chosen) = match (wanted, damage) {
+    let Contents { topics, preferred, damage } = Contents::of(file)?;
+    let wanted = options.topic.as_deref().or(preferred.as_deref());
+    let (name, chosen) = match (wanted, damage) {
         (None, Some(damage)) => return Err(fail(damage)),
         _ => choose_topic(FORMAT, &topics, wanted).map_err(fail)?,
     };
-    let mut table = MessageTable::new(file, MESSAGES[chosen.0].1, options)?;
-    let damage =
-        for_each_message(
-            file,
-            |number, instance, message| {
-                if (number, instance) == *chosen { push(&mut table, message) } else { Ok(()) }
-            },
-        )?;
+    let mut table = MessageTable::new(file, TIME_UNIT, chosen.fields(), options)?;
+    let mut pairing = Pairing::default();
+    let damage = for_each_sample(file, |message, instance, sample| match *chosen {
+        Topic::Single { .. } if *chosen == (Topic::Single { message, instance }) => table.push(sample),
+        Topic::Pair { pair, instance: of } if of == instance => {
+            let sensor = pair.iter().position(|member| *member == message);
+            match (sensor, sample.try_into()) {
+                (Some(sensor), Ok(sample)) => pairing.add(sensor, sample).map_or(Ok(()), |both| table.push(&both)),
+                _ => Ok(()),
+            }
+        }
+        _ => Ok(()),
+    })?;
     let mut table = table.finish(damage)?;
-    let others: Vec<&str> = topics.iter().map(|(name, _)| name.as_str()).filter(|name| name != topic).collect();
+    let alone = pairing.alone + pairing.waiting.len() as u64;
+    if alone > 0 {
+        table.notes.push(format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out"));
+    }
+    let others: Vec<&str> = topics.iter().map(|(name, _)| name.as_str()).filter(|other| other != name).collect();
     if options.topic.is_none() && !others.is_empty() {
-        table.notes.push(format!("{topic} is read; --topic reads one of the others: {}", others.join(", ")));
+        table.notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
     }
     Ok(table)
 }
 
-/// Gives each message of [`MESSAGES`] with its instance to `each`; and why there are no more where the file is damaged.
-fn for_each_message(
+/// Gives each sample of [`MESSAGES`] with the instance of its message to `each`; and why there are no more where the file is damaged.
+fn for_each_sample(
     file: &Path,
-    mut each: impl FnMut(usize, u8, &DataMessage) -> Result<(), InputError>,
+    mut each: impl FnMut(usize, u8, &[Number]) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
     let fail = |error| InputError::file(file, Reason::Io(error));
     let mut input = File::open(file).map_err(fail)?;
@@ -90,7 +196,8 @@ fn for_each_message(
         if failure.is_none()
             && let Some(number) = MESSAGES.iter().position(|(known, _)| *known == name)
         {
-            failure = each(number, message.multi_id.value(), message).err();
+            let instance = message.multi_id.value();
+            failure = samples(message, |sample| each(number, instance, sample)).err();
         }
     };
     let mut parser = LogParser::default();
@@ -109,38 +216,41 @@ fn for_each_message(
     failure.map_or(Ok(damage), Err)
 }
 
-/// The samples of a message.
-fn push(table: &mut MessageTable, message: &DataMessage) -> Result<(), InputError> {
-    let fields = Fields(message);
+/// Gives the samples of a message to `each`: the time, then the fields of [`MESSAGES`].
+fn samples(
+    message: &DataMessage,
+    mut each: impl FnMut(&[Number]) -> Result<(), InputError>,
+) -> Result<(), InputError> {
+    let values = MessageValues(message);
     // Older logs have the time of the message alone.
     let time =
-        fields.number("timestamp_sample").filter(|time| time.value() > 0.0).or_else(|| fields.number("timestamp"));
+        values.number("timestamp_sample").filter(|time| time.value() > 0.0).or_else(|| values.number("timestamp"));
     let time = time.unwrap_or(Number::Real(f64::NAN));
-    let value = |name: &str| fields.number(name).map_or(f64::NAN, Number::value);
+    let value = |name: &str| values.number(name).map_or(f64::NAN, Number::value);
     match message.flattened_format.message_name() {
         "sensor_gyro_fifo" | "sensor_accel_fifo" => {
             let (interval_us, scale) = (value("dt"), value("scale"));
             let samples = value("samples");
             // Also false for NaN.
             if !(samples >= 0.0 && samples <= FIFO_SAMPLES as f64) {
-                return table.push(&[]);
+                return each(&[]);
             }
             let samples = samples as usize;
             for at in 0..samples {
                 // The time of the message is that of its last sample.
                 let before_us = (samples - 1 - at) as f64 * interval_us;
                 let axis = |axis: char| Number::Real(scale * value(&format!("{axis}[{at}]")));
-                table.push(&[earlier(time, before_us), axis('x'), axis('y'), axis('z')])?;
+                each(&[earlier(time, before_us), axis('x'), axis('y'), axis('z')])?;
             }
             Ok(())
         }
         "sensor_combined" => {
             let axes = ["gyro_rad", "accelerometer_m_s2"];
-            let values = axes.into_iter().flat_map(|name| (0..3).map(move |axis| format!("{name}[{axis}]")));
-            let row: Vec<Number> = std::iter::once(time).chain(values.map(|name| Number::Real(value(&name)))).collect();
-            table.push(&row)
+            let names = axes.into_iter().flat_map(|name| (0..3).map(move |axis| format!("{name}[{axis}]")));
+            let row: Vec<Number> = std::iter::once(time).chain(names.map(|name| Number::Real(value(&name)))).collect();
+            each(&row)
         }
-        _ => table.push(&[time, Number::Real(value("x")), Number::Real(value("y")), Number::Real(value("z"))]),
+        _ => each(&[time, Number::Real(value("x")), Number::Real(value("y")), Number::Real(value("z"))]),
     }
 }
 
@@ -153,9 +263,9 @@ fn earlier(time: Number, before_us: f64) -> Number {
 }
 
 /// The fields of a message by their names.
-struct Fields<'a>(&'a DataMessage<'a>);
+struct MessageValues<'a>(&'a DataMessage<'a>);
 
-impl Fields<'_> {
+impl MessageValues<'_> {
     /// A field of any type of number; `None` where it is missing or cut off.
     fn number(&self, name: &str) -> Option<Number> {
         use FlattenedFieldType as Type;
@@ -176,5 +286,30 @@ impl Fields<'_> {
             _ => return None,
         };
         Some(Number::Integer(integer))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MOST_WAITING, Pairing};
+    use crate::sensor_table::Number;
+
+    fn sample(time_us: i64, value: f64) -> [Number; 4] {
+        [Number::Integer(time_us), Number::Real(value), Number::Real(value + 1.0), Number::Real(value + 2.0)]
+    }
+
+    #[test]
+    fn samples_of_one_time_are_paired_in_either_order_and_few_wait() {
+        let mut pairing = Pairing::default();
+        assert_eq!(pairing.add(0, sample(10, 1.0)), None);
+        assert_eq!(pairing.add(1, sample(20, 5.0)), None);
+        let values = |row: Option<[Number; 7]>| row.expect("both").map(Number::value);
+        assert_eq!(values(pairing.add(1, sample(10, 7.0))), [10.0, 1.0, 2.0, 3.0, 7.0, 8.0, 9.0]);
+        assert_eq!(values(pairing.add(0, sample(20, 3.0))), [20.0, 3.0, 4.0, 5.0, 5.0, 6.0, 7.0]);
+        for time in 0..10_000 {
+            assert_eq!(pairing.add(0, sample(100 + time, 0.0)), None);
+        }
+        assert_eq!((pairing.waiting.len(), pairing.paired), (MOST_WAITING, 2));
+        assert_eq!(pairing.alone, 10_000 - MOST_WAITING as u64);
     }
 }

@@ -6,7 +6,9 @@
 Needs numpy, scipy, rosbags, mcap, mcap-ros2-support, pyulog and pymavlink, and sigrok-cli for its SPI decoder. The writers are those of the formats' own
 projects (numpy, scipy, rosbags, mcap). ULog and ArduPilot logs have no writer in Python: the bytes are written here and read
 back by pyulog and pymavlink, which must find every sample. FOLDER/truth.json says what each file holds: arguments, rate in
-Hz, rows, samples that are missing between them, and the angle random walk of each channel in deg/s/sqrt(Hz) or g/sqrt(Hz).
+Hz, rows, samples that are missing between them, the angle random walk of each channel in deg/s/sqrt(Hz) or g/sqrt(Hz) that was
+drawn from, and, computed by numpy from the samples that were written, the Allan deviation of neighbours in deg/s or g and the
+angle random walk sigma/sqrt(rate), the maximum-likelihood estimate for white noise.
 """
 
 import json
@@ -20,7 +22,7 @@ import numpy as np
 import scipy.io
 
 GRAVITY = 9.80665
-ROWS = 20_000
+ROWS = 6_000
 RATE = 200.0
 # Standard deviations of white noise.
 GYRO_SIGMA = np.radians([0.05, 0.07, 0.09])  # rad/s
@@ -28,7 +30,7 @@ ACCL_SIGMA = np.array([0.002, 0.003, 0.004]) * GRAVITY  # m/s^2
 GYRO = ["gyro_x", "gyro_y", "gyro_z"]
 ACCL = ["accl_x", "accl_y", "accl_z"]
 # Samples that never arrive: single ones, and an outage.
-LOST = np.r_[500, 3_000, 7_777, 12_000:12_040, 17_001]
+LOST = np.r_[500, 1_500, 2_777, 4_000:4_040, 5_501]
 START_NS = 1_700_000_000_000_000_000
 
 
@@ -43,16 +45,39 @@ def samples(seed, rows=ROWS, rate=RATE):
 
 
 def noise(channels, rate=RATE):
-    sigmas = dict(zip(GYRO, np.degrees(GYRO_SIGMA))) | dict(zip(ACCL, ACCL_SIGMA / GRAVITY))
-    return {channel: float(sigmas[channel] / np.sqrt(rate)) for channel in channels}
+    return {channel: float(SIGMAS[channel] / np.sqrt(rate)) for channel in channels}
 
 
 class Truth(list):
     """What the files hold."""
 
-    def add(self, file, arguments=(), rate=RATE, rows=ROWS - len(LOST), missing=len(LOST), channels=GYRO + ACCL):
+    def add(self, file, samples, arguments=(), rate=RATE, kept=None):
+        """`samples` by channel in deg/s or g, of which those at the positions `kept` of a complete record were written."""
+        rows = len(next(iter(samples.values())))
+        kept = np.arange(rows) if kept is None else np.asarray(kept)
+        neighbours = np.diff(kept) == 1
+        missing = int(kept[-1] - kept[0] + 1 - rows)
         known = dict(file=str(file), arguments=list(arguments), rate_hz=rate, rows=rows, missing=missing)
-        self.append(known | dict(angle_random_walk=noise(channels, rate)))
+        deviation = lambda values: np.sqrt(np.mean(np.diff(values)[neighbours] ** 2) / 2)
+        known["neighbours"] = {name: float(deviation(values)) for name, values in samples.items()}
+        known["sample_walk"] = {name: float(np.std(values) / np.sqrt(rate)) for name, values in samples.items()}
+        known["angle_random_walk"] = noise([name for name in samples if name in SIGMAS], rate)
+        self.append(known)
+        return known
+
+
+SIGMAS = dict(zip(GYRO, np.degrees(GYRO_SIGMA))) | dict(zip(ACCL, ACCL_SIGMA / GRAVITY))
+KEPT = np.setdiff1d(np.arange(ROWS), LOST)
+
+
+def rates(gyro):
+    """By channel, of columns in rad/s."""
+    return dict(zip(GYRO, np.degrees(gyro).T))
+
+
+def both(gyro, accl):
+    """By channel, of columns in rad/s and m/s^2."""
+    return rates(gyro) | dict(zip(ACCL, accl.T / GRAVITY))
 
 
 def tables(folder, truth):
@@ -61,7 +86,7 @@ def tables(folder, truth):
     columns = np.c_[seconds, np.degrees(gyro), accl]
     header = "time_s,gyro_x_deg_s,gyro_y_deg_s,gyro_z_deg_s,ax [m/s^2],ay [m/s^2],az [m/s^2]"
     np.savetxt(folder / "units.csv", columns, delimiter=",", header=header, comments="", fmt="%.9f")
-    truth.add("units.csv")
+    truth.add("units.csv", both(gyro, accl), kept=KEPT)
     # The headings of EuRoC's imu0/data.csv.
     euroc = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
     euroc += "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"
@@ -69,18 +94,18 @@ def tables(folder, truth):
         print(euroc, file=out)
         for time, rate, force in zip(times, gyro, accl):
             print(time, *rate, *force, sep=",", file=out)
-    truth.add("euroc.csv")
+    truth.add("euroc.csv", both(gyro, accl), kept=KEPT)
     with open(folder / "semicolon.csv", "w") as out:
         print("t;p;q;r", file=out)
         for time, rate in zip(seconds, np.degrees(gyro) * 1e3):
             print(*(f"{value:.6f}".replace(".", ",") for value in [time * 1e3, *rate]), sep=";", file=out)
     named = ["--columns", "time=t,gyro_x=p,gyro_y=q,gyro_z=r", "--units", "ms,mdeg/s"]
-    truth.add("semicolon.csv", named, channels=GYRO)
+    truth.add("semicolon.csv", rates(gyro), named, kept=KEPT)
     # Counts of the included profile of an MPU-6050: 131 LSB per deg/s.
     counts = np.round(np.degrees(gyro) * 131).astype(int)
     table = np.c_[np.round(seconds * 1e6).astype(int), counts]
     np.savetxt(folder / "counts.tsv", table, delimiter="\t", header="time_us\tgx_raw\tgy_raw\tgz_raw", comments="", fmt="%d")
-    truth.add("counts.tsv", ["--sensor", "mpu6050"], channels=GYRO)
+    truth.add("counts.tsv", dict(zip(GYRO, counts.T / 131)), ["--sensor", "mpu6050"], kept=KEPT)
 
 
 def numpy_arrays(folder, truth):
@@ -88,18 +113,18 @@ def numpy_arrays(folder, truth):
     np.save(folder / "matrix.npy", gyro)
     # Without time stamps the lost samples are not seen.
     chosen = ["--columns", "gyro_x=0,gyro_y=1,gyro_z=2", "--units", "rad/s", "--rate", "200"]
-    truth.add("matrix.npy", chosen, missing=0, channels=GYRO)
+    truth.add("matrix.npy", rates(gyro), chosen)
     np.save(folder / "transposed.npy", np.asfortranarray(np.c_[(times - times[0]) / 1e9, gyro].T.astype(">f8")))
     chosen = ["--columns", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "--units", "rad/s,s"]
-    truth.add("transposed.npy", chosen, channels=GYRO)
+    truth.add("transposed.npy", rates(gyro), chosen, kept=KEPT)
     fields = [("t_us", "<i8")] + [(name, "<f4") for name in ["gx", "gy", "gz", "ax", "ay", "az"]]
     records = np.zeros(len(times), fields)
     for name, column in zip(records.dtype.names, [(times - times[0]) // 1000, *gyro.T, *accl.T]):
         records[name] = column
     np.save(folder / "records.npy", records)
-    truth.add("records.npy", ["--units", "rad/s,m/s^2"])
+    truth.add("records.npy", both(gyro, accl), ["--units", "rad/s,m/s^2"], kept=KEPT)
     np.savez_compressed(folder / "arrays.npz", stamp=times, gyro=gyro, accel=accl / GRAVITY, note=np.array("text"))
-    truth.add("arrays.npz", ["--units", "ns,rad/s,g"])
+    truth.add("arrays.npz", both(gyro, accl), ["--units", "ns,rad/s,g"], kept=KEPT)
 
 
 def matlab(folder, truth):
@@ -107,7 +132,7 @@ def matlab(folder, truth):
     arrays = dict(time=(times - times[0])[:, None] / 1e9, gyro=gyro, accel=accl, name="bench")
     for file, compressed in [("level5.mat", False), ("compressed.mat", True)]:
         scipy.io.savemat(folder / file, arrays, do_compression=compressed)
-        truth.add(file, ["--units", "s,rad/s,m/s^2"])
+        truth.add(file, both(gyro, accl), ["--units", "s,rad/s,m/s^2"], kept=KEPT)
 
 
 def ros_bags(folder, truth):
@@ -143,13 +168,13 @@ def ros_bags(folder, truth):
     bag = Writer1(folder / "one.bag")
     bag.set_compression(Writer1.CompressionFormat.LZ4)
     write(bag, ["/imu/data"], ros1, ros1.serialize_ros1)
-    truth.add("one.bag")
+    truth.add("one.bag", both(gyro, accl), kept=KEPT)
     write(Writer1(folder / "two.bag"), ["/imu/data", "/imu/other"], ros1, ros1.serialize_ros1)
-    truth.add("two.bag", ["--topic", "/imu/other"])
+    truth.add("two.bag", both(gyro, accl), ["--topic", "/imu/other"], kept=KEPT)
     for name, plugin, ending in [("mcap", StoragePlugin.MCAP, "mcap"), ("sqlite", StoragePlugin.SQLITE3, "db3")]:
         writer = Writer2(folder / name, version=9, storage_plugin=plugin)
         write(writer, ["/imu/data"], ros2, ros2.serialize_cdr)
-        truth.add(f"{name}/{name}.{ending}")
+        truth.add(f"{name}/{name}.{ending}", both(gyro, accl), kept=KEPT)
 
     # The same by Foxglove's own writer, compressed in chunks.
     from mcap_ros2.writer import Writer as McapWriter
@@ -167,7 +192,7 @@ def ros_bags(folder, truth):
             message |= {f"{name}_covariance": [0.0] * 9 for name in covariances}
             writer.write_message("/imu", schema, message, log_time=int(time), publish_time=int(time), sequence=number)
         writer.finish()
-    truth.add("foxglove.mcap")
+    truth.add("foxglove.mcap", both(gyro, accl), kept=KEPT)
 
 
 def ulog(folder, truth):
@@ -198,8 +223,9 @@ def ulog(folder, truth):
     read = {topic.name: topic.data for topic in ULog(str(folder / "single.ulg")).data_list}
     assert np.array_equal(read["sensor_gyro"]["timestamp_sample"], micros)
     assert np.allclose(read["sensor_accel"]["z"], accl[:, 2], rtol=1e-6)
-    truth.add("single.ulg", channels=GYRO)
-    truth.add("single.ulg", ["--topic", "sensor_accel"], channels=ACCL)
+    # Both messages have the same times: they are read as one.
+    truth.add("single.ulg", both(gyro, accl), kept=KEPT)
+    truth.add("single.ulg", dict(zip(ACCL, accl.T / GRAVITY)), ["--topic", "sensor_accel"], kept=KEPT)
 
     # FIFO: 8 samples of 16 bits a message at 8 kHz; three messages are lost. The range is small enough that the step, a seventh
     # of the noise, adds no more than 0.2 % to its variance.
@@ -208,7 +234,7 @@ def ulog(folder, truth):
     counts = np.round(random.normal(0.0, GYRO_SIGMA, (4 * ROWS, 3)) / scale).astype(int)
     fifo = "sensor_gyro_fifo:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float dt;float scale;"
     fifo += "uint8_t samples;int16_t[32] x;int16_t[32] y;int16_t[32] z;"
-    lost = {100, 2_000, 5_555}
+    lost = {100, 1_000, 2_555}
     data = []
     for number in sorted(set(range(len(counts) // each)) - lost):
         time = 1_000_000 + ((number + 1) * each - 1) * 125
@@ -218,8 +244,8 @@ def ulog(folder, truth):
     (folder / "fifo.ulg").write_bytes(log([fifo], [(0, "sensor_gyro_fifo")], data))
     topic = ULog(str(folder / "fifo.ulg")).data_list[0].data
     assert len(topic["x[0]"]) == len(counts) // each - len(lost) and topic["y[7]"][0] == counts[7, 1]
-    missing = each * len(lost)
-    truth.add("fifo.ulg", rate=rate, rows=len(counts) - missing, missing=missing, channels=GYRO)
+    kept = [at for at in range(len(counts)) if at // each not in lost]
+    truth.add("fifo.ulg", rates(counts[kept] * scale), rate=rate, kept=kept)
 
 
 def ardupilot(folder, truth):
@@ -254,11 +280,11 @@ def ardupilot(folder, truth):
 
     found = read_back("imu.bin", "IMU")
     assert len(found) == len(micros) and abs(found[9].GyrX - gyro[9, 0]) < 1e-6
-    truth.add("imu.bin")
+    truth.add("imu.bin", both(gyro, accl), kept=KEPT)
 
     # Batches of 1024 raw samples at 2 kHz, every 0.75 s: the gaps between them are as long as 476 samples. One message of
     # 32 samples is lost.
-    rate, size, every, multiplier, batches = 2000.0, 1024, 1500, 900, 60
+    rate, size, every, multiplier, batches = 2000.0, 1024, 1500, 900, 20
     counts = np.round(np.random.default_rng(8).normal(0.0, GYRO_SIGMA, (batches * size, 3)) * multiplier * 16).astype(int)
     body, lost = [], (7, 11)
     for batch in range(batches):
@@ -271,8 +297,9 @@ def ardupilot(folder, truth):
     (folder / "batches.bin").write_bytes(head + b"".join(body))
     found = read_back("batches.bin", "ISBD")
     assert len(found) == batches * size // 32 - 1 and list(found[0].x) == list(counts[:32, 0])
-    missing = (batches - 1) * (every - size) + 32
-    truth.add("batches.bin", rate=rate, rows=batches * size - 32, missing=missing, channels=GYRO)
+    sent = np.setdiff1d(np.arange(batches * size), lost[0] * size + 32 * lost[1] + np.arange(32))
+    kept = sent // size * every + sent % size
+    truth.add("batches.bin", rates(counts[sent] / (multiplier * 16)), rate=rate, kept=kept)
 
 
 def spi_captures(folder, truth):
@@ -289,12 +316,12 @@ def spi_captures(folder, truth):
     for row in sorted(set(range(rows)) - set(lost)):
         out, back = bytes([0x3E, 0]) + bytes(24), bytes(2) + words[row].astype(">u2").tobytes()
         frames.append((1_000 + row * 5_000, out, back))
-    noise = {name: float(sigma[at] * lsb / np.sqrt(rate)) for at, name, lsb in
-             [(1, "gyro_x", 0.05), (2, "gyro_y", 0.05), (3, "gyro_z", 0.05), (6, "accl_z", 3.33e-3)]}
+    lsb = dict(gyro_x=(1, 0.05), gyro_y=(2, 0.05), gyro_z=(3, 0.05), accl_x=(4, 3.33e-3), accl_y=(5, 3.33e-3), accl_z=(6, 3.33e-3))
+    kept = np.setdiff1d(np.arange(rows), lost)
 
     def add(file):
-        known = dict(file=file, arguments=[], rate_hz=rate, rows=rows - len(lost), missing=len(lost))
-        truth.append(known | dict(angle_random_walk=noise))
+        known = truth.add(file, {name: counts[kept, at] * size for name, (at, size) in lsb.items()}, rate=rate, kept=kept)
+        known["angle_random_walk"] = {name: float(sigma[at] * size / np.sqrt(rate)) for name, (at, size) in lsb.items()}
 
     # SPI mode 3 at 500 kHz; one time unit is 1 us, the high and the low of the clock take one each.
     lines = ["$timescale 1 us $end", "$scope module bus $end"]

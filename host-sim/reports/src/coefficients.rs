@@ -1,6 +1,21 @@
-//! The rows of the coefficient tables on the terminal and on the page: by the slope method, beside the fit.
+//! A coefficient of a model, whose white noise may have two terms; and the rows of the coefficient tables on the terminal and on
+//! the page: by the slope method, beside the fit.
 
+use noise_analysis::assessment::sum_of_white_noise;
+use noise_analysis::findings::BoundedEstimate;
 use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue};
+
+/// The coefficient `kind` of a model with these terms: of each its kind, its `value` with bounds, and the unit. N is that of all white
+/// noise, behind the part's filter (`filter_bandwidth`) and after it.
+pub(crate) fn coefficient<'a>(
+    kind: &str,
+    terms: impl Iterator<Item = (&'a str, BoundedEstimate, &'a str)>,
+) -> Option<(BoundedEstimate, &'a str)> {
+    let is_of = |of: &str| of == kind || (kind == SLOPES[0].0 && of == "filter_bandwidth");
+    let (estimates, units): (Vec<BoundedEstimate>, Vec<&str>) =
+        terms.filter(|(of, ..)| is_of(of)).map(|(_, estimate, unit)| (estimate, unit)).unzip();
+    Some((sum_of_white_noise(&estimates), units.first()?))
+}
 
 /// Kind, letter and slope of the coefficients that the slope method gives (IEEE Std 952, annex C).
 pub const SLOPES: [(&str, &str, &str); 3] = [

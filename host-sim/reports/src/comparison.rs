@@ -29,19 +29,9 @@ pub enum ComparisonError {
     /// There is no coefficient that both have.
     #[error("no coefficient of a channel is in both")]
     Nothing,
-}
-
-/// Values that a data sheet gives for a channel, in its unit and s.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SpecifiedNoise {
-    /// Such as `gyro_x`.
-    pub channel: String,
-    /// N.
-    pub angle_random_walk: Option<f64>,
-    /// The lowest Allan deviation.
-    pub in_run_bias_stability: Option<f64>,
-    /// K.
-    pub rate_random_walk: Option<f64>,
+    /// The report was made without the profile of a sensor, or with one that states no noise.
+    #[error("the report has no values of a data sheet: analyse the recording with --sensor, and the name or the profile of the sensor")]
+    NoDataSheet,
 }
 
 /// A comparison.
@@ -113,14 +103,18 @@ pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Compariso
     compared(pairs)
 }
 
-/// Compares a report with the values of a data sheet, which are typical ones without an interval.
+/// Compares a report with the data sheet of its sensor, whose values are typical ones without an interval.
 ///
 /// # Errors
-/// The data sheet says nothing of the channels of the report.
-pub fn with_data_sheet(data_sheet: &[SpecifiedNoise], report: &SavedReport) -> Result<Comparison, ComparisonError> {
+/// The report has no values of a data sheet, or they say nothing of what was measured.
+pub fn with_data_sheet(report: &SavedReport) -> Result<Comparison, ComparisonError> {
     let exact = |value: f64| BoundedEstimate { value, low: value, high: value };
+    let specified = || report.channels.iter().filter_map(|channel| Some((channel.data_sheet?, channel)));
+    if specified().next().is_none() {
+        return Err(ComparisonError::NoDataSheet);
+    }
     let mut pairs = Vec::new();
-    for (specified, channel) in data_sheet.iter().filter_map(|of| Some((of, report.channel(&of.channel)?))) {
+    for (specified, channel) in specified() {
         for (kind, value) in [(KINDS[0], specified.angle_random_walk), (KINDS[2], specified.rate_random_walk)] {
             if let (Some(value), Some((measured, unit))) = (value, coefficient(channel, kind)) {
                 pairs.push((channel.name.clone(), kind, unit, exact(value), measured));

@@ -14,13 +14,18 @@ use std::io::{self, Write};
 /// Columns of the longest line.
 const WIDTH: u16 = 100;
 
-/// Writes the whole report.
+/// Writes the whole report, with the name of the recording if it has one.
 ///
 /// # Errors
 /// `out` cannot be written.
-pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "ADIS16405 noise report")?;
-    writeln!(out, "══════════════════════")?;
+pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
+    let part = if report.part.name.is_empty() { "Sensor" } else { &report.part.name };
+    let title = format!("{part} noise report");
+    match source {
+        Some(source) => writeln!(out, "{title}   {source}")?,
+        None => writeln!(out, "{title}")?,
+    }
+    writeln!(out, "{}", "═".repeat(title.chars().count()))?;
     writeln!(out, "sample rate  {} Hz", number(report.sample_rate_hz))?;
     let length = duration(report.samples as f64 / report.sample_rate_hz);
     writeln!(out, "samples      {} used, {length}", count(report.samples))?;

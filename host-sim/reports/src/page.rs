@@ -21,6 +21,9 @@ const SCRIPT: &str = include_str!("page/script.js");
 /// Only what is in the file itself.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
+/// Name of the page in its folder.
+pub const FILE: &str = "index.html";
+
 /// The page could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write the page {}: {reason}", path.display())]
@@ -31,13 +34,13 @@ pub struct PageError {
     pub reason: std::io::Error,
 }
 
-/// Writes `index.html` into `dir`, which is made if it is missing, and returns its path.
+/// Writes [`FILE`] into `dir`, which is made if it is missing, and returns its path.
 ///
 /// # Errors
 /// The folder or the file cannot be written.
 pub fn write(report: &Report, dir: &Path) -> Result<PathBuf, PageError> {
     let page = render(report).into_string();
-    let path = dir.join("index.html");
+    let path = dir.join(FILE);
     std::fs::create_dir_all(dir)
         .and_then(|()| std::fs::write(&path, page))
         .map_err(|reason| PageError { path: path.clone(), reason })?;

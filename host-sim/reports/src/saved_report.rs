@@ -1,9 +1,9 @@
 //! The part of a report that other programs need: sample rate, and each channel's curve and final model. It is read from the
 //! JSON of schema 1 or taken from a report in memory.
 
-use noise_analysis::assessment::sum_of_white_noise;
+use crate::coefficients;
 use noise_analysis::findings::BoundedEstimate;
-use noise_analysis::report::{ChannelReport, Parameter, Report, SCHEMA, TermReport};
+use noise_analysis::report::{ChannelReport, DataSheetReport, Parameter, Report, SCHEMA, TermReport};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,6 +31,8 @@ pub struct SavedChannel {
     /// The model that was fitted to the whole record.
     #[serde(rename = "final")]
     pub refitted: SavedModel,
+    /// Typical noise by the data sheet of the sensor; absent where that is not known.
+    pub data_sheet: Option<DataSheetReport>,
 }
 
 /// One octave of the measured Allan deviation, with 95 % bounds.
@@ -153,15 +155,13 @@ impl SavedChannel {
     /// The coefficient of the term `kind`. N is that of all white noise, behind a filter and after it.
     #[must_use]
     pub fn coefficient(&self, kind: &str) -> Option<SavedParameter> {
-        let is_of = |of: &str| of == kind || (kind == "angle_random_walk" && of == "filter_bandwidth");
-        let terms = self.refitted.terms.iter().filter(|term| is_of(&term.kind));
-        let parts: Vec<&SavedParameter> = terms.filter_map(|term| term.parameters.get("value")).collect();
-        let estimates: Vec<BoundedEstimate> = parts
-            .iter()
-            .map(|&&SavedParameter { value, low, high, .. }| BoundedEstimate { value, low, high })
-            .collect();
-        let unit = parts.first()?.unit.clone();
-        let BoundedEstimate { value, low, high } = sum_of_white_noise(&estimates);
+        let terms = self.refitted.terms.iter().filter_map(|term| {
+            let SavedParameter { value, low, high, unit } = term.parameters.get("value")?;
+            let estimate = BoundedEstimate { value: *value, low: *low, high: *high };
+            Some((term.kind.as_str(), estimate, unit.as_str()))
+        });
+        let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
+        let unit = unit.to_owned();
         Some(SavedParameter { value, low, high, unit })
     }
 }
@@ -203,6 +203,7 @@ impl From<&ChannelReport> for SavedChannel {
                 terms: channel.refitted.terms.iter().map(term).collect(),
                 adev: channel.refitted.adev.clone(),
             },
+            data_sheet: channel.figure_data.data_sheet,
         }
     }
 }

@@ -1,10 +1,10 @@
 //! What a report says in short, for the terminal's screen, the page's first screen and the live view: the record in sentences,
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
+use crate::coefficients;
 use crate::finding_text::{FindingText, channel_list, describe};
 use crate::formatting::{count, words};
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span};
-use noise_analysis::assessment::sum_of_white_noise;
 use noise_analysis::findings::BoundedEstimate;
 use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
@@ -121,14 +121,11 @@ pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
 /// A coefficient of the model to use. N is that of all white noise, behind the part's filter and after it.
 #[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
-    let is_white = kind == LETTERS[0].0;
-    let is_of = |of: &str| of == kind || (is_white && of == "filter_bandwidth");
-    let terms = channel.refitted.terms.iter().filter(|term| is_of(&term.kind));
-    let parts: Vec<&Parameter> = terms.filter_map(|term| term.parameters.get("value")).collect();
-    let estimates: Vec<BoundedEstimate> =
-        parts.iter().map(|&&Parameter { value, low, high, .. }| BoundedEstimate { value, low, high }).collect();
-    let unit = &parts.first()?.unit;
-    let BoundedEstimate { value, low, high } = sum_of_white_noise(&estimates);
+    let terms = channel.refitted.terms.iter().filter_map(|term| {
+        let &Parameter { value, low, high, ref unit } = term.parameters.get("value")?;
+        Some((term.kind.as_str(), BoundedEstimate { value, low, high }, unit.as_str()))
+    });
+    let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
     Some(Parameter::new(value, low, high, unit))
 }
 
@@ -399,7 +396,7 @@ pub fn next_steps(report: &Report) -> Vec<String> {
         steps.push("! The error on the unseen half is far above 1: see --full.".to_owned());
     }
     if inertial(report).next().is_some() {
-        steps.push("For a filter: add --kalibr imu.yaml.".to_owned());
+        steps.push("For a filter: add --export kalibr=imu.yaml.".to_owned());
     }
     steps
 }

@@ -78,7 +78,7 @@ fn a_simulated_table_has_the_noise_the_rate_and_the_line_that_were_asked_for() {
 fn every_format_has_the_same_samples() {
     let dir = tempdir().expect("a folder");
     let [table, frames, again, back] = ["a.csv", "b.csv.gz", "c.csv", "d.csv"].map(|name| path(&dir, name));
-    let common = ["--seconds", "20", "--seed", "3", "--range", "75", "--fault", "stale:from=5,bursts=7"];
+    let common = ["--seconds", "8", "--seed", "3", "--range", "75", "--fault", "stale:from=5,bursts=7"];
     run(&[&["simulate", &table][..], &common].concat());
     run(&[&["simulate", &frames, "--format", "frames"][..], &common].concat());
     // 75 °/s need 16 taps; the log says range and filter itself.
@@ -149,7 +149,17 @@ fn what_cannot_be_simulated_or_converted_is_refused_before_anything_is_written()
 #[test]
 fn options_are_those_that_a_subcommand_uses() {
     for arguments in
-        [&["uf2", "a", "b", "--kalibr", "c"][..], &["explain", "a", "--json", "b"], &["monitor", "p", "--page", "d"]]
+        [
+            &["uf2", "a", "b", "--export", "kalibr=c"][..],
+            &["explain", "a", "--json", "b"],
+            &["monitor", "p", "--page", "d"],
+            &["replay", "a", "--sensor", "generic"],
+            &["replay", "a", "--columns", "gyro_x=0"],
+            &["replay", "a", "--topic", "t"],
+            &["convert", "a", "b", "--rate", "100"],
+            &["paper", "--export", "kalibr=c"],
+            &["compare", "a", "b", "--page", "d"],
+        ]
     {
         let output = host_sim(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();

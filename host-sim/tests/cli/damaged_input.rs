@@ -3,6 +3,7 @@
 use crate::program::{gzip, host_sim, json_of, write};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use recordings::frame_log::FrameLogReader;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -161,7 +162,69 @@ fn a_log_is_read_behind_a_byte_order_mark_or_blank_lines_and_from_a_pipe() {
     replay.stdin.take().expect("a pipe").write_all(log.as_bytes()).expect("written");
     let output = replay.wait_with_output().expect("an end");
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(std::fs::read(out).expect("a report") == plain);
+    assert!(std::fs::read(&out).expect("a report") == plain);
+    // A named pipe gives its bytes once.
+    let pipe = dir.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    let mut replay = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(["replay", name(&pipe), "--quiet", "--json", name(&out)])
+        .spawn()
+        .expect("the program starts");
+    std::fs::write(&pipe, &log).expect("the program reads");
+    let started = Instant::now();
+    let status = loop {
+        if let Some(status) = replay.try_wait().expect("a status") {
+            break status;
+        }
+        if started.elapsed() > Duration::from_secs(60) {
+            replay.kill().expect("killed");
+            panic!("the program waits for a second writer");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(status.success() && std::fs::read(out).expect("a report") == plain);
+}
+
+/// A long simulation that is interrupted, hung up or killed leaves a log whose bursts can be read up to then, plain or gzip.
+#[test]
+fn an_interrupted_simulation_leaves_a_log_that_can_be_read() {
+    let dir = tempdir().expect("a folder");
+    for (signal, file) in [("INT", "a.csv.gz"), ("HUP", "b.csv.gz"), ("KILL", "c.csv")] {
+        let log = dir.path().join(file);
+        let mut record = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+            .args(["record", name(&log), "--seconds", "50000"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // What is written stays in memory for a second at most.
+        std::thread::sleep(Duration::from_millis(2500));
+        let id = record.id().to_string();
+        assert!(Command::new("kill").args([&format!("-{signal}"), &id]).status().expect("kill").success());
+        assert!(!record.wait().expect("an end").success(), "{signal}: it ended by itself");
+        let mut reader = FrameLogReader::open(&log).expect("a log");
+        let mut bursts = 0;
+        while let Some(frame) = reader.next().unwrap_or_else(|error| panic!("{signal}: {error}")) {
+            bursts += u32::from(frame.mosi.len() == 26);
+        }
+        assert!(bursts > 100, "{signal}: {bursts} bursts");
+    }
+}
+
+#[test]
+fn a_full_disk_is_named() {
+    for arguments in [
+        &["record", "/dev/full", "--seconds", "5"][..],
+        &["simulate", "/dev/full", "--seconds", "5"],
+        &["simulate", "/dev/full", "--seconds", "5", "--format", "frames"],
+    ] {
+        let line = refusal(arguments);
+        assert!(line.contains("/dev/full") && line.contains("No space left"), "{arguments:?}: {line}");
+    }
+    // The report is printed all the same.
+    let output = host_sim(&["record", "/dev/null", "--seconds", "2", "--export", "csv=/dev/full"]);
+    assert!(error_line(&output).contains("No space left"));
+    assert!(text(&output.stdout).contains("angle random walk"));
 }
 
 #[test]
@@ -215,20 +278,44 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
     let file = write(&dir, "rows.csv", &rows);
     let link = dir.path().join("link.csv");
     std::os::unix::fs::symlink(&file, &link).expect("a link");
-    for output in ["--json", "--kalibr"] {
+    let outputs: [(&str, fn(&Path) -> String); 2] =
+        [("--json", |file| name(file).to_owned()), ("--export", |file| format!("kalibr={}", name(file)))];
+    for (option, value) in outputs {
         for same in [&file, &link] {
-            let line = refusal(&["analyze", name(&file), output, name(same)]);
+            let line = refusal(&["analyze", name(&file), option, &value(same)]);
             assert!(line.contains("is an input"), "{line}");
         }
         let nowhere = dir.path().join("missing").join("out");
         let started = Instant::now();
-        let output =
-            host_sim(&["record", name(&dir.path().join("log.csv")), "--seconds", "20000", output, name(&nowhere)]);
+        let log = dir.path().join("log.csv");
+        let output = host_sim(&["record", name(&log), "--seconds", "20000", option, &value(&nowhere)]);
         let line = error_line(&output);
         assert!(line.contains("No such file") && started.elapsed() < Duration::from_secs(5), "{line}");
     }
-    let line = refusal(&["analyze", name(&file), "--json", name(&link), "--kalibr", name(&link)]);
-    assert!(line.contains("is an input"), "{line}");
+    let twice = name(&dir.path().join("twice")).to_owned();
+    let line = refusal(&["analyze", name(&file), "--json", &twice, "--export", &format!("csv={twice}")]);
+    assert!(line.contains("named twice"), "{line}");
+    // Folders whose files cannot be written: a file is in the way, or a folder of the name of the page or of the figure.
+    let blocked = dir.path().join("blocked");
+    for inside in ["index.html", "overview.svg"] {
+        std::fs::create_dir_all(blocked.join(inside)).expect("a folder");
+    }
+    let log = dir.path().join("log.csv");
+    for (option, folder) in
+        [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)]
+    {
+        let started = Instant::now();
+        let line = refusal(&["record", name(&log), "--seconds", "20000", option, name(folder)]);
+        assert!(started.elapsed() < Duration::from_secs(5) && line.contains(name(folder)), "{option}: {line}");
+    }
+    for command in [&["compare", name(&file), "--data-sheet"][..], &["compare", name(&file), name(&file)]] {
+        let line = refusal(&[command, &["--json", name(&file)]].concat());
+        assert!(line.contains("is an input"), "{line}");
+    }
+    for command in [&["uf2"][..], &["convert"], &["export", "--format", "kalibr"]] {
+        let line = refusal(&[command, &[name(&file), name(&link)]].concat());
+        assert!(line.contains("is an input"), "{command:?}: {line}");
+    }
     assert!(std::fs::read(&file).expect("the input") == rows);
 }
 

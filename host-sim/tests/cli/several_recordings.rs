@@ -70,7 +70,7 @@ fn wrong_sets_of_recordings_and_reports_are_refused() {
     }
     for (arguments, expected) in [
         (&["analyze", &one, &two][..], "recordings are compared at one rate"),
-        (&["analyze", &one, &one, "--kalibr", &path("x")], "leave out --page and --kalibr"),
+        (&["analyze", &one, &one, "--export", "kalibr=x", "--page", &path("p")], "leave out --page, --export"),
         (&["analyze", &one, &two, "--json", &two], "it would be overwritten"),
         (&["compare", &one, &two], "no JSON report"),
     ] {

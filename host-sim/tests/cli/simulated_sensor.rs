@@ -53,7 +53,7 @@ fn the_file_for_kalibr_has_the_noise_of_the_virtual_sensor() {
     let file = dir.path().join("imu.yaml");
     let page = dir.path().to_str().expect("UTF-8");
     let file_name = file.to_str().expect("UTF-8");
-    let output = host_sim(&["--plain", "--seconds", "600", "--page", page, "--kalibr", file_name]);
+    let output = host_sim(&["--plain", "--seconds", "600", "--page", page, "--export", &format!("kalibr={file_name}")]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let yaml = std::fs::read_to_string(&file).expect("the file");
     // The converter's steps of 3.33 mg add white noise of a twelfth of their square.
@@ -72,11 +72,4 @@ fn the_file_for_kalibr_has_the_noise_of_the_virtual_sensor() {
     assert!(number(&yaml, "accelerometer_random_walk") > 0.0, "not positive");
     assert!((number(&yaml, "update_rate") - 204.8).abs() < 0.1);
     assert!(yaml.contains("rostopic: /imu0") && yaml.contains("#   gyro_z: "));
-}
-
-#[test]
-fn the_paper_command_writes_no_noise_model() {
-    let output = host_sim(&["paper", "--seeds", "2", "--kalibr", "nowhere.yaml"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("unexpected argument '--kalibr'"));
 }

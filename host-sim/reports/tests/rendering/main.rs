@@ -9,7 +9,7 @@ use roxmltree::{Document, Node};
 
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
-    full_tables::write(report, &mut out).expect("a vector can be written");
+    full_tables::write(report, None, &mut out).expect("a vector can be written");
     String::from_utf8(out).expect("text")
 }
 
