@@ -36,7 +36,7 @@ pub(crate) enum Command {
     Analyze(AnalyzeArguments),
     /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
     Replay(ReplayArguments),
-    /// Explain recordings of hours: added effects, parameters that change, common-mode drift, and what compensation gains.
+    /// Explain recordings in sentences: what was found, what changes in the course of the record, and what the models foretell.
     Explain(ExplainArguments),
     /// Write every bus transaction of the virtual sensor, or the raw bursts of a device on a serial port, to an SPI frame
     /// log, then analyse what was read.
@@ -431,7 +431,7 @@ pub(crate) struct ExplainArguments {
     /// Gyro range in which the recordings were taken, deg/s.
     #[arg(long, value_enum, default_value = "300")]
     pub(crate) range: GyroRangeArgument,
-    /// Write the figure of every channel as SVG into this folder.
+    /// Write every figure of the reports as SVG into this folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
 }

@@ -1,9 +1,10 @@
-//! `explain`: tables, and on demand figures, of what the analysis finds in recordings of hours.
+//! `explain`: the reports of recordings in sentences, and on demand their figures.
 
 use crate::cli::ExplainArguments;
 use crate::output::{note, print};
 use anyhow::{Context, Result};
-use noise_analysis::nonstationarity::{Explanation, explain};
+use noise_analysis::analysis::analyze;
+use noise_analysis::report::Report;
 use recordings::Printable;
 use recordings::count_table;
 use recordings::time_base::{StampQuality, time_base};
@@ -22,13 +23,13 @@ pub(crate) fn run(arguments: &ExplainArguments) -> Result<()> {
             for sentence in base.stamps.iter().flat_map(StampQuality::notes) {
                 note(format_args!("{}: {sentence}", file.display()));
             }
-            let explanation = explain(&base.measurement);
+            let report = analyze(&base.measurement);
             print(|out| {
                 writeln!(out, "\n══ {}", Printable(&file.display().to_string()))?;
-                reports::explanation::write(&explanation, out)
+                reports::explanation::write(&report, out)
             })?;
             if let Some(folder) = &arguments.pictures {
-                write_figures(&explanation, &distinct_stem(&file, &mut stems), folder)?;
+                write_figures(&report, &distinct_stem(&file, &mut stems), folder)?;
             }
         }
     }
@@ -46,12 +47,12 @@ fn distinct_stem(recording: &Path, stems: &mut BTreeSet<String>) -> String {
     distinct
 }
 
-/// Writes one SVG a channel into `folder`, named after the recording and the channel.
-fn write_figures(explanation: &Explanation, stem: &str, folder: &Path) -> Result<()> {
+/// Writes every figure of a report as SVG into `folder`, named after the recording and the figure.
+fn write_figures(report: &Report, stem: &str, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    for channel in &explanation.channels {
-        let file = folder.join(format!("{stem}-{}.svg", channel.channel.name));
-        fs::write(&file, reports::figure::explained_channel(channel)).with_context(|| file.display().to_string())?;
+    for picture in reports::figure::pictures(report) {
+        let file = folder.join(format!("{stem}-{}.svg", picture.name));
+        fs::write(&file, picture.svg).with_context(|| file.display().to_string())?;
     }
     Ok(())
 }

@@ -17,6 +17,7 @@ use crate::figure_data;
 use crate::findings::{Detection, Effect};
 use crate::motion::{self, PlatformMotion};
 use crate::naming::{ChannelFindings, name_effects};
+use crate::nonstationarity::{self, ChannelEpochs, CommonModeRegression, EpochCurves, Nonstationarity, TracedChannel};
 use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::part_report;
 use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
@@ -39,11 +40,14 @@ use std::collections::BTreeMap;
 /// model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
-    let (mut channels, part) = analyze_channels(measurement);
+    let (mut channels, part) = analyze_channels(measurement, Extent::Report);
     // What the first half shows by itself, to compare with what the whole record shows.
     let has_effects = channels.iter().any(|channel| !channel.effects.is_empty());
-    let first_half =
-        if has_effects { analyze_channels(&measurement.before(measurement.middle())).0 } else { Vec::new() };
+    let first_half = if has_effects {
+        analyze_channels(&measurement.before(measurement.middle()), Extent::Effects).0
+    } else {
+        Vec::new()
+    };
     let duration_s = measurement.periods() as f64 * measurement.period_s();
     let findings = causes::find(&mut channels, &first_half, &measurement.profile, duration_s);
     let mut report = Report {
@@ -54,6 +58,7 @@ pub fn analyze(measurement: &Measurement) -> Report {
         flagged: by_cause(&measurement.flagged),
         part,
         findings,
+        common_mode: common_mode_regression(measurement, &channels),
         channels,
     };
     figure_data::set(&mut report, measurement);
@@ -64,7 +69,24 @@ fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
     counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
-fn analyze_channels(measurement: &Measurement) -> (Vec<ChannelReport>, PartReport) {
+/// What an analysis is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Extent {
+    /// Everything that a report has.
+    Report,
+    /// The effects alone.
+    Effects,
+}
+
+/// The drift that the channels whose noise was followed have in common.
+fn common_mode_regression(measurement: &Measurement, channels: &[ChannelReport]) -> Option<CommonModeRegression> {
+    let is_followed =
+        |profile: &ChannelProfile| channels.iter().any(|of| of.name == profile.name && of.nonstationarity.is_some());
+    let followed: Vec<ChannelProfile> = measurement.profiles().filter(is_followed).collect();
+    CommonModeRegression::estimate(measurement, &followed)
+}
+
+fn analyze_channels(measurement: &Measurement, extent: Extent) -> (Vec<ChannelReport>, PartReport) {
     let of = |quantities: [Quantity; 2]| {
         quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
     };
@@ -84,14 +106,16 @@ fn analyze_channels(measurement: &Measurement) -> (Vec<ChannelReport>, PartRepor
     let duration_s = measurement.periods() as f64 * measurement.period_s();
     let at_rest = motion::at_rest(motions.iter().map(|(_, motion)| motion), duration_s);
     let series = series_without(Exclusion::ByWhole);
-    let first_half: Vec<Series> =
-        series_without(Exclusion::ByFirstHalf).iter().map(|series| series.before(measurement.middle())).collect();
+    let by_first_half = series_without(Exclusion::ByFirstHalf);
+    let first_half: Vec<Series> = by_first_half.iter().map(|series| series.before(measurement.middle())).collect();
     let preprocessed = Preprocessed {
         profile,
         estimators: &estimators,
         preprocessing: &preprocessing,
         series: &series,
         first_half: &first_half,
+        by_first_half: &by_first_half,
+        middle: measurement.middle(),
     };
     let analyses = in_parallel(&recorded, |&channel| match traced.iter().position(|of| *of == channel) {
         Some(position) => ChannelAnalysis::trace(&preprocessed, channel, position, &noise_grids),
@@ -109,6 +133,10 @@ fn analyze_channels(measurement: &Measurement) -> (Vec<ChannelReport>, PartRepor
             by_spectrum: by_spectrum(measurement, channel),
         }
     });
+    let nonstationarities = match extent {
+        Extent::Report => nonstationarities(&traced, &by_first_half, &analyses),
+        Extent::Effects => Vec::new(),
+    };
     let commons = common_modes(&analyses);
     let avar_of = |of: ChannelProfile, n: u64| {
         let position = analyses.iter().position(|(channel, _)| *channel == of)?;
@@ -155,8 +183,13 @@ fn analyze_channels(measurement: &Measurement) -> (Vec<ChannelReport>, PartRepor
                 .collect(),
             read_off: SlopeMethodReport::from_curve(&whole, unit),
             before: analysis.before(&estimators, &preprocessing, *channel, &whole),
+            first_half_curve: analysis.first_half_curve(&estimators, *channel),
             after,
             refitted,
+            nonstationarity: traced
+                .iter()
+                .position(|of| of == channel)
+                .and_then(|position| nonstationarities.get(position)?.clone()),
             at_rest: at_rest.clone(),
             effects,
             assessment: assessed.assessment,
@@ -177,7 +210,8 @@ fn agree_on_filter(
 ) -> Result<PartFilter, Unidentified> {
     let profile = &measurement.profile;
     let decimation = profile.internal_rate_hz / measurement.sample_rate_hz;
-    let mut agree = |of: fn(&mut ChannelAnalysis) -> &mut ChannelFit| {
+    let agree = |analyses: &mut [(ChannelProfile, ChannelAnalysis)],
+                 of: fn(&mut ChannelAnalysis) -> &mut ChannelFit| {
         let mut fits: Vec<(&ChannelProfile, &mut ChannelFit)> = analyses
             .iter_mut()
             .filter(|(channel, _)| traced.contains(channel))
@@ -206,12 +240,39 @@ fn agree_on_filter(
         }
         common
     };
-    let _of_first_half = agree(|analysis| &mut analysis.first);
-    let common = agree(|analysis| &mut analysis.both);
+    let _of_first_half = agree(analyses, |analysis| &mut analysis.first);
+    for (_, analysis) in analyses.iter_mut() {
+        analysis.fit_to_recent();
+    }
+    let common = agree(analyses, |analysis| &mut analysis.both);
     for (channel, analysis) in analyses.iter_mut().filter(|(channel, _)| traced.contains(channel)) {
         analysis.refit(estimators, *channel, common.as_ref().ok());
     }
     common
+}
+
+/// How the noise of each channel of `traced` changes; `series` are theirs, without what the rules of the first half exclude.
+fn nonstationarities(
+    traced: &[ChannelProfile],
+    series: &[Series],
+    analyses: &[(ChannelProfile, ChannelAnalysis)],
+) -> Vec<Option<Nonstationarity>> {
+    let channels: Vec<TracedChannel> = traced
+        .iter()
+        .zip(series)
+        .filter_map(|(profile, series)| {
+            let (_, analysis) = analyses.iter().find(|(of, _)| of == profile)?;
+            Some(TracedChannel {
+                name: profile.name,
+                series,
+                epochs: analysis.epochs.as_ref(),
+                baseline: &analysis.first.trace.before,
+                model: &analysis.first.trace.after,
+            })
+        })
+        .collect();
+    let positions: Vec<usize> = (0..channels.len()).collect();
+    in_parallel(&positions, |&position| nonstationarity::describe(&channels, position))
 }
 
 /// What the samples of a channel say beside its fits.
@@ -242,6 +303,10 @@ struct Preprocessed<'a> {
     series: &'a [Series],
     /// Their first half, without what its own rules exclude.
     first_half: &'a [Series],
+    /// The whole record, without what these rules exclude.
+    by_first_half: &'a [Series],
+    /// Sample period that begins the second half.
+    middle: u64,
 }
 
 /// Samples of a channel that are missing in its model.
@@ -268,6 +333,10 @@ struct ChannelAnalysis {
     /// The baseline model of the first half as it was recorded, with its spikes and knocks.
     raw: Model,
     first: ChannelFit,
+    /// Curves of the channel's epochs; `None` of a record that is too short for them, and of a channel that is not traced.
+    epoch_curves: Option<EpochCurves>,
+    /// The same, with the part of the first half that `first` is fitted to.
+    epochs: Option<ChannelEpochs>,
     both: ChannelFit,
     /// Lines in the spectrum of the whole record.
     lines: Vec<MergedLine>,
@@ -284,14 +353,15 @@ impl ChannelAnalysis {
         let position = estimators.both.position(channel).unwrap_or_default();
         let [first, both] = [&estimators.ruled[0], &estimators.both]
             .map(|part| ChannelFit::fit_baseline(CovariateFit::estimate(part, position, false, |_| None)));
-        Self { raw: first.trace.before.clone(), first, both, lines: Vec::new(), telegraph: None, rest: None }
+        let raw = first.trace.before.clone();
+        Self { raw, first, epoch_curves: None, epochs: None, both, lines: Vec::new(), telegraph: None, rest: None }
     }
 
-    /// The baseline model and what it lacks; `own` is the position of the channel's series.
-    fn trace(record: &Preprocessed, channel: ChannelProfile, own: usize, noise_grids: &NoiseGrids) -> Self {
-        let &Preprocessed { profile, estimators, preprocessing, series, first_half } = record;
+    /// The baseline model and what it lacks; `own_position` is that of the channel's series.
+    fn trace(record: &Preprocessed, channel: ChannelProfile, own_position: usize, noise_grids: &NoiseGrids) -> Self {
+        let &Preprocessed { profile, estimators, preprocessing, series, first_half, by_first_half, middle } = record;
         let position = estimators.both.position(channel).unwrap_or_default();
-        let (own, own_half) = (&series[own], &first_half[own]);
+        let (own, own_half) = (&series[own_position], &first_half[own_position]);
         // Temperature and supply in the first half.
         let (slow, slow_halves): (Vec<ChannelProfile>, Vec<&Series>) = estimators
             .both
@@ -316,6 +386,8 @@ impl ChannelAnalysis {
             preprocessing.sensitivity(channel, regressor)
         });
         let half = first.compensated_series(own_half, first_half);
+        let followed = first.compensated_series(&by_first_half[own_position], by_first_half);
+        let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&by_first_half[own_position]), middle);
         let whole = both.compensated_series(own, series);
         let (first, _) = fit_with_lines(first, own_half, half.as_ref(), profile);
         let (both, lines) = fit_with_lines(both, own, whole.as_ref(), profile);
@@ -325,7 +397,24 @@ impl ChannelAnalysis {
             |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
         let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
         let raw = raw.unwrap_or_else(|| first.trace.before.clone());
-        Self { raw, first, both, lines, telegraph, rest: Some(rest) }
+        Self { raw, first, epoch_curves, epochs: None, both, lines, telegraph, rest: Some(rest) }
+    }
+
+    /// Fits the model of the first half to its later quarter where the noise of the first half changes.
+    fn fit_to_recent(&mut self) {
+        let Some(curves) = self.epoch_curves.take() else { return };
+        let epochs = ChannelEpochs::compare(curves, &self.first.trace.after);
+        if let Some(recent) = epochs.recent_curve() {
+            self.first.fit_to(&recent);
+        }
+        self.epochs = Some(epochs);
+    }
+
+    /// The error on the second half of the curve of the first half itself.
+    fn first_half_curve(&self, estimators: &RecordEstimators, channel: ChannelProfile) -> ModelErrorReport {
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let unseen = self.first.covariates.compensated(&estimators.raw[1], position);
+        ModelErrorReport::of_curve(&self.first.covariates.curve, &unseen, &self.first.trace.after)
     }
 
     /// Makes the terms of the first half's model those of the whole record's where the second half does not contradict it.
@@ -402,7 +491,7 @@ impl ChannelAnalysis {
         ModelReport {
             terms: term_reports(model, channel.unit),
             adev: self.first.deviations(&estimators.both, position, whole, avar_of),
-            fitted: ModelErrorReport::new(model, &covariates.curve),
+            fitted: ModelErrorReport::new(model, self.first.fitted_curve()),
             unseen: unseen(&estimators.raw[1]),
             unseen_excluding: has_rules(preprocessing, channel).then(|| unseen(&estimators.ruled[1])),
         }

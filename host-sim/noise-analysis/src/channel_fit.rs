@@ -29,13 +29,15 @@ const COST_OF_A_TERM: f64 = 18.0;
 pub(crate) struct ChannelFit {
     pub covariates: CovariateFit,
     pub trace: Trace,
+    /// The curve that the model with added terms is fitted to, where that is not the curve of the whole part.
+    recent: Option<Curve<OCTAVES>>,
 }
 
 impl ChannelFit {
     /// The baseline model alone.
     pub(crate) fn fit_baseline(covariates: CovariateFit) -> Self {
         let trace = Trace::baseline(&covariates.curve);
-        Self { covariates, trace }
+        Self { covariates, trace, recent: None }
     }
 
     /// The baseline model and what it lacks; `lines` are those of the spectrum, `filters` those that the sensor may have.
@@ -45,11 +47,35 @@ impl ChannelFit {
     pub(crate) fn fit_traced(covariates: CovariateFit, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
         let by_spectrum = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
         if lines.is_empty() || by_spectrum.after_goodness.p_value > POOR_FIT {
-            return Self { covariates, trace: by_spectrum };
+            return Self { covariates, trace: by_spectrum, recent: None };
         }
         let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
         let is_better = by_curve.after_goodness.deviance < by_spectrum.after_goodness.deviance;
-        Self { covariates, trace: if is_better { by_curve } else { by_spectrum } }
+        Self { covariates, trace: if is_better { by_curve } else { by_spectrum }, recent: None }
+    }
+
+    /// Fits the terms of the model to `recent`, the curve of the latest stretch of the part: their coefficients and shapes, but
+    /// for that of the filter, which the sensor has once.
+    pub(crate) fn fit_to(&mut self, recent: &Curve<OCTAVES>) {
+        let terms = self.trace.after.terms();
+        let kinds: Vec<NoiseTerm> = terms.iter().map(|term| term.kind).collect();
+        let filters: Vec<NoiseTerm> =
+            kinds.iter().copied().filter(|kind| matches!(kind, NoiseTerm::Filtered(_))).collect();
+        let of_filter = |term: &FittedTerm| matches!(term.kind, NoiseTerm::Filtered(_)).then_some(term.shape);
+        let shape = terms.iter().find_map(of_filter);
+        let model = with_resolved_bounds(recent, &fit_shapes_except(recent, &kinds, &filters), None);
+        let with_shape = |term: &FittedTerm| FittedTerm {
+            shape: shape.filter(|_| of_filter(term).is_some()).unwrap_or(term.shape),
+            ..*term
+        };
+        self.trace.after = Model::new(model.sample_period(), model.terms().iter().map(with_shape));
+        self.trace.after_goodness = goodness(recent, &self.trace.after);
+        self.recent = Some(recent.clone());
+    }
+
+    /// The curve that the model with added terms is fitted to.
+    pub(crate) fn fitted_curve(&self) -> &Curve<OCTAVES> {
+        self.recent.as_ref().unwrap_or(&self.covariates.curve)
     }
 
     /// Correlation times of the model's Markov processes, s.

@@ -9,11 +9,11 @@
 //! Between `channel_fit` and `naming`, `part_filter` gives all channels the one filter of the sensor, and `octave_covariance` the
 //! bounds of the noise behind it. `contradiction` tells where a model fails.
 //!
-//! `analysis` calls all of these; `nonstationarity` is the second entry, for what changes while the record is made.
+//! Once the filter is agreed on, `nonstationarity` tells whether the noise changes while the record is made, which decides what
+//! the models of the first half are fitted to.
 //!
-//! [`analysis::analyze`] is the pipeline to a [`report::Report`], [`nonstationarity::explain`] the one to an
-//! [`nonstationarity::Explanation`]. `spectra` and `detectors` are used by both and
-//! depend neither on the model nor on the report.
+//! [`analysis::analyze`] is the pipeline to a [`report::Report`]. `spectra` and `detectors` depend neither on the model nor on
+//! the report.
 
 pub mod analysis;
 pub mod assessment;

@@ -25,6 +25,8 @@ const NEIGHBOURING_COUNTS: f64 = 1.5;
 const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 /// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
+/// Farthest that a line of the curve and the same line of the spectrum are apart, as a part of the frequency.
+const FREQUENCY_BY_OCTAVES: f64 = 0.2;
 /// Variance of the rounding error, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -65,6 +67,9 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     };
     let telegraph = findings.telegraph.filter(|found| !is_rounding(found));
     let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
+    let duration_s = fit.covariates.curve.samples() as f64 * period_s;
+    let in_spectrum: Vec<Effect> =
+        lines.iter().map(|line| line_effect(line, model, unit)).filter(|effect| is_shown(effect, duration_s)).collect();
     for found in &fit.trace.added {
         let term = &model.terms()[found.term];
         match term.kind {
@@ -74,8 +79,9 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             _ if !is_dithered => {}
             NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s => {}
             NoiseTerm::Quantization if rounding_s > 0.0 => {}
-            // Reported from the spectrum, which resolves them better than the curve.
-            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) => {}
+            // Reported from the spectrum, which resolves them better than the curve. A line whose frequency moves may be in the
+            // curve alone.
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if is_in_spectrum(&term.kind, &in_spectrum) => {}
             // In the curve, random telegraph noise and a common-mode drift look like these.
             NoiseTerm::Markov(_) | NoiseTerm::RateRamp if telegraph.is_some() || common.is_some() => {}
             NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
@@ -97,8 +103,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     }
     effects.extend(telegraph.map(|found| found.effect.clone()));
     effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
-    effects.extend(lines.iter().map(|line| line_effect(line, model, unit)));
-    let duration_s = fit.covariates.curve.samples() as f64 * period_s;
+    effects.extend(in_spectrum);
     effects.retain(|effect| is_shown(effect, duration_s));
     effects
 }
@@ -111,6 +116,21 @@ fn is_shown(effect: &Effect, duration_s: f64) -> bool {
     effect.parameters.iter().all(|(name, parameter)| match name.as_str() {
         "time_constant" => parameter.value < duration_s,
         name => !is_size(name) || !includes_0(parameter),
+    })
+}
+
+/// Whether a line of the model is one of `lines`, the effects by the spectrum: its frequency by the curve, whose octaves tell it
+/// to some tenths, is that of an effect.
+fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
+    let frequency = match kind {
+        NoiseTerm::Sinusoid(line) => line.frequency,
+        NoiseTerm::Resonance(line) => line.frequency,
+        _ => return false,
+    };
+    lines.iter().any(|line| {
+        let value = |name: &str| line.parameters.get(name).map_or(0.0, |parameter| parameter.value);
+        let reach = (FREQUENCY_BY_OCTAVES * frequency).max(0.5 * value("bandwidth"));
+        (value("frequency") - frequency).abs() < reach
     })
 }
 

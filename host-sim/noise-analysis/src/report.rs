@@ -6,7 +6,9 @@
 use crate::assessment::Assessment;
 pub use crate::contradiction::Contradiction;
 pub use crate::findings::{Effect, Finding, Parameter, Validation};
+pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
 use crate::units::coefficient_unit;
+use allan_core::model::cube_root_deviation;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -31,6 +33,9 @@ pub struct Report {
     pub part: PartReport,
     /// What the baseline models lack, one entry a cause.
     pub findings: Vec<Finding>,
+    /// Regression of the gyros and accelerometers on each other; absent where there are fewer than two, or too few samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub common_mode: Option<CommonModeRegression>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
 }
@@ -85,10 +90,17 @@ pub struct ChannelReport {
     pub effects: Vec<Effect>,
     /// The baseline model with the terms that were added.
     pub after: ModelReport,
+    /// Against the second half, of the curve of the first half taken for a model. A model that describes the first half exactly
+    /// leaves as much: it is what the second half does not repeat.
+    pub first_half_curve: ModelErrorReport,
     /// The model of `after`, fitted once more to the whole record. Its errors are those of `after`: the whole record leaves no
     /// data that it has not seen.
     #[serde(rename = "final")]
     pub refitted: ModelReport,
+    /// How the noise changes in the course of the record; absent of a record that is too short to be cut into epochs, and of
+    /// channels other than gyros and accelerometers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nonstationarity: Option<Nonstationarity>,
     /// Stretches in which the sensor was at rest: those without a motion of any channel.
     pub at_rest: Vec<Stretch>,
     /// Assessment of the model for use in navigation.
@@ -185,7 +197,8 @@ pub struct ModelReport {
     pub terms: Vec<TermReport>,
     /// The model's Allan deviation at each point of the curve, in the channel's unit.
     pub adev: Vec<f64>,
-    /// Against the first half of the record, which the model was fitted to.
+    /// Against the data that the model was fitted to: the first half of the record or, where the first half itself shows that
+    /// the noise changes, the median of the epochs of its later half.
     pub fitted: ModelErrorReport,
     /// Against the second half of the record as it was recorded, which was not used in the fit.
     pub unseen: ModelErrorReport,
@@ -343,6 +356,38 @@ impl ModelErrorReport {
             worst_tau_s: error.and_then(|error| finite(error.worst_tau)),
             worst_ratio: error.and_then(|error| finite(error.worst_ratio.sqrt())),
             contradiction: error.and_then(|_| Contradiction::find(model, curve)),
+        }
+    }
+
+    /// The error on `curve` of another curve, `other`, taken for a model, with the degrees of freedom of `model`. Octaves that
+    /// `other` lacks are left out.
+    #[must_use]
+    pub fn of_curve<const POINTS: usize>(other: &Curve<POINTS>, curve: &Curve<POINTS>, model: &Model) -> Self {
+        let (mut deviance, mut square, mut points) = (0.0, 0.0, 0.0);
+        let (mut sigma, mut tau, mut ratio) = (0.0_f64, None, None);
+        for point in curve.points() {
+            let Some(of) = other.points().iter().find(|of| of.n == point.n && of.avar * point.avar > 0.0) else {
+                continue;
+            };
+            let (measured, edf) = (point.avar / of.avar, model.edf(point));
+            let deviation = cube_root_deviation(measured, edf);
+            if deviation.abs() > sigma.abs() {
+                (sigma, tau, ratio) = (deviation, Some(point.tau), Some((1.0 / measured).sqrt()));
+            }
+            if point.n <= curve.samples() / 8 {
+                deviance += edf * (measured - 1.0 - measured.ln());
+                square += measured.ln().powi(2) / 4.0;
+                points += 1.0;
+            }
+        }
+        let mean = |sum: f64| (points > 0.0 && sum.is_finite()).then(|| sum / points);
+        Self {
+            deviance_per_point: mean(deviance),
+            rms_percent: mean(square).map(|square| 100.0 * square.sqrt()),
+            worst_sigma: tau.is_some().then_some(sigma),
+            worst_tau_s: tau,
+            worst_ratio: ratio,
+            contradiction: None,
         }
     }
 }

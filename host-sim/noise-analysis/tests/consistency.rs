@@ -61,6 +61,7 @@ fn contradictions(report: &Report) -> Vec<String> {
         curve_by_spectrum(channel, &mut add);
         effects_and_terms(channel, &mut add);
         effects_and_findings(report, channel, &mut add);
+        terms_in_findings(channel, &mut add);
         filter_of_the_part(report, channel, &mut add);
     }
     found
@@ -143,6 +144,44 @@ fn effects_and_findings(report: &Report, channel: &ChannelReport, add: &mut impl
                 add(format!("{} refers to the finding {} of {:?}", effect.kind, finding.kind, finding.channels));
             }
             Some(_) => {}
+        }
+    }
+}
+
+/// Each term of the model of the whole record beyond the baseline, and an effect of the channel: of its kind, or of a kind whose
+/// curve is that of the term. White noise beside a filter is that of rounding.
+fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
+    let baseline = ["angle_random_walk", "bias_instability", "rate_random_walk"];
+    // Where rounding hides the noise, terms stand for the rounding.
+    let is_rounding = |kind: &str| kind == "noise_below_count" || kind == "quantization";
+    if channel.effects.iter().any(|effect| is_rounding(&effect.kind)) {
+        return;
+    }
+    for term in channel.refitted.terms.iter().filter(|term| !baseline.contains(&term.kind.as_str())) {
+        let frequency = term.parameters.get("frequency").map(|frequency| frequency.value);
+        let is_of = |kind: &str| channel.effects.iter().any(|effect| effect.kind == kind);
+        let is_told = match term.kind.as_str() {
+            "sinusoid" | "resonance" => channel.effects.iter().any(|effect| {
+                let of = effect.parameters.get("frequency").map(|frequency| frequency.value);
+                // Octaves tell a frequency to some tenths. A wave that is no sinusoid has lines at multiples of its frequency.
+                of.zip(frequency).is_some_and(|(of, frequency)| {
+                    let multiple = (frequency / of).round().max(1.0);
+                    let is_wave = effect.kind == "square_wave" || effect.parameters.contains_key("harmonics");
+                    (frequency / of / if is_wave { multiple } else { 1.0 }).ln().abs() < 0.25
+                })
+            }),
+            // Terms of the curve that a detector in the samples or in several channels names.
+            "markov" => ["markov", "telegraph", "common_mode", "filter_bandwidth", "unexplained", "thermal_lag"]
+                .iter()
+                .any(|kind| is_of(kind)),
+            "rate_ramp" => {
+                ["rate_ramp", "telegraph", "common_mode", "unexplained", "sinusoid"].iter().any(|kind| is_of(kind))
+            }
+            kind => is_of(kind),
+        };
+        if !is_told {
+            let effects: Vec<&str> = channel.effects.iter().map(|effect| effect.kind.as_str()).collect();
+            add(format!("the model has {} {:?}, and no effect of {effects:?} is it", term.kind, term.parameters));
         }
     }
 }

@@ -1,270 +1,279 @@
-//! The explanation of a recording as text: a sentence for each fault of its sampling, then tables.
+//! The long form of a report: in sentences, what was found, what changes in the course of the record, and what a model of the
+//! first half leaves on the second.
 
-use crate::formatting::{NONE, TextTable, count, duration, interval, number, words};
-use allan_core::NoiseTerm;
-use allan_core::model::FittedTerm;
-use noise_analysis::nonstationarity::{
-    ChannelExplanation, CommonModeRegression, Explanation, FittedPart, RelatedLine, TrackedSet,
-};
+use crate::finding_text::{FindingText, channel_list};
+use crate::formatting::{NONE, count, duration, number, words, wrap};
+use crate::rounding::{significant, span};
+use crate::summary;
+use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
+use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
 use std::io::{self, Write};
 
-/// Writes the explanation. Lines are as long as the tables need.
+/// Columns of a line.
+const WIDTH: usize = 100;
+/// Averaging times at which the common mode is told, s: the octave nearest to each.
+const COMMON_MODE_TAU_S: [f64; 3] = [0.01, 40.0, 160.0];
+
+/// Writes the explanation of `report`.
 ///
 /// # Errors
 /// `out` cannot be written.
-pub fn write(explanation: &Explanation, out: &mut impl Write) -> io::Result<()> {
-    let Explanation { sample_rate_hz, samples, time_base, channels, common_mode, .. } = explanation;
-    let length = duration(*samples as f64 / sample_rate_hz);
-    writeln!(out, "{} samples at {} Hz, {length}", count(*samples), number(*sample_rate_hz))?;
-    for sentence in time_base {
-        writeln!(out, "• {sentence}")?;
+pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
+    let length = duration(report.samples as f64 / report.sample_rate_hz);
+    writeln!(out, "{} samples at {} Hz, {length}.", count(report.samples), number(report.sample_rate_hz))?;
+    writeln!(out, "\nWhat was found")?;
+    let (named, unexplained) = summary::findings(report);
+    if named.is_empty() && unexplained.is_empty() {
+        writeln!(out, "{}", item("Nothing beyond N, B and K."))?;
     }
-    if channels.is_empty() {
-        return writeln!(out, "No inertial channel has enough samples to be cut into epochs.");
+    for finding in named.iter().chain(&unexplained) {
+        writeln!(out, "{}", item(&found(finding)))?;
     }
-    writeln!(out, "\nWhat the baseline model lacks, by the first half")?;
-    writeln!(out, "{}", added_term_table(channels))?;
-    writeln!(out, "\nNon-stationarity of the noise: the two quarters of the first half, where they differ most")?;
-    writeln!(out, "{}", stationarity_table(channels))?;
-    writeln!(out, "\nDeviance per point (1: a true model on its own data)")?;
-    writeln!(out, "{}", error_table(channels))?;
-    writeln!(
-        out,
-        "N, B, K and traced: fitted to the first half. Predictive: the traced terms fitted to the part named"
-    )?;
-    writeln!(
-        out,
-        "above, to the median of its epochs if it is the later quarter. Still: the first half's curve itself taken for"
-    )?;
-    writeln!(
-        out,
-        "the second half's. Nothing of these has seen the second half. Beyond drift: the predictive model, where level"
-    )?;
-    writeln!(
-        out,
-        "and line may have gone as far as the epochs of the first half let expect, (x/σ)² being added for it. Degrees"
-    )?;
-    writeln!(out, "of freedom are those of the kind of noise at each octave, whatever the model.")?;
-    writeln!(out, "\nThe second half predicted epoch by epoch, each from those before it")?;
-    writeln!(out, "{}", tracking_table(channels))?;
-    writeln!(
-        out,
-        "Shapes and gains by the first half; tracked parameters are corrected by each epoch after it was predicted. All"
-    )?;
-    writeln!(
-        out,
-        "epochs: the mean of what was predicted, against the curve of the second half. One epoch: the mean of"
-    )?;
-    writeln!(out, "every epoch's own deviance, with tracked parameters and with the predictive model as it stands.")?;
-    for of in channels {
-        if let Some(related) = &of.related_line {
-            writeln!(out, "{}", related_line(explanation, of, related))?;
+    if let Some(note) = &report.part.note {
+        writeln!(out, "{}", item(&sentence(note)))?;
+    }
+    let followed = || report.channels.iter().filter_map(|channel| Some((channel, channel.nonstationarity.as_ref()?)));
+    for (channel, changes) in followed() {
+        writeln!(out, "\n{}", channel_list(std::slice::from_ref(&channel.name)))?;
+        for text in paragraphs(channel, changes) {
+            writeln!(out, "{}", item(&text))?;
         }
     }
-    writeln!(out, "\nWhite noise (change of its variance, %) and moving line (Hz), epoch by epoch")?;
-    writeln!(out, "{}", profile_table(*sample_rate_hz, channels))?;
-    writeln!(
-        out,
-        "By the curves alone: how a line moves, they show well; where it is, octaves tell to some ten percent."
-    )?;
-    if let Some(common_mode) = common_mode {
-        writeln!(out, "\nFraction of each channel's variance that the others predict, %, first half")?;
-        writeln!(out, "{}", variance_fraction_table(common_mode))?;
-        let learned = number(common_mode.weights_at as f64 / sample_rate_hz);
-        writeln!(out, "\nBias drift after over before, second half; weights learned in the first at τ = {learned} s")?;
-        writeln!(out, "{}", gain_table(common_mode))?;
-        writeln!(out, "Trusted: the weights of the first quarter reduced the variance of the second quarter.")?;
+    let Some(first) = followed().next() else {
+        return writeln!(
+            out,
+            "\n{}",
+            wrap("No gyro or accelerometer changes and has enough samples to be cut into epochs (24,576).", WIDTH)
+        );
+    };
+    writeln!(out, "\nAll channels")?;
+    writeln!(out, "{}", item(&coverage(followed().map(|(_, changes)| changes), first.1.epoch_s)))?;
+    for text in report.common_mode.iter().flat_map(common_mode) {
+        writeln!(out, "{}", item(&text))?;
     }
     Ok(())
 }
 
-/// The added terms in the order in which they were added, with their values in the final model.
-fn added_term_table(channels: &[ChannelExplanation]) -> TextTable {
-    let of = |channel: &ChannelExplanation| {
-        let row = |found: &allan_core::trace::AddedTerm| {
-            let term = &channel.trace.after.terms()[found.term];
-            vec![
-                channel.channel.name.to_owned(),
-                words(term.kind.name()),
-                shape_parameters(term),
-                format!("{} [{}]", number(term.value), interval(term.low, term.high)),
-                format!("{:.0}", found.score),
-                format!(
-                    "{} σ at {} s",
-                    number(found.residual.sigmas),
-                    number(found.residual.n as f64 * channel.trace.after.sample_period())
-                ),
-            ]
-        };
-        channel.trace.added.iter().map(row).collect::<Vec<_>>()
-    };
-    let header = ["channel", "term", "shape", "coefficient", "score", "residual before"];
-    TextTable::new(header, 3, channels.iter().flat_map(of))
+/// A paragraph of a list.
+fn item(text: &str) -> String {
+    wrap(&format!("• {text}"), WIDTH)
 }
 
-/// Names, values and intervals of the parameters of a term's shape.
-fn shape_parameters(term: &FittedTerm) -> String {
-    let parameters = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
-    let of = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
-        let bounds = if low < high { format!(" [{}]", interval(low, high)) } else { String::new() };
-        format!("{} {}{bounds}", words(name), number(value))
-    };
-    let stages = match term.kind {
-        NoiseTerm::Filtered(filter) => Some(format!("stages {}", filter.stages)),
-        _ => None,
-    };
-    stages.into_iter().chain(parameters.map(of)).collect::<Vec<_>>().join(", ")
+/// `text` with a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    let stop = if text.ends_with('.') { "" } else { "." };
+    format!("{first}{}{stop}", letters.as_str())
 }
 
-/// The octave at which the variances of the two quarters differ most, and what the predictive model is fitted to.
-fn stationarity_table(channels: &[ChannelExplanation]) -> TextTable {
-    let row = |channel: &ChannelExplanation| {
-        let mut row = vec![channel.channel.name.to_owned()];
-        match channel.stationarity {
-            Some(found) => row.extend([
-                number(found.n as f64 * channel.curves.fitted.sample_period()),
-                format!("{:+.2} %", 100.0 * (found.ratio - 1.0)),
-                format!("{:.1e}", found.p_value),
-            ]),
-            None => row.extend([NONE, NONE, NONE].map(str::to_owned)),
-        }
-        row.push(match channel.part {
-            FittedPart::FirstHalf => "the first half".to_owned(),
-            FittedPart::LatestQuarter => "its later quarter".to_owned(),
-        });
-        row
-    };
-    let header = ["channel", "at τ, s", "σ² later/earlier", "chance", "predictive model from"];
-    TextTable::new(header, 1, channels.iter().map(row))
+fn found(FindingText { channels, physics, advice, weight }: &FindingText) -> String {
+    format!("{channels}: {physics} {} {advice}", sentence(weight))
 }
 
-/// Deviance per point of every model, on what it was fitted to and on the unseen half.
-fn error_table(channels: &[ChannelExplanation]) -> TextTable {
-    let row = |channel: &ChannelExplanation| {
-        let errors = &channel.errors;
-        let [baseline, traced, predictive] =
-            [errors.baseline, errors.traced, errors.predictive].map(|both| both.map(deviance));
-        let values = [baseline, traced, predictive].concat();
-        let last = [errors.beyond_drift, errors.first_half_curve].map(deviance).to_vec();
-        [vec![channel.channel.name.to_owned()], values, last].concat()
-    };
-    let header = [
-        "channel",
-        "N, B, K: fitted",
-        "unseen",
-        "traced: fitted",
-        "unseen",
-        "predictive: fitted",
-        "unseen",
-        "beyond drift",
-        "still",
-    ];
-    TextTable::new(header, 1, channels.iter().map(row))
+/// Two significant digits of a deviance per point.
+fn deviance(error: &ModelErrorReport) -> String {
+    error.deviance_per_point.map_or_else(|| NONE.to_owned(), per_point)
 }
 
-/// Two decimals below 100, none above.
-fn deviance(value: f64) -> String {
-    if value < 100.0 { format!("{value:.2}") } else { format!("{value:.0}") }
+fn per_point(deviance: f64) -> String {
+    significant(deviance, 2)
 }
 
-/// Deviance per point of predictions that follow the tracked parameters, beside two baselines.
-fn tracking_table(channels: &[ChannelExplanation]) -> TextTable {
-    let row = |channel: &ChannelExplanation| {
-        let (tracked, controls) = (&channel.tracking, &channel.baselines);
-        let what = match channel.tracked_set {
-            TrackedSet::Nothing => "nothing",
-            TrackedSet::Level => "level",
-            TrackedSet::LevelAndLine => "level, line",
-        };
-        let values = [
-            tracked.pooled,
-            tracked.one_step,
-            tracked.one_step_static,
-            controls.baseline_tracked,
-            controls.persistence,
-        ];
-        [vec![channel.channel.name.to_owned(), what.to_owned()], values.map(deviance).to_vec()].concat()
-    };
-    let header = [
-        "channel",
-        "tracked",
-        "all epochs",
-        "one epoch",
-        "… as it stands",
-        "baseline: N, B, K",
-        "baseline: epoch before",
-    ];
-    TextTable::new(header, 2, channels.iter().map(row))
+/// Such as `chance explains it once in 8·10¹² times`.
+fn chance(p_value: f64) -> String {
+    match 1.0 / p_value {
+        odds if odds >= 1e15 => "chance does not explain it".to_owned(),
+        odds if odds >= 2.0 => format!("chance explains it once in {} times", significant(odds, 2)),
+        _ => "chance explains it".to_owned(),
+    }
 }
 
-/// A line of another channel whose frequency is in a fixed ratio to that of the channel's line.
-fn related_line(explanation: &Explanation, of: &ChannelExplanation, related: &RelatedLine) -> String {
-    let (name, other) = (of.channel.name, explanation.searched[related.channel].name);
-    let (mean, deviation) = related.measured_ratio;
-    let ((above, below), path) = (related.ratio, [&related.line, &related.related[0], &related.related[1]]);
-    let [line, seen, unseen] = path.map(|path| path.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" "));
+/// What is said of one channel.
+fn paragraphs(channel: &ChannelReport, changes: &Nonstationarity) -> Vec<String> {
+    let mut told = vec![model(channel), stationarity(changes), movement(changes)];
+    told.push(tracking(changes));
+    told.extend(changes.related_line.as_ref().map(|related| related_line(&channel.name, related)));
+    told
+}
+
+/// The terms, and the errors on the second half.
+fn model(channel: &ChannelReport) -> String {
+    let terms: Vec<String> = channel.after.terms.iter().map(|term| words(&term.kind)).collect();
+    let excluding = channel.after.unseen_excluding.as_ref().map_or_else(String::new, |error| {
+        format!(" ({} without the samples that the rules of the first half exclude)", deviance(error))
+    });
     format!(
-        "\nThe line of {name} shows in {other} at {above}/{below} of its frequency: ratio {mean:.4} ± {deviation:.4} epoch by\n\
-         epoch, correlation of the steps {:.3}, chance {:.0e} (first half). Where {other} has it in the second half\n\
-         predicts {name} with a deviance per point of {:.2}; {name} itself is not looked at there. Hz, by the spectra:\n\
-         {name}, first half: {line}\n{other}, first half: {seen}\n{other}, second half: {unseen}",
-        related.correlation, related.p_value, related.unseen,
+        "N, B and K of the first half leave a deviance of {} a point on the second half; 1 is a true model on its own data. The \
+         model with its effects ({}) leaves {}{excluding}. The curve of the first half itself, taken for a model, leaves {}: a \
+         model of stationary noise cannot be expected to do better.",
+        deviance(&channel.before.unseen),
+        terms.join(", "),
+        deviance(&channel.after.unseen),
+        deviance(&channel.first_half_curve),
     )
 }
 
-/// White noise and line frequency of each channel in each epoch, with standard errors.
-fn profile_table(rate: f64, channels: &[ChannelExplanation]) -> TextTable {
-    let mut header = vec!["half".to_owned(), "from, min".to_owned()];
-    for channel in channels {
-        header.push(channel.channel.name.to_owned());
-        if channel.tracked_model.line_frequency().is_some() {
-            header.push("Hz".to_owned());
+/// What the first half says of its own two quarters.
+fn stationarity(changes: &Nonstationarity) -> String {
+    let Some(quarters) = changes.quarters else {
+        return "The first half is too short to compare its two quarters.".to_owned();
+    };
+    let difference = format!(
+        "Between the two quarters of the first half the Allan variance differs most at τ = {}: by {} %; {}.",
+        span(quarters.tau_s),
+        signed(100.0 * (quarters.variance_ratio - 1.0)),
+        chance(quarters.p_value),
+    );
+    let part = match changes.fitted_to {
+        FittedPart::FirstHalf => "The model is fitted to the whole first half.".to_owned(),
+        FittedPart::LaterQuarter => format!(
+            "The noise changes, so the model is fitted to the later quarter, which is nearer in time to the second half: to the \
+             medians of its stretches of {}, which a disturbance of some minutes does not move.",
+            span(changes.epoch_s)
+        ),
+    };
+    format!("{difference} {part}")
+}
+
+fn signed(value: f64) -> String {
+    format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), 2))
+}
+
+/// The range of the parameters over the record.
+fn movement(changes: &Nonstationarity) -> String {
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let (low, high) = range(&mut changes.epochs.iter().map(|epoch| 100.0 * (epoch.white_noise_ratio - 1.0)));
+    let error = changes.epochs.iter().map(|epoch| epoch.white_noise_error).fold(0.0, f64::max);
+    let level = format!(
+        "from one stretch of {} to the next the variance of the white noise lies between {} % and {} % of the model's own (each \
+         ± {} %)",
+        span(changes.epoch_s),
+        signed(low),
+        signed(high),
+        significant(100.0 * error, 2),
+    );
+    let lines = changes.epochs.iter().filter_map(|epoch| epoch.line_hz);
+    let (lowest, highest) = range(&mut lines.clone());
+    match changes.tracked {
+        TrackedSet::Nothing => format!("No parameter of the first half moves: {level}."),
+        TrackedSet::Level => format!("The white noise of the first half moves: {level}."),
+        TrackedSet::LevelAndLine => {
+            format!("A line moves, between {lowest:.2} and {highest:.2} Hz over the record; {level}.")
         }
     }
-    let Some(first) = channels.first() else { return TextTable::new(header, 0, Vec::new()) };
-    let half = first.curves.fitted.samples() as usize;
-    let starts = [half % first.curves.epoch, half];
-    let rows = ["first", "second"].iter().enumerate().flat_map(|(at, name)| {
-        (0..first.profile[at].len()).map(move |epoch| {
-            let from = (starts[at] + epoch * first.curves.epoch) as f64 / rate / 60.0;
-            let mut row = vec![(*name).to_owned(), format!("{from:.1}")];
-            for channel in channels {
-                let estimate = channel.profile[at][epoch];
-                let [level, line] = estimate.parameters;
-                row.push(format!("{:+.1} ± {:.1}", 100.0 * level.exp_m1(), 100.0 * estimate.error[0]));
-                if let Some(frequency) = channel.tracked_model.line_frequency() {
-                    let f = frequency * line.exp();
-                    row.push(format!("{f:.2} ± {:.2}", f * estimate.error[1]));
-                }
-            }
-            row
-        })
-    });
-    TextTable::new(header, 1, rows)
 }
 
-/// Header of a table with a column for each channel.
-fn by_channel(common_mode: &CommonModeRegression) -> Vec<String> {
-    let names = common_mode.channels.iter().map(|channel| channel.name.to_owned());
-    ["τ, s".to_owned()].into_iter().chain(names).collect()
+/// Errors of the prediction stretch by stretch, and how often the intervals held.
+fn tracking(changes: &Nonstationarity) -> String {
+    let moved = match changes.tracked {
+        TrackedSet::Nothing => "With nothing to follow, the model leaves",
+        TrackedSet::Level => {
+            "With the white noise followed, each stretch predicted from those before it, the model leaves"
+        }
+        TrackedSet::LevelAndLine => {
+            "With the white noise and the line followed, each stretch predicted from those before it, the model leaves"
+        }
+    };
+    let held = changes.intervals;
+    format!(
+        "{moved} {} a point on a single stretch of the second half, against {} as it stands. Of {} octaves of these stretches {} \
+         ({}) lie within the 95 % prediction intervals that the stretches before them give. Beyond the drift that the steps of \
+         the first half let expect, the model leaves {} on the second half.",
+        per_point(changes.tracking.one_step),
+        per_point(changes.tracking.one_step_static),
+        count(held.octaves as u64),
+        count(held.within as u64),
+        share(held.within, held.octaves),
+        per_point(changes.beyond_drift),
+    )
 }
 
-/// Fraction of each channel's variance that the others predict, at each octave.
-fn variance_fraction_table(common_mode: &CommonModeRegression) -> TextTable {
-    let rows = common_mode.shares.iter().map(|octave| {
-        let shares = octave.share.iter().map(|share| format!("{:.0}", 100.0 * share));
-        [number(octave.tau)].into_iter().chain(shares).collect::<Vec<_>>()
-    });
-    TextTable::new(by_channel(common_mode), 0, rows)
+fn share(part: usize, whole: usize) -> String {
+    if whole == 0 { NONE.to_owned() } else { format!("{:.1} %", 100.0 * part as f64 / whole as f64) }
 }
 
-/// Bias drift after the common-mode correction over that before, at each octave.
-fn gain_table(common_mode: &CommonModeRegression) -> TextTable {
-    let rows = common_mode.gains.iter().map(|octave| {
-        let ratios = octave.ratio.iter().map(|ratio| format!("{ratio:.2}"));
-        [number(octave.tau)].into_iter().chain(ratios).collect::<Vec<_>>()
+/// A line of another channel that moves with the channel's.
+fn related_line(name: &str, related: &RelatedLine) -> String {
+    let own = channel_list(&[name.to_owned()]);
+    let other = channel_list(std::slice::from_ref(&related.channel));
+    let (above, below) = related.ratio;
+    let ratio = if (above, below) == (1, 1) {
+        "the same frequency".to_owned()
+    } else {
+        format!("{above}/{below} of its frequency")
+    };
+    format!(
+        "The line shows in {other} too, at {ratio}: the frequencies of the first half have the ratio {:.4} ± {:.4}, and their steps \
+         are correlated by {:.2}; {}. One cause moves both. With the line where {other} has it in the second half, the model leaves \
+         {}; this uses the second half of {other}, and not that of {own}.",
+        related.measured_ratio,
+        related.measured_ratio_deviation,
+        related.correlation,
+        chance(related.p_value),
+        per_point(related.unseen),
+    )
+}
+
+/// How often the prediction intervals of all channels held.
+fn coverage<'a>(channels: impl Iterator<Item = &'a Nonstationarity>, epoch_s: f64) -> String {
+    let (octaves, within) = channels.fold((0, 0), |(octaves, within), changes| {
+        (octaves + changes.intervals.octaves, within + changes.intervals.within)
     });
-    let trusted = common_mode.trusted.iter().map(|&trusted| if trusted { "yes" } else { "no" }.to_owned());
-    let last: Vec<_> = ["trusted".to_owned()].into_iter().chain(trusted).collect();
-    TextTable::new(by_channel(common_mode), 0, rows.chain([last]))
+    format!(
+        "Of all {} octaves of the stretches of {} in the second half {} lie within their 95 % prediction intervals.",
+        count(octaves as u64),
+        span(epoch_s),
+        share(within, octaves),
+    )
+}
+
+/// What the channels have in common, and what subtracting it gains.
+fn common_mode(of: &CommonModeRegression) -> Vec<String> {
+    let names = |at: usize| channel_list(std::slice::from_ref(&of.channels[at]));
+    let list = |values: &[f64], text: &dyn Fn(f64) -> String| -> String {
+        values
+            .iter()
+            .enumerate()
+            .map(|(at, &value)| format!("{} {}", names(at), text(value)))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let nearest = |taus: &mut dyn Iterator<Item = f64>, tau: f64| {
+        taus.enumerate().min_by(|a, b| (a.1 / tau).ln().abs().total_cmp(&(b.1 / tau).ln().abs())).map(|(at, _)| at)
+    };
+    let mut places: Vec<usize> =
+        COMMON_MODE_TAU_S.iter().filter_map(|&tau| nearest(&mut of.shares.iter().map(|at| at.tau_s), tau)).collect();
+    places.dedup();
+    let shares = places.iter().map(|&at| {
+        let octave = &of.shares[at];
+        let shown = list(&octave.share, &|share| format!("{:.0} %", 100.0 * share));
+        format!("At τ = {} the other channels predict of the variance in the first half: {shown}.", span(octave.tau_s))
+    });
+    let mut places: Vec<usize> = COMMON_MODE_TAU_S[1..]
+        .iter()
+        .filter_map(|&tau| nearest(&mut of.gains.iter().map(|at| at.tau_s), tau))
+        .collect();
+    places.dedup();
+    let gains = places.iter().map(|&at| {
+        let octave = &of.gains[at];
+        let shown = list(&octave.ratio, &|ratio| format!("{ratio:.2}"));
+        format!(
+            "With the weights of the first half at τ = {} subtracted, the Allan deviation of the second half at τ = {} is this times \
+             what it was: {shown}.",
+            span(of.weights_tau_s),
+            span(octave.tau_s),
+        )
+    });
+    let untrusted: Vec<String> =
+        (0..of.channels.len()).filter(|&at| !of.trusted[at]).map(|at| of.channels[at].clone()).collect();
+    let note = (!untrusted.is_empty()).then(|| {
+        format!(
+            "In {} the weights of the first quarter did not make the second quarter better: do not subtract them there.",
+            channel_list(&untrusted)
+        )
+    });
+    shares.chain(gains).chain(note).collect()
 }

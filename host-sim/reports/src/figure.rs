@@ -6,14 +6,10 @@ mod channel;
 mod evidence;
 mod plot;
 
-use allan_core::Model;
 use axis::{Axis, has_logarithm};
 use channel::{allan_deviation_plot, bias_plot, measured, spectrum_plot};
 pub(crate) use evidence::evidence;
-use noise_analysis::nonstationarity::ChannelExplanation;
-use noise_analysis::report::{
-    ChannelReport, CurvePoint, DataSheetReport, ModelErrorReport, ModelReport, Report, SlopeMethodReport,
-};
+use noise_analysis::report::{ChannelReport, DataSheetReport, Report};
 pub(crate) use plot::Plot;
 use plot::{LEFT, Line, Look, Panel, RIGHT, frames, heights, places};
 
@@ -162,36 +158,4 @@ fn sheet_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
         (tau, variance.sqrt())
     };
     taus.iter().map(|&tau| of(tau)).collect()
-}
-
-/// The figure of an explained channel as an SVG document: the curve of the second half, with the baseline model and the
-/// predictive model of the first.
-#[must_use]
-pub fn explained_channel(of: &ChannelExplanation) -> String {
-    let unseen = &of.curves.unseen;
-    let model = |model: &Model, [fitted, error]: [f64; 2]| ModelReport {
-        terms: Vec::new(),
-        adev: unseen.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
-        fitted: ModelErrorReport { deviance_per_point: Some(fitted), ..Default::default() },
-        unseen: ModelErrorReport { deviance_per_point: Some(error), ..Default::default() },
-        unseen_excluding: None,
-    };
-    let predictive = || model(&of.predictive, of.errors.predictive);
-    let channel = ChannelReport {
-        name: format!("{}, second half; models of the first", of.channel.name),
-        unit: of.channel.unit.to_owned(),
-        samples: unseen.samples(),
-        missing: Default::default(),
-        // With the degrees of freedom of the tables.
-        curve: unseen.points().iter().map(|point| CurvePoint::new(point, unseen.samples())).collect(),
-        read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
-        before: model(&of.trace.before, of.errors.baseline),
-        assessment: Default::default(),
-        effects: Vec::new(),
-        after: predictive(),
-        refitted: predictive(),
-        at_rest: Vec::new(),
-        figure_data: Default::default(),
-    };
-    standalone(&channel::deviation_plot(&channel, 1.0 / of.trace.before.sample_period(), 2)).svg
 }

@@ -338,7 +338,7 @@ fn figures_of_recordings_with_like_names_do_not_overwrite_each_other() {
         &[&["explain"][..], &files.each_ref().map(|file| name(file)), &["--pictures", name(&pictures)]].concat(),
     );
     assert!(output.status.success(), "{}", text(&output.stderr));
-    for figure in ["run.1-gyro_x.svg", "run.2-gyro_x.svg", "run.1-2-gyro_x.svg"] {
+    for figure in ["run.1-gyro_x-allan.svg", "run.2-gyro_x-allan.svg", "run.1-2-gyro_x-allan.svg"] {
         assert!(pictures.join(figure).exists(), "{figure}: {}", text(&output.stdout));
     }
 }

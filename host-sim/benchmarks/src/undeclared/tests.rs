@@ -259,7 +259,9 @@ fn report(found: &[Found<'_>]) -> Report {
         assessment: Default::default(),
         effects: found.iter().filter(|(of, ..)| *of == channel).map(effect).collect(),
         after: model(),
+        first_half_curve: ModelErrorReport::default(),
         refitted: model(),
+        nonstationarity: None,
         at_rest: Vec::new(),
         figure_data: Default::default(),
     };
@@ -271,6 +273,7 @@ fn report(found: &[Found<'_>]) -> Report {
         flagged: BTreeMap::new(),
         part: PartReport::default(),
         findings: Vec::new(),
+        common_mode: None,
         channels: Channel::ALL.into_iter().map(channel).collect(),
     }
 }

@@ -15,6 +15,9 @@ const SQUARE_SIGMAS: f64 = 3.0;
 /// Largest part by which an amplitude may differ from that of a square wave beyond its error: edges that take a tenth of a
 /// period lower the fifth harmonic by `1 − sinc(5/10)` = 0.36.
 const SQUARE_TOLERANCE: f64 = 0.36;
+/// Probability that an unrelated line has the amplitude of a harmonic of a square wave within [`SQUARE_TOLERANCE`], if
+/// amplitudes are spread evenly over the logarithm of two decades: ln(1.36/0.64)/ln 100.
+const SQUARE_BY_CHANCE: f64 = 0.164;
 
 /// Whether an effect is a line of the spectrum.
 pub(super) fn is_line(effect: &Effect) -> bool {
@@ -136,30 +139,53 @@ fn most_certain(frequencies: &[Frequency], duration_s: f64) -> Option<HarmonicSe
 
 /// The lines at multiples of the frequency at `fundamental`.
 ///
-/// An unrelated line lies within a distance d of a multiple of f₀ with the probability 2d/f₀, so that of m other lines the
-/// number that do has at most the binomial distribution with the largest of these probabilities.
+/// Unrelated lines are spread evenly over the logarithm of the frequency, from 1/T of a record of T to the highest line that it
+/// shows: over L = ln(f·T). One lies within d of a multiple k of f₀ with the probability 2d/(k·f₀·L), and within d of one of
+/// the multiples from 2 to k with the sum of these. Of m other lines the number that do has at most the binomial distribution
+/// with the largest d. The highest multiple that is counted is the one for which chance is least, of those that occur.
 fn series_of(frequencies: &[Frequency], fundamental: usize, duration_s: f64) -> Option<HarmonicSeries> {
     let first = frequencies[fundamental].best();
-    let mut members = vec![(fundamental, Multiple::Harmonic(1))];
-    let mut largest = 0.0_f64;
+    let mut harmonics: Vec<(u32, usize, f64)> = Vec::new();
     let others: Vec<usize> = (0..frequencies.len()).filter(|number| *number != fundamental).collect();
     for &number in &others {
         let line = frequencies[number].best();
         let multiple = (line.frequency / first.frequency).round();
         let within = reach(first, multiple, line, duration_s);
         if multiple >= 2.0 && (line.frequency - multiple * first.frequency).abs() < within {
-            members.push((number, Multiple::Harmonic(multiple as u32)));
-            largest = largest.max(2.0 * within / first.frequency);
+            harmonics.push((multiple as u32, number, within));
         }
     }
-    let harmonics = members.len() - 1;
-    if harmonics == 0 || largest >= 1.0 {
+    harmonics.sort_by_key(|&(multiple, ..)| multiple);
+    let highest = frequencies.iter().map(|of| of.best().frequency).fold(0.0, f64::max);
+    let log_range = (highest * duration_s).ln().max(1.0);
+    let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
+    for (at, &(multiple, _, within)) in harmonics.iter().enumerate() {
+        largest = largest.max(2.0 * within / first.frequency);
+        let multiples: f64 = (2..=multiple).map(|k| 1.0 / f64::from(k)).sum();
+        least = least.min(binomial_tail(at + 1, others.len(), (largest * multiples / log_range).min(largest)));
+    }
+    if harmonics.is_empty() || largest >= 1.0 {
         return None;
     }
-    let p_value = binomial_tail(harmonics, others.len(), largest);
+    let mut members: Vec<(usize, Multiple)> =
+        harmonics.iter().map(|&(multiple, number, _)| (number, Multiple::Harmonic(multiple))).collect();
+    members.insert(0, (fundamental, Multiple::Harmonic(1)));
+    let by_amplitude = if has_amplitudes_of_square(frequencies, &members) { SQUARE_BY_CHANCE } else { 1.0 };
+    let p_value = (least * harmonics.len() as f64 * by_amplitude).min(1.0);
     let sidebands = sidebands(frequencies, first, &members, duration_s);
     members.extend(sidebands);
     Some(HarmonicSeries { members, p_value })
+}
+
+/// Whether the lines of any channel have the amplitudes of a square wave.
+fn has_amplitudes_of_square(frequencies: &[Frequency], members: &[(usize, Multiple)]) -> bool {
+    let mut by_channel: BTreeMap<usize, Vec<(Multiple, Line)>> = BTreeMap::new();
+    for &(number, multiple) in members {
+        for line in &frequencies[number].lines {
+            by_channel.entry(line.channel).or_default().push((multiple, line.clone()));
+        }
+    }
+    by_channel.values().any(|lines| is_square(lines))
 }
 
 /// Pairs of lines at equal distances on either side of a member: an amplitude or a frequency that is modulated.

@@ -8,17 +8,16 @@ use crate::{OCTAVES, OVERLAP};
 use allan_core::PowerLaw;
 use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 /// Degrees of freedom that an octave needs for each weight that is estimated from it.
 const DEGREES_OF_FREEDOM_PER_WEIGHT: f64 = 10.0;
 
 /// The share of the common mode at one averaging time of the first half.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OctaveShares {
-    /// Averaging factor, samples.
-    pub n: u64,
     /// Averaging time, s.
-    pub tau: f64,
+    pub tau_s: f64,
     /// Degrees of freedom of the variance of flicker noise.
     pub edf: f64,
     /// By channel: the part of its variance that the others explain, adjusted for the number of weights (adjusted R²).
@@ -26,23 +25,21 @@ pub struct OctaveShares {
 }
 
 /// The gain of subtracting the common mode at one averaging time of the second half.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HoldOutGain {
-    /// Averaging factor, samples.
-    pub n: u64,
     /// Averaging time, s.
-    pub tau: f64,
+    pub tau_s: f64,
     /// By channel: Allan deviation after over before; above 1 the channel is worse after it.
     pub ratio: Vec<f64>,
 }
 
 /// The regression of each channel on the others.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CommonModeRegression {
     /// In the order of all lists by channel.
-    pub channels: Vec<ChannelProfile>,
-    /// Averaging factor at which the weights were estimated, samples: the longest one with enough degrees of freedom.
-    pub weights_at: u64,
+    pub channels: Vec<String>,
+    /// Averaging time at which the weights were estimated, s: the longest one with enough degrees of freedom.
+    pub weights_tau_s: f64,
     /// By channel: whether the weights of the first quarter reduce the variance of the second quarter at `weights_at`. This
     /// decides from the first half alone whether to use the weights.
     pub trusted: Vec<bool>,
@@ -86,18 +83,18 @@ impl CommonModeRegression {
                 Some((1.0 - left * adjustment).max(0.0))
             });
             (edf > 2.0 + others as f64).then_some(())?;
-            Some(OctaveShares { n, tau: n as f64 * period, edf, share: share.collect::<Option<_>>()? })
+            Some(OctaveShares { tau_s: n as f64 * period, edf, share: share.collect::<Option<_>>()? })
         });
         let gains = octaves().filter_map(|n| {
             let covariances = covariances(&unseen, n)?;
             let ratio =
                 by_channel().map(|of| Some(remaining_variance(&covariances, of, &weights(&at_weights, of)?)?.sqrt()));
-            Some(HoldOutGain { n, tau: n as f64 * period, ratio: ratio.collect::<Option<_>>()? })
+            Some(HoldOutGain { tau_s: n as f64 * period, ratio: ratio.collect::<Option<_>>()? })
         });
         let trusted = by_channel().map(|of| Some(remaining_variance(&late, of, &weights(&early, of)?)? < 1.0));
         Some(Self {
-            channels: channels.to_vec(),
-            weights_at,
+            channels: channels.iter().map(|channel| channel.name.to_owned()).collect(),
+            weights_tau_s: weights_at as f64 * period,
             trusted: trusted.collect::<Option<_>>()?,
             shares: shares.collect(),
             gains: gains.collect(),

@@ -3,6 +3,7 @@
 use crate::series::Series;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
 
@@ -10,11 +11,11 @@ use std::ops::Range;
 pub(crate) const SIGNIFICANCE: f64 = 0.01;
 
 /// Longest epoch, samples: five minutes at 100 Hz.
-const LONGEST_EPOCH: usize = 1 << 15;
+const LONGEST_EPOCH: u64 = 1 << 15;
 /// Shortest epoch, samples, whose curve separates the white noise from a line.
-const SHORTEST_EPOCH: usize = 1 << 10;
+const SHORTEST_EPOCH: u64 = 1 << 10;
 /// Fewest epochs of a half.
-const MIN_EPOCHS: usize = 12;
+const MIN_EPOCHS: u64 = 12;
 
 /// An epoch's Allan variance is used up to averaging factors of a `MIN_AVERAGES`th of its samples.
 pub(crate) const MIN_AVERAGES: u64 = 64;
@@ -23,46 +24,52 @@ pub(crate) const MIN_AVERAGES: u64 = 64;
 ///
 /// The first half is what models are fitted to; the second half is unseen.
 #[derive(Debug, Clone)]
-pub struct EpochCurves {
-    /// First half of the record.
-    pub fitted: Curve<OCTAVES>,
+pub(crate) struct EpochCurves {
     /// The two quarters of the first half, the earlier first.
     pub quarters: [Curve<OCTAVES>; 2],
     /// Second half of the record.
     pub unseen: Curve<OCTAVES>,
-    /// Samples in an epoch: a power of 2.
-    pub epoch: usize,
-    /// Epochs up to the middle of the record; the samples that are left over lie before the first.
+    /// Sample periods in an epoch: a power of 2.
+    pub epoch: u64,
+    /// Epochs up to the middle of the record; the sample periods that are left over lie before the first.
     pub fitted_epochs: Vec<Curve<OCTAVES>>,
-    /// Epochs from the middle on; the samples that are left over lie behind the last.
+    /// Epochs from the middle on; the sample periods that are left over lie behind the last.
     pub unseen_epochs: Vec<Curve<OCTAVES>>,
+    /// Sample periods of each of these.
+    pub(crate) ranges: [Vec<Range<u64>>; 2],
 }
 
 impl EpochCurves {
-    /// Curves of a series of at least 24,576 samples (two halves of twelve shortest epochs); `None` of a shorter one.
+    /// Curves of a series whose second half begins with the sample period `middle`, of at least 24,576 sample periods (two halves
+    /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch.
     #[must_use]
-    pub fn from_series(series: &Series) -> Option<Self> {
-        let (all, half) = (series.values.len(), series.values.len() / 2);
+    pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
+        let (from, to) = (series.span.start, series.span.end);
+        let half = middle.checked_sub(from)?.min(to.checked_sub(middle)?);
         let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;
         if epoch < SHORTEST_EPOCH {
             return None;
         }
-        let epochs = |from: usize| (0..half / epoch).map(move |k| from + k * epoch..from + (k + 1) * epoch);
-        let curves =
-            |ranges: &mut dyn Iterator<Item = Range<usize>>| ranges.map(|range| curve(series, range)).collect();
-        Some(Self {
-            fitted: curve(series, 0..half),
-            quarters: [curve(series, 0..half / 2), curve(series, half / 2..half)],
-            unseen: curve(series, half..all),
+        let epochs =
+            |from: u64| -> Vec<_> { (0..half / epoch).map(|k| from + k * epoch..from + (k + 1) * epoch).collect() };
+        let ranges = [epochs(middle - half / epoch * epoch), epochs(middle)];
+        let curves = |ranges: &[Range<u64>]| ranges.iter().map(|range| curve(series, range.clone())).collect();
+        let quarter = from + (middle - from) / 2;
+        let curves = Self {
+            quarters: [curve(series, from..quarter), curve(series, quarter..middle)],
+            unseen: curve(series, middle..to),
             epoch,
-            fitted_epochs: curves(&mut epochs(half % epoch)),
-            unseen_epochs: curves(&mut epochs(half)),
-        })
+            fitted_epochs: curves(&ranges[0]),
+            unseen_epochs: curves(&ranges[1]),
+            ranges,
+        };
+        let mut parts = curves.quarters.iter().chain(&curves.fitted_epochs).chain(&curves.unseen_epochs);
+        parts.all(|part| part.points().iter().any(|point| point.avar > 0.0)).then_some(curves)
     }
 
     /// Epochs of the later quarter of the first half.
     #[must_use]
-    pub fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
+    pub(crate) fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
         &self.fitted_epochs[self.fitted_epochs.len() / 2..]
     }
 
@@ -72,14 +79,17 @@ impl EpochCurves {
     /// with `ν` degrees of freedom is low by the factor `(1 − 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided
     /// out. The median scatters by a fourth more than the mean; the confidence bounds do not include that.
     #[must_use]
-    pub fn median_curve(&self) -> Curve<OCTAVES> {
+    pub(crate) fn median_curve(&self) -> Curve<OCTAVES> {
         let mut curve = self.quarters[1].clone();
         curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));
         curve
     }
 }
 
-fn curve(series: &Series, range: Range<usize>) -> Curve<OCTAVES> {
+/// The curve of the sample periods `slots`.
+pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
+    let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
+    let range = position(slots.start)..position(slots.end);
     let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
     let mut next = series.slots.get(range.start).copied().unwrap_or(0);
     for (&slot, value) in series.slots[range.clone()].iter().zip(&series.values[range]) {
@@ -105,38 +115,55 @@ fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<
     Some((lower + upper) / 2.0 / (1.0 - 2.0 / (9.0 * edf)).powi(3))
 }
 
-/// `mean edf·(ln(m/v) + v/m − 1)` over the octaves with `n ≤ M/8`, of a model with the Allan variance `modelled`.
+/// A curve that models are compared with, at its octaves with `n ≤ M/8`, and the degrees of freedom of its points.
 ///
-/// It differs from the figure of the report in the degrees of freedom: here they are those of the kind of noise that the
-/// curve itself shows, and the same for all models, so that a model with uncertain points gains nothing by them.
-pub(crate) fn deviance_per_point<const POINTS: usize>(curve: &Curve<POINTS>, modelled: impl Fn(u64) -> f64) -> f64 {
-    // A variance of 0, of counts that repeat with this averaging time, has no logarithm.
-    let points = || curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
-    let of = |point: &AllanPoint| {
-        let ratio = point.avar / modelled(point.n);
-        point.edf * (ratio - 1.0 - ratio.ln())
-    };
-    points().map(of).sum::<f64>() / points().count().max(1) as f64
+/// These are those of one model, that of the channel, whichever model is compared: a model with uncertain points gains
+/// nothing by them.
+pub(crate) struct ComparedCurve {
+    points: Vec<(AllanPoint, f64)>,
+}
+
+impl ComparedCurve {
+    pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
+        // A variance of 0, of counts that repeat with this averaging time, has no logarithm.
+        let points = curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
+        Self { points: points.map(|point| (*point, model.edf(point))).collect() }
+    }
+
+    /// Number of octaves.
+    pub(crate) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// `mean edf·(ln(m/v) + v/m − 1)` of a model with the Allan variance `modelled`.
+    pub(crate) fn deviance_per_point(&self, modelled: impl Fn(u64) -> f64) -> f64 {
+        let of = |(point, edf): &(AllanPoint, f64)| {
+            let ratio = point.avar / modelled(point.n);
+            edf * (ratio - 1.0 - ratio.ln())
+        };
+        self.points.iter().map(of).sum::<f64>() / self.len().max(1) as f64
+    }
 }
 
 /// Comparison of two stretches of a channel, at the octave at which they differ most.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stationarity {
-    /// Averaging factor, samples.
-    pub n: u64,
+    /// Averaging time, s.
+    pub tau_s: f64,
     /// Allan variance of the later stretch over that of the earlier one.
-    pub ratio: f64,
+    pub variance_ratio: f64,
     /// Probability that stretches of the same noise differ as clearly at any octave.
     pub p_value: f64,
 }
 
 /// The part of the first half that a model for the second half is fitted to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum FittedPart {
     /// All of it.
     FirstHalf,
     /// Its later half, which is nearer in time to the second half: the noise is non-stationary.
-    LatestQuarter,
+    LaterQuarter,
 }
 
 impl Stationarity {
@@ -156,7 +183,7 @@ impl Stationarity {
             }
             let fisher = FisherSnedecor::new(model.edf(after), model.edf(before)).ok()?;
             let p_value = (2.0 * fisher.cdf(ratio).min(fisher.sf(ratio))).min(1.0);
-            Some(Self { n: before.n, ratio, p_value })
+            Some(Self { tau_s: before.tau, variance_ratio: ratio, p_value })
         };
         let pairs = earlier.points().iter().zip(later.points()).filter(|(point, _)| point.n <= longest);
         let octaves: Vec<Self> = pairs.filter_map(compare).collect();
@@ -176,7 +203,7 @@ impl FittedPart {
     #[must_use]
     pub fn select(quarters: Option<Stationarity>) -> Self {
         match quarters {
-            Some(comparison) if comparison.is_nonstationary() => Self::LatestQuarter,
+            Some(comparison) if comparison.is_nonstationary() => Self::LaterQuarter,
             _ => Self::FirstHalf,
         }
     }

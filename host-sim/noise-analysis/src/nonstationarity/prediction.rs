@@ -5,19 +5,18 @@
 //! epochs the mean of the predictions, which lag by one epoch, is nearly the mean of the parameters: the error of the pooled
 //! curve is therefore too small. The error of the single epochs, one step ahead, is not.
 
-use super::epochs::{EpochCurves, MIN_AVERAGES, SIGNIFICANCE, deviance_per_point};
+use super::epochs::{ComparedCurve, EpochCurves, MIN_AVERAGES, SIGNIFICANCE};
 use super::tracked_parameters::{MAX_LEVEL, PARAMETERS, ParameterVector, TrackedModel, TrackedSet, minimum};
 use allan_core::{Curve, Model};
+use serde::Serialize;
 
 /// Rounds of the search in [`beyond_drift`], one parameter after the other, and its first step.
 const ROUNDS: usize = 8;
 const FIRST_STEP: f64 = 0.01;
 
 /// Deviances per point on the second half of a model with tracked parameters.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrackingErrors {
-    /// What was tracked.
-    pub tracked: TrackedSet,
     /// Of the mean of all predicted curves against the curve of the second half.
     pub pooled: f64,
     /// Mean over the epochs of each one's own, against its prediction.
@@ -45,6 +44,23 @@ pub(crate) fn track<const POINTS: usize>(
     [fitted, unseen]: [&[Curve<POINTS>]; 2],
     half: &Curve<POINTS>,
 ) -> TrackingErrors {
+    let models = predictions(model, tracked, [fitted, unseen]);
+    let compared: Vec<_> = unseen.iter().map(|epoch| ComparedCurve::new(epoch, model.model())).collect();
+    let of_epoch = |(epoch, model): (&ComparedCurve, &Model)| epoch.deviance_per_point(|n| model.avar(n));
+    let count = unseen.len() as f64;
+    TrackingErrors {
+        pooled: ComparedCurve::new(half, model.model()).deviance_per_point(|n| mean_avar(&models, n)),
+        one_step: compared.iter().zip(&models).map(of_epoch).sum::<f64>() / count,
+        one_step_static: compared.iter().map(|epoch| of_epoch((epoch, model.model()))).sum::<f64>() / count,
+    }
+}
+
+/// The model of each epoch of the second half, with the parameters that the epochs before it predict.
+fn predictions<const POINTS: usize>(
+    model: &TrackedModel,
+    tracked: TrackedSet,
+    [fitted, unseen]: [&[Curve<POINTS>]; 2],
+) -> Vec<Model> {
     let estimates: Vec<_> = fitted.iter().chain(unseen).map(|epoch| model.estimate(epoch, tracked)).collect();
     let mut predicted = [[0.0; PARAMETERS]].repeat(unseen.len());
     for index in 0..PARAMETERS {
@@ -54,16 +70,12 @@ pub(crate) fn track<const POINTS: usize>(
             parameters[index] = *value;
         }
     }
-    let models: Vec<Model> = predicted.iter().map(|parameters: &ParameterVector| model.at(*parameters)).collect();
-    let mean = |n: u64| models.iter().map(|model| model.avar(n)).sum::<f64>() / models.len() as f64;
-    let of_epoch = |(epoch, model): (&Curve<POINTS>, &Model)| deviance_per_point(epoch, |n| model.avar(n));
-    let count = unseen.len() as f64;
-    TrackingErrors {
-        tracked,
-        pooled: deviance_per_point(half, mean),
-        one_step: unseen.iter().zip(&models).map(of_epoch).sum::<f64>() / count,
-        one_step_static: unseen.iter().map(|epoch| of_epoch((epoch, model.model()))).sum::<f64>() / count,
-    }
+    predicted.iter().map(|parameters: &ParameterVector| model.at(*parameters)).collect()
+}
+
+/// Mean Allan variance of models at the averaging factor `n`.
+pub(crate) fn mean_avar(models: &[Model], n: u64) -> f64 {
+    models.iter().map(|model| model.avar(n)).sum::<f64>() / models.len() as f64
 }
 
 /// Variance of the step from each `(value, error)` to the next, less the variances of the errors.
@@ -121,12 +133,13 @@ pub(crate) fn beyond_drift<const POINTS: usize>(
     drift: ParameterVector,
     half: &Curve<POINTS>,
 ) -> f64 {
-    let points = half.points().iter().filter(|point| point.n <= half.samples() / 8).count() as f64;
+    let half = ComparedCurve::new(half, model.model());
+    let points = half.len() as f64;
     let cost = |parameters: ParameterVector| {
         let moved = parameters.iter().zip(drift).filter(|(_, sigma)| *sigma > 0.0);
         let prior: f64 = moved.map(|(x, sigma)| (x / sigma).powi(2)).sum();
         let model = model.at(parameters);
-        deviance_per_point(half, |n| model.avar(n)) + prior / points
+        half.deviance_per_point(|n| model.avar(n)) + prior / points
     };
     let mut parameters = [0.0; PARAMETERS];
     for _ in 0..ROUNDS {
@@ -143,7 +156,7 @@ pub(crate) fn beyond_drift<const POINTS: usize>(
 }
 
 /// Deviances per point on the second half of two predictions without added terms.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Baselines {
     /// Of the baseline model with its white noise tracked: what tracking alone explains.
     pub baseline_tracked: f64,
@@ -152,21 +165,25 @@ pub struct Baselines {
 }
 
 impl Baselines {
-    /// `baseline` is the baseline model, fitted to the first half.
+    /// `baseline` is the baseline model, fitted to the first half; `model` gives the degrees of freedom.
     #[must_use]
-    pub fn new(curves: &EpochCurves, baseline: &Model) -> Self {
-        let model = TrackedModel::without_line(baseline.clone());
+    pub(crate) fn new(curves: &EpochCurves, baseline: &Model, model: &Model) -> Self {
+        let half = ComparedCurve::new(&curves.unseen, model);
+        let tracked = TrackedModel::without_line(baseline.clone());
         let epochs = [&curves.fitted_epochs[..], &curves.unseen_epochs[..]];
-        let tracked = track(&model, TrackedSet::Level, epochs, &curves.unseen);
+        let predicted = predictions(&tracked, TrackedSet::Level, epochs);
         let count = curves.unseen_epochs.len();
         let persistent = |n: u64| {
-            if n * MIN_AVERAGES > curves.epoch as u64 {
+            if n * MIN_AVERAGES > curves.epoch {
                 return baseline.avar(n);
             }
             let before = curves.fitted_epochs.last().into_iter().chain(&curves.unseen_epochs).take(count);
             let points = before.flat_map(|epoch| epoch.points().iter().filter(|point| point.n == n));
             points.map(|point| point.avar).sum::<f64>() / count as f64
         };
-        Self { baseline_tracked: tracked.pooled, persistence: deviance_per_point(&curves.unseen, persistent) }
+        Self {
+            baseline_tracked: half.deviance_per_point(|n| mean_avar(&predicted, n)),
+            persistence: half.deviance_per_point(persistent),
+        }
     }
 }

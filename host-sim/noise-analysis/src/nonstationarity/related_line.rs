@@ -3,13 +3,14 @@
 //! A mechanical or electrical source shows in several channels and at multiples of its frequency. If the first half has
 //! such a related line, its frequency in the second half predicts the frequency of the channel's own line there.
 
-use super::epochs::{EpochCurves, SIGNIFICANCE, deviance_per_point};
+use super::epochs::{ComparedCurve, EpochCurves, SIGNIFICANCE};
+use super::prediction::mean_avar;
 use super::tracked_parameters::{TrackedModel, minimum};
-use crate::OCTAVES;
 use crate::series::Series;
 use crate::spectra::Welch;
 use crate::uniform_series::UniformSeries;
-use allan_core::Curve;
+use allan_core::Model;
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
 
@@ -29,83 +30,96 @@ const ROUNDS: usize = 12;
 const FIRST_STEP: f64 = 0.02;
 
 /// A line of another channel that moves with the line of a channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RelatedLine {
-    /// Position of the channel among those that were searched.
-    pub channel: usize,
+    /// Name of the other channel.
+    pub channel: String,
     /// Its frequency over the line's, as a fraction.
     pub ratio: (u8, u8),
     /// Correlation of the two frequencies' changes from epoch to epoch, in the first half.
     pub correlation: f64,
     /// Probability of as much between unrelated lines, in any channel at any ratio.
     pub p_value: f64,
-    /// Mean and standard deviation of the line's frequency over the related line's, epoch by epoch, in the first half.
-    pub measured_ratio: (f64, f64),
+    /// Mean of the line's frequency over the related line's, epoch by epoch, in the first half.
+    pub measured_ratio: f64,
+    /// Standard deviation of that ratio.
+    pub measured_ratio_deviation: f64,
     /// Frequency of the line, Hz, in the epochs of the first half.
-    pub line: Vec<f64>,
-    /// Frequency of the related line, Hz, in the epochs of the first and of the second half.
-    pub related: [Vec<f64>; 2],
-    /// Deviance per point on the second half of the model whose line moves with the related line.
+    pub line_hz: Vec<f64>,
+    /// Frequency of the related line, Hz, in the epochs of the first half.
+    pub related_fitted_hz: Vec<f64>,
+    /// Frequency of the related line, Hz, in the epochs of the second half.
+    pub related_unseen_hz: Vec<f64>,
+    /// Deviance per point on the second half of the model whose line is where the *second half of the other channel* has the
+    /// related line.
     pub unseen: f64,
 }
 
 impl RelatedLine {
     /// Searches all other channels for a line that moves with the tracked line of channel `of`; `None` if no line is
     /// tracked or none moves with it.
-    #[must_use]
-    pub fn find(channels: &[Series], of: usize, model: &TrackedModel, curves: &EpochCurves) -> Option<Self> {
+    pub(crate) fn find(
+        channels: &[(&str, &Series)],
+        of: usize,
+        model: &TrackedModel,
+        curves: &EpochCurves,
+    ) -> Option<Self> {
         let near = model.line_frequency()?;
-        let (half, epoch) = (channels[of].values.len() / 2, curves.epoch);
-        let fitted = |channel: usize, near: f64| {
-            line_frequencies(&channels[channel], half % epoch, curves.fitted_epochs.len(), epoch, near)
+        let frequencies = |channel: usize, near: f64, epochs: &[Range<u64>]| -> Option<Vec<f64>> {
+            epochs.iter().map(|slots| centroid(channels[channel].1, slots.clone(), near)).collect()
         };
-        let unseen = |channel: usize, near: f64| {
-            line_frequencies(&channels[channel], half, curves.unseen_epochs.len(), epoch, near)
-        };
+        let [fitted, unseen] = &curves.ranges;
         // The second half of the channel itself is not used.
-        let mean = centroid(&channels[of], 0..half, near)?;
-        let line = fitted(of, mean)?;
+        let middle = unseen.first()?.start;
+        let mean = centroid(channels[of].1, channels[of].1.span.start..middle, near)?;
+        let line = frequencies(of, mean, fitted)?;
         let others = (0..channels.len()).filter(|&other| other != of);
         let candidates: Vec<(usize, (u8, u8))> = others.flat_map(|other| RATIOS.map(|ratio| (other, ratio))).collect();
         let tried = candidates.iter().filter_map(|&(channel, ratio)| {
             let near = mean * f64::from(ratio.0) / f64::from(ratio.1);
-            let related = fitted(channel, near)?;
+            let related = frequencies(channel, near, fitted)?;
             let (correlation, chance) = correlation(&changes(&line), &changes(&related))?;
             let p_value = (chance * candidates.len() as f64).min(1.0);
             Some((channel, ratio, correlation, p_value, related, near))
         });
-        let (channel, ratio, correlation, p_value, first_half, near) = tried.min_by(|a, b| a.3.total_cmp(&b.3))?;
+        let (channel, ratio, correlation, p_value, related_fitted_hz, near) =
+            tried.min_by(|a, b| a.3.total_cmp(&b.3))?;
         if p_value > SIGNIFICANCE || correlation < 0.0 {
             return None;
         }
-        let related = [first_half, unseen(channel, near)?];
-        let ratios: Vec<f64> = line.iter().zip(&related[0]).map(|(line, related)| line / related).collect();
-        let unseen = predict(model, curves, &related);
-        Some(Self { channel, ratio, correlation, p_value, measured_ratio: moments(&ratios), line, related, unseen })
+        let related_unseen_hz = frequencies(channel, near, unseen)?;
+        let ratios: Vec<f64> = line.iter().zip(&related_fitted_hz).map(|(line, related)| line / related).collect();
+        let (measured_ratio, measured_ratio_deviation) = moments(&ratios);
+        Some(Self {
+            channel: channels[channel].0.to_owned(),
+            ratio,
+            correlation,
+            p_value,
+            measured_ratio,
+            measured_ratio_deviation,
+            unseen: predict(model, curves, [&related_fitted_hz, &related_unseen_hz]),
+            line_hz: line,
+            related_fitted_hz,
+            related_unseen_hz,
+        })
     }
 }
 
-/// Frequencies, Hz, of the line near `near` Hz in `epochs` epochs of `epoch` samples from sample `start` on; `None` if an
-/// epoch has no line there.
-fn line_frequencies(series: &Series, start: usize, epochs: usize, epoch: usize, near: f64) -> Option<Vec<f64>> {
-    (0..epochs).map(|k| start + k * epoch).map(|at| centroid(series, at..at + epoch, near)).collect()
-}
-
-/// Centroid of the strongest line of the spectrum around `near` Hz, above the median of that band, Hz.
-fn centroid(series: &Series, range: Range<usize>, near: f64) -> Option<f64> {
+/// Centroid of the strongest line of the spectrum of the sample periods `slots` around `near` Hz, above the median of that
+/// band, Hz. `None` if there is no line.
+fn centroid(series: &Series, slots: Range<u64>, near: f64) -> Option<f64> {
     let rate = 1.0 / series.period_s;
     if near > MAX_FREQUENCY * rate {
         return None;
     }
     let length = ((rate / (RESOLUTION * near)) as usize).next_power_of_two();
-    let slots = series.slots.get(range.clone())?.to_vec();
+    let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
+    let range = position(slots.start)..position(slots.end);
     let stretch = Series {
-        span: *slots.first()?..slots.last()? + 1,
-        slots,
-        values: series.values.get(range)?.to_vec(),
-        period_s: series.period_s,
-        resolution: series.resolution,
-        unit: series.unit,
+        span: slots,
+        slots: series.slots[range.clone()].to_vec(),
+        values: series.values[range].to_vec(),
+        ..*series
     };
     let welch = Welch::estimate(&UniformSeries::from_series(&stretch), length)?;
     let band: Vec<(f64, f64)> = welch.points().filter(|(f, _)| (f / near - 1.0).abs() < BAND).collect();
@@ -148,29 +162,27 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
 ///
 /// The ratio of the frequencies, the width of the line without its movement, its amplitude, and the level of the white
 /// noise are fitted to the later quarter of the first half, with the related line's frequencies there.
-fn predict(tracked: &TrackedModel, curves: &EpochCurves, [fitted, unseen]: &[Vec<f64>; 2]) -> f64 {
+fn predict(tracked: &TrackedModel, curves: &EpochCurves, [fitted, unseen]: [&[f64]; 2]) -> f64 {
     let Some(near) = tracked.line_frequency() else { return f64::NAN };
-    let quarter = &curves.quarters[1];
+    let quarter = ComparedCurve::new(&curves.quarters[1], tracked.model());
     let recent = &fitted[fitted.len() / 2..];
     let start = (recent.len() as f64 * near / recent.iter().sum::<f64>()).ln();
     // Logarithms: of level, frequency over the related line's, width and amplitude.
     let mut shape = [0.0, start, -0.5, 0.0];
-    let model = |shape: [f64; 4], frequencies: &[f64], n: u64| {
-        let at = |&f: &f64| tracked.with_line_shape(shape[0], shape[1] + (f / near).ln(), shape[2], shape[3]).avar(n);
-        frequencies.iter().map(at).sum::<f64>() / frequencies.len() as f64
-    };
-    let deviance = |shape: [f64; 4], frequencies: &[f64], curve: &Curve<OCTAVES>| {
-        deviance_per_point(curve, |n| model(shape, frequencies, n))
+    let deviance = |shape: [f64; 4], frequencies: &[f64], curve: &ComparedCurve| {
+        let model = |f: &f64| tracked.with_line_shape(shape[0], shape[1] + (f / near).ln(), shape[2], shape[3]);
+        let models: Vec<Model> = frequencies.iter().map(model).collect();
+        curve.deviance_per_point(|n| mean_avar(&models, n))
     };
     for _ in 0..ROUNDS {
         for index in 0..shape.len() {
             let trial = |value: f64| {
                 let mut shape = shape;
                 shape[index] = value;
-                deviance(shape, recent, quarter)
+                deviance(shape, recent, &quarter)
             };
             shape[index] = minimum(trial, shape[index], FIRST_STEP, f64::INFINITY);
         }
     }
-    deviance(shape, unseen, &curves.unseen)
+    deviance(shape, unseen, &ComparedCurve::new(&curves.unseen, tracked.model()))
 }

@@ -5,6 +5,7 @@ use allan_core::confidence::octave_correlation;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Number of parameters that can be tracked.
@@ -22,18 +23,18 @@ const GUESS_STEP: f64 = 0.02;
 
 /// The differences of an epoch from the model, or their standard deviations: ln of the variance of the white noise, and ln
 /// of the line's frequency.
-pub type ParameterVector = [f64; PARAMETERS];
+pub(crate) type ParameterVector = [f64; PARAMETERS];
 
 /// A model, and which of its lines is tracked.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TrackedModel {
+pub(crate) struct TrackedModel {
     model: Model,
     line: Option<usize>,
 }
 
 /// The tracked parameters of an epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EpochEstimate {
+pub(crate) struct EpochEstimate {
     /// At the minimum of the deviance.
     pub parameters: ParameterVector,
     /// Standard deviations.
@@ -45,7 +46,8 @@ pub struct EpochEstimate {
 }
 
 /// The parameters that are tracked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum TrackedSet {
     /// Nothing.
     Nothing,
@@ -57,7 +59,7 @@ pub enum TrackedSet {
 
 /// Test of whether a parameter moves among the epochs of the first half.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MovementTest {
+pub(crate) struct MovementTest {
     /// Mean decrease of the deviance of an epoch, over that by chance.
     pub gain: f64,
     /// Probability of as much if the parameter does not move.
@@ -67,13 +69,16 @@ pub struct MovementTest {
 impl TrackedModel {
     /// A model none of whose lines is tracked.
     #[must_use]
-    pub fn without_line(model: Model) -> Self {
+    pub(crate) fn without_line(model: Model) -> Self {
         Self { model, line: None }
     }
 
     /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
     #[must_use]
-    pub fn select_line<const POINTS: usize>(model: Model, epochs: &[Curve<POINTS>]) -> (Self, Option<MovementTest>) {
+    pub(crate) fn select_line<const POINTS: usize>(
+        model: Model,
+        epochs: &[Curve<POINTS>],
+    ) -> (Self, Option<MovementTest>) {
         let is_line = |term: &FittedTerm| match term.kind {
             NoiseTerm::Sinusoid(_) => term.value > 0.0,
             NoiseTerm::Resonance(line) => term.value > 0.0 && line.bandwidth < MAX_BANDWIDTH * line.frequency,
@@ -101,25 +106,25 @@ impl TrackedModel {
 
     /// The model with all parameters at their means.
     #[must_use]
-    pub fn model(&self) -> &Model {
+    pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
     /// Mean frequency of the line that is tracked, Hz.
     #[must_use]
-    pub fn line_frequency(&self) -> Option<f64> {
+    pub(crate) fn line_frequency(&self) -> Option<f64> {
         self.line.map(|line| self.model.terms()[line].kind.shape()[0].1)
     }
 
     /// All parameters that can be tracked.
     #[must_use]
-    pub fn largest_set(&self) -> TrackedSet {
+    pub(crate) fn largest_set(&self) -> TrackedSet {
         if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }
 
     /// The model with the parameters of an epoch.
     #[must_use]
-    pub fn at(&self, [level, line]: ParameterVector) -> Model {
+    pub(crate) fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
             if matches!(term.kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_)) {
@@ -135,7 +140,7 @@ impl TrackedModel {
 
     /// The model with the parameters of an epoch, and with the logarithms of the line's width and amplitude changed by
     /// `width` and `amplitude`.
-    pub fn with_line_shape(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
+    pub(crate) fn with_line_shape(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
         let moved = self.at([level, line]);
         let changed = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
@@ -154,7 +159,7 @@ impl TrackedModel {
     ///
     /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
     #[must_use]
-    pub fn test_movement<const POINTS: usize>(
+    pub(crate) fn test_movement<const POINTS: usize>(
         &self,
         epochs: &[Curve<POINTS>],
         fewer: TrackedSet,
@@ -173,7 +178,7 @@ impl TrackedModel {
 
     /// The parameters of an epoch; those that are not in `tracked` are 0.
     #[must_use]
-    pub fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
+    pub(crate) fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
         let points: Vec<(&AllanPoint, f64)> = epoch
             .points()
             .iter()

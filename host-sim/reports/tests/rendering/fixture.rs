@@ -40,6 +40,7 @@ pub(crate) fn report() -> Report {
         flagged: [("repeated".to_owned(), 1804)].into(),
         part: PartReport::default(),
         findings: Vec::new(),
+        common_mode: None,
         channels,
     }
 }
@@ -97,7 +98,9 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         before: baseline.clone(),
         effects: vec![],
         after: baseline.clone(),
+        first_half_curve: error(1.711, 4.112),
         refitted: baseline,
+        nonstationarity: None,
         at_rest: vec![],
         assessment: assessment(scale),
         figure_data: Default::default(),
