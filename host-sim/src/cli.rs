@@ -523,7 +523,10 @@ fn export_target(text: &str) -> Result<ExportTarget, String> {
         let names = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
         names.map(|name| name.get_name().to_owned()).collect::<Vec<_>>().join(", ")
     };
-    let (name, file) = text.split_once('=').filter(|(_, file)| !file.is_empty()).ok_or("expected FORMAT=OUT, as in kalibr=imu.yaml")?;
+    let (name, file) = text
+        .split_once('=')
+        .filter(|(_, file)| !file.is_empty())
+        .ok_or("expected FORMAT=OUT, as in kalibr=imu.yaml")?;
     let format = ExportFormat::from_str(name, true).map_err(|_| format!("`{name}` is none of {}", formats()))?;
     Ok(ExportTarget { format, file: file.into() })
 }

@@ -2,8 +2,8 @@
 # Time and memory of this program and of a script of pandas and allantools on the same table, from the file to the curves, in
 # one run: tests/peers/recording.sh [ROWS]   (a million by default; six channels)
 #
-# allantools gives the curves alone. This program is run with --quick (curves, fit and trace) and without (everything that a
-# report has). Installs the script's packages into target/peers.
+# allantools gives the curves alone; this program everything that a report has. Installs the script's packages into
+# target/peers.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -38,5 +38,4 @@ print(f"{sys.argv[1]:<32} {wall:8.2f} s {work:8.2f} s of processor time {usage.r
 MEASURE
 }
 measure "pandas and allantools.oadev" "$python" tests/peers/recording/curves.py "$table" 100
-measure "host-sim analyze --quick" "$target/release/host-sim" analyze "$table" --rate 100 --quick --quiet
 measure "host-sim analyze" "$target/release/host-sim" analyze "$table" --rate 100 --quiet

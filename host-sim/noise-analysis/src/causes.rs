@@ -40,15 +40,17 @@ const ONCE_A_UNIT: [&str; 2] = ["common_mode", "shared_drift"];
 const WITHIN_COMMON_MODE: f64 = 3.0;
 
 /// The causes of what all channels show. The effects of each channel become those by which it reports a cause, and refer to
-/// the finding; `first_half` are the reports of the same channels from the first half alone.
+/// the finding; `first_half` are the effects of the same channels from the first half alone.
 pub(crate) fn find(
     channels: &mut [ChannelReport],
-    first_half: &[ChannelReport],
+    first_half: &[Vec<Effect>],
     profile: &SensorProfile,
     duration_s: f64,
 ) -> Vec<Finding> {
-    let causes = merged(&effects_of(channels), duration_s);
-    let half = merged(&effects_of(first_half), 0.5 * duration_s);
+    let shown = |channel: &ChannelReport| (channel.unit.clone(), channel.effects.clone());
+    let (units, whole): (Vec<String>, Vec<Vec<Effect>>) = channels.iter().map(shown).unzip();
+    let causes = merged(&with_units(&units, &whole), duration_s);
+    let half = merged(&with_units(&units, first_half), 0.5 * duration_s);
     let findings: Vec<Finding> = causes.iter().map(|cause| finding(cause, channels, &half, profile)).collect();
     let mut reported: Vec<Vec<Effect>> = vec![Vec::new(); channels.len()];
     for (number, cause) in causes.into_iter().enumerate() {
@@ -62,8 +64,8 @@ pub(crate) fn find(
     findings
 }
 
-fn effects_of(channels: &[ChannelReport]) -> Vec<(&str, &[Effect])> {
-    channels.iter().map(|channel| (channel.unit.as_str(), channel.effects.as_slice())).collect()
+fn with_units<'e>(units: &'e [String], effects: &'e [Vec<Effect>]) -> Vec<(&'e str, &'e [Effect])> {
+    units.iter().map(String::as_str).zip(effects.iter().map(Vec::as_slice)).collect()
 }
 
 /// The causes of the effects of all channels, each with its unit, in the order in which the channels first show them.

@@ -4,6 +4,8 @@
 //! Measurement ─► preprocessing (sampling_faults, detectors) ─► estimators ─► covariates ─► spectral_lines ─► channel_fit
 //!                      └─► series ─► assessment                                                            │
 //!                                                    report ◄─ causes ◄─ naming ◄─ slow_drift ◄────────────┘
+//!
+//! traced_record: all of this for the whole record      first_half: models of the first half, errors on the second
 //! ```
 //!
 //! Between `channel_fit` and `naming`, `part_filter` gives all channels the one filter of the sensor, and `octave_covariance` the
@@ -27,6 +29,7 @@ pub mod distributions;
 mod estimators;
 pub mod figure_data;
 pub mod findings;
+mod first_half;
 pub mod gauss_markov;
 mod interpolation;
 mod motion;
@@ -46,6 +49,7 @@ mod simulated_part;
 mod slow_drift;
 pub mod spectra;
 mod spectral_lines;
+mod traced_record;
 mod unexplained;
 pub mod uniform_series;
 pub mod units;

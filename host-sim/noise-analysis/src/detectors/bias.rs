@@ -83,8 +83,7 @@ pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> Bias
 
 /// Whether `regressor` has at least the fraction [`LEAST_COMMON`] of the samples of `series`.
 fn covers(regressor: &Series, series: &Series) -> bool {
-    regressor.slots == series.slots
-        || series.count_common(regressor) as f64 >= LEAST_COMMON * series.slots.len() as f64
+    regressor.slots == series.slots || series.count_common(regressor) as f64 >= LEAST_COMMON * series.slots.len() as f64
 }
 
 /// [`find`] where all have samples in the same sample periods.

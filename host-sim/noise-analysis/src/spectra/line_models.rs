@@ -42,11 +42,7 @@ impl Sine {
     /// The same sinusoid `delay` s later.
     pub(super) fn delayed(self, delay: f64) -> Self {
         let (sine, cosine) = (TAU * self.frequency * delay).sin_cos();
-        Self {
-            cosine: self.cosine * cosine - self.sine * sine,
-            sine: self.cosine * sine + self.sine * cosine,
-            ..self
-        }
+        Self { cosine: self.cosine * cosine - self.sine * sine, sine: self.cosine * sine + self.sine * cosine, ..self }
     }
 
     pub(super) fn amplitude(&self) -> f64 {

@@ -1,0 +1,185 @@
+//! Models of the first half of a recording, and their errors on the second half, which they have not seen.
+
+use crate::OCTAVES;
+use crate::channel_fit::ChannelFit;
+use crate::contradiction::Contradiction;
+use crate::covariates::CovariateFit;
+use crate::detectors::bias;
+use crate::estimators::RecordPart;
+use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
+use crate::preprocessing::{Exclusion, in_parallel};
+use crate::report::{ModelErrorReport, ModelReport, term_reports};
+use crate::series::Series;
+use crate::spectral_lines::fit_with_lines;
+use crate::traced_record::{TracedRecord, agree_on_filter};
+use allan_core::{Curve, Model};
+use measurement::ChannelProfile;
+
+/// The models of every channel by the first half alone.
+pub(crate) struct FirstHalf {
+    /// In the order of the measurement's channels.
+    pub channels: Vec<FirstHalfFit>,
+    /// The series of [`TracedRecord::series`] without what the rules of the first half exclude, in both halves.
+    series: Vec<Series>,
+}
+
+/// The models of one channel by the first half alone.
+pub(crate) struct FirstHalfFit {
+    /// The baseline model of the first half as it was recorded, with its spikes and knocks.
+    raw: Model,
+    pub fit: ChannelFit,
+    /// Curves of the channel's epochs; `None` of a record that is too short for them, and of a channel that is not traced.
+    epoch_curves: Option<EpochCurves>,
+    /// The same, with the part of the first half that `fit` is fitted to.
+    epochs: Option<ChannelEpochs>,
+}
+
+impl FirstHalf {
+    pub(crate) fn fit(record: &TracedRecord) -> Self {
+        let series = record.series_without(Exclusion::ByFirstHalf);
+        let middle = record.measurement.middle();
+        let halves: Vec<Series> = series.iter().map(|series| series.before(middle)).collect();
+        let mut channels =
+            in_parallel(&record.channels, |trace| match record.traced.iter().position(|of| *of == trace.channel) {
+                Some(own) => FirstHalfFit::trace(record, own, &series, &halves),
+                None => FirstHalfFit::baseline(record, trace.channel),
+            });
+        let fits = record.channels.iter().zip(&mut channels).map(|(trace, of)| (trace.channel, &mut of.fit));
+        let traced = fits.filter(|(channel, _)| record.traced.contains(channel));
+        // The filter of the whole record is the one that is reported.
+        let _of_first_half = agree_on_filter(record.measurement, &record.estimators, traced);
+        channels.iter_mut().for_each(FirstHalfFit::fit_to_recent);
+        Self { channels, series }
+    }
+
+    /// How the noise of each traced channel changes, in the order of the traced channels.
+    pub(crate) fn nonstationarities(&self, record: &TracedRecord) -> Vec<Option<Nonstationarity>> {
+        let fits = record.channels.iter().zip(&self.channels);
+        let fit_of = |profile: &ChannelProfile| fits.clone().find(|(trace, _)| trace.channel == *profile);
+        let channels: Vec<TracedChannel> = record
+            .traced
+            .iter()
+            .zip(&self.series)
+            .filter_map(|(profile, series)| {
+                let (_, half) = fit_of(profile)?;
+                Some(TracedChannel {
+                    name: profile.name,
+                    series,
+                    epochs: half.epochs.as_ref(),
+                    baseline: &half.fit.trace.before,
+                    model: &half.fit.trace.after,
+                })
+            })
+            .collect();
+        let positions: Vec<usize> = (0..channels.len()).collect();
+        in_parallel(&positions, |&position| nonstationarity::describe(&channels, position))
+    }
+}
+
+impl FirstHalfFit {
+    /// The baseline model alone.
+    fn baseline(record: &TracedRecord, channel: ChannelProfile) -> Self {
+        let estimators = &record.estimators;
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let fit = ChannelFit::fit_baseline(CovariateFit::estimate(&estimators.ruled[0], position, false, |_| None));
+        Self { raw: fit.trace.before.clone(), fit, epoch_curves: None, epochs: None }
+    }
+
+    /// The baseline model and what it lacks, of the channel of `series[own]`; `halves` are the first halves of `series`.
+    fn trace(record: &TracedRecord, own: usize, series: &[Series], halves: &[Series]) -> Self {
+        let (estimators, preprocessing) = (&record.estimators, &record.preprocessing);
+        let channel = record.traced[own];
+        // Temperature and supply in the first half.
+        let (slow, slow_halves): (Vec<ChannelProfile>, Vec<&Series>) = estimators
+            .both
+            .channels
+            .iter()
+            .zip(halves)
+            .filter(|(regressor, _)| regressor.quantity.is_environment())
+            .map(|(regressor, series)| (*regressor, series))
+            .unzip();
+        let bias_changes = bias::find(&halves[own], &slow_halves, &record.noise_grids);
+        let sensitivity = |regressor: ChannelProfile| {
+            let is_of = |(number, _): &&(usize, bias::BiasSensitivity)| slow[*number] == regressor;
+            bias_changes.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)
+        };
+        let has_ramp = preprocessing.has_ramp(channel);
+        let raw = preprocessing.excludes_any(Exclusion::ByFirstHalf).then(|| {
+            let raw = CovariateFit::estimate(&estimators.raw[0], own, has_ramp, sensitivity);
+            ChannelFit::fit_baseline(raw).trace.before
+        });
+        let covariates = CovariateFit::estimate(&estimators.ruled[0], own, has_ramp, sensitivity);
+        let followed = covariates.compensated_series(&series[own], series);
+        let middle = record.measurement.middle();
+        let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&series[own]), middle);
+        let rest = covariates.compensated_series(&halves[own], halves);
+        let (fit, _) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile);
+        let raw = raw.unwrap_or_else(|| fit.trace.before.clone());
+        Self { raw, fit, epoch_curves, epochs: None }
+    }
+
+    /// Fits the model to the later quarter of the first half where its noise changes.
+    fn fit_to_recent(&mut self) {
+        let Some(curves) = self.epoch_curves.take() else { return };
+        let epochs = ChannelEpochs::compare(curves, &self.fit.trace.after);
+        if let Some(recent) = epochs.recent_curve() {
+            self.fit.fit_to(&recent);
+        }
+        self.epochs = Some(epochs);
+    }
+
+    /// The error on the second half of the curve of the first half itself.
+    pub(crate) fn curve_error(&self, record: &TracedRecord, channel: ChannelProfile) -> ModelErrorReport {
+        let position = record.estimators.both.position(channel).unwrap_or_default();
+        let unseen = self.fit.covariates.compensated(&record.estimators.raw[1], position);
+        ModelErrorReport::of_curve(&self.fit.covariates.curve, &unseen, &self.fit.trace.after)
+    }
+
+    /// Whether the second half does not contradict the model with the added terms.
+    pub(crate) fn held(&self, record: &TracedRecord, channel: ChannelProfile) -> bool {
+        let position = record.estimators.both.position(channel).unwrap_or_default();
+        let unseen = self.fit.covariates.compensated(&record.estimators.ruled[1], position);
+        Contradiction::find(&self.fit.trace.after, &unseen).is_none()
+    }
+
+    /// The baseline model of the first half as it was recorded.
+    pub(crate) fn before(&self, record: &TracedRecord, channel: ChannelProfile, whole: &Curve<OCTAVES>) -> ModelReport {
+        let estimators = &record.estimators;
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let error = |part: &RecordPart| ModelErrorReport::new(&self.raw, &part.curve(position));
+        ModelReport {
+            terms: term_reports(&self.raw, channel.unit),
+            adev: whole.points().iter().map(|point| self.raw.avar(point.n).sqrt()).collect(),
+            fitted: error(&estimators.raw[0]),
+            unseen: error(&estimators.raw[1]),
+            unseen_excluding: has_rules(record, channel).then(|| error(&estimators.ruled[1])),
+        }
+    }
+
+    /// The model with the added terms, without what the rules of the first half exclude. `avar_of` is the Allan variance of a
+    /// channel of the whole record at an averaging factor.
+    pub(crate) fn after(
+        &self,
+        record: &TracedRecord,
+        channel: ChannelProfile,
+        whole: &Curve<OCTAVES>,
+        avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
+    ) -> ModelReport {
+        let estimators = &record.estimators;
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let (model, covariates) = (&self.fit.trace.after, &self.fit.covariates);
+        let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, position));
+        ModelReport {
+            terms: term_reports(model, channel.unit),
+            adev: self.fit.deviations(&estimators.both, position, whole, avar_of),
+            fitted: ModelErrorReport::new(model, self.fit.fitted_curve()),
+            unseen: unseen(&estimators.raw[1]),
+            unseen_excluding: has_rules(record, channel).then(|| unseen(&estimators.ruled[1])),
+        }
+    }
+}
+
+/// Whether rules of the first half exclude samples of a channel.
+fn has_rules(record: &TracedRecord, channel: ChannelProfile) -> bool {
+    record.preprocessing.excludes(channel, Exclusion::ByFirstHalf)
+}

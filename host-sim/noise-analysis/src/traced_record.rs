@@ -1,0 +1,224 @@
+//! What all of a recording shows: the effects in the samples of each channel, the noise model of each channel with what its
+//! baseline lacks, and the filter that the part has once.
+
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::covariates::CovariateFit;
+use crate::detectors::block_means::NoiseGrids;
+use crate::detectors::random_telegraph;
+use crate::estimators::RecordEstimators;
+use crate::findings::{Detection, Effect};
+use crate::motion::{self, PlatformMotion};
+use crate::naming::{ChannelFindings, name_effects};
+use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
+use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
+use crate::report::Stretch;
+use crate::series::Series;
+use crate::slow_drift::{ChannelsInCommon, common_mode, goes_as_far_as_ramp};
+use crate::spectral_lines::{MergedLine, fit_with_lines};
+use crate::unexplained;
+use crate::uniform_series::UniformSeries;
+use allan_core::NoiseTerm;
+use measurement::{ChannelProfile, Measurement, Quantity};
+
+/// A recording with what was found in all of it.
+pub(crate) struct TracedRecord<'a> {
+    pub measurement: &'a Measurement,
+    /// The channels in which effects are traced: the inertial ones.
+    pub traced: Vec<ChannelProfile>,
+    /// Covariances of the block means of each channel's noise, computed once.
+    pub noise_grids: NoiseGrids,
+    pub preprocessing: Preprocessing,
+    pub estimators: RecordEstimators,
+    /// After preprocessing: of the traced channels, then of temperature and supply.
+    pub series: Vec<Series>,
+    /// In the order of the measurement's channels.
+    pub channels: Vec<ChannelTrace>,
+    /// The filter that the part has, by the whole record.
+    pub filter: Result<PartFilter, Unidentified>,
+    /// The channels of `series`.
+    coupled: Vec<ChannelProfile>,
+    motions: Vec<(ChannelProfile, PlatformMotion)>,
+}
+
+/// The noise of one channel in all of a recording.
+pub(crate) struct ChannelTrace {
+    pub channel: ChannelProfile,
+    pub fit: ChannelFit,
+    /// Lines in the spectrum.
+    lines: Vec<MergedLine>,
+    /// Random telegraph noise.
+    telegraph: Option<Detection>,
+    /// The samples less the share of the covariates; of a traced channel only.
+    rest: Option<UniformSeries>,
+}
+
+impl<'a> TracedRecord<'a> {
+    pub(crate) fn new(measurement: &'a Measurement) -> Self {
+        let of = |quantities: [Quantity; 2]| {
+            quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
+        };
+        let traced = of([Quantity::AngularRate, Quantity::SpecificForce]);
+        let coupled = [traced.clone(), of([Quantity::Temperature, Quantity::SupplyVoltage])].concat();
+        let noise_grids = NoiseGrids::default();
+        let preprocessing = Preprocessing::detect(measurement, &traced, &noise_grids);
+        let estimators = RecordEstimators::estimate(measurement, &coupled, &preprocessing);
+        let moved = in_parallel(&traced, |channel| {
+            motion::find(&Series::from_measurement(measurement, channel), channel).map(|motion| (*channel, motion))
+        });
+        let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
+        let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
+        let mut channels = in_parallel(&recorded, |&channel| match traced.iter().position(|of| *of == channel) {
+            Some(own) => ChannelTrace::trace(measurement, &preprocessing, &estimators, &series, own),
+            None => ChannelTrace::baseline(&estimators, channel),
+        });
+        let traces = channels.iter_mut().map(|trace| (trace.channel, &mut trace.fit));
+        let filter = agree_on_filter(measurement, &estimators, traces.filter(|(channel, _)| traced.contains(channel)));
+        let motions = moved.into_iter().flatten().collect();
+        Self { measurement, traced, noise_grids, preprocessing, estimators, series, channels, filter, coupled, motions }
+    }
+
+    /// The series of the same channels as [`series`](Self::series), without the samples of `exclusion`.
+    pub(crate) fn series_without(&self, exclusion: Exclusion) -> Vec<Series> {
+        in_parallel(&self.coupled, |&channel| self.preprocessing.series(self.measurement, channel, exclusion))
+    }
+
+    /// The series of one channel, if it is among them.
+    pub(crate) fn series_of(&self, channel: ChannelProfile) -> Option<&Series> {
+        self.coupled.iter().position(|of| *of == channel).map(|position| &self.series[position])
+    }
+
+    /// Stretches in which the platform did not move.
+    pub(crate) fn at_rest(&self) -> Vec<Stretch> {
+        let duration_s = self.measurement.periods() as f64 * self.measurement.period_s();
+        motion::at_rest(self.motions.iter().map(|(_, motion)| motion), duration_s)
+    }
+
+    /// The effects of each channel, in the order of the channels.
+    pub(crate) fn effects(&self) -> Vec<Vec<Effect>> {
+        let commons = common_modes(&self.channels);
+        self.channels
+            .iter()
+            .map(|trace| {
+                let common = commons.iter().find(|common| common.channels.contains(&trace.channel));
+                if self.traced.contains(&trace.channel) { self.effects_of(trace, common) } else { Vec::new() }
+            })
+            .collect()
+    }
+
+    fn effects_of(&self, trace: &ChannelTrace, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
+        let Self { preprocessing, estimators, measurement, .. } = self;
+        let channel = trace.channel;
+        let moved = self.motions.iter().filter(|(of, _)| *of == channel);
+        let mut effects: Vec<Effect> = moved.map(|(_, motion)| motion.effect.clone()).collect();
+        effects.extend(preprocessing.effects(channel));
+        // The longest octaves of the curve see a sinusoid of a few periods as a ramp.
+        let has_ramp = preprocessing.has_ramp(channel) || trace.lines.iter().any(MergedLine::is_slow);
+        let mut named = name_effects(&measurement.profile, &trace.findings(estimators, common));
+        // The response that is not proportional has the sensitivity too.
+        let responds = preprocessing.responds_to_temperature(channel);
+        named.retain(|effect| !responds || effect.kind != "temperature");
+        let is_ramp = |effect: &Effect| {
+            let slope = effect.parameters.get("slope").map_or(0.0, |slope| slope.value);
+            !has_ramp && self.series_of(channel).is_some_and(|own| goes_as_far_as_ramp(own, slope))
+        };
+        let is_named = |effect: &Effect| effect.kind != NoiseTerm::RateRamp.name() || is_ramp(effect);
+        effects.extend(named.into_iter().filter(is_named));
+        let resolution = estimators.both.resolution_of(channel);
+        effects.extend(unexplained::by_curve(&trace.fit, &measurement.profile, resolution));
+        effects
+    }
+}
+
+impl ChannelTrace {
+    /// The baseline model alone.
+    fn baseline(estimators: &RecordEstimators, channel: ChannelProfile) -> Self {
+        let position = estimators.both.position(channel).unwrap_or_default();
+        let covariates = CovariateFit::estimate(&estimators.both, position, false, |_| None);
+        let fit = ChannelFit::fit_baseline(covariates);
+        Self { channel, fit, lines: Vec::new(), telegraph: None, rest: None }
+    }
+
+    /// The baseline model and what it lacks, of the channel of `series[own]`.
+    fn trace(
+        measurement: &Measurement,
+        preprocessing: &Preprocessing,
+        estimators: &RecordEstimators,
+        series: &[Series],
+        own: usize,
+    ) -> Self {
+        let channel = estimators.both.channels[own];
+        let covariates = CovariateFit::estimate(&estimators.both, own, preprocessing.has_ramp(channel), |regressor| {
+            preprocessing.sensitivity(channel, regressor)
+        });
+        let own = &series[own];
+        let rest = covariates.compensated_series(own, series);
+        let (fit, lines) = fit_with_lines(covariates, own, rest.as_ref(), &measurement.profile);
+        let correlation_times: Vec<f64> = fit.correlation_times().collect();
+        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
+        let is_reversible =
+            |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
+        let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
+        Self { channel, fit, lines, telegraph, rest: Some(rest) }
+    }
+
+    fn findings<'a>(
+        &'a self,
+        estimators: &RecordEstimators,
+        common: Option<&'a ChannelsInCommon>,
+    ) -> ChannelFindings<'a> {
+        let both = &estimators.both;
+        let sensitivities = self.fit.covariates.sensitivities();
+        ChannelFindings {
+            channel: self.channel,
+            resolution: both.resolution_of(self.channel),
+            fit: &self.fit,
+            sensitivities: sensitivities.map(|(position, of)| (both.channels[position], *of)).collect(),
+            lines: &self.lines,
+            telegraph: self.telegraph.as_ref(),
+            common,
+            rest: self.rest.as_ref(),
+        }
+    }
+}
+
+/// Gives `fits` of channels in one part of a recording the filter that the part of the sensor has once, as they show it
+/// together.
+pub(crate) fn agree_on_filter<'f>(
+    measurement: &Measurement,
+    estimators: &RecordEstimators,
+    fits: impl Iterator<Item = (ChannelProfile, &'f mut ChannelFit)>,
+) -> Result<PartFilter, Unidentified> {
+    let profile = &measurement.profile;
+    let decimation = profile.internal_rate_hz / measurement.sample_rate_hz;
+    let mut fits: Vec<(ChannelProfile, &mut ChannelFit)> = fits.collect();
+    let channels: Vec<FilteredChannel> = fits
+        .iter()
+        .map(|(channel, fit)| {
+            let resolution = estimators.both.resolution_of(*channel);
+            FilteredChannel {
+                name: channel.name,
+                curve: &fit.covariates.curve,
+                model: &fit.trace.after,
+                resolution,
+                is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
+            }
+        })
+        .collect();
+    let filter = part_filter::estimate(&channels, &profile.filters, decimation);
+    let dithered: Vec<bool> = channels.iter().map(|channel| channel.is_dithered).collect();
+    for ((_, fit), is_dithered) in fits.iter_mut().zip(dithered) {
+        fit.agree(filter.as_ref().ok(), is_dithered);
+    }
+    filter
+}
+
+/// The drift that the gyroscopes have in common, and that of the accelerometers.
+fn common_modes(channels: &[ChannelTrace]) -> Vec<ChannelsInCommon> {
+    let of_quantity = |quantity: &Quantity| {
+        let members = channels.iter().filter(|trace| trace.channel.quantity == *quantity);
+        let (profiles, rests): (Vec<ChannelProfile>, Vec<UniformSeries>) =
+            members.filter_map(|trace| Some((trace.channel, trace.rest.clone()?))).unzip();
+        common_mode(&profiles, &rests)
+    };
+    in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], of_quantity).into_iter().flatten().collect()
+}
