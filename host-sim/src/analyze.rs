@@ -25,7 +25,8 @@ const GENERIC: &str = "generic";
 /// Analyses the recordings of the arguments and writes the report, or the summary of several.
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let AnalyzeArguments { recording, more, against, output } = arguments;
-    let inputs: Vec<&Path> = [&recording.input.file].into_iter().chain(more).chain(against).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> =
+        [&recording.input.file].into_iter().chain(more).chain(against).map(PathBuf::as_path).collect();
     output::check(output, &inputs)?;
     if more.is_empty() && against.is_none() {
         let source = output::source_name(&recording.input.file);
@@ -49,9 +50,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         [&recording.input.file].into_iter().chain(more).map(read_other).collect::<Result<_>>()?;
     let agreement = (still.len() > 1).then(|| several::compare(&still)).transpose()?;
     let inflation = match against {
-        Some(file) => {
-            Some(several::inflation(&still, &read_other(file)?)?)
-        }
+        Some(file) => Some(several::inflation(&still, &read_other(file)?)?),
         None => None,
     };
     if let Some(file) = &output.json {

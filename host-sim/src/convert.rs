@@ -29,6 +29,8 @@ fn write(recording: &SensorRecording, out: &Path, format: RecordingFormat) -> Re
             recording_file::note_columns(out, &recording.write_array(out)?);
             Ok(())
         }
-        RecordingFormat::Frames => bail!("an SPI frame log has the register counts of an ADIS16405, which the recording has not"),
+        RecordingFormat::Frames => {
+            bail!("an SPI frame log has the register counts of an ADIS16405, which the recording has not")
+        }
     }
 }

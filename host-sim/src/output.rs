@@ -26,8 +26,8 @@ const USUAL_COLUMNS: usize = 80;
 pub(crate) fn check(output: &OutputArguments, inputs: &[&Path]) -> Result<()> {
     let json = output.json.as_deref().filter(|file| !is_standard_output(file));
     // A figure that every report has stands for all of them.
-    let [page, picture] =
-        [(&output.page, page::FILE), (&output.pictures, "overview.svg")].map(|(folder, file)| Some(folder.as_ref()?.join(file)));
+    let [page, picture] = [(&output.page, page::FILE), (&output.pictures, "overview.svg")]
+        .map(|(folder, file)| Some(folder.as_ref()?.join(file)));
     for folder in [&output.page, &output.pictures].into_iter().flatten() {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }

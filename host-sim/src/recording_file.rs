@@ -20,9 +20,9 @@ pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat) 
     let written = match format {
         RecordingFormat::Table => count_table_writer::write(recording, out).map_err(anyhow::Error::from),
         RecordingFormat::Frames => write_frames(recording, out),
-        RecordingFormat::Npy => numpy_matrix::write(recording, out)
-            .map(|names| note_columns(out, &names))
-            .map_err(anyhow::Error::from),
+        RecordingFormat::Npy => {
+            numpy_matrix::write(recording, out).map(|names| note_columns(out, &names)).map_err(anyhow::Error::from)
+        }
     };
     written.with_context(|| out.display().to_string())?;
     if format == RecordingFormat::Table && recording.range != GyroRange::Dps300 {

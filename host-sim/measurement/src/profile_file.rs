@@ -212,7 +212,8 @@ mod tests {
             assert!((stated / noise - 1.0).abs() < 4e-4, "{name} {channel}: {stated} for {noise}");
         }
         // Full scale of 16 bits; of the ADIS16470 the counts reach beyond it.
-        for (name, channel, counts) in [("bmi088", "accl_x", 32_768.0), ("bmi088", "gyro_x", 32_768.0), ("mpu6050", "accl_x", 32_768.0)]
+        for (name, channel, counts) in
+            [("bmi088", "accl_x", 32_768.0), ("bmi088", "gyro_x", 32_768.0), ("mpu6050", "accl_x", 32_768.0)]
         {
             let profile = included(name).expect(name).channel(channel).expect(channel);
             assert_eq!(profile.range.map(|range| range / profile.lsb), Some(counts), "{name} {channel}");

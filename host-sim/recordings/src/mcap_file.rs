@@ -38,7 +38,12 @@ impl<'a> McapRecord<'a> {
             op::CHANNEL => {
                 let numbers = fields.number().zip(fields.number());
                 let texts = fields.text().zip(fields.text());
-                numbers.zip(texts).map(|((id, schema), (topic, encoding))| Self::Channel { id, schema, topic, encoding })
+                numbers.zip(texts).map(|((id, schema), (topic, encoding))| Self::Channel {
+                    id,
+                    schema,
+                    topic,
+                    encoding,
+                })
             }
             op::MESSAGE => {
                 // Its number, and the times at which it was logged and published.
@@ -221,7 +226,8 @@ mod tests {
         let message = record(5, &[&7u16.to_le_bytes(), &[0; 20], b"data"]);
         let chunk = |records: &[u8]| record(6, &[&[0; 28], &text(""), &(records.len() as u64).to_le_bytes(), records]);
         let footer = record(2, &[&[0; 20]]);
-        let whole = ["Schema { id: 1, name: \"sensor_msgs/msg/Imu\" }", "Message { channel: 7, data: [100, 97, 116, 97] }"];
+        let whole =
+            ["Schema { id: 1, name: \"sensor_msgs/msg/Imu\" }", "Message { channel: 7, data: [100, 97, 116, 97] }"];
         let (found, damage) = read(&[schema.clone(), chunk(&message), footer.clone()]);
         assert_eq!((found.as_slice(), damage), (whole.map(str::to_owned).as_slice(), None));
         let long_text = record(3, &[&2u16.to_le_bytes(), &u32::MAX.to_le_bytes(), b"short"]);

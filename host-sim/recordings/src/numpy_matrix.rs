@@ -19,7 +19,9 @@ pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
     let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
     let units: Vec<SiUnit> = recording.channels.iter().map(|channel| SiUnit::of(channel.unit())).collect();
     let mut names: Vec<String> = if has_time { vec!["time_s".to_owned()] } else { Vec::new() };
-    names.extend(recording.channels.iter().zip(&units).map(|(channel, unit)| format!("{}_{}", channel.name(), unit.suffix)));
+    names.extend(
+        recording.channels.iter().zip(&units).map(|(channel, unit)| format!("{}_{}", channel.name(), unit.suffix)),
+    );
     let values = recording.samples.iter().flat_map(|sample| {
         let channels = recording.channels.iter().zip(&units).map(|(&channel, unit)| {
             let count = f64::from(sample.counts.get(channel));

@@ -32,7 +32,8 @@ pub(crate) fn write_table(table: &SensorTable, file: &Path) -> io::Result<()> {
 pub(crate) fn write_array(table: &SensorTable, file: &Path) -> io::Result<Vec<String>> {
     let units: Vec<SiUnit> = table.columns.iter().map(|column| SiUnit::of(column.profile.unit)).collect();
     let time = table.times_s.iter().map(|_| "time_s".to_owned());
-    let channels = table.columns.iter().zip(&units).map(|(column, unit)| format!("{}_{}", column.profile.name, unit.suffix));
+    let channels =
+        table.columns.iter().zip(&units).map(|(column, unit)| format!("{}_{}", column.profile.name, unit.suffix));
     let names: Vec<String> = time.chain(channels).collect();
     let values = (0..rows(table)).flat_map(|row| {
         let time = table.times_s.as_ref().and_then(|times| times.get(row)).copied();

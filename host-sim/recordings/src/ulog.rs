@@ -174,7 +174,9 @@ pub(crate) fn read(file: &Path, options: &ReadOptions) -> Result<SensorTable, In
     let mut table = table.finish(damage)?;
     let alone = pairing.alone + pairing.waiting.len() as u64;
     if alone > 0 {
-        table.notes.push(format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out"));
+        table.notes.push(format!(
+            "{alone} samples of {name} have no sample of the other sensor at their time and are left out"
+        ));
     }
     let others: Vec<&str> = topics.iter().map(|(name, _)| name.as_str()).filter(|other| other != name).collect();
     if options.topic.is_none() && !others.is_empty() {
@@ -217,10 +219,7 @@ fn for_each_sample(
 }
 
 /// Gives the samples of a message to `each`: the time, then the fields of [`MESSAGES`].
-fn samples(
-    message: &DataMessage,
-    mut each: impl FnMut(&[Number]) -> Result<(), InputError>,
-) -> Result<(), InputError> {
+fn samples(message: &DataMessage, mut each: impl FnMut(&[Number]) -> Result<(), InputError>) -> Result<(), InputError> {
     let values = MessageValues(message);
     // Older logs have the time of the message alone.
     let time =

@@ -30,7 +30,9 @@ pub enum ComparisonError {
     #[error("no coefficient of a channel is in both")]
     Nothing,
     /// The report was made without the profile of a sensor, or with one that states no noise.
-    #[error("the report has no values of a data sheet: analyse the recording with --sensor, and the name or the profile of the sensor")]
+    #[error(
+        "the report has no values of a data sheet: analyse the recording with --sensor, and the name or the profile of the sensor"
+    )]
     NoDataSheet,
 }
 

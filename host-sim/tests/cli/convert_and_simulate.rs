@@ -148,19 +148,17 @@ fn what_cannot_be_simulated_or_converted_is_refused_before_anything_is_written()
 
 #[test]
 fn options_are_those_that_a_subcommand_uses() {
-    for arguments in
-        [
-            &["uf2", "a", "b", "--export", "kalibr=c"][..],
-            &["explain", "a", "--json", "b"],
-            &["monitor", "p", "--page", "d"],
-            &["replay", "a", "--sensor", "generic"],
-            &["replay", "a", "--columns", "gyro_x=0"],
-            &["replay", "a", "--topic", "t"],
-            &["convert", "a", "b", "--rate", "100"],
-            &["paper", "--export", "kalibr=c"],
-            &["compare", "a", "b", "--page", "d"],
-        ]
-    {
+    for arguments in [
+        &["uf2", "a", "b", "--export", "kalibr=c"][..],
+        &["explain", "a", "--json", "b"],
+        &["monitor", "p", "--page", "d"],
+        &["replay", "a", "--sensor", "generic"],
+        &["replay", "a", "--columns", "gyro_x=0"],
+        &["replay", "a", "--topic", "t"],
+        &["convert", "a", "b", "--rate", "100"],
+        &["paper", "--export", "kalibr=c"],
+        &["compare", "a", "b", "--page", "d"],
+    ] {
         let output = host_sim(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && errors.contains("unexpected argument"), "{arguments:?}: {errors}");

@@ -301,9 +301,7 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
         std::fs::create_dir_all(blocked.join(inside)).expect("a folder");
     }
     let log = dir.path().join("log.csv");
-    for (option, folder) in
-        [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)]
-    {
+    for (option, folder) in [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)] {
         let started = Instant::now();
         let line = refusal(&["record", name(&log), "--seconds", "20000", option, name(folder)]);
         assert!(started.elapsed() < Duration::from_secs(5) && line.contains(name(folder)), "{option}: {line}");

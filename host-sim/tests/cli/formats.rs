@@ -122,7 +122,8 @@ fn one_command_leads_from_a_recording_to_a_file_for_kalibr() {
                 .filter(|(channel, _)| channel.starts_with(prefix))
                 .map(|(_, walk)| to_si * walk.as_f64().expect("a number"))
                 .collect();
-            let (density, walk) = (number(&format!("{sensor}_noise_density")), number(&format!("{sensor}_random_walk")));
+            let (density, walk) =
+                (number(&format!("{sensor}_noise_density")), number(&format!("{sensor}_random_walk")));
             if own.is_empty() {
                 assert_eq!((density, walk), (None, None), "{name}");
                 assert!(notes.contains(&format!("no {sensor}_noise_density")), "{name}: {notes}");
@@ -174,7 +175,8 @@ fn every_format_is_converted() {
     let report = |file: &str| -> Value { serde_json::from_slice(&json_of(&dir, &["analyze", file])).expect("JSON") };
     let (direct, converted) = (report(bag), report(back));
     assert_eq!(direct["dropped"], converted["dropped"]);
-    for (one, other) in direct["channels"].as_array().expect("a list").iter().zip(converted["channels"].as_array().expect("a list"))
+    for (one, other) in
+        direct["channels"].as_array().expect("a list").iter().zip(converted["channels"].as_array().expect("a list"))
     {
         assert_eq!(one["name"], other["name"]);
         let [one, other] = [one, other].map(|of| of["curve"][0]["adev"].as_f64().expect("a number"));
@@ -208,7 +210,8 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
                 1..4 => bytes.truncate(rng.random_range(1..length)),
                 // In the headers, where lengths and types are; then anywhere.
                 4..9 => (0..1 << (case - 4)).for_each(|_| bytes[rng.random_range(0..length.min(2000))] = rng.random()),
-                _ => (0..1 << (2 * (case - 8))).for_each(|_| bytes[rng.random_range(0..length)] ^= 1 << rng.random_range(0..8)),
+                _ => (0..1 << (2 * (case - 8)))
+                    .for_each(|_| bytes[rng.random_range(0..length)] ^= 1 << rng.random_range(0..8)),
             }
             std::fs::write(&file, &bytes).expect("written");
             let analyses = case == 5;
@@ -230,7 +233,10 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
                     read += 1;
                 }
                 Some(1) => {
-                    assert!(matches!(errors[..], [error] if error.starts_with("error: ") && error.contains("damaged.")), "{what}");
+                    assert!(
+                        matches!(errors[..], [error] if error.starts_with("error: ") && error.contains("damaged.")),
+                        "{what}"
+                    );
                     refused += 1;
                 }
                 other => panic!("{what}: {other:?}"),

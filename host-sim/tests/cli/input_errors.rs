@@ -204,6 +204,8 @@ fn benchmarks_have_limits() {
         &["undeclared", "--nothing", "1000000000"],
         &["undeclared", "--per-kind", "1000000000"],
         &["undeclared", "--pairs", "1000000000"],
+        &["undeclared", "--triples", "1000000000"],
+        &["undeclared", "--outside", "1000000000"],
         &["paper", "--seeds", "18446744073709551615"],
         &["losses", "--records", "18446744073709551615"],
     ] {
@@ -211,7 +213,8 @@ fn benchmarks_have_limits() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
     let began = std::time::Instant::now();
-    let few = ["--nothing", "2", "--per-kind", "0", "--pairs", "0", "--seconds", "1"];
+    let few =
+        ["--nothing", "2", "--per-kind", "0", "--pairs", "0", "--triples", "0", "--outside", "0", "--seconds", "1"];
     let output = host_sim(&[&["undeclared", "--jobs", "1000000"], &few[..]].concat());
     // A million threads take most of a minute to begin; two recordings of a second take none of it. The second is too short
     // to be analysed, which may be the program's answer.
