@@ -29,7 +29,7 @@ fn the_two_hidden_effects_of_the_default_sensor_are_found() {
     assert!((frequency - 20.5).abs() < 0.01, "{frequency}");
     assert!((amplitude / 0.2 - 1.0).abs() < 0.05, "{amplitude}");
 
-    // 0.05 (deg/s)/°C on gyro x; the rate random walk during the hour of warm-up adds an error of about a tenth.
+    // 0.05 (deg/s)/°C on gyro x; the rate random walk during the warm-up adds an error of about a tenth.
     let warmth = effect(channel(&report, "gyro_x"), "temperature");
     let sensitivity = warmth["parameters"]["sensitivity"]["value"].as_f64().expect("a number");
     assert!((sensitivity / 0.05 - 1.0).abs() < 0.25, "{sensitivity}");
