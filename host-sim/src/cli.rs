@@ -164,10 +164,10 @@ pub(crate) struct UndeclaredArguments {
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub(crate) pairs: u64,
     /// Recordings with three effects.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub(crate) triples: u64,
     /// Recordings of each kind of effect that no kind of the report describes.
-    #[arg(long, value_name = "PER_KIND", default_value_t = 20)]
+    #[arg(long, value_name = "PER_KIND", default_value_t = 20, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
     pub(crate) outside: u64,
     /// Length of a recording, s.
     #[arg(long, default_value_t = 1800.0)]

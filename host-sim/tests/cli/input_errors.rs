@@ -204,6 +204,8 @@ fn benchmarks_have_limits() {
         &["undeclared", "--nothing", "1000000000"],
         &["undeclared", "--per-kind", "1000000000"],
         &["undeclared", "--pairs", "1000000000"],
+        &["undeclared", "--triples", "1000000000"],
+        &["undeclared", "--outside", "1000000000"],
         &["paper", "--seeds", "18446744073709551615"],
         &["losses", "--records", "18446744073709551615"],
     ] {

@@ -285,7 +285,7 @@ fn explain_names_the_reason_why_it_refuses() {
         assert!(!output.status.success() && error.contains(reason), "{arguments:?}: {error}");
     };
     refused(&["explain", path], "no file in it ends in .csv or .csv.gz");
-    refused(&["explain", path, "--page", "x"], "leave out --page");
+    refused(&["explain", path, "--page", "x"], "unexpected argument '--page'");
     let table = program::write(&dir, "short.csv", b"gyro_x_counts\n1\n2\n3\n4\n5\n");
     refused(&["explain", path], "no sample rate");
     let output = host_sim(&["explain", table.to_str().expect("UTF-8"), "--rate", "100"]);

@@ -5,10 +5,10 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use tempfile::TempDir;
 
-/// What the program prints for a minute of the virtual sensor.
+/// What the program prints for half a minute of the virtual sensor.
 fn run(dir: &TempDir, arguments: &[&str]) -> String {
     let log = dir.path().join("bus.csv");
-    let record = ["record", log.to_str().expect("UTF-8"), "--plain"];
+    let record = ["record", log.to_str().expect("UTF-8"), "--plain", "--seconds", "30"];
     let output = host_sim(&[&record, arguments].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
@@ -19,7 +19,7 @@ fn the_arguments_choose_what_is_printed() {
     let dir = TempDir::new().expect("a folder");
     let screen = run(&dir, &[]);
     // Standard output is no terminal here: 80 columns without colour.
-    assert!(screen.lines().count() <= 40 && screen.starts_with("ADIS16405   "), "{screen}");
+    assert!(screen.lines().count() <= 40 && screen.starts_with("ADIS16405   bus.csv   "), "{screen}");
     assert!(screen.lines().all(|line| line.chars().count() <= 80 && !line.contains('\u{1b}')), "{screen}");
     for heading in ["What was found", "What to do", "gyro", "accel"] {
         assert!(screen.contains(heading), "{heading}: {screen}");
