@@ -129,7 +129,7 @@ fn stationarity(changes: &Nonstationarity) -> String {
         FittedPart::FirstHalf => "The model is fitted to the whole first half.".to_owned(),
         FittedPart::LaterQuarter => format!(
             "The noise changes, so the model is fitted to the later quarter, which is nearer in time to the second half: to the \
-             medians of its stretches of {}, which a disturbance of some minutes does not move.",
+             medians of its stretches of {}, which a disturbance of a few of them does not move.",
             span(changes.epoch_s)
         ),
     };

@@ -1,5 +1,6 @@
 //! Terminal, figure and page of a report whose numbers are known.
 
+mod explanation;
 mod fixture;
 
 use fixture::{channel, empty, report};
