@@ -4,7 +4,7 @@
 //! The degrees of freedom are those of C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
 //! differences" (PTTI 2003), for differences taken every `n/P` samples.
 
-use crate::math::{abs, clamp, exp, ln, ln_gamma, sqrt};
+use crate::math::{Real, abs, clamp, exp, ln, ln_gamma, sqrt};
 use crate::noise_type::VarianceFractions;
 
 /// The normal quantile of 0.975: half the width of a 95 % interval in standard deviations.
@@ -27,14 +27,16 @@ pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f6
 /// the ratio of the last two tabulated values.
 #[must_use]
 pub fn octave_correlation(lag: usize, a: VarianceFractions, b: VarianceFractions) -> f64 {
-    let (a, b) = (roots(a), roots(b));
+    let (a, b): ([f64; 3], [f64; 3]) = (roots(a), roots(b));
     (0..3).map(|noise| a[noise] * b[noise] * pure_octave_correlation(lag, noise)).sum()
 }
 
 /// Square roots of the variance fractions of white, flicker and random-walk noise.
-pub(crate) fn roots(fractions: VarianceFractions) -> [f64; 3] {
+pub(crate) fn roots<F: Real>(fractions: VarianceFractions) -> [F; 3] {
     // Angle quantization decorrelates faster than white noise and is counted as white noise: an upper bound.
-    [sqrt(fractions.white + fractions.quantization), sqrt(fractions.flicker), sqrt(fractions.random_walk)]
+    let VarianceFractions { white, flicker, random_walk, quantization } = fractions;
+    let [white, quantization] = [white, quantization].map(F::constant);
+    [white + quantization, F::constant(flicker), F::constant(random_walk)].map(F::sqrt)
 }
 
 /// [`octave_correlation`] of one pure noise: 0 is white, 1 flicker, 2 random walk.

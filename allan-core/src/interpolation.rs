@@ -123,12 +123,12 @@ impl<F: Real> AddedVariance<F> {
 
 /// Factor on the degrees of freedom of a measured variance of which `subtracted` was taken and `left` remains: the scatter
 /// is the same, the value smaller.
-pub(crate) fn subtraction_factor(left: f64, subtracted: f64) -> f64 {
-    if subtracted > 0.0 {
+pub(crate) fn subtraction_factor<F: Real>(left: F, subtracted: F) -> F {
+    if subtracted > F::ZERO {
         let share = left / (left + subtracted);
         share * share
     } else {
-        1.0
+        F::constant(1.0)
     }
 }
 

@@ -18,21 +18,36 @@
 //! | `abs` | 0 | 18, 20 | 0 | 13, 20 |
 //! | `ln_gamma` | 8e-15 | 4990, 13796 | — | — |
 
+use core::cmp::Ordering;
 use core::f64::consts::FRAC_2_PI;
-use core::ops::{Add, Div, Mul, Sub};
+use core::iter::Sum;
+use core::ops::{Add, AddAssign, Div, Mul, Sub};
 
 /// A floating-point number: double precision for what is reported, single precision where its seven digits are enough and
 /// the soft double-precision arithmetic of small processors would not be linked otherwise.
 pub(crate) trait Real:
-    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy + PartialOrd + Add<Output = Self> + AddAssign + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Sum
 {
+    const ZERO: Self;
+    /// Relative size below which the difference of two sums of a few dozen numbers counts as a rounding error.
+    const ROUNDING: Self;
+
     /// A constant, rounded to nearest.
     fn constant(value: f64) -> Self;
     fn from_integer(value: u128) -> Self;
     fn from_word(value: u64) -> Self;
+    fn from_single(value: f32) -> Self;
+    fn single(self) -> f32;
+    fn double(self) -> f64;
+    fn sqrt(self) -> Self;
+    /// As `f64::total_cmp`.
+    fn order(&self, other: &Self) -> Ordering;
 }
 
 impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const ROUNDING: Self = 1e-12;
+
     fn constant(value: f64) -> Self {
         value
     }
@@ -44,9 +59,32 @@ impl Real for f64 {
     fn from_word(value: u64) -> Self {
         value as Self
     }
+
+    fn from_single(value: f32) -> Self {
+        value.into()
+    }
+
+    fn single(self) -> f32 {
+        self as f32
+    }
+
+    fn double(self) -> f64 {
+        self
+    }
+
+    fn sqrt(self) -> Self {
+        sqrt(self)
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
 }
 
 impl Real for f32 {
+    const ZERO: Self = 0.0;
+    const ROUNDING: Self = 2e-6;
+
     #[inline(always)] // so that the conversion happens at compile time
     fn constant(value: f64) -> Self {
         value as Self
@@ -59,6 +97,26 @@ impl Real for f32 {
     fn from_word(value: u64) -> Self {
         value as Self
     }
+
+    fn from_single(value: f32) -> Self {
+        value
+    }
+
+    fn single(self) -> f32 {
+        self
+    }
+
+    fn double(self) -> f64 {
+        self.into()
+    }
+
+    fn sqrt(self) -> Self {
+        sqrtf(self)
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
 }
 
 /// `x·2^exponent` without arithmetic; `x` itself if it is 0, subnormal, infinite or not a number.
@@ -70,6 +128,20 @@ pub(crate) fn times_power_of_two(x: f64, exponent: u32) -> f64 {
 
 pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
+}
+
+/// √x with a relative error below 2⁻²², without arithmetic in double precision: 0 for a subnormal `x`, and `x` itself if it is
+/// negative, infinite or not a number.
+pub(crate) fn sqrt_in_single(x: f64) -> f64 {
+    let bits = x.to_bits();
+    let known = bits >> 52;
+    if known == 0 || known >= 0x7ff {
+        return if known == 0 { 0.0 } else { x };
+    }
+    // x = m·4^half with 1 ≤ m < 4. Exponents are stored with an offset of 1023.
+    let half = ((known + 1) / 2).wrapping_sub(512);
+    let root = sqrtf(f64::from_bits(bits.wrapping_sub(half << 53)) as f32);
+    f64::from_bits(f64::from(root).to_bits().wrapping_add(half << 52))
 }
 
 pub(crate) fn sqrtf(x: f32) -> f32 {
@@ -102,7 +174,7 @@ pub(crate) fn exp(x: f64) -> f64 {
 }
 
 /// As `f64::clamp`, but without its panic, whose message formatting takes 12 kB of flash.
-pub(crate) fn clamp(x: f64, low: f64, high: f64) -> f64 {
+pub(crate) fn clamp<F: Real>(x: F, low: F, high: F) -> F {
     if x < low {
         low
     } else if x > high {
@@ -172,6 +244,16 @@ fn series(square: f64, ratios: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn the_square_root_in_single_precision_has_its_digits_over_the_whole_range() {
+        for k in -10_000..=10_000 {
+            let x = (f64::from(k) / 10.0).exp2();
+            let (found, exact) = (super::sqrt_in_single(x), x.sqrt());
+            assert!((found / exact - 1.0).abs() < 2.0_f64.powi(-22), "{x}: {found} and {exact}");
+        }
+        assert_eq!([0.0, f64::MIN_POSITIVE / 2.0, f64::INFINITY].map(super::sqrt_in_single), [0.0, 0.0, f64::INFINITY]);
+    }
+
     #[test]
     fn the_coarse_logarithm_is_within_0_2() {
         let worst =

@@ -2,7 +2,8 @@
 //! from a measured curve.
 
 use crate::curve::{AllanPoint, CurveView};
-use crate::math::{abs, clamp, exp, ln, sqrt};
+use crate::interpolation::subtraction_factor;
+use crate::math::{Real, abs, clamp, exp, ln, sqrt};
 use crate::noise_type::VarianceFractions;
 use crate::term::{AllTerms, MAX_SHAPE, NoiseTerm, TermSet};
 use core::mem::discriminant;
@@ -156,15 +157,15 @@ pub(crate) fn variance_fractions<T: TermSet>(
     n: u64,
     sample_period: f64,
 ) -> VarianceFractions {
-    let mut fractions = VarianceFractions { white: 0.0, ..VarianceFractions::WHITE };
+    let mut sums = [T::Real::ZERO; 4];
     for (kind, part) in parts {
-        let share = T::share(&kind, part, n, sample_period);
-        fractions.white += share.white;
-        fractions.flicker += share.flicker;
-        fractions.random_walk += share.random_walk;
-        fractions.quantization += share.quantization;
+        let VarianceFractions { white, flicker, random_walk, quantization } = T::share(&kind, part, n, sample_period);
+        for (sum, share) in sums.iter_mut().zip([white, flicker, random_walk, quantization]) {
+            *sum += T::Real::constant(share);
+        }
     }
-    fractions
+    let [white, flicker, random_walk, quantization] = sums.map(T::Real::double);
+    VarianceFractions { white, flicker, random_walk, quantization }
 }
 
 /// Distance of a model from a measured curve over the octaves with `n ≤ M/8` of a curve of `M` samples. `v` is the
@@ -247,16 +248,18 @@ const MAX_LAGS: usize = 4 * MAX_OVERLAP as usize + 1;
 /// [`confidence`]: crate::confidence
 #[inline(never)] // its stack frame would otherwise be part of every caller's
 pub(crate) fn degrees_of_freedom<T: TermSet>(
-    parts: &[(NoiseTerm, f64)],
+    parts: &[(NoiseTerm, T::Real)],
     point: &AllanPoint,
     sample_period: f64,
     flicker: &FlickerCorrelations,
-) -> (f64, f64) {
+) -> (T::Real, T::Real) {
     let overlap = point.overlap.min(MAX_OVERLAP);
-    let count = point.count as f64 * f64::from(overlap) / f64::from(point.overlap);
+    let [one, two] = [1.0, 2.0].map(T::Real::from_single);
+    let whole = |number: u32| T::Real::from_word(number.into());
+    let count = T::Real::from_word(point.count) * whole(overlap) / whole(point.overlap);
     let reach = |times: u32| (u64::from(times * overlap).min(point.count.saturating_sub(1))) as usize + 1;
     let (mut noise, mut deterministic) = ([0.0_f32; MAX_LAGS], [0.0_f32; MAX_LAGS]);
-    let mut far = 0.0;
+    let mut far = T::Real::ZERO;
     for (kind, share) in parts {
         let sums = match kind {
             NoiseTerm::BiasInstability => &mut noise[..reach(4)],
@@ -265,17 +268,20 @@ pub(crate) fn degrees_of_freedom<T: TermSet>(
             _ => &mut noise[..reach(2)],
         };
         match kind {
-            NoiseTerm::BiasInstability => flicker.add::<T>(*share as f32, overlap, sums),
-            kind => add_correlations::<T>(kind, *share as f32, point.n, overlap, sample_period, sums),
+            NoiseTerm::BiasInstability => flicker.add::<T>(share.single(), overlap, sums),
+            kind => add_correlations::<T>(kind, share.single(), point.n, overlap, sample_period, sums),
         }
-        let stride = point.n as f64 / f64::from(overlap);
-        far += 2.0 * share * share * T::squared_covariance_tail(kind, point.n, stride, sample_period);
+        let stride = T::Real::from_word(point.n) / whole(overlap);
+        far += two * *share * *share * T::squared_covariance_tail(kind, point.n, stride, sample_period);
     }
-    let pairs = noise.iter().zip(&deterministic).map(|(noise, fixed)| f64::from(noise * (noise + 2.0 * fixed)));
-    let weight = |lag: usize| if lag == 0 { 1.0 } else { 2.0 * (1.0 - lag as f64 / count) };
-    let near: f64 = pairs.enumerate().map(|(lag, pair)| if pair == 0.0 { 0.0 } else { weight(lag) * pair }).sum();
-    let factor = point.subtraction_factor();
-    let edf = |pairs: f64| clamp(factor * count / pairs, 1.0_f64.min(count), 1e18);
+    let pairs =
+        noise.iter().zip(&deterministic).map(|(noise, fixed)| T::Real::from_single(noise * (noise + 2.0 * fixed)));
+    let weight = |lag: usize| if lag == 0 { one } else { two * (one - T::Real::from_word(lag as u64) / count) };
+    let weighted = |(lag, pair): (usize, T::Real)| if pair == T::Real::ZERO { pair } else { weight(lag) * pair };
+    let near: T::Real = pairs.enumerate().map(weighted).sum();
+    let factor = subtraction_factor(T::Real::constant(point.avar), T::Real::constant(point.interpolation));
+    let least = if count < one { count } else { one };
+    let edf = |pairs: T::Real| clamp(factor * count / pairs, least, T::Real::constant(1e18));
     (edf(near + far), edf(near))
 }
 
@@ -329,17 +335,20 @@ fn add_correlations<T: TermSet>(
     sums: &mut [f32],
 ) {
     let width = overlap as usize;
-    let mut table = [0.0; MAX_LAGS + 2 * MAX_OVERLAP as usize];
+    let mut table = [T::Real::ZERO; MAX_LAGS + 2 * MAX_OVERLAP as usize];
     let Some(v) = table.get_mut(..sums.len() + 2 * width) else { return };
-    T::sum_variances(kind, n as f64 / f64::from(overlap), sample_period, v);
+    T::sum_variances(kind, n, overlap, sample_period, v);
+    let [four, six] = [4.0, 6.0].map(T::Real::from_single);
     // The covariances are these fourth differences times `−1/(4n²)`.
     let fourth = |lag: usize| {
-        6.0 * v[lag] - 4.0 * (v[lag.abs_diff(width)] + v[lag + width]) + v[lag.abs_diff(2 * width)] + v[lag + 2 * width]
+        six * v[lag] - four * (v[lag.abs_diff(width)] + v[lag + width])
+            + v[lag.abs_diff(2 * width)]
+            + v[lag + 2 * width]
     };
     let whole = fourth(0);
-    if whole < 0.0 {
+    if whole < T::Real::ZERO {
         for (lag, sum) in sums.iter_mut().enumerate() {
-            *sum += share * clamp(fourth(lag) / whole, -1.0, 1.0) as f32;
+            *sum += share * clamp((fourth(lag) / whole).single(), -1.0, 1.0);
         }
     }
 }

@@ -5,6 +5,7 @@
 //! no sequence of samples leads to; the error says which.
 
 use crate::math::is_finite;
+use core::convert::Infallible;
 use core::fmt;
 use core::marker::PhantomData;
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
@@ -49,7 +50,28 @@ pub(crate) fn serialize<S: StateWords, Z: Serializer>(state: &S, serializer: Z) 
 }
 
 pub(crate) fn deserialize<'de, S: StateWords, D: Deserializer<'de>>(deserializer: D) -> Result<S, D::Error> {
-    deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor(PhantomData))
+    let mut state = S::EMPTY;
+    deserialize_in_place(deserializer, &mut state)?;
+    Ok(state)
+}
+
+/// Replaces `state`, whatever it was, without a second one on the stack; after an error it is that of no samples.
+pub(crate) fn deserialize_in_place<'de, S: StateWords, D: Deserializer<'de>>(
+    deserializer: D,
+    state: &mut S,
+) -> Result<(), D::Error> {
+    deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor(Some(&mut *state))).inspect_err(|_| {
+        // As `EMPTY`, which would be built on the stack first.
+        let Ok(()) = state.visit_words(|word| {
+            *word = 0;
+            Ok::<_, Infallible>(())
+        });
+    })
+}
+
+/// Checks all but the meaning of the words, and keeps none of them.
+pub(crate) fn check<'de, S: StateWords, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
+    deserializer.deserialize_tuple(S::WORDS + 2, StateVisitor::<S>(None))
 }
 
 fn started_digest<S: StateWords>() -> Digest<'static, u32> {
@@ -58,53 +80,64 @@ fn started_digest<S: StateWords>() -> Digest<'static, u32> {
     digest
 }
 
-struct StateVisitor<S>(PhantomData<S>);
+/// Reads a state, and keeps it if there is a place for it.
+struct StateVisitor<'a, S>(Option<&'a mut S>);
 
-impl<'de, S: StateWords> Visitor<'de> for StateVisitor<S> {
-    type Value = S;
+impl<'de, S: StateWords> Visitor<'de> for StateVisitor<'_, S> {
+    type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let [version, kind, octaves, overlap] = header::<S>();
-        write!(f, "an estimator's state: version {version}, type {kind}, {octaves} octaves, {overlap}-fold overlap")
+        fmt::Display::fmt(&Expected::<S>(PhantomData), f)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut words: A) -> Result<S, A::Error> {
-        let short = |at: usize| de::Error::invalid_length(at, &self);
+    fn visit_seq<A: SeqAccess<'de>>(self, mut words: A) -> Result<(), A::Error> {
+        let expected = Expected::<S>(PhantomData);
+        let short = |at: usize| <A::Error as de::Error>::invalid_length(at, &expected);
         let found = words.next_element::<u32>()?.ok_or_else(|| short(0))?;
         if found != u32::from_be_bytes(header::<S>()) {
             let [version, kind, octaves, overlap] = found.to_be_bytes();
             return Err(de::Error::custom(format_args!(
-                "version {version}, type {kind}, {octaves} octaves, {overlap}-fold overlap where there should be {}",
-                Expected(&self)
+                "version {version}, type {kind}, {octaves} octaves, {overlap}-fold overlap where there should be {expected}"
             )));
         }
-        let mut state = S::EMPTY;
+        let Self(mut state) = self;
         let mut digest = started_digest::<S>();
         let mut at = 1;
-        state.visit_words(|word| {
-            *word = words.next_element()?.ok_or_else(|| short(at))?;
+        let mut next = || -> Result<u64, A::Error> {
+            let word: u64 = words.next_element()?.ok_or_else(|| short(at))?;
             digest.update(&word.to_le_bytes());
             at += 1;
-            Ok(())
-        })?;
+            Ok(word)
+        };
+        match &mut state {
+            Some(state) => state.visit_words(|word| next().map(|next| *word = next))?,
+            None => (0..S::WORDS).try_for_each(|_| next().map(drop))?,
+        }
         let checksum: u32 = words.next_element()?.ok_or_else(|| short(at))?;
         if checksum != digest.finalize() {
             return Err(de::Error::custom("an estimator's state with a wrong checksum"));
         }
-        match state.inconsistency() {
+        match state.and_then(|state| state.inconsistency()) {
             Some(reason) => {
                 Err(de::Error::custom(format_args!("an estimator's state that no samples lead to: {reason}")))
             }
-            None => Ok(state),
+            None => Ok(()),
         }
     }
 }
 
-struct Expected<'a, S>(&'a StateVisitor<S>);
+struct Expected<S>(PhantomData<S>);
 
-impl<S: StateWords> fmt::Display for Expected<'_, S> {
+impl<S: StateWords> fmt::Display for Expected<S> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.0.expecting(f)
+        let [version, kind, octaves, overlap] = header::<S>();
+        write!(f, "an estimator's state: version {version}, type {kind}, {octaves} octaves, {overlap}-fold overlap")
+    }
+}
+
+impl<S: StateWords> de::Expected for Expected<S> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

@@ -98,7 +98,6 @@ macro_rules! with_process {
         }
     };
 }
-use with_process;
 
 impl NoiseTerm {
     /// The terms of the baseline model: N, B, K.

@@ -153,10 +153,39 @@ fn the_error_states_the_type_and_size_of_another_state() {
 
 #[test]
 fn an_estimator_without_samples_is_all_zeros() {
+    fn words(state: impl Serialize) -> Vec<u64> {
+        let words: Vec<u64> = serde_json::from_str(&serde_json::to_string(&state).unwrap()).unwrap();
+        words[1..words.len() - 1].to_vec()
+    }
     // A firmware's statics then lie in memory that is cleared at the start, and take no flash.
-    let state = serde_json::to_string(&Cascade::<24, 8>::new()).unwrap();
-    let words: Vec<u64> = serde_json::from_str(&state).unwrap();
-    assert!(words[1..words.len() - 1].iter().all(|&word| word == 0), "{words:?}");
+    for words in [
+        words(Cascade::<24, 8>::new()),
+        words(Coupling::<OCTAVES>::new()),
+        words(Hadamard::<OCTAVES, 8>::new()),
+        words(FractionalOctaves::<OCTAVES, 8>::new()),
+    ] {
+        assert!(!words.is_empty() && words.iter().all(|&word| word == 0), "{words:?}");
+    }
+}
+
+#[test]
+fn a_state_that_is_deserialised_in_place_replaces_the_one_before_or_leaves_an_empty_one() {
+    let read = |bytes: &[u8], place: &mut Cascade<OCTAVES, 8>| {
+        place.read_serialized(&mut postcard::Deserializer::from_bytes(bytes))
+    };
+    let check = |bytes: &[u8]| Cascade::<OCTAVES, 8>::check_serialized(&mut postcard::Deserializer::from_bytes(bytes));
+    let saved = Estimators::from_samples(&[(5, 0), (-3, 0), (9, 0)]).a;
+    let mut place = Estimators::from_samples(&[(1, 0); 200]).a;
+    let bytes = postcard::to_stdvec(&saved).unwrap();
+    assert_eq!((check(&bytes), read(&bytes, &mut place)), (Ok(()), Ok(())));
+    assert_eq!(place, saved);
+    let last = bytes.len() - 1;
+    let changed = [&bytes[..last], &[bytes[last] ^ 1]].concat();
+    for wrong in [&bytes[..last], &changed[..], &[], &bytes[1..]] {
+        let mut place = saved.clone();
+        assert!(check(wrong).is_err() && read(wrong, &mut place).is_err());
+        assert_eq!(place, Cascade::new());
+    }
 }
 
 /// The words of a state with one of them replaced and a correct checksum.

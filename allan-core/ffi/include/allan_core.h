@@ -446,7 +446,7 @@ enum allan_status allan_24_8_save(const struct allan_24_8 *estimator,
 
 /**
  * Replaces the state of an initialised estimator by a saved one, which continues to the bit. The estimator stays as it was
- * if the state is refused.
+ * if the state is refused, unless it has a correct checksum over sums that no samples lead to: then it is empty.
  *
  * # Safety
  * As `allan_24_8_push`; `state` is null or points to `length` bytes.
@@ -548,7 +548,7 @@ enum allan_status allan_20_4_save(const struct allan_20_4 *estimator,
 
 /**
  * Replaces the state of an initialised estimator by a saved one, which continues to the bit. The estimator stays as it was
- * if the state is refused.
+ * if the state is refused, unless it has a correct checksum over sums that no samples lead to: then it is empty.
  *
  * # Safety
  * As `allan_20_4_push`; `state` is null or points to `length` bytes.
@@ -556,6 +556,21 @@ enum allan_status allan_20_4_save(const struct allan_20_4 *estimator,
 enum allan_status allan_20_4_restore(struct allan_20_4 *estimator,
                                      const uint8_t *state,
                                      size_t length);
+
+/**
+ * Sets `count` to the count of a value in a unit: `(value - origin)/lsb`, rounded to nearest, ties up.
+ *
+ * `origin` is best near the mean of the values: the Allan variance does not depend on it. An `lsb` of a quarter of the
+ * standard deviation of the noise, or less, costs nothing that matters; give it to the functions that make a curve.
+ * `ALLAN_ERROR_RANGE` if the value is not finite or more than 2^31 counts from the origin, or `lsb` is not positive.
+ *
+ * # Safety
+ * `count` is null or points to a number that the caller may write.
+ */
+enum allan_status allan_count(double value,
+                              double origin,
+                              double lsb,
+                              int32_t *count);
 
 /**
  * Number of points; 0 if `curve` is not a curve.

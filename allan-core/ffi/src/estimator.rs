@@ -111,6 +111,9 @@ where
     check(state)?;
     // SAFETY: as the caller promises.
     let state = unsafe { elements(state, length)? };
-    *estimator = postcard::from_bytes(state).map_err(|_| ALLAN_ERROR_STATE)?;
-    Ok(())
+    let words = || postcard::Deserializer::from_bytes(state);
+    let refused = |_| ALLAN_ERROR_STATE;
+    Estimator::<OCTAVES, OVERLAP>::check_serialized(&mut words()).map_err(refused)?;
+    // In place: another estimator on the stack would be too much for many a microcontroller.
+    estimator.read_serialized(&mut words()).map_err(refused)
 }

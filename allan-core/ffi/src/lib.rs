@@ -7,12 +7,17 @@
 #![cfg_attr(target_os = "none", no_std)]
 #![allow(non_camel_case_types)] // the names are those of C
 #![allow(unreachable_pub)] // called from C
+#![deny(clippy::undocumented_unsafe_blocks)]
 
-mod cascade_20_4;
+/// The estimator with 20 octaves and 4-fold overlap: made by `build.rs` of the larger one.
+mod cascade_20_4 {
+    include!(concat!(env!("OUT_DIR"), "/cascade_20_4.rs"));
+}
 mod cascade_24_8;
 mod curve;
 mod estimator;
 mod model;
+mod quantizer;
 mod status;
 mod storage;
 mod trace;

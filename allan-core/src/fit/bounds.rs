@@ -10,7 +10,7 @@ use super::likelihood::{MAX_PARAMETERS, MAX_POINTS, Points, Problem};
 use super::shape::{FreeShapes, Parameter};
 use crate::confidence::NORMAL_975;
 use crate::curve::CurveView;
-use crate::math::{absf, exp, sqrt, sqrtf};
+use crate::math::{Real, absf, exp, sqrtf};
 use crate::model::{MAX_TERMS, Model};
 use crate::term::TermSet;
 
@@ -59,7 +59,7 @@ pub(crate) fn set_free<T: TermSet>(curve: CurveView, model: &mut Model, free: Fr
                 let low = if low <= amount { low } else { 0.0 };
                 let high = if high >= amount { high } else { largest(candidates.points, candidates.problem, term) };
                 let high = high.max(amount);
-                let coefficient = |amount: f32| sqrt(f64::from(amount) * problem.units[term]);
+                let coefficient = |amount: f32| T::sqrt(f64::from(amount) * problem.units[term]);
                 let set = &mut model.terms_mut()[term];
                 (set.low, set.high) = (coefficient(low), coefficient(high));
                 if problem.amounts != estimate {
@@ -84,7 +84,7 @@ pub(crate) fn set_free<T: TermSet>(curve: CurveView, model: &mut Model, free: Fr
 fn leave_open<T: TermSet>(points: &Points, problem: &Problem<T>, model: &mut Model) {
     for (term, set) in model.terms_mut().iter_mut().enumerate() {
         let amount = largest(points, problem, term).max(problem.amounts[term]);
-        (set.low, set.high) = (0.0, sqrt(f64::from(amount) * problem.units[term]));
+        (set.low, set.high) = (0.0, T::sqrt(f64::from(amount) * problem.units[term]));
     }
 }
 
@@ -151,18 +151,20 @@ fn direction<T: TermSet>(
     column: usize,
     weights: &mut [f32; MAX_POINTS],
 ) -> Option<[f32; MAX_PARAMETERS]> {
-    let mut information = [0.0_f64; triangle(MAX_PARAMETERS)];
+    let mut information = [T::Real::ZERO; triangle(MAX_PARAMETERS)];
     for (at, (weight, point)) in weights.iter_mut().zip(&points.measured).enumerate() {
         *weight = sqrtf(point.edf / 2.0) / problem.modelled(at, &problem.amounts);
         for i in 0..parameters {
             let weighted = *weight * *weight * problem.columns[i][at];
-            (0..=i).for_each(|j| information[entry(i, j)] += f64::from(weighted) * f64::from(problem.columns[j][at]));
+            for (j, column) in problem.columns[..=i].iter().enumerate() {
+                information[entry(i, j)] += T::Real::from_single(weighted) * T::Real::from_single(column[at]);
+            }
         }
     }
-    let mut direction = [0.0; MAX_PARAMETERS];
-    direction[column] = 1.0;
+    let mut direction = [T::Real::ZERO; MAX_PARAMETERS];
+    direction[column] = T::Real::from_single(1.0);
     solve(&mut information, &mut direction, (1 << parameters) - 1)?;
-    let direction = direction.map(|entry| entry as f32);
+    let direction = direction.map(T::Real::single);
     for (at, weight) in weights.iter_mut().enumerate() {
         *weight *= direction.iter().zip(&problem.columns).map(|(x, column)| x * column[at]).sum::<f32>();
     }

@@ -2,7 +2,7 @@
 //!
 //! Symmetric matrices are stored as their lower triangle, row by row.
 
-use crate::math::sqrt;
+use crate::math::Real;
 
 /// Largest number of unknowns.
 pub(crate) const MOST: usize = 12;
@@ -17,31 +17,28 @@ pub(crate) const fn entry(i: usize, j: usize) -> usize {
     if i < j { triangle(j) + i } else { triangle(i) + j }
 }
 
-/// Relative size below which a gradient, or the remainder of a pivot, counts as a rounding error.
-const ROUNDING: f64 = 1e-12;
-
 /// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns, starting from the given `x ≥ 0`.
 ///
 /// The active-set method of C. Lawson and R. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
-pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
-    a: &[f64; TRIANGLE],
-    b: &[f64; N],
+pub(crate) fn non_negative<F: Real, const N: usize, const TRIANGLE: usize>(
+    a: &[F; TRIANGLE],
+    b: &[F; N],
     count: usize,
-    x: &mut [f64; N],
+    x: &mut [F; N],
 ) {
-    let mut free = (0..count).filter(|&i| x[i] > 0.0).fold(0, |free, i| free | 1 << i);
+    let mut free = (0..count).filter(|&i| x[i] > F::ZERO).fold(0, |free, i| free | 1 << i);
     let mut refused = 0_usize;
     match minimise_free(a, b, x, free) {
         Some(set) => free = set,
-        None => (*x, free) = ([0.0; N], 0),
+        None => (*x, free) = ([F::ZERO; N], 0),
     }
     // Each round lowers the objective, so no set of free unknowns recurs, except by rounding: hence the limit.
     for _ in 0..4 * N {
-        let along = |i: usize| (0..count).map(|j| a[entry(i, j)] * x[j]).sum::<f64>();
-        let gradient = |i: usize| (b[i] - along(i)) / sqrt(a[entry(i, i)]);
-        let candidates = (0..count).filter(|&i| (free | refused) >> i & 1 == 0 && a[entry(i, i)] > 0.0);
-        let Some(entering) = candidates.max_by(|&i, &j| gradient(i).total_cmp(&gradient(j))) else { break };
-        if gradient(entering) <= ROUNDING * b[entering] / sqrt(a[entry(entering, entering)]) {
+        let along = |i: usize| (0..count).map(|j| a[entry(i, j)] * x[j]).sum::<F>();
+        let gradient = |i: usize| (b[i] - along(i)) / a[entry(i, i)].sqrt();
+        let candidates = (0..count).filter(|&i| (free | refused) >> i & 1 == 0 && a[entry(i, i)] > F::ZERO);
+        let Some(entering) = candidates.max_by(|&i, &j| gradient(i).order(&gradient(j))) else { break };
+        if gradient(entering) <= F::ROUNDING * b[entering] / a[entry(entering, entering)].sqrt() {
             break;
         }
         let before = *x;
@@ -49,7 +46,7 @@ pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
             Some(set) => free = set,
             None => *x = before,
         }
-        if x[entering] <= 0.0 {
+        if x[entering] <= F::ZERO {
             refused |= 1 << entering;
         }
     }
@@ -57,26 +54,27 @@ pub(crate) fn non_negative<const N: usize, const TRIANGLE: usize>(
 
 /// Moves `x` to the minimum over the unknowns in the bit set `free`, removing from the set each one that would turn
 /// negative. Returns the remaining set; `None` if the matrix is singular.
-fn minimise_free<const N: usize, const TRIANGLE: usize>(
-    a: &[f64; TRIANGLE],
-    b: &[f64; N],
-    x: &mut [f64; N],
+fn minimise_free<F: Real, const N: usize, const TRIANGLE: usize>(
+    a: &[F; TRIANGLE],
+    b: &[F; N],
+    x: &mut [F; N],
     mut free: usize,
 ) -> Option<usize> {
     while free != 0 {
         let (mut used, mut target) = (*a, *b);
         solve(&mut used, &mut target, free)?;
-        let blocking = |i: &usize| free >> i & 1 == 1 && target[*i] <= 0.0;
-        let reach = |i: usize| if x[i] > target[i] { x[i] / (x[i] - target[i]) } else { 0.0 };
-        let Some(first) = (0..N).filter(blocking).min_by(|&i, &j| reach(i).total_cmp(&reach(j))) else {
+        let blocking = |i: &usize| free >> i & 1 == 1 && target[*i] <= F::ZERO;
+        let reach = |i: usize| if x[i] > target[i] { x[i] / (x[i] - target[i]) } else { F::ZERO };
+        let Some(first) = (0..N).filter(blocking).min_by(|&i, &j| reach(i).order(&reach(j))) else {
             *x = target;
             break;
         };
         let step = reach(first);
         for (i, entry) in x.iter_mut().enumerate().filter(|(i, _)| free >> i & 1 == 1) {
-            *entry = (*entry + step * (target[i] - *entry)).max(0.0);
+            let moved = *entry + step * (target[i] - *entry);
+            *entry = if moved > F::ZERO { moved } else { F::ZERO };
         }
-        x[first] = 0.0;
+        x[first] = F::ZERO;
         free &= !(1 << first);
     }
     Some(free)
@@ -88,33 +86,33 @@ fn minimise_free<const N: usize, const TRIANGLE: usize>(
 /// By Cholesky decomposition of the matrix scaled to a unit diagonal, as the unknowns may differ by orders of magnitude.
 /// `None` if the matrix is singular.
 #[inline(never)] // one copy for all sizes
-pub(crate) fn solve(a: &mut [f64], x: &mut [f64], set: usize) -> Option<()> {
+pub(crate) fn solve<F: Real>(a: &mut [F], x: &mut [F], set: usize) -> Option<()> {
     let chosen = |i: &usize| set >> i & 1 == 1;
     let count = x.len();
-    let mut scale = [0.0; MOST];
+    let mut scale = [F::ZERO; MOST];
     for i in 0..count {
-        scale[i] = 1.0 / sqrt(a[entry(i, i)]);
-        x[i] = if chosen(&i) { x[i] * scale[i] } else { 0.0 };
+        scale[i] = F::constant(1.0) / a[entry(i, i)].sqrt();
+        x[i] = if chosen(&i) { x[i] * scale[i] } else { F::ZERO };
     }
     for i in (0..count).filter(chosen) {
         for j in (0..=i).filter(chosen) {
-            let known: f64 = (0..j).filter(chosen).map(|k| a[entry(i, k)] * a[entry(j, k)]).sum();
+            let known: F = (0..j).filter(chosen).map(|k| a[entry(i, k)] * a[entry(j, k)]).sum();
             let rest = a[entry(i, j)] * scale[i] * scale[j] - known;
             if i != j {
                 a[entry(i, j)] = rest / a[entry(j, j)];
-            } else if rest > ROUNDING {
-                a[entry(i, i)] = sqrt(rest);
+            } else if rest > F::ROUNDING {
+                a[entry(i, i)] = rest.sqrt();
             } else {
                 return None; // singular, or not a number
             }
         }
-        let known: f64 = (0..i).filter(chosen).map(|k| a[entry(i, k)] * x[k]).sum();
+        let known: F = (0..i).filter(chosen).map(|k| a[entry(i, k)] * x[k]).sum();
         x[i] = (x[i] - known) / a[entry(i, i)];
     }
     for i in (0..count).rev().filter(chosen) {
-        let known: f64 = (i + 1..count).filter(chosen).map(|k| a[entry(k, i)] * x[k]).sum();
+        let known: F = (i + 1..count).filter(chosen).map(|k| a[entry(k, i)] * x[k]).sum();
         x[i] = (x[i] - known) / a[entry(i, i)];
     }
-    x.iter_mut().zip(scale).enumerate().filter(|(i, _)| chosen(i)).for_each(|(_, (x, scale))| *x *= scale);
+    x.iter_mut().zip(scale).enumerate().filter(|(i, _)| chosen(i)).for_each(|(_, (x, scale))| *x = *x * scale);
     Some(())
 }

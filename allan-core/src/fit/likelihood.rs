@@ -2,12 +2,13 @@
 //!
 //! Modelled variances are relative to the measured ones, and each term is scaled so that its largest contribution to a
 //! point is 1 for an amount of 1. Single precision is enough: its rounding of 10⁻⁷ is far below the statistical
-//! uncertainty, 10⁻⁴ at best. Only the normal equations, which square the condition number, use double precision.
+//! uncertainty, 10⁻⁴ at best. Only the normal equations, which square the condition number, use double precision: but for
+//! power laws, whose pivots are above 10⁻⁴ of the diagonal, also where one of them dominates everywhere.
 
 use super::least_squares::{MOST, entry, non_negative, triangle};
 use crate::confidence::{pure_octave_correlation, roots};
 use crate::curve::{AllanPoint, CurveView};
-use crate::math::{absf, lnf, sqrt, sqrtf};
+use crate::math::{Real, absf, lnf, sqrtf};
 use crate::model::{FittedTerm, FlickerCorrelations, MAX_TERMS, Model, degrees_of_freedom, variance_fractions};
 use crate::noise_type::VarianceFractions;
 use crate::term::{NoiseTerm, TermSet};
@@ -59,7 +60,7 @@ impl<'a> Points<'a> {
             octave: lnf(point.n as f32) / LN_2,
             edf: point.edf as f32,
             near: 1.0,
-            roots: roots(VarianceFractions::WHITE).map(|root| root as f32),
+            roots: roots::<T::Real>(VarianceFractions::WHITE).map(T::Real::single),
         }));
     }
 
@@ -75,11 +76,11 @@ impl<'a> Points<'a> {
 
     /// Sets the degrees of freedom of a point, with and without the long-lasting correlations of narrow-band terms, and its
     /// variance fractions.
-    fn set(&mut self, at: usize, (edf, near_edf): (f64, f64), fractions: VarianceFractions) {
+    fn set<F: Real>(&mut self, at: usize, (edf, near_edf): (F, F), fractions: VarianceFractions) {
         let measured = &mut self.measured[at];
-        measured.edf = edf as f32;
-        measured.near = (edf / near_edf) as f32;
-        measured.roots = roots(fractions).map(|root| root as f32);
+        measured.edf = edf.single();
+        measured.near = (edf / near_edf).single();
+        measured.roots = roots::<F>(fractions).map(F::single);
     }
 
     /// Variances of the sums `Σ weights·residual` of standardised residuals.
@@ -183,11 +184,16 @@ impl<T: TermSet> Problem<T> {
         let period = points.curve.sample_period();
         for at in 0..points.measured.len() {
             let modelled = self.modelled(at, &self.amounts);
-            let part = |term: usize| f64::from(self.amounts[term] * self.columns[term][at] / modelled);
+            let part = |term: usize| T::Real::from_single(self.amounts[term] * self.columns[term][at] / modelled);
             let present = (0..self.kinds.len()).filter(|&term| self.amounts[term] > 0.0);
-            let parts: Vec<(NoiseTerm, f64), MAX_TERMS> = present.map(|term| (self.kinds[term], part(term))).collect();
+            let parts: Vec<(NoiseTerm, T::Real), MAX_TERMS> =
+                present.map(|term| (self.kinds[term], part(term))).collect();
             let point = points.point(at);
-            let fractions = variance_fractions::<T>(parts.iter().copied(), point.n, period);
+            let fractions = variance_fractions::<T>(
+                parts.iter().map(|&(kind, part)| (kind, part.single().into())),
+                point.n,
+                period,
+            );
             let edf = degrees_of_freedom::<T>(&parts, point, period, &points.flicker);
             points.set(at, edf, fractions);
         }
@@ -279,23 +285,23 @@ impl<T: TermSet> Problem<T> {
     /// One step of Fisher scoring: non-negative least squares with weights from the modelled or from the measured variances.
     #[inline(never)]
     fn scoring_step(&self, points: &Points, modelled: bool) -> [f32; MAX_TERMS] {
-        let mut normal = [0.0_f64; triangle(MAX_TERMS)];
-        let mut right = [0.0_f64; MAX_TERMS];
+        let mut normal = [T::Real::ZERO; triangle(MAX_TERMS)];
+        let mut right = [T::Real::ZERO; MAX_TERMS];
         let terms = self.kinds.len();
         for (at, point) in points.measured.iter().enumerate() {
             let variance = if modelled { self.modelled(at, &self.amounts) } else { 1.0 };
             let weight = point.edf / 2.0 / (variance * variance);
             for i in 0..terms {
-                let weighted = f64::from(weight) * f64::from(self.columns[i][at]);
+                let weighted = T::Real::from_single(weight) * T::Real::from_single(self.columns[i][at]);
                 right[i] += weighted;
                 for j in 0..=i {
-                    normal[entry(i, j)] += weighted * f64::from(self.columns[j][at]);
+                    normal[entry(i, j)] += weighted * T::Real::from_single(self.columns[j][at]);
                 }
             }
         }
-        let mut solution = self.amounts.map(f64::from);
+        let mut solution = self.amounts.map(T::Real::from_single);
         non_negative(&normal, &right, terms, &mut solution);
-        solution.map(|amount| amount as f32)
+        solution.map(T::Real::single)
     }
 
     /// The squared coefficient of a term.
@@ -305,7 +311,7 @@ impl<T: TermSet> Problem<T> {
 
     /// The terms with their coefficients, without bounds.
     pub(super) fn terms(&self) -> impl Iterator<Item = FittedTerm> {
-        self.kinds.iter().enumerate().map(|(term, &kind)| FittedTerm::exact(kind, sqrt(self.square(term))))
+        self.kinds.iter().enumerate().map(|(term, &kind)| FittedTerm::exact(kind, T::sqrt(self.square(term))))
     }
 }
 

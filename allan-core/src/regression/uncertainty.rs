@@ -43,7 +43,7 @@ impl OctaveWeight {
             n: point.n,
             edf: edf as f32,
             weight: edf / variance,
-            roots: roots(model.variance_fractions(point.n)).map(|root| root as f32),
+            roots: roots(model.variance_fractions(point.n)).map(|root: f64| root as f32),
         })
     }
 

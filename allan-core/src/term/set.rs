@@ -1,25 +1,28 @@
 //! Sets of terms that a fit can contain: the code of the other terms is not linked.
 
-use super::process::Process;
-use super::{AngleRandomWalk, BiasInstability, NoiseTerm, Quantization, RateRamp, RateRandomWalk, with_process};
+use super::NoiseTerm;
 use crate::confidence::{NORMAL_975, chi_square_quantile};
-use crate::math::{lnf, sqrt, sqrtf};
+use crate::math::{Real, lnf, sqrt, sqrt_in_single, sqrtf};
 use crate::noise_type::VarianceFractions;
+use core::f64::consts::{LN_2, PI};
 use core::ops::Range;
 
 /// What a fit asks of its terms. A term outside the set contributes nothing.
 pub(crate) trait TermSet {
+    /// The numbers of the normal equations and of the correlations.
+    type Real: Real;
+
     /// The terms of `kinds` that are in the set.
     fn contains(kind: &NoiseTerm) -> bool;
 
     /// [`NoiseTerm::avar`].
     fn avar(kind: &NoiseTerm, n: u64, sample_period: f64) -> f64;
 
-    /// [`NoiseTerm::sum_variances`].
-    fn sum_variances(kind: &NoiseTerm, stride: f64, sample_period: f64, table: &mut [f64]);
+    /// [`NoiseTerm::sum_variances`] at strides of `n/overlap` samples.
+    fn sum_variances(kind: &NoiseTerm, n: u64, overlap: u32, sample_period: f64, table: &mut [Self::Real]);
 
     /// [`NoiseTerm::squared_covariance_tail`].
-    fn squared_covariance_tail(kind: &NoiseTerm, n: u64, stride: f64, sample_period: f64) -> f64;
+    fn squared_covariance_tail(kind: &NoiseTerm, n: u64, stride: Self::Real, sample_period: f64) -> Self::Real;
 
     /// [`NoiseTerm::share`].
     fn share(kind: &NoiseTerm, fraction: f64, n: u64, sample_period: f64) -> VarianceFractions;
@@ -33,12 +36,17 @@ pub(crate) trait TermSet {
     /// The 2.5 % quantile, or the 97.5 % quantile if `upper`, of the gamma distribution (Pearson type III) with this
     /// skewness, a mean of 0 and a standard deviation of 1.
     fn gamma_quantile(skewness: f32, upper: bool) -> f32;
+
+    /// The square root of a squared coefficient.
+    fn sqrt(x: f64) -> f64;
 }
 
 /// Every [`NoiseTerm`], with exact quantiles.
 pub(crate) enum AllTerms {}
 
 impl TermSet for AllTerms {
+    type Real = f64;
+
     const SHAPES: bool = true;
 
     fn contains(_: &NoiseTerm) -> bool {
@@ -49,8 +57,8 @@ impl TermSet for AllTerms {
         kind.avar(n, sample_period)
     }
 
-    fn sum_variances(kind: &NoiseTerm, stride: f64, sample_period: f64, table: &mut [f64]) {
-        kind.sum_variances(stride, sample_period, table);
+    fn sum_variances(kind: &NoiseTerm, n: u64, overlap: u32, sample_period: f64, table: &mut [f64]) {
+        kind.sum_variances(n as f64 / f64::from(overlap), sample_period, table);
     }
 
     fn squared_covariance_tail(kind: &NoiseTerm, n: u64, stride: f64, sample_period: f64) -> f64 {
@@ -71,57 +79,64 @@ impl TermSet for AllTerms {
         let p = if upper { 0.975 } else { 0.025 };
         ((chi_square_quantile(p, dof) - dof) / sqrt(2.0 * dof)) as f32
     }
+
+    fn sqrt(x: f64) -> f64 {
+        sqrt(x)
+    }
 }
 
 /// The power laws of IEEE Std 952: Q, N, B, K and R.
 pub(crate) enum PowerLawTerms {}
 
-/// Evaluates an expression with the process of a power law, or another expression for other terms.
-macro_rules! with_power_law {
-    ($kind:expr, $process:ident => $expression:expr, else $otherwise:expr) => {
-        match $kind {
-            NoiseTerm::Filtered(_) | NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_) => {
-                $otherwise
-            }
-            NoiseTerm::Quantization => with_process!(@one Quantization, $process => $expression),
-            NoiseTerm::AngleRandomWalk => with_process!(@one AngleRandomWalk, $process => $expression),
-            NoiseTerm::BiasInstability => with_process!(@one BiasInstability, $process => $expression),
-            NoiseTerm::RateRandomWalk => with_process!(@one RateRandomWalk, $process => $expression),
-            NoiseTerm::RateRamp => with_process!(@one RateRamp, $process => $expression),
-        }
-    };
-}
-
 impl TermSet for PowerLawTerms {
+    type Real = f32;
+
     const SHAPES: bool = false;
 
     fn contains(kind: &NoiseTerm) -> bool {
-        with_power_law!(kind, _process => true, else false)
+        !matches!(
+            kind,
+            NoiseTerm::Filtered(_) | NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)
+        )
     }
 
     fn avar(kind: &NoiseTerm, n: u64, sample_period: f64) -> f64 {
-        with_power_law!(kind, process => process.avar(n, sample_period), else 0.0)
-    }
-
-    fn sum_variances(kind: &NoiseTerm, stride: f64, sample_period: f64, table: &mut [f64]) {
-        if let NoiseTerm::BiasInstability = kind {
-            // `−m² ln m` in units of the stride, to whose logarithm second differences are blind. In single precision it has
-            // an error of 10⁻⁵ of the covariance of a difference.
-            for (k, entry) in table.iter_mut().enumerate().skip(1) {
-                let k = k as f32;
-                *entry = f64::from(-k * k * lnf(k));
-            }
-            return;
+        // The closed forms of the processes, without a sum in double precision.
+        let tau = n as f64 * sample_period;
+        let n = n as f32;
+        match kind {
+            NoiseTerm::Quantization => 3.0 / (tau * tau),
+            NoiseTerm::AngleRandomWalk => 1.0 / tau,
+            NoiseTerm::BiasInstability => 2.0 * LN_2 / PI,
+            NoiseTerm::RateRandomWalk => sample_period * f64::from(n / 3.0 + 1.0 / (6.0 * n)),
+            NoiseTerm::RateRamp => tau * tau / 2.0,
+            _ => 0.0,
         }
-        with_power_law!(kind, process => process.sum_variances(stride, sample_period, table), else table.fill(0.0));
     }
 
-    fn squared_covariance_tail(_: &NoiseTerm, _: u64, _: f64, _: f64) -> f64 {
+    /// In units of the stride, and for the random walk without the term that is linear in the phase, to which second differences
+    /// are blind. In single precision the error is 10⁻⁵ of the covariance of a difference for flicker noise and a random
+    /// walk, and 10⁻⁴ for a ramp.
+    fn sum_variances(kind: &NoiseTerm, _: u64, _: u32, _: f64, table: &mut [f32]) {
+        for (k, entry) in (0_u16..).map(f32::from).zip(table) {
+            *entry = match kind {
+                _ if k == 0.0 => 0.0,
+                NoiseTerm::Quantization => 1.0,
+                NoiseTerm::AngleRandomWalk => k,
+                NoiseTerm::BiasInstability => -k * k * lnf(k),
+                NoiseTerm::RateRandomWalk => -k * k * k,
+                NoiseTerm::RateRamp => -k * k * k * k,
+                _ => 0.0,
+            };
+        }
+    }
+
+    fn squared_covariance_tail(_: &NoiseTerm, _: u64, _: f32, _: f64) -> f32 {
         0.0
     }
 
     fn share(kind: &NoiseTerm, fraction: f64, n: u64, sample_period: f64) -> VarianceFractions {
-        with_power_law!(kind, _process => kind.share(fraction, n, sample_period), else VarianceFractions::WHITE)
+        if Self::contains(kind) { kind.share(fraction, n, sample_period) } else { VarianceFractions::WHITE }
     }
 
     fn free_parameters(_: &NoiseTerm) -> Range<usize> {
@@ -136,5 +151,9 @@ impl TermSet for PowerLawTerms {
         let ninth = skewness * skewness / 36.0;
         let cube = (1.0 - ninth + normal * sqrtf(ninth)).max(0.0);
         (cube * cube * cube - 1.0) * 2.0 / skewness
+    }
+
+    fn sqrt(x: f64) -> f64 {
+        sqrt_in_single(x)
     }
 }

@@ -152,6 +152,18 @@ int main(void) {
     EXPECT(ALLAN_ERROR_STATE, allan_24_8_restore(estimator, saved, length));
     EXPECT(ALLAN_ERROR_NULL, allan_24_8_restore(estimator, NULL, length));
 
+    /* Values that have no count. */
+    int32_t count = 0;
+    EXPECT(ALLAN_OK, allan_count(1.125, 1.0, 0.25, &count)); /* half a count, up */
+    EXPECT(1, count);
+    EXPECT(ALLAN_ERROR_RANGE, allan_count(NAN, 0.0, 1.0, &count));
+    EXPECT(ALLAN_ERROR_RANGE, allan_count(INFINITY, 0.0, 1.0, &count));
+    EXPECT(ALLAN_ERROR_RANGE, allan_count(3e9, 0.0, 1.0, &count));
+    EXPECT(ALLAN_ERROR_RANGE, allan_count(1.0, 0.0, 0.0, &count));
+    EXPECT(ALLAN_ERROR_RANGE, allan_count(1.0, NAN, 1.0, &count));
+    EXPECT(ALLAN_ERROR_NULL, allan_count(1.0, 0.0, 1.0, NULL));
+    EXPECT(1, count);
+
     EXPECT(0, strcmp(allan_status_text(12345), "no status of this library"));
     free(small_buffer);
     free(saved);
