@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let inputs: Vec<&Path> = [&recording.file].into_iter().chain(more).chain(against).map(PathBuf::as_path).collect();
     output::check(output, &inputs)?;
     if more.is_empty() && against.is_none() {
-        return output::write_report(&analyze(&read_measurement(recording)?), output);
+        return output::write_report(&analyze(&read_measurement(recording)?), Some(&recording.file), output);
     }
     if output.page.is_some() || output.kalibr.is_some() {
         bail!("several recordings have a summary and no report: leave out --page and --kalibr");

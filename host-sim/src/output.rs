@@ -69,21 +69,21 @@ fn is_same(one: &Path, other: &Path) -> bool {
     matches!((resolved(one), resolved(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// Prints a report and writes the files that the arguments name. A file that cannot be written does not keep the others, or
+/// Prints a report on the recording in the file `source`, if it is of one, and writes the files that the arguments name. A file that cannot be written does not keep the others, or
 /// the report, from being written.
-pub(crate) fn write_report(report: &Report, output: &OutputArguments) -> Result<()> {
+pub(crate) fn write_report(report: &Report, source: Option<&Path>, output: &OutputArguments) -> Result<()> {
     let json = output.json.as_ref().map_or(Ok(()), |file| write_json(report, file));
     let kalibr = output.kalibr.as_ref().map_or(Ok(()), |file| write_kalibr(report, file));
     let page = output.page.as_ref().map(|dir| page::write(report, dir)).transpose();
     let pictures = output.pictures.as_ref().map_or(Ok(()), |folder| write_pictures(report, folder));
-    show(report, output, page.as_ref().ok().and_then(Option::as_deref))?;
+    show(report, source, output, page.as_ref().ok().and_then(Option::as_deref))?;
     json.and(kalibr).and(pictures)?;
     page?;
     Ok(())
 }
 
 /// Prints a report, and where its page is.
-fn show(report: &Report, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
+fn show(report: &Report, source: Option<&Path>, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
     // Nothing beside JSON on standard output.
     if output.quiet || output.json.as_deref().is_some_and(is_standard_output) {
         return Ok(());
@@ -91,15 +91,21 @@ fn show(report: &Report, output: &OutputArguments, page: Option<&Path>) -> Resul
     if output.full {
         print(|out| full_tables::write(report, out))?;
     } else {
-        // Without colour where standard output is no terminal, or NO_COLOR is set.
-        let mut out = anstream::AutoStream::auto(io::stdout().lock());
-        Screen { report, source: None, columns: columns() }.write(&mut out)?;
-        out.flush()?;
+        let name = source.and_then(Path::file_name).map(|name| Printable(&name.to_string_lossy()).to_string());
+        show_screen(report, name.as_deref())?;
     }
     match page {
         Some(page) => print(|out| writeln!(out, "page: {}", page.display())),
         None => Ok(()),
     }
+}
+
+/// Prints the screen of a report on the recording `source`.
+pub(crate) fn show_screen(report: &Report, source: Option<&str>) -> Result<()> {
+    // Without colour where standard output is no terminal, or NO_COLOR is set.
+    let mut out = anstream::AutoStream::auto(io::stdout().lock());
+    Screen { report, source, columns: columns() }.write(&mut out)?;
+    Ok(out.flush()?)
 }
 
 /// Columns of the terminal.
