@@ -47,6 +47,11 @@ impl EpochModel {
         Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), config))
     }
 
+    /// The terms of the compensated stream beyond N, B and K, with their coefficients.
+    pub(crate) fn added_terms(&self) -> impl Iterator<Item = (NoiseTerm, f64)> {
+        self.full.iter().copied().filter(|(term, _)| !NoiseTerm::BASELINE.contains(term))
+    }
+
     /// All terms of the compensated stream; `None` before the first fit.
     #[must_use]
     fn full(&self, config: Config) -> Option<Model> {

@@ -19,7 +19,8 @@
 //! | `device` | state of the device, supervision of the sensor |
 //! | `recovery`, `status_flags` | steps by which a sensor in trouble is recovered; what its status register has shown |
 //! | `task_monitor` | proof that every task is alive, for the watchdog |
-//! | `report`, [`console`] | reports in frames, answers in text |
+//! | `report` | reports in frames |
+//! | [`console`], `table`, [`number_text`] | answers in text, among them the report as a table; numbers in it |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
 //! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
@@ -47,12 +48,14 @@ pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 #[allow(unsafe_code, reason = "registers, and memory that is not initialised at the start")]
 pub mod microcontroller;
+pub mod number_text;
 mod recovery;
 mod report;
 pub mod retained;
 pub mod sensor;
 mod statistics;
 mod status_flags;
+mod table;
 mod task_monitor;
 mod transmit;
 

@@ -69,20 +69,9 @@ pub(crate) enum Command {
         /// The shell.
         shell: Shell,
     },
-    /// Show the messages of a device that runs the firmware.
-    Monitor {
-        /// Its serial port, such as /dev/ttyUSB0.
-        port: String,
-        /// Baud rate of the port.
-        #[arg(long, default_value_t = serial::BAUD)]
-        baud: u32,
-        /// Command to send first, such as "f 819.2"; may be repeated.
-        #[arg(long, value_name = "COMMAND")]
-        send: Vec<String>,
-        /// End after so many seconds [default: when the device disconnects].
-        #[arg(long)]
-        seconds: Option<f64>,
-    },
+    /// Show a device that runs the firmware, or a recording that is replayed, while its record grows: verdict, curves, findings,
+    /// health. Prints lines where standard output is no terminal.
+    Monitor(MonitorArguments),
     /// Convert an image for the Raspberry Pi Pico to the UF2 file that its boot loader takes.
     Uf2 {
         /// The image, an ELF.
@@ -417,6 +406,58 @@ pub(crate) struct InputArguments {
     /// Topic, message or array of a file with several.
     #[arg(long)]
     pub(crate) topic: Option<String>,
+}
+
+/// What to show live.
+#[derive(Debug, Args)]
+pub(crate) struct MonitorArguments {
+    /// A serial port such as /dev/ttyUSB0, or a recording in a file.
+    #[arg(value_name = "PORT|FILE")]
+    pub(crate) source: PathBuf,
+    /// Baud rate of the port.
+    #[arg(long, default_value_t = serial::BAUD)]
+    pub(crate) baud: u32,
+    /// Command to send to the device first, such as "f 819.2"; may be repeated.
+    #[arg(long, value_name = "COMMAND")]
+    pub(crate) send: Vec<String>,
+    /// End after so many seconds [default: when the device disconnects or the recording ends].
+    #[arg(long)]
+    pub(crate) seconds: Option<f64>,
+    /// Speed of a recording: seconds of it in a second, or max for no waiting.
+    #[arg(long, value_name = "TIMES|max", default_value = "1", value_parser = replay_speed)]
+    pub(crate) speed: f64,
+    /// Sample rate of a recording in Hz; overrides what the time stamps say.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub(crate) rate: Option<f64>,
+    /// Gyro range in which the recording was taken, deg/s.
+    #[arg(long, value_enum, default_value = "300")]
+    pub(crate) range: GyroRangeArgument,
+}
+
+impl MonitorArguments {
+    /// The recording, as the other commands take it.
+    pub(crate) fn recording(&self) -> RecordingArguments {
+        let Self { source, rate, range, .. } = self;
+        let (columns, units) = (Vec::new(), Vec::new());
+        RecordingArguments {
+            file: source.clone(),
+            rate: *rate,
+            range: *range,
+            sensor: None,
+            columns,
+            units,
+            topic: None,
+        }
+    }
+}
+
+/// A positive number, or `max`, which is infinite.
+fn replay_speed(text: &str) -> Result<f64, String> {
+    if text == "max" {
+        return Ok(f64::INFINITY);
+    }
+    let speed = text.parse().ok().filter(|speed: &f64| speed.is_finite() && *speed > 0.0);
+    speed.ok_or_else(|| "neither a positive number nor max".to_owned())
 }
 
 /// Recordings to explain.

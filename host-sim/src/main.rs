@@ -6,6 +6,7 @@ mod compare;
 mod convert;
 mod explain;
 mod export;
+mod live;
 mod losses;
 mod output;
 mod paper;
@@ -16,8 +17,9 @@ mod undeclared;
 
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
-use cli::{Cli, Command, ReplayArguments};
+use cli::{Cli, Command, MonitorArguments, ReplayArguments};
 use host_sim::{monitor, uf2};
+use live::{DeviceSource, GrowingRecording};
 use recordings::Printable;
 use recordings::serial::{self, SerialLink};
 use std::fs;
@@ -81,14 +83,14 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
         Some(Command::Undeclared(arguments)) => undeclared::run(&arguments.plan(), &arguments.output),
         Some(Command::Paper { seeds, first_seed, output }) => paper::run(seeds, first_seed, &output),
         Some(Command::Losses(arguments)) => losses::run(&arguments.plan(), &arguments.output),
-        Some(Command::Monitor { port, baud, send, seconds }) => {
-            show_messages(&port, baud, &send, seconds).with_context(|| port.clone())
-        }
+        Some(Command::Monitor(arguments)) => monitor_source(&arguments),
         Some(Command::Uf2 { elf, out }) => convert_image(&elf, &out),
     }
 }
 
-fn show_messages(port: &str, baud: u32, commands: &[String], seconds: Option<f64>) -> Result<()> {
+/// Shows a device or a recording live, or in lines where there is no terminal.
+fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
+    let MonitorArguments { source, seconds, speed, .. } = arguments;
     let deadline = seconds
         .map(|seconds| {
             let duration = Duration::try_from_secs_f64(seconds).ok();
@@ -96,12 +98,33 @@ fn show_messages(port: &str, baud: u32, commands: &[String], seconds: Option<f64
             deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
         })
         .transpose()?;
-    let mut link = SerialLink::new(serial::open(port, baud)?);
-    for command in commands {
-        link.send_command(command)?;
+    if !source.is_file() {
+        return monitor_device(arguments, deadline).with_context(|| source.display().to_string());
     }
-    monitor::show(&mut link, deadline, &mut io::stdout().lock())?;
-    Ok(())
+    let name = source.file_name().unwrap_or_default().to_string_lossy();
+    let name = Printable(&name).to_string();
+    let mut recording = GrowingRecording::new(analyze::read_measurement(&arguments.recording())?, name.clone(), *speed);
+    let report = if live::has_terminal() {
+        live::show(&mut recording, deadline)?;
+        recording.into_report()
+    } else {
+        recording.write_lines(deadline, &mut io::stdout().lock())?
+    };
+    report.map_or(Ok(()), |report| output::show_screen(&report, Some(&name)))
+}
+
+fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Result<()> {
+    let MonitorArguments { source, baud, send, .. } = arguments;
+    let port = source.to_str().context("a name of a port that is not UTF-8")?;
+    let mut cable = SerialLink::new(serial::open(port, *baud)?);
+    for command in send {
+        cable.send_command(command)?;
+    }
+    if live::has_terminal() {
+        live::show(&mut DeviceSource::new(&mut cable, port.to_owned()), deadline)?;
+        return output::print(|out| writeln!(out, "{}", monitor::summary(&cable.counters())));
+    }
+    Ok(monitor::show(&mut cable, deadline, &mut io::stdout().lock())?)
 }
 
 fn convert_image(elf: &Path, out: &Path) -> Result<()> {

@@ -65,7 +65,7 @@ impl MessageFormatter {
                 hello(report)
             }
             Message::Channel(report) => vec![channel(report)],
-            Message::Health(report) => vec![health(report)],
+            Message::Health(report) => vec![format!("   {}", health_text(report))],
             Message::Log(line) => vec![line.as_str().to_owned()],
             Message::Raw(raw) => vec![self.raw(raw)],
             Message::Validation(report) => vec![checked(report, self.sample_rate_hz)],
@@ -164,7 +164,8 @@ fn name(channel: u8) -> &'static str {
     Channel::ALL.get(usize::from(channel)).map_or("unknown channel", |channel| channel.name())
 }
 
-fn health(health: &Health) -> String {
+/// Use of the bursts, every counter that is not 0, and the load of the processor, in one line.
+pub fn health_text(health: &Health) -> String {
     let counters = [
         ("no new data", health.no_new_data),
         ("error or alarm", health.error_alarm),
@@ -202,7 +203,7 @@ fn health(health: &Health) -> String {
         ("serial overruns", health.serial_overruns),
         ("bad commands", health.bad_commands),
     ];
-    let mut text = format!("   {} of {} bursts used", health.used, health.bursts);
+    let mut text = format!("{} of {} bursts used", health.used, health.bursts);
     for (name, count) in counters.into_iter().filter(|(_, count)| *count > 0) {
         text += &format!(", {name} {count}");
     }

@@ -103,15 +103,20 @@ fn show(report: &Report, source: Option<&str>, output: &OutputArguments, page: O
     if output.full {
         print(|out| full_tables::write(report, source, out))?;
     } else {
-        // Without colour where standard output is no terminal, or NO_COLOR is set.
-        let mut out = anstream::AutoStream::auto(io::stdout().lock());
-        Screen { report, source, columns: columns() }.write(&mut out)?;
-        out.flush()?;
+        show_screen(report, source)?;
     }
     match page {
         Some(page) => print(|out| writeln!(out, "page: {}", Printable(&page.display().to_string()))),
         None => Ok(()),
     }
+}
+
+/// Prints the screen of a report on the recording `source`.
+pub(crate) fn show_screen(report: &Report, source: Option<&str>) -> Result<()> {
+    // Without colour where standard output is no terminal, or NO_COLOR is set.
+    let mut out = anstream::AutoStream::auto(io::stdout().lock());
+    Screen { report, source, columns: columns() }.write(&mut out)?;
+    Ok(out.flush()?)
 }
 
 /// Columns of the terminal.

@@ -1,9 +1,9 @@
 //! Each finding in words: one sentence of physics and one of advice, made of its parameters. `docs/findings.md` explains every
 //! sentence.
 
-use crate::formatting::words;
+use crate::formatting::{capital, words};
 use crate::rounding::{bounded_quantity, plain, quantity, significant, span};
-use noise_analysis::report::{Finding, Validation};
+use noise_analysis::report::{Finding, Parameter, Validation};
 
 /// Every kind of finding that has its own sentences, in the order of `docs/findings.md`.
 pub const KINDS: [&str; 26] = [
@@ -42,6 +42,8 @@ pub struct FindingText {
     pub channels: String,
     /// What it is, with its size.
     pub physics: String,
+    /// The same without intervals, for one line.
+    pub brief: String,
     /// What to do about it, or what to look for.
     pub advice: String,
     /// How much of the variance it makes, and whether the second half confirms it; where neither is known, the evidence in short.
@@ -51,8 +53,9 @@ pub struct FindingText {
 /// The words for `finding`.
 #[must_use]
 pub fn describe(finding: &Finding) -> FindingText {
-    let (physics, advice) = sentences(finding);
-    FindingText { channels: channel_list(&finding.channels), physics, advice, weight: weight(finding) }
+    let (physics, advice) = sentences(finding, bounded_quantity, &reaches(finding));
+    let (brief, _) = sentences(finding, |parameter| quantity(parameter.value, &parameter.unit), "");
+    FindingText { channels: channel_list(&finding.channels), physics, brief, advice, weight: weight(finding) }
 }
 
 /// The largest share of the variance, and what the second half says.
@@ -89,26 +92,31 @@ fn gain(finding: &Finding) -> Option<String> {
     (share > 0.0 && share < 1.0).then(|| significant(100.0 * (1.0 - (1.0 - share).sqrt()), 2))
 }
 
-/// The sentence of physics and the sentence of advice.
-fn sentences(finding: &Finding) -> (String, String) {
+fn reaches(finding: &Finding) -> String {
+    let these = if finding.channels.len() > 1 { "these channels" } else { "this channel" };
+    format!(" reaches {these}")
+}
+
+/// The sentence of physics and the sentence of advice; `amount` writes a parameter, and `reaches` comes after what reaches the
+/// channels from outside.
+fn sentences(finding: &Finding, amount: impl Fn(&Parameter) -> String, reaches: &str) -> (String, String) {
     let parameter = |name: &str| finding.parameters.get(name);
     let value = |name: &str| parameter(name).map(|parameter| parameter.value);
     // The parameter with its interval, or words where the finding lacks it.
-    let sized = |name: &str| parameter(name).map_or_else(|| "unknown size".to_owned(), bounded_quantity);
+    let sized = |name: &str| parameter(name).map_or_else(|| "unknown size".to_owned(), &amount);
     let at = |name: &str| value(name).map_or_else(|| "an unknown time".to_owned(), span);
     let off = || {
         gain(finding)
             .map_or_else(String::new, |percent| format!(" It would take {percent} % off σ where it is largest."))
     };
     let pair = |physics: String, advice: &str| (physics, advice.to_owned());
-    let are = if finding.channels.len() > 1 { "reaches these channels" } else { "reaches this channel" };
     match finding.kind.as_str() {
         "filter_bandwidth" => match (value("taps"), value("decimation")) {
             (Some(taps), Some(decimation)) if (decimation - 1.0).abs() > 1e-9 => pair(
                 format!(
                     "The part's low-pass filter of {} taps, read every {} of its samples.",
                     plain(taps, 3),
-                    parameter("decimation").map_or_else(String::new, bounded_quantity)
+                    parameter("decimation").map_or_else(String::new, &amount)
                 ),
                 "Nothing to repair; N holds below the corner of the filter, and a model for a Kalman filter at this rate is white.",
             ),
@@ -122,14 +130,15 @@ fn sentences(finding: &Finding) -> (String, String) {
             ),
         },
         "sinusoid" => (
-            format!("A vibration or hum at {} {are}: a narrow line of {}.", sized("frequency"), sized("amplitude")),
+            format!("A vibration or hum at {}{reaches}: a narrow line of {}.", sized("frequency"), sized("amplitude")),
             format!("Look for a fan, a motor or the mains; a notch there would help.{}", off()),
         ),
         "resonance" => (
             format!(
-                "A vibration around {}, {} wide, {are}: {} (1 σ).",
+                "A vibration around {}, {} wide{}: {} (1 σ).",
                 sized("frequency"),
                 value("bandwidth").map_or_else(|| "some hertz".to_owned(), |width| quantity(width, "Hz")),
+                if reaches.is_empty() { String::new() } else { format!(",{reaches}") },
                 sized("deviation")
             ),
             format!("Look for a fan whose speed wanders or a loose mount; stiffen the mount or notch the band.{}", off()),
@@ -150,19 +159,17 @@ fn sentences(finding: &Finding) -> (String, String) {
         "markov" => (
             format!(
                 "A noise with a memory of {} and a size of {} (1 σ).",
-                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), bounded_quantity),
+                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), &amount),
                 sized("deviation")
             ),
             "Give the filter a first-order Gauss-Markov state of this time constant and size.".to_owned(),
         ),
         "common_mode" | "shared_drift" => (
-            format!(
-                "A slow drift of {} that these channels share, and that nothing recorded explains.",
-                ["deviation", "amplitude", "size"].iter().find_map(|name| parameter(name)).map_or_else(
-                    || "unknown size".to_owned(),
-                    bounded_quantity
-                )
-            ),
+            {
+                let size = ["deviation", "amplitude", "size"].iter().find_map(|name| parameter(name));
+                let size = size.map_or_else(String::new, |size| format!(" of {}", amount(size)));
+                format!("A slow drift{size} in common, which nothing recorded explains.")
+            },
             "Record temperature and supply beside the channels; look for a slow change in the room or the mount.".to_owned(),
         ),
         "rate_ramp" => (
@@ -190,7 +197,7 @@ fn sentences(finding: &Finding) -> (String, String) {
             format!(
                 "The bias follows the temperature with {} through a lag of {}.",
                 sized("sensitivity"),
-                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), bounded_quantity)
+                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), &amount)
             ),
             format!("Compensate with the temperature behind a low-pass filter of this time constant.{}", off()),
         ),
@@ -201,7 +208,7 @@ fn sentences(finding: &Finding) -> (String, String) {
         "acceleration" => {
             let axes: Vec<String> = ["x", "y", "z"]
                 .iter()
-                .filter_map(|axis| Some(format!("{} ({axis})", bounded_quantity(parameter(&format!("sensitivity_{axis}"))?))))
+                .filter_map(|axis| Some(format!("{} ({axis})", amount(parameter(&format!("sensitivity_{axis}"))?))))
                 .collect();
             (
                 format!("The rate follows the specific force: {}.", axes.join(", ")),
@@ -217,7 +224,7 @@ fn sentences(finding: &Finding) -> (String, String) {
                 "Rounding shows: {}.",
                 parameter("step").map_or_else(
                     || format!("a quantization noise of {}", sized("value")),
-                    |step| format!("only every value {} apart occurs", bounded_quantity(step))
+                    |step| format!("only every value {} apart occurs", amount(step))
                 )
             ),
             "Read the part with more bits or in a smaller range; short averaging times are dominated by rounding.".to_owned(),
@@ -262,7 +269,7 @@ fn sentences(finding: &Finding) -> (String, String) {
             format!("The clock of the samples runs at {}.", sized("rate_hz")),
             "State this rate: every averaging time and N scale with it.".to_owned(),
         ),
-        "unexplained" => (unexplained(finding), "Look at the channel's figures at that place; a longer record, or temperature and supply beside it, may tell the cause.".to_owned()),
+        "unexplained" => (format!("{} fits no known effect.", capital(&unexplained_place(finding))), "Look at the channel's figures at that place; a longer record, or temperature and supply beside it, may tell the cause.".to_owned()),
         kind => (
             format!("{}: {}.", words(kind), finding.evidence.trim_end_matches('.')),
             "This version of the report has no words for it; the evidence is that of the analysis.".to_owned(),
@@ -280,8 +287,9 @@ fn share(fraction: Option<f64>) -> String {
     fraction.map_or_else(|| "Some".to_owned(), |fraction| format!("{} %", significant(100.0 * fraction, 2)))
 }
 
-/// Where and how much.
-fn unexplained(finding: &Finding) -> String {
+/// Where something is unexplained, and by how much.
+#[must_use]
+pub(crate) fn unexplained_place(finding: &Finding) -> String {
     let value = |name: &str| finding.parameters.get(name).map(|parameter| parameter.value);
     let place = match (value("tau"), value("frequency"), value("time")) {
         (Some(tau), ..) => format!("at averaging times around {}", span(tau)),
@@ -292,9 +300,9 @@ fn unexplained(finding: &Finding) -> String {
     match value("excess_percent") {
         Some(excess) => {
             let sign = if excess < 0.0 { "−" } else { "+" };
-            format!("{sign}{} % {place} fits no known effect.", significant(excess.abs(), 2))
+            format!("{sign}{} % {place}", significant(excess.abs(), 2))
         }
-        None => format!("What is measured {place} fits no known effect."),
+        None => format!("what is measured {place}"),
     }
 }
 
@@ -323,7 +331,6 @@ pub fn channel_list(names: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use noise_analysis::report::Parameter;
 
     fn names(list: &[&str]) -> Vec<String> {
         list.iter().map(|name| (*name).to_owned()).collect()

@@ -100,6 +100,13 @@ pub fn interval(low: f64, high: f64) -> String {
     format!("{} … {}", number(low), number(high))
 }
 
+/// `text` with a capital at its beginning.
+#[must_use]
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// A name of the JSON schema as words: `angle_random_walk` becomes `angle random walk`.
 pub fn words(name: &str) -> String {
     name.replace('_', " ")

@@ -1,10 +1,12 @@
 //! Every table of a report as text: at most 100 columns, the same in a terminal and in a file.
 
 use crate::coefficients::{self, CoefficientRow};
+use crate::finding_text::FindingText;
 use crate::formatting::{
-    NONE, TextTable, count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name,
-    percent, recording_advice, unit, words, worst_deviations, wrap,
+    NONE, TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
+    parameter_name, percent, recording_advice, unit, words, worst_deviations, wrap,
 };
+use crate::summary;
 use noise_analysis::assessment::navigation::CALIBRATION_S;
 use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, Parameter, Report, TermReport};
@@ -31,6 +33,7 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     writeln!(out, "samples      {} used, {length}", count(report.samples))?;
     writeln!(out, "dropped      {}", by_cause(&report.dropped))?;
     writeln!(out, "flagged      {}", by_cause(&report.flagged))?;
+    verdict(report, out)?;
     for channel in &report.channels {
         section(channel, out)?;
     }
@@ -47,6 +50,34 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
         out,
         "error after t: rms of the integral over t when the bias is the mean of the {CALIBRATION_S} s before."
     )
+}
+
+/// Everything that the one screen tells, without its limits.
+fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
+    let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
+    writeln!(out)?;
+    for sentence in summary::record_sentences(report).into_iter().chain(summary::part_note(report)) {
+        paragraph(out, &sentence)?;
+    }
+    let (found, _) = summary::findings(report);
+    writeln!(out, "\nWhat was found")?;
+    for (index, finding) in found.iter().enumerate() {
+        let FindingText { channels, physics, advice, weight, .. } = finding;
+        let weight = if weight.is_empty() { String::new() } else { format!(" {}.", capital(weight)) };
+        paragraph(out, &format!("{}. {channels}: {physics}{weight} {advice}", index + 1))?;
+    }
+    if let Some(text) = summary::unexplained(report) {
+        paragraph(out, &format!("Not explained: {text}."))?;
+    }
+    if found.is_empty() {
+        writeln!(out, "No cause beyond N, B and K.")?;
+    }
+    let contradictions = summary::contradictions(report);
+    if !contradictions.is_empty() {
+        writeln!(out, "\nWhat the data contradicts")?;
+        contradictions.iter().try_for_each(|text| paragraph(out, &format!("{text}.")))?;
+    }
+    Ok(())
 }
 
 /// Numbers of samples by cause, as a list.

@@ -9,6 +9,7 @@ pub mod figure;
 pub mod finding_text;
 pub mod formatting;
 pub mod full_tables;
+pub mod live;
 pub mod page;
 pub mod raster;
 pub mod rounding;

@@ -71,7 +71,10 @@ fn render(report: &Report) -> Markup {
                 main {
                     div.first {
                         (verdict(report))
-                        @if let Some(plot) = figure::overview(report) { section { (drawing(&plot)) } }
+                        section.steps aria-label="Curves and what to do" {
+                            @if let Some(plot) = figure::overview(report) { (drawing(&plot)) }
+                            (next_steps(report))
+                        }
                     }
                     (findings(report))
                     @for channel in in_reading_order(report) { (channel_section(report, channel)) }
@@ -105,24 +108,32 @@ fn contents(report: &Report) -> Markup {
     }
 }
 
-/// The record in sentences, the coefficients, and what to do.
+/// The record in sentences, and the coefficients.
 fn verdict(report: &Report) -> Markup {
-    let contradictions = summary::contradictions(report);
     html! {
         section.verdict aria-label="Verdict" {
             @for sentence in summary::record_sentences(report) { p { (sentence) } }
             @let conditions = summary::conditions(report);
             @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
             (tables::coefficients_of_all(report))
-            @if !contradictions.is_empty() {
-                h3 { "What the data contradicts" }
-                ul { @for text in &contradictions { li.warning { (text) "." } } }
+            @if let Some(note) = summary::part_note(report) {
+                details { summary { "Clock and filter of the part" } p.faint { (note) } }
             }
-            @let steps = summary::next_steps(report);
-            @if !steps.is_empty() {
-                h3 { "What to do" }
-                ul { @for step in &steps { li { (step) } } }
-            }
+        }
+    }
+}
+
+/// What the data contradicts, and what to do.
+fn next_steps(report: &Report) -> Markup {
+    let (contradictions, steps) = (summary::contradictions(report), summary::next_steps(report));
+    html! {
+        @if !contradictions.is_empty() {
+            h3 { "What the data contradicts" }
+            ul { @for text in &contradictions { li.warning { (text) "." } } }
+        }
+        @if !steps.is_empty() {
+            h3 { "What to do" }
+            ul { @for step in &steps { li { (step) } } }
         }
     }
 }

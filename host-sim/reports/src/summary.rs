@@ -2,8 +2,8 @@
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{FindingText, channel_list, describe};
-use crate::formatting::{count, words};
+use crate::finding_text::{FindingText, channel_list, describe, unexplained_place};
+use crate::formatting::{capital, count, words};
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span};
 use noise_analysis::findings::BoundedEstimate;
 use noise_analysis::report::DataSheetReport;
@@ -58,22 +58,64 @@ const GROUPS: [(&str, &str, [UnitOfColumn; 3]); 2] = [
     ("accel", "accl_", [("g/√Hz", "ug/sqrt(Hz)", 1e-6), ("g", "ug", 1e-6), ("g/√h", "ug/sqrt(h)", 1e-6)]),
 ];
 
+/// N, B and K of a channel in its unit and seconds, and what is said of its model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelCoefficients {
+    /// Name of the channel, such as `gyro_z`.
+    pub name: String,
+    /// Its unit, such as `deg/s`.
+    pub unit: String,
+    /// N, B and K, as far as the model has them.
+    pub coefficients: [Option<Parameter>; 3],
+    /// Deviance a point on unseen data of the model without and with its effects.
+    pub deviance: [Option<f64>; 2],
+}
+
+impl ChannelCoefficients {
+    fn from_report(channel: &ChannelReport) -> Self {
+        Self {
+            name: channel.name.clone(),
+            unit: channel.unit.clone(),
+            coefficients: LETTERS.map(|(kind, _)| coefficient(channel, kind)),
+            deviance: [&channel.before, &channel.after].map(|model| unseen(model).deviance_per_point),
+        }
+    }
+}
+
 /// The tables of the gyros and of the accelerometers, without those of which there is no channel.
 #[must_use]
 pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
+    let channels: Vec<ChannelCoefficients> = report.channels.iter().map(ChannelCoefficients::from_report).collect();
+    let sheet = |prefix: &str| {
+        let first = report.channels.iter().find(|channel| channel.name.starts_with(prefix))?;
+        first.figure_data.data_sheet.as_ref().map(sheet_coefficients)
+    };
+    tables_of(&channels, report.sample_rate_hz, sheet)
+}
+
+/// The same tables of channels sampled at `sample_rate_hz`, without a row for the data sheet.
+#[must_use]
+pub fn tables_of_channels(channels: &[ChannelCoefficients], sample_rate_hz: f64) -> Vec<CoefficientTable> {
+    tables_of(channels, sample_rate_hz, |_| None)
+}
+
+/// `sheet` has N, B and K of the data sheet for the channels whose names begin so.
+fn tables_of(
+    all: &[ChannelCoefficients],
+    sample_rate_hz: f64,
+    sheet: impl Fn(&str) -> Option<[Option<f64>; 3]>,
+) -> Vec<CoefficientTable> {
     let table = |(title, prefix, units): &(&'static str, &str, [UnitOfColumn; 3])| {
-        let channels: Vec<&ChannelReport> =
-            report.channels.iter().filter(|channel| channel.name.starts_with(prefix)).collect();
+        let channels: Vec<&ChannelCoefficients> =
+            all.iter().filter(|channel| channel.name.starts_with(prefix)).collect();
         let first = channels.first()?;
         let factor = |index: usize| {
-            let known = conversions(LETTERS[index].0, &first.unit, report.sample_rate_hz);
+            let known = conversions(LETTERS[index].0, &first.unit, sample_rate_hz);
             known.iter().find(|known| known.unit == units[index].1).map_or(1.0, |known| known.factor) * units[index].2
         };
         let factors: [f64; 3] = std::array::from_fn(factor);
-        let of = |channel: &ChannelReport, index: usize| coefficient(channel, LETTERS[index].0);
-        let sheet = first.figure_data.data_sheet.as_ref().map(sheet_coefficients);
         let prefixes: [(&str, f64); 3] = std::array::from_fn(|index| {
-            let shown = channels.iter().filter_map(|channel| of(channel, index));
+            let shown = channels.iter().filter_map(|channel| channel.coefficients[index].as_ref());
             column_prefix(shown.map(|n| factors[index] * if n.value > 0.0 { n.value } else { n.high }))
         });
         let scale = |index: usize| factors[index] / prefixes[index].1;
@@ -83,16 +125,16 @@ pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
                 label: channel.name.trim_start_matches(prefix).to_owned(),
                 channel: channel.name.clone(),
                 coefficients: std::array::from_fn(|index| {
-                    of(channel, index).map_or_else(
+                    channel.coefficients[index].as_ref().map_or_else(
                         || "–".to_owned(),
                         |n| estimate(n.value * scale(index), n.low * scale(index), n.high * scale(index)),
                     )
                 }),
-                error: error_change(channel),
-                is_high: is_high(channel),
+                error: error_change(channel.deviance),
+                is_high: channel.deviance[1].is_some_and(|of| of > HIGH_DEVIANCE),
             })
             .collect();
-        rows.extend(sheet.map(|sheet| CoefficientTableRow {
+        rows.extend(sheet(prefix).map(|sheet| CoefficientTableRow {
             label: "sheet".to_owned(),
             channel: String::new(),
             coefficients: std::array::from_fn(|index| {
@@ -134,14 +176,15 @@ fn unseen(model: &noise_analysis::report::ModelReport) -> &ModelErrorReport {
     model.unseen_excluding.as_ref().unwrap_or(&model.unseen)
 }
 
-/// Deviance a point before and after.
-fn error_change(channel: &ChannelReport) -> String {
-    let deviance = |error: &ModelErrorReport| {
-        error
-            .deviance_per_point
-            .map_or_else(|| "–".to_owned(), |of| if of < 9.95 { format!("{of:.1}") } else { count(of.round() as u64) })
-    };
-    format!("{} → {}", deviance(unseen(&channel.before)), deviance(unseen(&channel.after)))
+/// Deviance a point before and after; nothing where no model has met unseen data yet.
+fn error_change(deviance: [Option<f64>; 2]) -> String {
+    if deviance == [None, None] {
+        return "–".to_owned();
+    }
+    let [before, after] = deviance.map(|of| {
+        of.map_or_else(|| "–".to_owned(), |of| if of < 9.95 { format!("{of:.1}") } else { count(of.round() as u64) })
+    });
+    format!("{before} → {after}")
 }
 
 /// Whether the model with its effects fails on the unseen half.
@@ -182,14 +225,43 @@ fn report_length_s(report: &Report) -> f64 {
 pub fn record_sentences(report: &Report) -> Vec<String> {
     let mut sentences = vec![rest(report), losses(report)];
     sentences.extend(length_advice(report));
-    sentences.extend(report.part.note.as_ref().map(|note| format!("{}.", capitalised(note.trim_end_matches('.')))));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
 }
 
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+/// What the record does not tell of the part's clock and filter, and why.
+#[must_use]
+pub fn part_note(report: &Report) -> Option<String> {
+    report.part.note.as_ref().map(|note| format!("{}.", capital(note.trim_end_matches('.'))))
+}
+
+/// The record in sentences, with the first clause of the note on the part.
+#[must_use]
+pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
+    let mut sentences = record_sentences(report);
+    sentences.extend(part_note(report).map(|note| match note.split_once([':', ';']) {
+        Some((clause, _)) => format!("{clause}: see --full."),
+        None => note,
+    }));
+    sentences
+}
+
+/// Where and by how much the data departs from every model, in one text; `None` where it does not.
+#[must_use]
+pub fn unexplained(report: &Report) -> Option<String> {
+    let mut text = String::new();
+    let mut before = None;
+    for finding in report.findings.iter().filter(|finding| finding.kind == "unexplained") {
+        let place = unexplained_place(finding);
+        if before == Some(&finding.channels) {
+            text += &format!(", {place}");
+        } else {
+            let separator = if text.is_empty() { "" } else { "; " };
+            text += &format!("{separator}{}: {place}", channel_list(&finding.channels));
+        }
+        before = Some(&finding.channels);
+    }
+    (!text.is_empty()).then_some(text)
 }
 
 fn rest(report: &Report) -> String {
@@ -387,16 +459,22 @@ pub fn next_steps(report: &Report) -> Vec<String> {
     for (_, text) in weighed {
         let first = text.advice.split_inclusive(['.', ';']).next().unwrap_or_default().trim_end_matches([';', '.']);
         let step = format!("{first}.");
-        if !first.starts_with("Nothing to repair") && !steps.contains(&step) {
+        // What the analysis has done already is no step.
+        let is_done = ["Nothing to repair", "These samples are left out"].iter().any(|done| first.starts_with(done));
+        if !is_done && !steps.contains(&step) {
             steps.push(step);
         }
     }
     steps.truncate(3);
-    if inertial(report).any(is_high) {
-        steps.push("! The error on the unseen half is far above 1: see --full.".to_owned());
-    }
     if inertial(report).next().is_some() {
         steps.push("For a filter: add --export kalibr=imu.yaml.".to_owned());
+    }
+    let high: Vec<String> = inertial(report).filter(|of| is_high(of)).map(|channel| channel.name.clone()).collect();
+    if !high.is_empty() {
+        steps.push(format!(
+            "! The model of {} fails on the unseen half: its error is far above 1.",
+            channel_list(&high)
+        ));
     }
     steps
 }

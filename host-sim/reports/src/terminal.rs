@@ -2,6 +2,7 @@
 //! wanted.
 
 use crate::finding_text::FindingText;
+use crate::formatting::capital;
 use crate::summary::{self, CoefficientTable};
 use anstyle::{AnsiColor, Style};
 use noise_analysis::report::Report;
@@ -17,6 +18,8 @@ const TEXT: usize = 110;
 /// Columns of the channel's label, and of the error.
 const LABEL: usize = 7;
 const ERROR: usize = 15;
+/// Contradictions that are told where there is room.
+const MOST_CONTRADICTED: usize = 3;
 /// Columns of the channels of a finding, with its number.
 const CHANNELS: usize = 17;
 
@@ -58,43 +61,57 @@ impl Screen<'_> {
     /// The lines, with styles.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
-        let report = self.report;
-        let mut above = self.above();
-        let below = self.below();
-        let (found, unexplained) = summary::findings(report);
-        let mut blocks: Vec<Vec<String>> =
-            found.iter().enumerate().map(|(index, finding)| self.finding(index + 1, finding)).collect();
-        let mut rest: Vec<String> = unexplained
-            .iter()
-            .flat_map(|finding| {
-                self.block("Not explained", &format!("{}: {}", finding.channels, finding.physics), WARNING)
-            })
-            .collect();
-        if blocks.is_empty() && rest.is_empty() {
-            blocks.push(vec![" Nothing: N, B and K describe every channel.".to_owned()]);
+        let mut lines = self.above();
+        let (found, _) = summary::findings(self.report);
+        let rest = summary::unexplained(self.report)
+            .map_or_else(Vec::new, |text| self.block("Not explained", &format!("{text}."), WARNING));
+        lines.push(String::new());
+        lines.push(styled(HEADING, "What was found"));
+        if found.is_empty() && rest.is_empty() {
+            lines.push(" Nothing: N, B and K describe every channel.".to_owned());
         }
-        let fixed = above.len() + below.len() + 2;
-        rest.truncate(MOST_LINES.saturating_sub(fixed + 2));
-        let room = MOST_LINES.saturating_sub(fixed + rest.len());
-        above.push(String::new());
-        above.push(styled(HEADING, "What was found"));
-        let total: usize = blocks.iter().map(Vec::len).sum();
-        let mut left = if total > room { room.saturating_sub(1) } else { room };
-        let mut shown = 0;
-        for block in &blocks {
-            if block.len() > left {
-                break;
+        // Of what is contradicted, fewer lines where the findings need the room.
+        let room = |contradicted: usize| {
+            let below = self.below(contradicted);
+            let room = MOST_LINES.saturating_sub(lines.len() + rest.len() + below.len());
+            (below, room)
+        };
+        let (mut below, mut left) = room(MOST_CONTRADICTED);
+        if left < found.len() {
+            (below, left) = room(1);
+        }
+        lines.extend(self.findings(&found, left));
+        lines.extend(rest);
+        lines.extend(below);
+        lines.truncate(MOST_LINES);
+        lines
+    }
+
+    /// The findings in at most `room` lines: each in one, and with intervals and weight, from the first on, as far as there is
+    /// room for that.
+    fn findings(&self, found: &[FindingText], room: usize) -> Vec<String> {
+        let shown = if found.len() > room { room.saturating_sub(1) } else { found.len() };
+        let mut left = room.saturating_sub(found.len());
+        let mut lines = Vec::new();
+        for (index, finding) in found.iter().take(shown).enumerate() {
+            let block = self.finding(index + 1, finding);
+            if block.len() <= left + 1 {
+                left -= block.len() - 1;
+                lines.extend(block);
+            } else {
+                lines.push(self.brief_finding(index + 1, finding));
             }
-            left -= block.len();
-            shown += 1;
-            above.extend(block.iter().cloned());
         }
-        if shown < blocks.len() {
-            above.push(styled(FAINT, &format!(" … and {} more: --full", blocks.len() - shown)));
+        if shown < found.len() && room > 0 {
+            lines.push(styled(FAINT, &format!(" … and {} more: --full", found.len() - shown)));
         }
-        above.extend(rest);
-        above.extend(below);
-        above
+        lines
+    }
+
+    /// One finding in one line: number, channels, physics without intervals.
+    fn brief_finding(&self, number: usize, finding: &FindingText) -> String {
+        let label = shortened(&format!("{number:>2}  {}", finding.channels), CHANNELS - 1);
+        format!("{}{}", padded(&label, CHANNELS), shortened(&finding.brief, self.columns() - CHANNELS))
     }
 
     /// Verdict, coefficients and conditions.
@@ -102,7 +119,7 @@ impl Screen<'_> {
         let report = self.report;
         let mut lines =
             vec![styled(HEADING, &shortened(&summary::headline(report, self.source).join("   "), self.columns()))];
-        lines.extend(wrapped(&summary::record_sentences(report).join(" "), self.text_columns()));
+        lines.extend(wrapped(&summary::record_sentences_in_short(report).join(" "), self.text_columns()));
         let tables = summary::coefficient_tables(report);
         if !tables.is_empty() {
             lines.push(String::new());
@@ -118,38 +135,7 @@ impl Screen<'_> {
     }
 
     fn table(&self, table: &CoefficientTable, is_first: bool) -> Vec<String> {
-        let width = ((self.columns() - LABEL - ERROR) / 3).min(26);
-        let row = |cells: [&str; 5]| {
-            let [label, n, b, k, error] = cells;
-            let line = format!(
-                "{}{}{}{}{}",
-                padded(&format!(" {label}"), LABEL),
-                padded(n, width),
-                padded(b, width),
-                padded(k, width),
-                left_padded(error, ERROR)
-            );
-            line.trim_end().to_owned()
-        };
-        let mut lines = Vec::new();
-        if is_first {
-            let names = ["angle random walk", "bias instability", "rate random walk"];
-            lines.push(styled(HEADING, &row([table.title, names[0], names[1], names[2], "error on  "])));
-        }
-        let [n, b, k] = &table.units;
-        let units = if is_first { row(["", n, b, k, "unseen half  "]) } else { row([table.title, n, b, k, ""]) };
-        lines.push(if is_first { styled(FAINT, &units) } else { styled(HEADING, &units) });
-        for of in &table.rows {
-            let [n, b, k] = &of.coefficients;
-            let error = if of.is_high { format!("{} !", of.error) } else { format!("{}  ", of.error) };
-            let line = row([&of.label, n, b, k, &error]);
-            lines.push(match (of.is_high, of.channel.is_empty()) {
-                (true, _) => styled(WARNING, &line),
-                (_, true) => styled(FAINT, &line),
-                _ => line,
-            });
-        }
-        lines
+        table_lines(table, is_first, self.columns()).into_iter().map(|(style, line)| styled(style, &line)).collect()
     }
 
     /// One finding: number, channels, physics and weight.
@@ -172,22 +158,26 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// What the data contradicts, and what to do.
-    fn below(&self) -> Vec<String> {
+    /// What the data contradicts, `most` of it, and what to do.
+    fn below(&self, most: usize) -> Vec<String> {
         let mut lines = Vec::new();
         let contradictions = summary::contradictions(self.report);
         if !contradictions.is_empty() {
-            const MOST: usize = 3;
-            let mut told = contradictions.iter().take(MOST).cloned().collect::<Vec<_>>().join("; ");
-            if contradictions.len() > MOST {
-                told += &format!("; {} more: --full", contradictions.len() - MOST);
+            let mut told = contradictions.iter().take(most).cloned().collect::<Vec<_>>().join("; ");
+            if contradictions.len() > most {
+                told += &format!("; {} more: --full", contradictions.len() - most);
             }
             lines.extend(self.block("Contradicted", &format!("{told}."), WARNING));
         }
-        let steps = summary::next_steps(self.report);
-        if !steps.is_empty() {
-            lines.push(String::new());
-            lines.extend(self.block("What to do", &steps.join(" "), HEADING));
+        // A warning has a line of its own.
+        let (warnings, steps): (Vec<String>, Vec<String>) =
+            summary::next_steps(self.report).into_iter().partition(|step| step.starts_with('!'));
+        let paragraphs = [steps.join(" ")].into_iter().filter(|steps| !steps.is_empty()).chain(warnings);
+        for (index, paragraph) in paragraphs.enumerate() {
+            if index == 0 {
+                lines.push(String::new());
+            }
+            lines.extend(self.block(if index == 0 { "What to do" } else { "" }, &paragraph, HEADING));
         }
         lines
     }
@@ -205,9 +195,40 @@ impl Screen<'_> {
     }
 }
 
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+/// The rows of a table in `columns` columns, each with its style; `is_first` has the names of the coefficients above it.
+pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usize) -> Vec<(Style, String)> {
+    let width = ((columns - LABEL - ERROR) / 3).min(26);
+    let row = |cells: [&str; 5]| {
+        let [label, n, b, k, error] = cells;
+        let line = format!(
+            "{}{}{}{}{}",
+            padded(&format!(" {label}"), LABEL),
+            padded(n, width),
+            padded(b, width),
+            padded(k, width),
+            left_padded(error, ERROR)
+        );
+        line.trim_end().to_owned()
+    };
+    let mut lines = Vec::new();
+    if is_first {
+        let names = ["angle random walk", "bias instability", "rate random walk"];
+        lines.push((HEADING, row([table.title, names[0], names[1], names[2], "error on  "])));
+    }
+    let [n, b, k] = &table.units;
+    let units = if is_first { row(["", n, b, k, "unseen half  "]) } else { row([table.title, n, b, k, ""]) };
+    lines.push(if is_first { (FAINT, units) } else { (HEADING, units) });
+    for of in &table.rows {
+        let [n, b, k] = &of.coefficients;
+        let error = if of.is_high { format!("{} !", of.error) } else { format!("{}  ", of.error) };
+        let line = row([&of.label, n, b, k, &error]);
+        lines.push(match (of.is_high, of.channel.is_empty()) {
+            (true, _) => (WARNING, line),
+            (_, true) => (FAINT, line),
+            _ => (Style::new(), line),
+        });
+    }
+    lines
 }
 
 fn styled(style: Style, text: &str) -> String {

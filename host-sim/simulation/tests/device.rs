@@ -3,8 +3,7 @@
 use adis16405_driver::{Channel, OutputWord};
 use embedded_hal::spi::SpiDevice;
 use firmware::CHANNELS;
-use firmware::console::ShortFloat;
-use link::{Decoder, Health, Hello, Message, RawMessage, Received};
+use link::{ChannelMessage, Decoder, Health, Hello, Message, RawMessage, Received};
 use simulation::Device;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
@@ -147,30 +146,78 @@ fn the_serial_clock_follows_the_rate() {
     assert_eq!(device.bus().part().violations(), []);
 }
 
-/// The table has the numbers of the frames.
+/// The numbers of a cell, and the words around them.
+fn numbers(text: &str) -> Vec<f64> {
+    text.split(|letter: char| !(letter.is_ascii_digit() || letter == '.'))
+        .filter_map(|word| word.trim_matches('.').parse().ok())
+        .collect()
+}
+
+/// The table has the numbers of the frames, in its units, with the rounding that its bounds support.
 #[test]
 fn the_table_shows_the_numbers_of_the_report() {
     let mut device = device();
     after(&mut device, "", 9 * SECOND);
     let heard = after(&mut device, "tr", 9 * SECOND + 1);
-    let Some(Message::Channel(gyro_x)) = heard.messages.iter().find(|message| matches!(message, Message::Channel(_)))
-    else {
-        panic!("{:?}", heard.messages);
+    let channels: Vec<&ChannelMessage> = heard
+        .messages
+        .iter()
+        .filter_map(|message| if let Message::Channel(channel) = message { Some(channel) } else { None })
+        .collect();
+    assert_eq!(channels.len(), CHANNELS.len());
+    let lines = &heard.lines;
+    assert!(lines.iter().all(|line| line.is_ascii() && line.len() <= 80), "{lines:#?}");
+    let samples = format!("ADIS16405   {},{:03} samples   ", channels[0].samples / 1000, channels[0].samples % 1000);
+    assert!(lines[0].starts_with(&samples) && lines[0].contains(" at 204.8 Hz"), "{}", lines[0]);
+    assert_eq!(lines[1], "No sample lost. The epoch has no end.");
+    let place = |start: &str| {
+        lines.iter().position(|line| line.starts_with(start)).unwrap_or_else(|| panic!("{start}: {lines:#?}"))
     };
-    assert!(heard.lines[0].starts_with("Allan deviation"));
-    for (line, point) in heard.lines[2..].iter().zip(&gyro_x.octaves) {
-        let n = point.n as f64;
-        let tau = n / 204.8;
-        let deviation = 0.05 * (point.sum as f64 / (2.0 * n * n * point.count as f64)).sqrt();
-        let cells: Vec<&str> = line.split_whitespace().collect();
-        assert_eq!(
-            (cells.len(), cells[0], cells[1]),
-            (7, &*format!("{}", ShortFloat(tau)), &*format!("{}", ShortFloat(deviation)))
-        );
+    let (gyros, accelerometers) = (place("       deg/sqrt(s)") + 1, place(" accel ug/sqrt(Hz)") + 1);
+    assert!(gyros < accelerometers && accelerometers < place("What was found"), "the order of the host's screen");
+    assert!(place("What was found") < place("Health") && place("Health") < place("Allan deviation"), "{lines:#?}");
+    // From deg/s and g: the columns begin where their titles do.
+    let columns = ["angle random walk", "bias instability", "rate random walk", "error on"];
+    let starts = columns.map(|title| lines[gyros - 2].find(title).expect(title));
+    for (index, report) in channels[..6].iter().enumerate() {
+        let (line, factors) = if index < 3 {
+            (&lines[gyros + index], [1.0, 1e3, 1e3])
+        } else {
+            (&lines[accelerometers + index - 3], [1e6; 3])
+        };
+        assert_eq!(line.trim_start().chars().next(), "xyz".chars().nth(index % 3), "{line}");
+        for (k, (coefficient, factor)) in report.coefficients.iter().zip(factors).enumerate() {
+            let cell = line.get(starts[k]..(starts[k + 1].min(line.len()))).unwrap_or_default().trim();
+            let found = numbers(&cell.replace(',', ""));
+            let (value, low, high) = (factor * coefficient.value, factor * coefficient.low, factor * coefficient.high);
+            // Two significant digits at least: 5 % off at most, for 1.05 that is written 1.1.
+            let near = |shown: f64, of: f64| (shown - of).abs() <= 0.05 * of.abs();
+            let is_right = match found[..] {
+                [bound] if cell.starts_with('<') => near(bound, high),
+                [shown, half] if cell.contains("+-") => {
+                    near(shown, value) && (half / ((high - low) / 2.0) - 1.0).abs() < 0.2
+                }
+                [shown, bound] if cell.contains("(<") => near(shown, value) && near(bound, high),
+                [shown, below, above] => near(shown, value) && near(below, low) && near(above, high),
+                _ => false,
+            };
+            assert!(is_right, "{cell}: {value} ({low} .. {high})");
+        }
     }
-    let coefficients: Vec<&String> = heard.lines.iter().filter(|line| line.starts_with("gyro_x")).collect();
-    let value = format!("{}", ShortFloat(gyro_x.coefficients[0].value));
-    assert!(coefficients.len() == 1 && coefficients[0].contains(&value), "{coefficients:?}, {value}");
+    let curve = place("Allan deviation") + 2;
+    for (k, point) in channels[0].octaves.iter().enumerate() {
+        let cells = numbers(&lines[curve + k]);
+        for (index, report) in channels[..6].iter().enumerate() {
+            let of = report.octaves[k];
+            let n = point.n as f64;
+            // 0.05 deg/s and 3.33 mg are the data sheet's.
+            let unit = if index < 3 { 0.05 } else { 3.33 };
+            let deviation = unit * (of.sum as f64 / (2.0 * n * n * of.count as f64)).sqrt();
+            assert!((cells[0] * 204.8 / n - 1.0).abs() < 1e-3, "{}", lines[curve + k]);
+            // Four significant digits.
+            assert!((cells[1 + index] / deviation - 1.0).abs() < 0.6e-3, "{deviation}: {}", lines[curve + k]);
+        }
+    }
 }
 
 #[test]
@@ -186,7 +233,7 @@ fn commands_show_help_status_version_and_counters() {
     let lines: Vec<String> = lines.into_iter().flat_map(|heard| heard.lines).collect();
     for expected in [
         "sensor sampled",
-        "measured 2.048e2 Hz",
+        "rate 204.80 Hz, measured 204.8",
         "start 1",
         "used ",
         concat!("observatory ", env!("CARGO_PKG_VERSION")),

@@ -1,5 +1,5 @@
 //! The command `host-sim`: input errors, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
-//! exports, conversions, and a device on a serial port.
+//! exports, conversions, the live screen, and a device on a serial port.
 
 mod analyze_and_replay;
 mod convert_and_simulate;
@@ -7,6 +7,7 @@ mod damaged_input;
 mod exports;
 mod formats;
 mod input_errors;
+mod live_screen;
 mod measured_recordings;
 mod program;
 mod report_output;

@@ -62,6 +62,10 @@ function facts(frame) {
   return {
     width: page.documentElement.clientWidth,
     overflow: page.documentElement.scrollWidth - page.documentElement.clientWidth,
+    // What is wider than its place, and therefore cut off or to be scrolled.
+    cut: [...page.querySelectorAll("body *")]
+      .filter((element) => element.scrollWidth > element.clientWidth + 1 && view.getComputedStyle(element).overflowX !== "visible")
+      .map((element) => `${element.closest("section")?.className ?? ""} ${element.className}`.trim()),
     contrasts: contrasts.slice(0, 3),
     dark: view.matchMedia("(prefers-color-scheme: dark)").matches,
     requests: view.performance.getEntriesByType("resource").map((entry) => entry.name),

@@ -186,6 +186,34 @@ fn what_is_drawn_is_what_was_measured() {
     }
 }
 
+/// The channels of a burst and of the conditions, each with as many points as a spectrum and a bias over time have at most.
+#[test]
+fn the_page_of_an_hour_of_twelve_channels_is_below_a_megabyte() {
+    let mut report = report();
+    let full = report.channels[0].clone();
+    let names = ["magn_x", "magn_y", "magn_z", "temp", "supply", "aux_adc"];
+    report
+        .channels
+        .extend(names.map(|name| noise_analysis::report::ChannelReport { name: name.to_owned(), ..full.clone() }));
+    for channel in &mut report.channels {
+        let data = &mut channel.figure_data;
+        let most = noise_analysis::figure_data::MOST_POINTS;
+        // Irregular digits, as measured ones are.
+        let digits = |k: usize| 0.0123456 + ((k * 7919) % 1000) as f64 * 1.00037e-6;
+        let values: Vec<f64> = (0..most).map(digits).collect();
+        let frequency_hz: Vec<f64> = (0..most).map(|bin| 0.00123456 * 1.03f64.powi(bin as i32)).collect();
+        let (low, high, model, density) = (values.clone(), values.clone(), values.clone(), values.clone());
+        data.spectrum = Some(SpectrumReport { frequency_hz, low, high, model, density });
+        let time_s = (0..most).map(|block| 9.012345 * (block as f64 + 0.5)).collect();
+        data.bias_over_time = Some(BiasOverTime { block_s: 9.012345, followed: values.clone(), time_s, mean: values });
+    }
+    assert_eq!(report.channels.len(), 12);
+    let dir = tempfile::tempdir().expect("a folder");
+    let page = reports::page::write(&report, dir.path()).expect("a page");
+    let bytes = std::fs::metadata(page).expect("the page").len();
+    assert!(bytes < 1_000_000, "{bytes} bytes");
+}
+
 #[test]
 fn the_page_fits_and_can_be_read_in_both_colour_schemes() {
     let Some(program) = chromium() else { return };
@@ -194,6 +222,11 @@ fn the_page_fits_and_can_be_read_in_both_colour_schemes() {
             let width = &facts["width"];
             assert_eq!(facts["dark"], is_dark);
             assert_eq!(facts["overflow"], 0, "at {width} pixels");
+            let cut: Vec<&str> = list(&facts, "cut").iter().filter_map(Value::as_str).collect();
+            // On a telephone a figure is scrolled, since its text would be too small to read otherwise; the first screen's table
+            // is not.
+            let is_allowed = |of: &&&str| width.as_u64() == Some(400) && !of.starts_with("verdict");
+            assert!(cut.iter().all(|of| is_allowed(&of)), "{cut:?} at {width} pixels");
             let worst = &facts["contrasts"][0];
             assert!(worst[0].as_f64().expect("a contrast") >= 4.5, "{} at {width}, dark {is_dark}", facts["contrasts"]);
             assert_eq!(list(&facts, "requests").len(), 0, "{}", facts["requests"]);

@@ -1,0 +1,277 @@
+//! Numbers as a person reads them, in the words of the host's screen: decimals without an exponent, estimates with as many
+//! digits as their bounds support, quantities with a prefix in their unit.
+//!
+//! The formatting of floating-point numbers in `core` takes 20 kB of flash; this takes 2 kB.
+
+use core::fmt::{self, Display, Formatter};
+
+/// Values from this one on are not written out.
+const TOO_LARGE: f64 = 1e15;
+/// Decimals at most.
+const MOST_DECIMALS: i32 = 12;
+
+/// Widest relative half-width at which bounds are written as `+- half`, and the largest ratio of the wider to the narrower
+/// side of such an interval: as on the host's screen.
+const SYMMETRIC: f64 = 0.25;
+const SKEW: f64 = 1.3;
+
+/// Ten to a power between -22 and 22, for which it is exact or one rounding off.
+fn power_of_ten(exponent: i32) -> f64 {
+    let power = (0..exponent.unsigned_abs()).fold(1.0, |power, _| power * 10.0);
+    if exponent < 0 { 1.0 / power } else { power }
+}
+
+/// The exponent of the leading digit of a positive number.
+fn exponent(mut value: f64) -> i32 {
+    let mut exponent = 0;
+    while value >= 10.0 {
+        (value, exponent) = (value / 10.0, exponent + 1);
+    }
+    while value < 1.0 && exponent > -MOST_DECIMALS {
+        (value, exponent) = (value * 10.0, exponent - 1);
+    }
+    exponent
+}
+
+/// A number with so many decimals, half rounded up, and a comma between thousands; what is not finite or at least 10^15 as `-`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decimal {
+    value: f64,
+    decimals: i32,
+}
+
+impl Decimal {
+    /// With so many significant digits: `0.0368`, `2.43`, `1,200`.
+    #[must_use]
+    pub fn significant(value: f64, digits: i32) -> Self {
+        let magnitude = libm::fabs(value);
+        if magnitude == 0.0 || !(magnitude < TOO_LARGE) {
+            return Self { value, decimals: 0 };
+        }
+        let place = exponent(magnitude) - digits + 1;
+        // 9.96 in two digits is 10, whose last digit is one place further left.
+        let carried = magnitude + power_of_ten(place) / 2.0;
+        Self::at_place(value, exponent(carried) - digits + 1)
+    }
+
+    /// Rounded to a multiple of ten to the power of `place`.
+    fn at_place(value: f64, place: i32) -> Self {
+        if place <= 0 {
+            return Self { value, decimals: (-place).min(MOST_DECIMALS) };
+        }
+        let unit = power_of_ten(place);
+        Self { value: libm::floor(value / unit + 0.5) * unit, decimals: 0 }
+    }
+}
+
+impl Display for Decimal {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let magnitude = libm::fabs(self.value);
+        if !(magnitude < TOO_LARGE) {
+            return f.write_str("-");
+        }
+        let scale = (0..self.decimals).fold(1_u64, |scale, _| scale * 10);
+        let scaled = (magnitude * scale as f64 + 0.5) as u64;
+        if self.value < 0.0 && scaled > 0 {
+            f.write_str("-")?;
+        }
+        write!(f, "{}", Count(scaled / scale))?;
+        if self.decimals > 0 {
+            write!(f, ".{:0width$}", scaled % scale, width = self.decimals as usize)?;
+        }
+        Ok(())
+    }
+}
+
+/// A count with a comma between thousands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Count(pub u64);
+
+impl Display for Count {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let mut divisor = 1;
+        while self.0 / divisor >= 1000 {
+            divisor *= 1000;
+        }
+        write!(f, "{}", self.0 / divisor)?;
+        while divisor > 1 {
+            divisor /= 1000;
+            write!(f, ",{:03}", self.0 / divisor % 1000)?;
+        }
+        Ok(())
+    }
+}
+
+/// An estimate with its 95 % bounds: `2.43 +- 0.04`, `24 (14 .. 37)`, `< 190` where only an upper bound is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Lower and upper 95 % bound.
+    pub bounds: (f64, f64),
+}
+
+impl Display for Estimate {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (value, (low, high)) = (self.value, self.bounds);
+        let two = |value| Decimal::significant(value, 2);
+        if !value.is_finite() || !low.is_finite() || !high.is_finite() || high <= low {
+            return write!(f, "{}", Decimal::significant(value, 3));
+        }
+        if low <= 0.0 && high >= 0.0 && libm::fabs(value) <= high / 1e3 {
+            return write!(f, "< {}", two(high));
+        }
+        let (below, above) = (value - low, high - value);
+        let (half, wider, narrower) = ((high - low) / 2.0, below.max(above), below.min(above));
+        if wider <= SKEW * narrower && half <= SYMMETRIC * libm::fabs(value) {
+            // Two digits of the half-width where it begins with 1 or 2, else one.
+            let leading = exponent(half);
+            let place = if half / power_of_ten(leading) < 2.95 { leading - 1 } else { leading };
+            return write!(f, "{} +- {}", Decimal::at_place(value, place), Decimal::at_place(half, place));
+        }
+        if low <= 0.0 && value > 0.0 {
+            return write!(f, "{} (< {})", two(value), two(high));
+        }
+        write!(f, "{} ({} .. {})", two(value), two(low), two(high))
+    }
+}
+
+/// An estimate in `unit`, whose prefix `m` or `u` keeps the value at 0.1 or above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity<'a> {
+    /// Value and bounds in the unit; bounds that equal the value are not written.
+    pub estimate: Estimate,
+    /// The unit without a prefix.
+    pub unit: &'a str,
+}
+
+impl<'a> Quantity<'a> {
+    /// A value without bounds.
+    #[must_use]
+    pub const fn new(value: f64, unit: &'a str) -> Self {
+        Self { estimate: Estimate { value, bounds: (value, value) }, unit }
+    }
+}
+
+impl Display for Quantity<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Estimate { value, bounds: (low, high) } = self.estimate;
+        let (prefix, factor) = match libm::fabs(value) {
+            magnitude if magnitude >= 0.0995 || magnitude == 0.0 => ("", 1.0),
+            magnitude if magnitude >= 0.995e-3 => ("m", 1e3),
+            _ => ("u", 1e6),
+        };
+        let scaled = Estimate { value: value * factor, bounds: (low * factor, high * factor) };
+        write!(f, "{scaled} {prefix}{}", self.unit)
+    }
+}
+
+/// A duration: `9.0 s`, `10 min`, `3 h 02 min`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span(pub f64);
+
+impl Display for Span {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if self.0 < 99.5 {
+            return write!(f, "{} s", Decimal::significant(self.0, 2));
+        }
+        let minutes = (self.0 / 60.0 + 0.5) as u64;
+        match (minutes / 60, minutes % 60) {
+            (0, minutes) => write!(f, "{minutes} min"),
+            (hours, 0) => write!(f, "{hours} h"),
+            (hours, minutes) => write!(f, "{hours} h {minutes:02} min"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use std::format;
+    use std::string::ToString;
+
+    /// `core`'s own formatting is the reference: it rounds the exact binary value, this a product that is one rounding off, so
+    /// numbers are taken that do not lie on a tie.
+    #[test]
+    fn decimals_equal_the_standard_formatting() {
+        let mut value = 1.234_56e-9;
+        while value < 1e14 {
+            for decimals in 0..=9 {
+                let text = Decimal { value, decimals }.to_string().replace(',', "");
+                let expected = format!("{value:.*}", decimals as usize);
+                // Beyond 15 digits the last ones are those of the rounding.
+                if value * power_of_ten(decimals) < 1e15 {
+                    assert_eq!(text, expected, "{value} to {decimals} decimals");
+                    assert_eq!(
+                        Decimal { value: -value, decimals }.to_string().replace(',', "").trim_start_matches('-'),
+                        text
+                    );
+                }
+            }
+            for digits in 1..=6 {
+                let shown: f64 =
+                    Decimal::significant(value, digits).to_string().replace(',', "").parse().expect("a number");
+                let expected: f64 = format!("{value:.*e}", digits as usize - 1).parse().expect("a number");
+                // Exponents below the last decimal that is written are cut off.
+                let limit = 0.5 * power_of_ten(-MOST_DECIMALS);
+                assert!((shown - expected).abs() <= 1e-14 * expected + limit, "{value} in {digits} digits: {shown}");
+            }
+            value *= 1.37;
+        }
+    }
+
+    #[test]
+    fn numbers_are_written_as_a_person_reads_them() {
+        for (value, digits, text) in [
+            (0.0368, 3, "0.0368"),
+            (0.99996, 3, "1.00"),
+            (9.96, 2, "10"),
+            (1234.0, 2, "1,200"),
+            (204.8, 4, "204.8"),
+            (-4.26, 2, "-4.3"),
+            (0.0, 3, "0"),
+            (f64::NAN, 3, "-"),
+            (f64::NEG_INFINITY, 3, "-"),
+            (1e300, 3, "-"),
+        ] {
+            assert_eq!(Decimal::significant(value, digits).to_string(), text, "{value}");
+        }
+        assert_eq!([0, 999, 1000, 1_002_003].map(|count| Count(count).to_string()), ["0", "999", "1,000", "1,002,003"]);
+        let spans = [(0.02, "0.020 s"), (80.0, "80 s"), (600.0, "10 min"), (10_940.0, "3 h 02 min"), (32_400.0, "9 h")];
+        for (seconds, text) in spans {
+            assert_eq!(Span(seconds).to_string(), text);
+        }
+    }
+
+    /// The same cases as in the test of the host's screen, in ASCII.
+    #[test]
+    fn estimates_have_the_digits_that_their_bounds_support() {
+        for (value, low, high, text) in [
+            (2.4312, 2.4212, 2.4412, "2.431 +- 0.010"),
+            (2.4312, 2.39, 2.47, "2.43 +- 0.04"),
+            (24.3, 20.9, 27.4, "24 +- 3"),
+            (24.3, 14.0, 37.0, "24 (14 .. 37)"),
+            (240.0, 60.0, 420.0, "240 (60 .. 420)"),
+            (0.0, 0.0, 187.0, "< 190"),
+            (863.2, 820.0, 906.0, "860 +- 40"),
+            (12.0, 0.0, 31.0, "12 (< 31)"),
+            (f64::NAN, 0.0, 1.0, "-"),
+            (-52.3, -59.0, -45.0, "-52 +- 7"),
+        ] {
+            assert_eq!(Estimate { value, bounds: (low, high) }.to_string(), text, "{value} ({low} .. {high})");
+        }
+    }
+
+    #[test]
+    fn quantities_have_prefixes_in_their_units() {
+        let line = Quantity { estimate: Estimate { value: 0.0516, bounds: (0.0446, 0.0586) }, unit: "deg/s/degC" };
+        assert_eq!(line.to_string(), "52 +- 7 mdeg/s/degC");
+        for (value, unit, text) in
+            [(0.4, "deg/s", "0.400 deg/s"), (22.0e-6, "g", "22.0 ug"), (20.62, "Hz", "20.6 Hz"), (0.0, "g", "0 g")]
+        {
+            assert_eq!(Quantity::new(value, unit).to_string(), text);
+        }
+    }
+}

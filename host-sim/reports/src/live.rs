@@ -1,0 +1,237 @@
+//! A record while it grows, on a terminal's whole screen: the verdict of the report, the curves, the findings, and the health
+//! of the source. Drawn by ratatui.
+
+use crate::finding_text::FindingText;
+use crate::summary::{self, CoefficientTable};
+use crate::terminal::table_lines;
+use noise_analysis::report::Report;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Block, Borders, Chart, Dataset, GraphType, Paragraph, Wrap};
+
+/// Columns of the tables; text is broken at the edge of the screen.
+const TABLE_COLUMNS: usize = 80;
+/// Rows of the screen from which on the tables have the data sheet's row.
+const ROWS_FOR_SHEET: u16 = 30;
+
+/// One curve: the Allan deviation over the averaging time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LiveCurve {
+    /// Name of the channel, such as `gyro_z`.
+    pub channel: String,
+    /// Unit of the deviation.
+    pub unit: String,
+    /// Averaging time in s and deviation.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Which curves are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CurveGroup {
+    /// Those of the gyros.
+    #[default]
+    Gyros,
+    /// Those of the accelerometers.
+    Accelerometers,
+}
+
+impl CurveGroup {
+    /// The group that is not this one.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Gyros => Self::Accelerometers,
+            Self::Accelerometers => Self::Gyros,
+        }
+    }
+
+    fn prefix(self) -> &'static str {
+        match self {
+            Self::Gyros => "gyro_",
+            Self::Accelerometers => "accl_",
+        }
+    }
+}
+
+/// What is shown of a growing record.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LiveView {
+    /// Part, source, samples, length.
+    pub headline: String,
+    /// The record in sentences.
+    pub sentences: String,
+    /// Coefficients of the gyros and of the accelerometers.
+    pub tables: Vec<CoefficientTable>,
+    /// The curves.
+    pub curves: Vec<LiveCurve>,
+    /// What was found.
+    pub findings: Vec<FindingText>,
+    /// What nothing explains.
+    pub unexplained: Option<String>,
+    /// Where the record departs from the model, and what to do.
+    pub advice: Vec<String>,
+    /// Counters of the source.
+    pub health: String,
+    /// What the source does now.
+    pub status: String,
+}
+
+impl LiveView {
+    /// What a report says; `health` and `status` are those of its source.
+    #[must_use]
+    pub fn from_report(report: &Report, source: Option<&str>, health: String, status: String) -> Self {
+        let curve = |channel: &noise_analysis::report::ChannelReport| LiveCurve {
+            channel: channel.name.clone(),
+            unit: channel.unit.clone(),
+            points: channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect(),
+        };
+        let contradicted = summary::contradictions(report).into_iter().next();
+        let contradicted = contradicted.map(|first| format!("Contradicted: {first}."));
+        Self {
+            headline: summary::headline(report, source).join("   "),
+            sentences: summary::record_sentences_in_short(report).join(" "),
+            tables: summary::coefficient_tables(report),
+            curves: report.channels.iter().map(curve).collect(),
+            findings: summary::findings(report).0,
+            unexplained: summary::unexplained(report),
+            advice: contradicted.into_iter().chain(summary::next_steps(report)).collect(),
+            health,
+            status,
+        }
+    }
+
+    /// Draws the view on the whole frame, which 80 columns and 24 rows suffice for; in colour if that is wanted.
+    pub fn draw(&self, frame: &mut Frame<'_>, group: CurveGroup, in_colour: bool) {
+        let area = frame.area();
+        let text_rows = rows_of(&self.sentences, area.width).min(3);
+        let health_rows = rows_of(&self.health, area.width).min(2);
+        let tables = self.table_text(area, in_colour);
+        let [head, sentences, coefficients, middle, health, status] = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Length(text_rows),
+            Constraint::Length(u16::try_from(tables.len()).unwrap_or(u16::MAX)),
+            Constraint::Min(6),
+            Constraint::Length(health_rows),
+            Constraint::Length(1),
+        ])
+        .areas(area);
+        let bold = Style::new().add_modifier(Modifier::BOLD);
+        frame.render_widget(Paragraph::new(Span::styled(self.headline.as_str(), bold)), head);
+        frame.render_widget(Paragraph::new(self.sentences.as_str()).wrap(Wrap { trim: true }), sentences);
+        frame.render_widget(Paragraph::new(tables), coefficients);
+        let [left, right] = Layout::horizontal([Constraint::Percentage(50), Constraint::Percentage(50)]).areas(middle);
+        self.draw_curves(frame, left, group, in_colour);
+        let found = Block::new().borders(Borders::TOP).title("What was found");
+        frame.render_widget(Paragraph::new(self.found_text(in_colour)).wrap(Wrap { trim: false }).block(found), right);
+        frame.render_widget(Paragraph::new(self.health.as_str()).wrap(Wrap { trim: true }), health);
+        let reversed = Style::new().add_modifier(Modifier::REVERSED);
+        let keys = "q ends, Tab other curves";
+        let status_text = if self.status.is_empty() { keys.to_owned() } else { format!("{}; {keys}", self.status) };
+        frame.render_widget(Paragraph::new(status_text).style(reversed), status);
+    }
+
+    /// The tables, without the data sheet's rows on a low screen.
+    fn table_text(&self, area: Rect, in_colour: bool) -> Vec<Line<'static>> {
+        let columns = usize::from(area.width).clamp(TABLE_COLUMNS, 120);
+        let mut lines = Vec::new();
+        for (index, table) in self.tables.iter().enumerate() {
+            let mut table = table.clone();
+            if area.height < ROWS_FOR_SHEET {
+                table.rows.retain(|row| !row.channel.is_empty());
+            }
+            for (style, text) in table_lines(&table, index == 0, columns) {
+                let effects = style.get_effects();
+                let mut shown = Style::new();
+                for (effect, modifier) in
+                    [(anstyle::Effects::BOLD, Modifier::BOLD), (anstyle::Effects::DIMMED, Modifier::DIM)]
+                {
+                    if effects.contains(effect) {
+                        shown = shown.add_modifier(modifier);
+                    }
+                }
+                if in_colour && style.get_fg_color().is_some() {
+                    shown = shown.fg(Color::Yellow);
+                }
+                lines.push(Line::styled(text, shown));
+            }
+        }
+        lines
+    }
+
+    /// Findings, what is unexplained, and advice.
+    fn found_text(&self, in_colour: bool) -> Vec<Line<'_>> {
+        let warning = if in_colour { Style::new().fg(Color::Yellow) } else { Style::new() };
+        let mut lines: Vec<Line<'_>> =
+            self.findings.iter().map(|finding| Line::raw(format!("{}: {}", finding.channels, finding.brief))).collect();
+        if lines.is_empty() && self.unexplained.is_none() {
+            lines.push(Line::raw("Nothing beyond N, B and K yet."));
+        }
+        lines.extend(self.unexplained.iter().map(|text| Line::styled(format!("Not explained: {text}."), warning)));
+        lines.extend(self.advice.iter().map(|text| Line::raw(format!("> {text}"))));
+        lines
+    }
+
+    /// The curves of a group on logarithmic axes; each point is the letter of its axis, so that no colour is needed.
+    fn draw_curves(&self, frame: &mut Frame<'_>, area: Rect, group: CurveGroup, in_colour: bool) {
+        let logarithmic = |curve: &LiveCurve| -> Vec<(f64, f64)> {
+            let positive = curve.points.iter().filter(|(tau, deviation)| *tau > 0.0 && *deviation > 0.0);
+            positive.map(|(tau, deviation)| (tau.log10(), deviation.log10())).collect()
+        };
+        let shown: Vec<(&str, Vec<(f64, f64)>)> = self
+            .curves
+            .iter()
+            .filter_map(|curve| Some((curve.channel.strip_prefix(group.prefix())?, logarithmic(curve))))
+            .collect();
+        let unit = self.curves.iter().find(|curve| curve.channel.starts_with(group.prefix()));
+        let unit = unit.map_or_else(String::new, |curve| crate::formatting::unit(&curve.unit));
+        let name = match group {
+            CurveGroup::Gyros => "gyros",
+            CurveGroup::Accelerometers => "accels",
+        };
+        let block = Block::new().borders(Borders::TOP).title(format!("σ(τ) of the {name}, {unit} over s"));
+        let points = || shown.iter().flat_map(|(_, points)| points);
+        if points().next().is_none() {
+            frame.render_widget(Paragraph::new("No curve yet.").block(block), area);
+            return;
+        }
+        let bounds = |of: fn(&(f64, f64)) -> f64| {
+            let (low, high) = points()
+                .map(of)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (value.min(low), value.max(high)));
+            [low.floor(), high.ceil().max(low.floor() + 1.0)]
+        };
+        let (x, y) = (bounds(|point| point.0), bounds(|point| point.1));
+        let datasets = shown.iter().map(|(axis, points)| {
+            let letter = axis.chars().next().unwrap_or('·');
+            let colour = match letter {
+                'x' => Color::Cyan,
+                'y' => Color::Magenta,
+                _ => Color::Green,
+            };
+            let style = if in_colour { Style::new().fg(colour) } else { Style::new() };
+            Dataset::default().marker(Marker::Custom(letter)).graph_type(GraphType::Scatter).style(style).data(points)
+        });
+        let chart = Chart::new(datasets.collect())
+            .block(block)
+            .x_axis(Axis::default().bounds(x).labels(powers_of_ten(x)))
+            .y_axis(Axis::default().bounds(y).labels(powers_of_ten(y)));
+        frame.render_widget(chart, area);
+    }
+}
+
+/// Both ends of an axis of logarithms.
+fn powers_of_ten(bounds: [f64; 2]) -> [String; 2] {
+    bounds.map(|exponent| match exponent {
+        exponent if (-3.0..=4.0).contains(&exponent) => format!("{}", 10f64.powf(exponent)),
+        exponent => format!("1e{exponent}"),
+    })
+}
+
+/// Rows of a text that is broken at `columns`: as many as its length needs, and one for words that are moved down.
+fn rows_of(text: &str, columns: u16) -> u16 {
+    let wrapped = crate::formatting::wrap(text, usize::from(columns.max(1)));
+    u16::try_from(wrapped.lines().count()).unwrap_or(u16::MAX)
+}

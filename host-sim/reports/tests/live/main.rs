@@ -1,0 +1,99 @@
+//! The live screen on a terminal in memory, against the snapshots beside this file. After a change that is meant, run the test with
+//! `INSTA_UPDATE=always` and read what it wrote.
+
+#[path = "../rendering/fixture.rs"]
+#[allow(dead_code)]
+mod fixture;
+
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::buffer::Buffer;
+use ratatui::style::Color;
+use reports::finding_text::FindingText;
+use reports::live::{CurveGroup, LiveView};
+
+/// The view of the report of the other tests, with a finding and a departure.
+fn view() -> LiveView {
+    let health = "Health: 1,000,000 samples used, 212 lost, 3 refused, 0 used with a warning.".to_owned();
+    let status = "replayed 12 min of 2 h 47 min, 60 times real time".to_owned();
+    let mut view = LiveView::from_report(&fixture::report(), Some("run1.csv.gz"), health, status);
+    view.findings = vec![FindingText {
+        channels: "gyro z".to_owned(),
+        physics: String::new(),
+        brief: "A vibration or hum at 21 Hz: a narrow line of 0.27 °/s.".to_owned(),
+        advice: String::new(),
+        weight: String::new(),
+    }];
+    view.unexplained = Some("gyro z: +9.0 % at averaging times around 80 s".to_owned());
+    view
+}
+
+fn drawn(view: &LiveView, columns: u16, rows: u16, group: CurveGroup, in_colour: bool) -> Buffer {
+    let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a terminal in memory");
+    terminal.draw(|frame| view.draw(frame, group, in_colour)).expect("drawn");
+    terminal.backend().buffer().clone()
+}
+
+fn text(buffer: &Buffer) -> String {
+    let row = |y| (0..buffer.area.width).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>();
+    (0..buffer.area.height).map(|y| row(y).trim_end().to_owned() + "\n").collect()
+}
+
+#[test]
+fn the_live_screen_is_as_it_was_read() {
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = text(&drawn(&view(), columns, rows, CurveGroup::Gyros, true));
+        insta::assert_snapshot!(format!("{columns}x{rows}"), screen);
+    }
+}
+
+#[test]
+fn the_screen_has_verdict_curve_findings_health_and_keys_in_80_columns() {
+    let screen = text(&drawn(&view(), 80, 24, CurveGroup::Gyros, false));
+    for expected in [
+        "run1.csv.gz",
+        "1,000,000 samples",
+        "angle random walk",
+        "µg/√Hz",
+        "σ(τ) of the gyros, °/s over s",
+        "What was found",
+        "A vibration or hum at 21 Hz",
+        "Not explained: gyro z",
+        "Health: 1,000,000 samples used, 212 lost",
+        "12 min of 2 h 47 min",
+        "q ends",
+    ] {
+        assert!(screen.contains(expected), "{expected}:\n{screen}");
+    }
+    // The points of each gyro are the letters of its axis, in the left half below the tables.
+    let below = screen.split("σ(τ) of the gyros").nth(1).expect("the curves");
+    let left: String = below.lines().map(|line| line.chars().take(40).collect::<String>() + "\n").collect();
+    assert!(left.matches(['x', 'y', 'z']).count() >= 4, "{left}");
+}
+
+#[test]
+fn the_other_group_of_curves_is_shown_on_request() {
+    let group = CurveGroup::Gyros.other();
+    assert_eq!((group, group.other()), (CurveGroup::Accelerometers, CurveGroup::Gyros));
+    assert!(text(&drawn(&view(), 80, 24, group, true)).contains("σ(τ) of the accels, g over s"));
+}
+
+#[test]
+fn without_colour_no_cell_has_one() {
+    let coloured = |in_colour| {
+        let buffer = drawn(&view(), 120, 40, CurveGroup::Gyros, in_colour);
+        buffer.content().iter().filter(|cell| cell.fg != Color::Reset || cell.bg != Color::Reset).count()
+    };
+    assert!(coloured(true) > 0);
+    assert_eq!(coloured(false), 0);
+}
+
+#[test]
+fn any_size_and_an_empty_view_are_drawn() {
+    for (columns, rows) in [(1, 1), (10, 3), (40, 12), (80, 24), (200, 60)] {
+        for view in [view(), LiveView::default()] {
+            let buffer = drawn(&view, columns, rows, CurveGroup::Gyros, true);
+            assert_eq!((buffer.area.width, buffer.area.height), (columns, rows));
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! `monitor` on a pseudo-terminal: the live screen of a replayed recording, how it ends, and that the terminal is restored.
+
+use crate::program::{host_sim, write};
+use serialport::{SerialPort, TTYPort};
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Read, Write};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// The sequences by which a terminal enters and leaves its alternate screen.
+const ENTER: &str = "\u{1b}[?1049h";
+const LEAVE: &str = "\u{1b}[?1049l";
+/// The longest that a test waits for something to appear.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// White noise of 30 s at 100 Hz in three gyros, made by a linear congruential generator with a fixed seed.
+fn table() -> Vec<u8> {
+    let mut state = 1_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 60) as i64 - 8
+    };
+    let rows = (0..3000).map(|_| format!("{},{},{}\n", next(), next(), next()));
+    let head = "gyro_x_counts,gyro_y_counts,gyro_z_counts\n".to_owned();
+    [head].into_iter().chain(rows).collect::<String>().into_bytes()
+}
+
+/// What `stty` says of a terminal.
+fn settings(terminal: &str) -> String {
+    let output = Command::new("stty").args(["-F", terminal, "-a"]).output().expect("stty starts");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// A session of the program on a pseudo-terminal of 80 columns and 24 rows.
+struct Session {
+    near: TTYPort,
+    far: TTYPort,
+    program: std::process::Child,
+    seen: String,
+    before: String,
+}
+
+impl Session {
+    fn start(arguments: &[&str], environment: &[(&str, &str)]) -> Self {
+        let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
+        near.set_timeout(Duration::from_millis(20)).expect("a timeout");
+        let name = far.name().expect("a name");
+        let sized =
+            Command::new("stty").args(["-F", &name, "sane", "rows", "24", "cols", "80"]).status().expect("stty");
+        assert!(sized.success());
+        let before = settings(&name);
+        let terminal = || Stdio::from(OpenOptions::new().read(true).write(true).open(&name).expect("the terminal"));
+        let program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+            .args(arguments)
+            .env_remove("NO_COLOR")
+            .envs(environment.iter().copied())
+            .env("TERM", "xterm")
+            .stdin(terminal())
+            .stdout(terminal())
+            .stderr(terminal())
+            .spawn()
+            .expect("the program starts");
+        Self { near, far, program, seen: String::new(), before }
+    }
+
+    fn read(&mut self) {
+        let mut bytes = [0; 4096];
+        match self.near.read(&mut bytes) {
+            Ok(count) => self.seen += &String::from_utf8_lossy(&bytes[..count]),
+            Err(error) => assert_eq!(error.kind(), ErrorKind::TimedOut),
+        }
+    }
+
+    fn wait_for(&mut self, expected: &str) {
+        let begun = Instant::now();
+        while !self.seen.contains(expected) {
+            assert!(begun.elapsed() < PATIENCE, "{expected}: {:?}", self.seen);
+            self.read();
+        }
+    }
+
+    /// Waits for the end; returns the exit code and whether the terminal is as it was.
+    fn end(mut self) -> (ExitStatus, bool, String) {
+        let begun = Instant::now();
+        let status = loop {
+            self.read();
+            if let Some(status) = self.program.try_wait().expect("the program") {
+                break status;
+            }
+            assert!(begun.elapsed() < PATIENCE, "no end: {:?}", self.seen);
+        };
+        self.read();
+        let restored = settings(&self.far.name().expect("a name")) == self.before && self.seen.contains(LEAVE);
+        (status, restored, self.seen)
+    }
+}
+
+#[test]
+fn the_live_screen_grows_and_every_end_restores_the_terminal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write(&folder, "still.csv", &table());
+    let file = file.to_str().expect("a name");
+    // The key q, Ctrl-C as a key, and a signal.
+    for (end, name) in [(Some(b"q".as_slice()), "q"), (Some(b"\x03"), "Ctrl-C"), (None, "SIGINT")] {
+        let mut session = Session::start(&["monitor", file, "--rate", "100", "--speed", "max"], &[]);
+        session.wait_for(ENTER);
+        for expected in ["angle random walk", "What was found", "Health", "q ends"] {
+            session.wait_for(expected);
+        }
+        match end {
+            Some(keys) => session.near.write_all(keys).expect("typed"),
+            None => {
+                let process = session.program.id().to_string();
+                assert!(Command::new("kill").args(["-INT", &process]).status().expect("kill starts").success());
+            }
+        }
+        let (status, restored, seen) = session.end();
+        assert!(status.success() && restored, "{name}: {status}, {seen:?}");
+        // The report stays on the terminal.
+        let after = seen.rsplit(LEAVE).next().unwrap_or_default();
+        assert!(after.contains("ADIS16405") && after.contains("3,000 samples"), "{name}: {after:?}");
+    }
+}
+
+#[test]
+fn a_terminal_that_changes_its_size_is_drawn_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write(&folder, "still.csv", &table());
+    let mut session =
+        Session::start(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"], &[]);
+    session.wait_for("What was found");
+    session.seen.clear();
+    let name = session.far.name().expect("a name");
+    assert!(Command::new("stty").args(["-F", &name, "rows", "40", "cols", "120"]).status().expect("stty").success());
+    // Row 40 is written only on the larger screen.
+    session.wait_for("\u{1b}[40;");
+    session.before = settings(&name);
+    session.near.write_all(b"q").expect("typed");
+    let (status, restored, _) = session.end();
+    assert!(status.success() && restored);
+}
+
+#[test]
+fn no_color_is_respected() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write(&folder, "still.csv", &table());
+    let arguments = ["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"];
+    // 36, 38;5;6 and the like are foreground colours, in which the curves are drawn.
+    let has_colour = |seen: &str| {
+        seen.split('\u{1b}')
+            .filter_map(|part| part.strip_prefix('[')?.split_once('m'))
+            .any(|(code, _)| code.split(';').any(|number| matches!(number.parse::<u8>(), Ok(30..=38 | 90..=97))))
+    };
+    for (environment, expected) in [(&[][..], true), (&[("NO_COLOR", "1")][..], false)] {
+        let mut session = Session::start(&arguments, environment);
+        session.wait_for("angle random walk");
+        session.wait_for("Health");
+        session.near.write_all(b"q").expect("typed");
+        let (_, _, seen) = session.end();
+        assert_eq!(has_colour(&seen), expected, "{seen:?}");
+    }
+}
+
+#[test]
+fn over_a_pipe_a_replay_prints_lines() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write(&folder, "still.csv", &table());
+    let output = host_sim(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).expect("text");
+    assert!(!text.contains('\u{1b}'), "{text}");
+    // 10 s, 20 s and the whole 30 s.
+    for length in ["10 s", "20 s", "30 s"] {
+        let lines: Vec<&str> = text.lines().filter(|line| line.starts_with(&format!("{length}: "))).collect();
+        assert_eq!(lines.len(), 4, "{length}: {text}");
+        assert!(lines[0].contains("gyro x, N ") && lines[0].contains("°/√h"), "{}", lines[0]);
+    }
+    assert!(text.contains("What was found"), "{text}");
+}
+
+#[test]
+fn a_speed_that_is_none_is_refused() {
+    for speed in ["0", "-1", "inf", "fast"] {
+        let output = host_sim(&["monitor", "still.csv", &format!("--speed={speed}")]);
+        assert!(!output.status.success());
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(error.contains("neither a positive number nor max"), "{error}");
+    }
+}
