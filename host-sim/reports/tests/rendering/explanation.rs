@@ -68,7 +68,7 @@ fn the_explanation_tells_every_figure_of_the_report() {
     // The fixture's curve of the first half leaves 1.711.
     for told in [
         "The curve of the first half itself, taken for a model, leaves 1.7",
-        "at τ = 80.0 ms: by +7.1 %; chance explains it once in",
+        "at τ = 80 ms: by +7.1 %; chance explains it once in",
         "fitted to the later quarter",
         "between 19.66 and 21.87 Hz",
         "between −19 % and +4.3 %",
