@@ -43,7 +43,7 @@ async fn main(_spawner: Spawner) {
             // Not pushed: the next time stamp shows the gap.
             Err(error) => defmt::warn!("{}", error),
         }
-        if estimator.len() % 600 == 0 {
+        if estimator.len().is_multiple_of(600) {
             let curve = estimator.curve_without_confidence(PERIOD.as_micros() as f64 * 1e-6).scaled(quantizer.lsb());
             let model = fit_power_laws(&curve, &NoiseTerm::BASELINE);
             for term in model.terms() {
