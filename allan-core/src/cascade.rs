@@ -151,6 +151,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Adds the next sample, in counts.
     ///
     /// The first 2048 samples, and those after a gap until the shortest octaves have left it behind, take more time.
+    ///
+    /// # Cost
+    /// | `Cascade::push` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions on average | 199 | 509 |
+    /// | instructions at most | 3,880 | 12,400 |
+    /// | stack, bytes | 116 | 260 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
     pub fn push(&mut self, sample: i32) {
         // Every 2³² samples this is true without need, which costs time and changes nothing.
@@ -219,6 +228,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// that stretch.
     ///
     /// No difference contains samples of both stretches.
+    ///
+    /// # Cost
+    /// | `Cascade::merge` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions | 6,840 | 11,800 |
+    /// | stack, bytes | 140 | 216 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn merge(&mut self, later: &Self) {
         for k in 0..OCTAVES {
             let differences = self.count(k).saturating_add(later.octaves[k].differences);
@@ -236,6 +253,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     }
 
     /// Removes all samples.
+    ///
+    /// # Cost
+    /// | `Cascade::reset` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions | 1,360 | 1,800 |
+    /// | stack, bytes | 24 | 32 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn reset(&mut self) {
         // In place: a new estimator would be built on the stack first.
         self.recent.fill(0);

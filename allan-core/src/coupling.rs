@@ -69,6 +69,14 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
 
     /// Adds the products of the differences that the newest sample of both channels completed. To be called once after
     /// each pair of samples.
+    ///
+    /// # Cost
+    /// | `Coupling::observe` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions on average | 1,470 | 3,650 |
+    /// | stack, bytes | 136 | 212 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
     pub fn observe<const OVERLAP: usize>(&mut self, a: &Cascade<OCTAVES, OVERLAP>, b: &Cascade<OCTAVES, OVERLAP>) {
         if a.now() != b.now() {

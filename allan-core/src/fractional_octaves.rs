@@ -50,6 +50,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
     }
 
     /// Adds the differences that the newest sample completed. To be called once after each sample.
+    ///
+    /// # Cost
+    /// | `FractionalOctaves::observe` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions on average | 1,250 | 2,340 |
+    /// | stack, bytes | 152 | 184 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn observe(&mut self, cascade: &Cascade<OCTAVES, OVERLAP>) {
         for doubling in 0..OCTAVES.saturating_sub(3) {
             for (k, factor) in FACTORS.into_iter().enumerate() {

@@ -1,5 +1,5 @@
 //! The book: what the Allan variance is for, how to record, how to choose the parameters, how to share an estimator with
-//! an interrupt, and where the limits are.
+//! an interrupt, what each call costs, and where the limits are.
 #![doc = include_str!("../guide/allan_variance.md")]
 #![doc = include_str!("../guide/allan_deviation.svg")]
 #![doc = include_str!("../guide/terms.md")]
@@ -12,6 +12,9 @@ pub mod parameters {}
 
 #[doc = include_str!("../guide/interrupts.md")]
 pub mod interrupts {}
+
+#[doc = include_str!("../guide/costs.md")]
+pub mod costs {}
 
 #[doc = include_str!("../guide/limits.md")]
 pub mod limits {}

@@ -1,6 +1,6 @@
 //! Samples that are not counts of 32 bits: physical values, wider integers, and the phase of a clock.
 
-use crate::math::{abs, floor, is_finite};
+use crate::math::{abs, is_finite, sqrt};
 use core::fmt;
 
 /// Turns values in a physical unit into the counts that a [`Cascade`](crate::Cascade) takes.
@@ -41,6 +41,9 @@ pub struct Quantizer {
     lsb: f64,
 }
 
+/// Steps of [`Quantizer::for_samples`] in the standard deviation of white noise.
+const STEPS: f64 = 65_536.0;
+
 /// Why a value has no count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -72,6 +75,41 @@ impl Quantizer {
         (is_finite(origin) && is_finite(lsb) && lsb > 0.0).then_some(Self { origin, lsb })
     }
 
+    /// A quantizer that is fine enough for these samples: its origin is the first one, and its LSB the largest power of two
+    /// below 1/65536 of the root mean square of `(x[k+1] − x[k])/√2`, which for white noise is the standard deviation.
+    ///
+    /// Rounding then adds `2⁻³²/12`, or 2·10⁻¹¹, of the variance of white noise, and counts of 32 bits reach 32,768 standard
+    /// deviations to either side. Samples that are not finite are left out. `None` if no two neighbouring samples are finite
+    /// and different.
+    ///
+    /// ```
+    /// use allan_core::Quantizer;
+    ///
+    /// let quantizer = Quantizer::for_samples([9.81, 9.83, 9.80]).unwrap();
+    /// // √((0.02² + 0.03²)/4) = 0.018, and a power of two below 1/65536 of it.
+    /// assert_eq!((quantizer.origin(), quantizer.lsb()), (9.81, 2.0_f64.powi(-22)));
+    /// ```
+    #[must_use]
+    pub fn for_samples(samples: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let (mut origin, mut previous) = (None, f64::NAN);
+        let (mut sum, mut count) = (0.0, 0_u64);
+        for value in samples {
+            if is_finite(value) {
+                origin.get_or_insert(value);
+            }
+            let difference = value - previous;
+            previous = value;
+            if is_finite(difference) {
+                sum += difference * difference / 2.0;
+                count += 1;
+            }
+        }
+        let finest = sqrt(sum / count as f64) * (1.0 / STEPS);
+        // Without its fraction a normal number is a power of two.
+        let lsb = f64::from_bits(finest.to_bits() >> 52 << 52);
+        if finest.is_normal() { Self::new(origin?, lsb) } else { None }
+    }
+
     /// The value of a count of 0.
     #[must_use]
     pub const fn origin(&self) -> f64 {
@@ -85,6 +123,14 @@ impl Quantizer {
     }
 
     /// The count of a value: an `f32`, an `f64`, or an integer of up to 32 bits.
+    ///
+    /// # Cost
+    /// | `Quantizer::count` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions on average | 901 | 1,950 |
+    /// | stack, bytes | 140 | 196 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
     /// # Errors
     /// The value is not finite, or its count does not fit.
@@ -101,9 +147,15 @@ impl Quantizer {
         if !is_finite(value) {
             return Err(SampleError::Infinite);
         }
-        let count = floor((value - self.origin) / self.lsb + 0.5);
+        let steps = (value - self.origin) / self.lsb;
         const LARGEST: f64 = (1_u64 << 53) as f64;
-        if abs(count) <= LARGEST { Ok(count as i64) } else { Err(SampleError::OutOfRange) }
+        if abs(steps) >= LARGEST {
+            return Err(SampleError::OutOfRange);
+        }
+        let truncated = steps as i64;
+        let below = truncated - i64::from(truncated as f64 > steps);
+        // The difference is exact; a half added to the steps would be rounded.
+        Ok(below + i64::from(steps - below as f64 >= 0.5))
     }
 }
 

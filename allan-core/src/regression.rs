@@ -124,6 +124,13 @@ pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = P
 
 impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, COUPLED> {
     /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen.
+    ///
+    /// # Cost
+    /// | `CovariateRegression::sensitivities` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions | 50.4 million | — |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
     pub fn sensitivities(&self) -> List<Sensitivity, MAX_COVARIATES> {
         self.sensitivities_while(&mut || true).unwrap_or_default()

@@ -22,6 +22,14 @@ struct Sums<W> {
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Adds samples in order: the same result as [`push`](Self::push) for each, and faster on 64-bit machines.
+    ///
+    /// # Cost
+    /// | `Cascade::push_slice` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions on average | 198 | 505 |
+    /// | stack, bytes | 132 | 276 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn push_slice(&mut self, samples: &[i32]) {
         if cfg!(target_pointer_width = "32") {
             return samples.iter().for_each(|&sample| self.push(sample));

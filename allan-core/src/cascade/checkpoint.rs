@@ -48,7 +48,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 4,280 | 7,520 |
     /// | stack, bytes | 72 | 120 |
-    /// | flash, bytes | — | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn restore(&mut self, samples: u64, missing: u64, sums: impl Fn(usize) -> OctaveSums) {
@@ -71,7 +70,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 6.7 million | 20.4 million |
     /// | stack, bytes | 2,190 | 2,100 |
-    /// | flash, bytes | — | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
@@ -91,7 +89,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 3,160 | 6,880 |
     /// | stack, bytes | 332 | 332 |
-    /// | flash, bytes | — | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
@@ -115,7 +112,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 18,500 | 50,800 |
     /// | stack, bytes | 520 | 556 |
-    /// | flash, bytes | — | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
@@ -206,7 +202,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 53,200 | 83,600 |
     /// | stack, bytes | 208 | 280 |
-    /// | flash, bytes | — | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///

@@ -40,6 +40,17 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// Records that `missing` samples were lost before the next one; see [the gaps of a cascade](Self#gaps).
     ///
     /// Calls add up until the next sample. A gap of 0 samples has no effect.
+    ///
+    /// # Cost
+    /// | `Cascade::gap` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions | 20 | 31 |
+    /// | instructions of the next sample, 1 missing | 4,960 | 14,100 |
+    /// | instructions of the next sample, 100 missing | 9,650 | 21,200 |
+    /// | instructions of the next sample, 2²⁰ missing | 19,700 | 35,700 |
+    /// | stack, bytes | 308 | 532 |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn gap(&mut self, missing: u32) {
         if missing > 0 {
             self.pending += u64::from(missing);

@@ -2,15 +2,23 @@
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg(not(target_os = "none"))]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
 /// The target of a Cortex-M4F.
 pub const M4F: &str = "thumbv7em-none-eabihf";
+/// The target of a Cortex-M0+.
+pub const M0_PLUS: &str = "thumbv6m-none-eabi";
 
 /// Builds the image for a target with these features, optimised as the firmware is, and returns the path of its ELF.
 pub fn build(target: &str, features: &str) -> PathBuf {
+    build_with_call(target, features, "")
+}
+
+/// As [`build`], with the call of allan-core that the feature `calls` links.
+fn build_with_call(target: &str, features: &str, call: &str) -> PathBuf {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate lies in tests/");
     let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
     // Not the target folder of the tests, which the cargo that runs the tests may have locked.
@@ -20,6 +28,7 @@ pub fn build(target: &str, features: &str) -> PathBuf {
         .args(["build", "--quiet", "--package", "driver-footprint", "--bin", "footprint", "--profile", "image"])
         .args(["--locked", "--target", target, "--features", &format!("on-target,{features}"), "--target-dir"])
         .arg(&directory)
+        .env("ALLAN_CALL", call)
         .status()
         .expect("cargo starts");
     assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
@@ -28,9 +37,13 @@ pub fn build(target: &str, features: &str) -> PathBuf {
 
 /// The image with these features, read before another one is built into the same file.
 pub fn built(target: &str, features: &str) -> Vec<u8> {
+    built_with_call(target, features, "")
+}
+
+fn built_with_call(target: &str, features: &str, call: &str) -> Vec<u8> {
     static BUILDING: Mutex<()> = Mutex::new(());
     let _building = BUILDING.lock().unwrap_or_else(PoisonError::into_inner);
-    std::fs::read(build(target, features)).expect("the image is readable")
+    std::fs::read(build_with_call(target, features, call)).expect("the image is readable")
 }
 
 /// Bytes of flash that the image takes, which are those that its program headers load (ELF of 32 bits, little-endian).
@@ -49,12 +62,22 @@ pub fn added_bytes(target: &str, features: &str) -> u32 {
     flash_bytes(&built(target, features)) - flash_bytes(&built(target, ""))
 }
 
+/// Bytes of flash that a call of allan-core adds to an image without any; 0 for a call that the image does not know.
+pub fn call_bytes(target: &str, call: &str) -> u32 {
+    let bytes = |call: &str| flash_bytes(&built_with_call(target, "calls", call));
+    static WITHOUT: Mutex<BTreeMap<String, u32>> = Mutex::new(BTreeMap::new());
+    let mut without = WITHOUT.lock().unwrap_or_else(PoisonError::into_inner);
+    let without = *without.entry(target.to_owned()).or_insert_with(|| bytes(""));
+    bytes(call).saturating_sub(without)
+}
+
 /// Names of the functions in an image that belong to a panic.
 pub fn panic_symbols(elf: &[u8]) -> Vec<String> {
     use object::{Object, ObjectSymbol, SymbolKind};
     let elf = object::File::parse(elf).expect("an ELF");
     let functions = elf.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text);
     let names = functions.filter_map(|symbol| symbol.name().ok().map(str::to_owned));
-    let is_panic = |name: &String| ["panic", "unwrap_failed", "expect_failed"].iter().any(|part| name.contains(part));
+    let is_panic =
+        |name: &String| ["panic", "unwrap_failed", "expect_failed", "int_log10"].iter().any(|part| name.contains(part));
     names.filter(is_panic).collect()
 }

@@ -4,6 +4,8 @@
 #![no_main]
 
 mod bus;
+#[cfg(feature = "calls")]
+mod calls;
 #[cfg(feature = "counted")]
 mod counted;
 #[cfg(feature = "push")]
@@ -27,6 +29,8 @@ fn main() -> ! {
     core::hint::black_box(methods::asynchronous(bus));
     #[cfg(feature = "push")]
     estimator::run();
+    #[cfg(feature = "calls")]
+    calls::run();
     core::hint::black_box(bus);
     debug::exit(debug::EXIT_SUCCESS);
     loop {

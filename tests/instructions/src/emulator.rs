@@ -6,12 +6,18 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{Peripherals, SYST};
+use cortex_m::register::msp;
 use cortex_m_rt::exception;
 use cortex_m_semihosting::debug::{self, ExitStatus};
 use cortex_m_semihosting::hprintln;
 
 const INSTRUCTIONS_PER_TICK: u64 = 40;
 const WRAP: u32 = 1 << 24;
+/// Value of a word of stack that has not been used.
+const PAINT: u32 = 0xCCCC_CCCC;
+/// Bytes of stack that are painted: more than anything here uses, and far from the data at the other end of the board's
+/// 4 MB.
+const PAINTED_BYTES: u32 = 64 * 1024;
 
 /// Number of times that the timer has wrapped.
 static WRAPS: AtomicU32 = AtomicU32::new(0);
@@ -47,6 +53,26 @@ pub(crate) fn instructions(work: impl FnOnce()) -> u64 {
     let start = ticks();
     work();
     (ticks() - start) * INSTRUCTIONS_PER_TICK
+}
+
+/// Bytes of stack that `work` uses below its caller's, interrupts included: the stack is painted before and searched
+/// after.
+#[inline(never)]
+pub(crate) fn stack_bytes(work: impl FnOnce()) -> u32 {
+    let top = msp::read();
+    let words = || (top - PAINTED_BYTES..top).step_by(4);
+    // SAFETY: this RAM lies below the stack pointer and above the static variables, so nothing uses it: an interrupt has
+    // released its part before it returns here.
+    words().for_each(|address| unsafe { (address as *mut u32).write_volatile(PAINT) });
+    run(work);
+    // SAFETY: as above.
+    let used = words().find(|&address| unsafe { (address as *const u32).read_volatile() } != PAINT);
+    used.map_or(0, |address| top - address)
+}
+
+#[inline(never)]
+fn run(work: impl FnOnce()) {
+    work();
 }
 
 /// Ends the run with success.

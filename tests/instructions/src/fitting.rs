@@ -11,7 +11,6 @@ use allan_core::term::MovingAverageFilter;
 use allan_core::trace::{LineCandidates, Trace, trace_while};
 use allan_core::{Cascade, Coupling, Curve, Model, NoiseTerm};
 use core::hint::black_box;
-use cortex_m::register::msp;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 
@@ -34,14 +33,6 @@ const FILTERS: [MovingAverageFilter; 10] = [
 ];
 /// The pairs of a channel and two covariates.
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
-/// Value of a word of stack that has not been used.
-const PAINT: u32 = 0xCCCC_CCCC;
-/// Bytes of stack that are painted: more than anything here uses, and far from the data at the other end of the board's
-/// 4 MB.
-const PAINTED_BYTES: u32 = 256 * 1024;
-/// Bytes of stack that painting itself may use.
-const MARGIN: u32 = 256;
-
 /// The curve of a gyro at rest with white noise, a random walk, and a square wave of 0.5 s with the amplitude `tone`.
 fn record(tone: i32) -> Curve<OCTAVES> {
     let mut state = 1_u64;
@@ -122,26 +113,7 @@ fn sensitivities() {
 
 fn measure(name: &str, work: impl FnOnce()) {
     let mut count = 0;
-    let stack = stack_bytes(|| count = emulator::instructions(work));
+    let stack = emulator::stack_bytes(|| count = emulator::instructions(work));
     hprintln!("count {} {}", name, count);
     hprintln!("bytes {}_stack {}", name, stack);
-}
-
-/// Bytes of stack that `work` uses below its caller's, interrupts included: the stack is painted before and searched
-/// after.
-#[inline(never)]
-fn stack_bytes(work: impl FnOnce()) -> u32 {
-    let top = msp::read();
-    let words = || (top - PAINTED_BYTES..top - MARGIN).step_by(4);
-    // SAFETY: this RAM lies below the stack pointer and above the static variables, so nothing uses it.
-    words().for_each(|address| unsafe { (address as *mut u32).write_volatile(PAINT) });
-    run(work);
-    // SAFETY: as above.
-    let used = words().find(|&address| unsafe { (address as *const u32).read_volatile() } != PAINT);
-    used.map_or(MARGIN, |address| top - address)
-}
-
-#[inline(never)]
-fn run(work: impl FnOnce()) {
-    work();
 }

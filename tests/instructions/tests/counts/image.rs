@@ -1,6 +1,6 @@
 //! Builds the counting images, runs them in QEMU and reads their output.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -16,15 +16,25 @@ pub(crate) struct Core {
 
 pub(crate) static M4F: Core = {
     static COUNTS: OnceLock<Counts> = OnceLock::new();
-    Core { target: "thumbv7em-none-eabihf", board: "mps2-an386", images: &["count", "fitting"], counts: &COUNTS }
+    Core {
+        target: "thumbv7em-none-eabihf",
+        board: "mps2-an386",
+        images: &["count", "calls", "fitting"],
+        counts: &COUNTS,
+    }
 };
 pub(crate) static M0_PLUS: Core = {
     static COUNTS: OnceLock<Counts> = OnceLock::new();
     // Without a floating-point unit the image `fitting` would take minutes to emulate.
-    Core { target: "thumbv6m-none-eabi", board: "mps2-an385", images: &["count"], counts: &COUNTS }
+    Core { target: "thumbv6m-none-eabi", board: "mps2-an385", images: &["count", "calls"], counts: &COUNTS }
 };
 
 impl Core {
+    /// Rust's target.
+    pub(crate) fn target(self) -> &'static str {
+        self.target
+    }
+
     /// The counts of this core's images, which are run at most once.
     pub(crate) fn counts(self) -> &'static Counts {
         self.counts.get_or_init(|| {
@@ -51,6 +61,7 @@ impl Counts {
                 ["count" | "bytes", name, number] => counts.insert(name, number),
                 ["early", "count", name, number] => counts.insert(&format!("early_{name}"), number),
                 [library, name, number] => counts.insert(&format!("{library} {name}"), number),
+                ["call", name, metric, number] => counts.insert(&format!("{name} {metric}"), number),
                 [library, name, argument, result] => {
                     counts.results.push((format!("{library} {name}"), bits(argument), bits(result)));
                 }
@@ -64,9 +75,20 @@ impl Counts {
         self.numbers.insert(name.to_owned(), number.parse().expect("a number"));
     }
 
+    /// The names of the calls that an image has counted.
+    pub(crate) fn calls(&self) -> BTreeSet<&str> {
+        let names = self.numbers.keys().filter_map(|name| name.split_once(' ')).map(|(call, _)| call);
+        names.filter(|call| call.contains("::")).collect()
+    }
+
+    /// The number that an image printed for this name, if one did.
+    pub(crate) fn get(&self, name: &str) -> Option<f64> {
+        self.numbers.get(name).copied()
+    }
+
     /// The number that an image printed for this name.
     pub(crate) fn number(&self, name: &str) -> f64 {
-        *self.numbers.get(name).unwrap_or_else(|| panic!("the image printed no {name}"))
+        self.get(name).unwrap_or_else(|| panic!("the image printed no {name}"))
     }
 }
 

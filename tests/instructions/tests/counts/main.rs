@@ -3,6 +3,7 @@
 //! The board mps2-an386 has a Cortex-M4F. For the Cortex-M0+, whose board QEMU lacks, the image is compiled for
 //! ARMv6-M and runs on the Cortex-M3 of mps2-an385, which executes the same instructions.
 
+mod calls;
 mod functions;
 mod image;
 

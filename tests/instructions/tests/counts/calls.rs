@@ -1,0 +1,132 @@
+//! The tables of costs in the documentation of allan-core's calls: what the images count, and the flash that a call adds.
+
+use crate::image::{Core, M0_PLUS, M4F};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Rows of a table: the text of the first cell, and the name of the number.
+const METRICS: [(&str, &str); 9] = [
+    ("instructions", "average"),
+    ("instructions on average", "average"),
+    ("instructions at most", "most"),
+    ("instructions of the next sample, 1 missing", "1"),
+    ("instructions of the next sample, 100 missing", "100"),
+    ("instructions of the next sample, 2²⁰ missing", "longest"),
+    ("instructions that add two terms", "most"),
+    ("stack, bytes", "stack"),
+    ("flash, bytes", "flash"),
+];
+
+/// A table of costs: a call, and its rows with a cell for each core.
+struct Table {
+    call: String,
+    rows: Vec<(String, [String; 2])>,
+    /// The code that the table documents.
+    documented: String,
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let files = |path: PathBuf| if path.is_dir() { sources(&path) } else { vec![path] };
+    let mut sources: Vec<PathBuf> = entries.flat_map(files).collect();
+    sources.sort();
+    sources
+}
+
+/// The tables of a source file: under `# Cost`, with the call's name in backquotes in the first cell.
+fn tables(source: &str) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for (at, _) in source.match_indices("/// # Cost\n") {
+        let mut lines = source[at..].lines().map(str::trim).skip_while(|line| !line.starts_with("/// |"));
+        let cells = |line: &str| -> Vec<String> {
+            line.trim_start_matches("/// |")
+                .trim_end_matches('|')
+                .split('|')
+                .map(|cell| cell.trim().to_owned())
+                .collect()
+        };
+        let header = cells(lines.next().expect("a table"));
+        assert_eq!(header[1..], ["Cortex-M4F", "Cortex-M0+"], "the columns of {}", header[0]);
+        let call = header[0].trim_matches('`').to_owned();
+        assert!(lines.next().is_some_and(|line| line.starts_with("/// |---|")), "{call}: no table");
+        let (mut rows, mut documented) = (Vec::new(), String::new());
+        for line in lines {
+            if line.starts_with("/// |") {
+                let [metric, first, second] = cells(line).try_into().expect("three cells");
+                rows.push((metric, [first, second]));
+            } else if !line.starts_with("///") && !line.starts_with("#[") {
+                documented = line.to_owned();
+                break;
+            }
+        }
+        tables.push(Table { call, rows, documented });
+    }
+    tables
+}
+
+/// The number of a core for a metric of a call; `None` if it is not counted there.
+fn measured(core: Core, call: &str, metric: &str) -> Option<f64> {
+    if metric == "flash" {
+        // One core is enough for the size: each image takes seconds to build.
+        let is_m4f = core.target() == driver_footprint::M4F;
+        return is_m4f.then(|| f64::from(driver_footprint::call_bytes(driver_footprint::M4F, call)));
+    }
+    let name = match (call, metric) {
+        // Of the image that counts records of sensor noise, on the Cortex-M4F alone.
+        ("trace::trace", "average") => "trace_nothing".into(),
+        ("trace::trace", "most") => "trace_tone".into(),
+        ("trace::trace", "stack") => "trace_tone_stack".into(),
+        ("CovariateRegression::sensitivities", "average") => "sensitivities".into(),
+        ("CovariateRegression::sensitivities", "stack") => "sensitivities_stack".into(),
+        _ => format!("{call} {metric}"),
+    };
+    core.counts().get(&name)
+}
+
+/// A count as the tables give it: 1,234 or 12.3 million.
+fn number(cell: &str) -> f64 {
+    let (digits, factor) = cell.strip_suffix(" million").map_or((cell, 1.0), |digits| (digits, 1e6));
+    digits.replace(',', "").parse::<f64>().unwrap_or_else(|_| panic!("{cell} is no number")) * factor
+}
+
+#[test]
+fn the_costs_in_the_documentation_of_a_call_are_those_of_the_target() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../allan-core/src");
+    let mut wrong = String::new();
+    let mut documented = BTreeSet::new();
+    let read = |path: &Path| std::fs::read_to_string(path).expect("a file");
+    // A derived implementation has no place for a table: it is on the page.
+    let page = read(&folder.join("../guide/costs.md"));
+    let rows =
+        page.lines().skip_while(|line| !line.starts_with("| `Serialize`")).take_while(|line| line.starts_with('|'));
+    let page = rows.fold("/// # Cost\n".to_owned(), |text, row| text + "/// " + row + "\n");
+    for source in sources(&folder).iter().map(|path| read(path)).chain([page]) {
+        for Table { call, rows, documented: code } in tables(&source) {
+            let function = call.rsplit("::").next().unwrap_or_default();
+            let names_it = code.contains(&format!("fn {function}(")) || code.contains(&format!("fn {function}<"));
+            assert!(names_it || call == "Serialize", "the table of {call} documents: {code}");
+            for (label, cells) in &rows {
+                let metric = METRICS.iter().find(|(text, _)| text == label);
+                let metric = metric.unwrap_or_else(|| panic!("{call}: no number is called {label}")).1;
+                for (core, cell) in [M4F, M0_PLUS].into_iter().zip(cells) {
+                    let Some(found) = measured(core, &call, metric) else {
+                        assert_eq!(cell, "—", "{call}: {label} is not counted on {core:?}");
+                        continue;
+                    };
+                    println!("{call} | {label} | {} | {found}", core.target());
+                    // A tenth with the compiler; the least that can be told apart are some instructions or words.
+                    let expected = number(cell);
+                    if (found - expected).abs() > 0.1 * expected + 16.0 {
+                        wrong += &format!("{call}: {label}: {found} on {}, not {cell}\n", core.target());
+                    }
+                }
+            }
+            assert!(!rows.is_empty(), "{call} has no figures");
+            assert!(documented.insert(call.clone()), "{call} has two tables");
+        }
+    }
+    assert_eq!(wrong, "", "\n{wrong}");
+    let counted = M4F.counts().calls();
+    let missing: Vec<_> = counted.iter().filter(|&&call| !documented.contains(call)).collect();
+    assert!(missing.is_empty() && !counted.is_empty(), "without a table: {missing:?}");
+}
