@@ -301,12 +301,12 @@ fn health(state: &DeviceState, board: &mut impl Board) -> TextLine {
     let (used, bursts) = (Count(u64::from(health.used)), Count(u64::from(health.bursts)));
     let awake = Decimal::significant(f64::from(health.awake_permille) / 10.0, 2);
     let recoveries = match health.recoveries {
-        0 => text_line(format_args!("sensor never lost")),
-        1 => text_line(format_args!("sensor lost once")),
-        lost => text_line(format_args!("sensor lost {} times", Count(u64::from(lost)))),
+        0 => text_line(format_args!("never lost")),
+        1 => text_line(format_args!("lost once")),
+        lost => text_line(format_args!("lost {} times", Count(u64::from(lost)))),
     };
     let starts = state.boot.starts;
-    labelled("Health", format_args!("{used} of {bursts} bursts used; {recoveries}; awake {awake} %; start {starts}."))
+    text_line(format_args!("Health   {used} of {bursts} bursts used; {recoveries}; awake {awake} %; start {starts}."))
 }
 
 /// The next step: for the first finding that has one, or towards a first model.
@@ -323,10 +323,10 @@ fn advice(state: &DeviceState) -> TextLine {
         Cause::Term(..) => None,
     });
     let step = match step {
-        _ if far_off => "The model fails on the unseen epoch (!): epochs differ, record longer ones.",
+        _ if far_off => "The model fails on the unseen epoch (!): make epochs longer.",
         Some(step) => step,
         None if state.settings.epoch_s == 0 => "Set an epoch for effects to be searched for: e 3600 is an hour.",
-        None => "Let epochs end; \"k\" has the counters, \"r\" a report for a program.",
+        None => "Let more epochs end: k has the counters, r the report.",
     };
     labelled("What to do", format_args!("{step}"))
 }
