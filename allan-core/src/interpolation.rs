@@ -151,9 +151,9 @@ impl<F: Real> BridgedGaps<F> {
     /// octave at which gaps of one sample are bridged.
     pub(crate) fn add(&mut self, gaps: &Interpolation, n: u64, shortest: u64) {
         let replaced = F::from_word(gaps.replaced.into());
-        self.replaced = self.replaced + replaced;
+        self.replaced += replaced;
         if gaps.tested == 0 {
-            self.untested = self.untested + replaced;
+            self.untested += replaced;
             return;
         }
         // A class holds the lengths from half its upper limit on.
@@ -162,10 +162,10 @@ impl<F: Real> BridgedGaps<F> {
         let length = if longest > one { F::constant(0.75) * longest } else { one };
         let (tested, error) = (F::from_word(gaps.tested.into()), F::from_integer(gaps.squared_error()));
         let squared_error = error * replaced / tested;
-        self.squared_error = self.squared_error + squared_error;
-        self.squared_error_length = self.squared_error_length + squared_error * length;
-        self.tested = self.tested + tested;
-        self.tested_error = self.tested_error + error;
+        self.squared_error += squared_error;
+        self.squared_error_length += squared_error * length;
+        self.tested += tested;
+        self.tested_error += error;
     }
 
     /// What the gaps add to the variance at the averaging factor `n` of a record of `samples` samples, beside which those

@@ -139,7 +139,7 @@ pub(crate) fn sqrt_in_single(x: f64) -> f64 {
         return if known == 0 { 0.0 } else { x };
     }
     // x = m·4^half with 1 ≤ m < 4. Exponents are stored with an offset of 1023.
-    let half = ((known + 1) / 2).wrapping_sub(512);
+    let half = known.div_ceil(2).wrapping_sub(512);
     let root = sqrtf(f64::from_bits(bits.wrapping_sub(half << 53)) as f32);
     f64::from_bits(f64::from(root).to_bits().wrapping_add(half << 52))
 }

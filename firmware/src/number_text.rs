@@ -45,7 +45,7 @@ impl Decimal {
     #[must_use]
     pub fn significant(value: f64, digits: i32) -> Self {
         let magnitude = libm::fabs(value);
-        if magnitude == 0.0 || !(magnitude < TOO_LARGE) {
+        if magnitude == 0.0 || magnitude.is_nan() || magnitude >= TOO_LARGE {
             return Self { value, decimals: 0 };
         }
         let place = exponent(magnitude) - digits + 1;
@@ -67,7 +67,7 @@ impl Decimal {
 impl Display for Decimal {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let magnitude = libm::fabs(self.value);
-        if !(magnitude < TOO_LARGE) {
+        if magnitude.is_nan() || magnitude >= TOO_LARGE {
             return f.write_str("-");
         }
         let scale = (0..self.decimals).fold(1_u64, |scale, _| scale * 10);

@@ -83,7 +83,7 @@ pub(crate) fn line(state: &DeviceState, board: &mut impl Board, mut index: usize
                 Section::Text(text) => Some(text_line(format_args!("{text}"))),
                 Section::Cells(cells) => Some(row(cells)),
                 Section::Coefficients(first) => Some(coefficients(state, board, first + index)),
-                Section::Findings if index % 2 == 0 => finding(state, index / 2),
+                Section::Findings if index.is_multiple_of(2) => finding(state, index / 2),
                 Section::Findings => compensation(state, index / 2),
                 Section::Health => Some(health(state, board)),
                 Section::Advice => Some(advice(state)),

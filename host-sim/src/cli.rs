@@ -439,15 +439,8 @@ impl MonitorArguments {
     pub(crate) fn recording(&self) -> RecordingArguments {
         let Self { source, rate, range, .. } = self;
         let (columns, units) = (Vec::new(), Vec::new());
-        RecordingArguments {
-            file: source.clone(),
-            rate: *rate,
-            range: *range,
-            sensor: None,
-            columns,
-            units,
-            topic: None,
-        }
+        let input = InputArguments { file: source.clone(), range: *range, sensor: None, columns, units, topic: None };
+        RecordingArguments { input, rate: *rate }
     }
 }
 

@@ -103,12 +103,7 @@ fn channel_reports(record: &TracedRecord, first_half: &FirstHalf, effects: Vec<V
         let position = record.channels.iter().position(|trace| trace.channel == of)?;
         estimators.measured[position].points().iter().find(|point| point.n == n).map(|point| point.avar)
     };
-    let measured = estimators.measured.iter().zip(assessments).zip(effects);
-    let channels = models.into_iter().zip(measured);
-    let report = |((trace, half), ((measured, assessed), effects)): (
-        (&ChannelTrace, &FirstHalfFit),
-        ((&Curve<OCTAVES>, Assessed), Vec<Effect>),
-    )| {
+    let report = |((trace, half), measured): (&(&ChannelTrace, &FirstHalfFit), &Curve<OCTAVES>), assessed: Assessed| {
         let channel = trace.channel;
         let whole = measured.clone().with_confidence(|point| half.fit.trace.before.variance_fractions(point.n));
         let after = half.after(record, channel, &whole, avar_of);
@@ -134,12 +129,14 @@ fn channel_reports(record: &TracedRecord, first_half: &FirstHalf, effects: Vec<V
             refitted,
             nonstationarity: nonstationarity.and_then(|position| nonstationarities.get(position)?.clone()),
             at_rest: at_rest.clone(),
-            effects,
+            effects: Vec::new(),
             assessment: assessed.assessment,
             figure_data: FigureData::default(),
         }
     };
-    channels.map(report).collect()
+    let reports = models.iter().zip(&estimators.measured).zip(assessments);
+    let with_effects = |(report, effects)| ChannelReport { effects, ..report };
+    reports.map(|(models, assessed)| report(models, assessed)).zip(effects).map(with_effects).collect()
 }
 
 /// What the samples of a channel say beside its fits.

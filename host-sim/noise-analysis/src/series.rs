@@ -99,7 +99,7 @@ impl Series {
     #[must_use]
     pub fn in_common(self, others: &[&Series]) -> Self {
         let mut others: Vec<_> = others.iter().map(|other| membership(&other.slots)).collect();
-        self.filtered(|slot| others.iter_mut().fold(true, |all, has| has(slot) && all))
+        self.filtered(|slot| others.iter_mut().all(|has| has(slot)))
     }
 
     /// Number of sample periods in which both have a sample.

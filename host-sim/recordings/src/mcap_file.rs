@@ -115,7 +115,10 @@ pub(crate) fn for_each_record(
     }
 }
 
-fn read(file: &Path, each: &mut dyn FnMut(u8, &[u8]) -> Result<(), Stop>) -> Result<(), Stop> {
+/// Takes the operation code and the content of a record.
+type EachRecord<'a> = dyn FnMut(u8, &[u8]) -> Result<(), Stop> + 'a;
+
+fn read(file: &Path, each: &mut EachRecord) -> Result<(), Stop> {
     let fail = |error| Stop::Refusal(InputError::file(file, Reason::Io(error)));
     let mut input = BufReader::new(File::open(file).map_err(fail)?);
     let mut data = Vec::new();
@@ -145,11 +148,7 @@ fn read(file: &Path, each: &mut dyn FnMut(u8, &[u8]) -> Result<(), Stop>) -> Res
 }
 
 /// The records of a chunk, which may be cut off, with the header of its own record.
-fn chunk(
-    header: [u8; HEADER_BYTES],
-    data: &[u8],
-    each: &mut dyn FnMut(u8, &[u8]) -> Result<(), Stop>,
-) -> Result<(), Stop> {
+fn chunk(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     let cut_off = || damaged("a chunk is cut off");
     let length_of_name = data.get(COMPRESSION_AT..).and_then(|rest| rest.first_chunk()).ok_or_else(cut_off)?;
     if u32::from_le_bytes(*length_of_name) != 0 {
@@ -167,11 +166,7 @@ fn chunk(
 }
 
 /// The records of a compressed chunk.
-fn compressed(
-    header: [u8; HEADER_BYTES],
-    data: &[u8],
-    each: &mut dyn FnMut(u8, &[u8]) -> Result<(), Stop>,
-) -> Result<(), Stop> {
+fn compressed(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)

@@ -1,5 +1,4 @@
-//! The live screen on a terminal in memory, against the snapshots beside this file. After a change that is meant, run the test with
-//! `INSTA_UPDATE=always` and read what it wrote.
+//! The live screen on a terminal in memory.
 
 #[path = "../rendering/fixture.rs"]
 #[allow(dead_code)]
@@ -37,14 +36,6 @@ fn drawn(view: &LiveView, columns: u16, rows: u16, group: CurveGroup, in_colour:
 fn text(buffer: &Buffer) -> String {
     let row = |y| (0..buffer.area.width).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>();
     (0..buffer.area.height).map(|y| row(y).trim_end().to_owned() + "\n").collect()
-}
-
-#[test]
-fn the_live_screen_is_as_it_was_read() {
-    for (columns, rows) in [(80, 24), (120, 40)] {
-        let screen = text(&drawn(&view(), columns, rows, CurveGroup::Gyros, true));
-        insta::assert_snapshot!(format!("{columns}x{rows}"), screen);
-    }
 }
 
 #[test]

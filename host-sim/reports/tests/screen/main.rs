@@ -133,3 +133,70 @@ fn what_is_not_known_is_not_claimed() {
     report.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
     assert!(plain(&report, 80).join("\n").contains("It moved: at rest for 10 min of 2 h 47 min."));
 }
+
+/// The parts of a sentence between numbers, names and punctuation that have two words or more.
+fn phrases(sentence: &str) -> Vec<String> {
+    let is_word = |word: &str| !word.is_empty() && word.chars().all(|letter| letter.is_alphabetic() || letter == '-');
+    let is_name = |word: &str| {
+        ["gyro", "gyros", "accel", "accels", "x", "y", "z", "N", "B", "K", "h", "s", "min", "d", "ms"].contains(&word)
+    };
+    let mut phrases = vec![String::new()];
+    for word in sentence.split_whitespace() {
+        let bare = word.trim_matches(|letter: char| ".,:;()!".contains(letter));
+        let last = phrases.last_mut().expect("one at least");
+        if is_word(bare) && !is_name(bare) {
+            *last += &format!("{}{bare}", if last.is_empty() { "" } else { " " });
+        }
+        if !is_word(bare) || is_name(bare) || bare != word {
+            phrases.push(String::new());
+        }
+    }
+    phrases.retain(|phrase| phrase.contains(' '));
+    phrases
+}
+
+#[test]
+fn the_documentation_explains_every_sentence_about_the_record() {
+    let page =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/findings.md")).expect("the page");
+    let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut moved = report();
+    moved.part.note = Some("without time stamps the clock is not measured; why".to_owned());
+    moved.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
+    moved.dropped.clear();
+    let mut checked = 0;
+    for report in [report(), moved, fixture::report(), fixture::empty()] {
+        let sentences = [
+            reports::summary::record_sentences_in_short(&report),
+            reports::summary::contradictions(&report),
+            reports::summary::conditions(&report),
+            // The advice is that of the findings, which has a test of its own.
+            reports::summary::next_steps(&report).into_iter().filter(|step| step.starts_with(['!', 'F'])).collect(),
+        ];
+        for phrase in sentences.iter().flatten().flat_map(|sentence| phrases(sentence)) {
+            checked += 1;
+            assert!(page.contains(&phrase), "docs/findings.md lacks \"{phrase}\"");
+        }
+    }
+    assert!(checked > 12, "{checked} phrases");
+}
+
+#[test]
+fn every_finding_of_a_full_screen_has_a_line() {
+    let mut crowded = report();
+    for number in 0..9 {
+        let values = [
+            ("frequency", parameter(20.0 + f64::from(number), 0.1, "Hz")),
+            ("amplitude", parameter(0.27, 0.01, "deg/s")),
+        ];
+        crowded.findings.push(finding("sinusoid", &["accl_x", "accl_y"], &values, 3.0));
+    }
+    crowded.part.note = Some("a note: that goes on and on ".repeat(40));
+    let screen = plain(&crowded, 80);
+    assert!(screen.len() <= MOST_LINES);
+    for number in 1..=11 {
+        assert!(screen.iter().any(|line| line.starts_with(&format!("{number:>2}  "))), "{number}: {screen:#?}");
+    }
+    // A warning begins a line.
+    assert!(screen.iter().all(|line| !line.trim_start().contains(" ! The")), "{screen:#?}");
+}
