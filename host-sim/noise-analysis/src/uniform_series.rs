@@ -264,7 +264,8 @@ mod tests {
         let lossy = |value: &dyn Fn(usize) -> f64| {
             UniformSeries::new(1.0, (0..2000).map(|at| if is_lost(at) { f64::NAN } else { value(at) }).collect())
         };
-        let (closed, share) = lossy(&wave).interpolated();
+        let with_losses = lossy(&wave);
+        let (closed, share) = with_losses.interpolated();
         let missing: Vec<usize> = (0..2000).filter(|&at| closed.values()[at].is_nan()).collect();
         assert_eq!(missing, (800..808).collect::<Vec<_>>(), "eight in a row are too many");
         assert_eq!(share, 45.0 / 2000.0);
@@ -273,7 +274,8 @@ mod tests {
         }
         // Uniform in ±0.5, by a multiplicative sequence.
         let white = |at: usize| (at as f64 * 0.754_877_666 * (at as f64 + 3.0)).fract() - 0.5;
-        let (closed, _) = lossy(&white).interpolated();
+        let with_losses = lossy(&white);
+        let (closed, _) = with_losses.interpolated();
         let replaced = (20..1980).filter(|&at| is_lost(at) && at < 600).map(|at| closed.values()[at].abs());
         assert!(replaced.fold(0.0, f64::max) < 0.2, "near the mean of 0");
     }

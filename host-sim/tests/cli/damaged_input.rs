@@ -278,9 +278,8 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
     let file = write(&dir, "rows.csv", &rows);
     let link = dir.path().join("link.csv");
     std::os::unix::fs::symlink(&file, &link).expect("a link");
-    let outputs: [(&str, fn(&Path) -> String); 2] =
-        [("--json", |file| name(file).to_owned()), ("--export", |file| format!("kalibr={}", name(file)))];
-    for (option, value) in outputs {
+    for (option, prefix) in [("--json", ""), ("--export", "kalibr=")] {
+        let value = |file: &Path| format!("{prefix}{}", name(file));
         for same in [&file, &link] {
             let line = refusal(&["analyze", name(&file), option, &value(same)]);
             assert!(line.contains("is an input"), "{line}");
