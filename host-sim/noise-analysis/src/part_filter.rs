@@ -115,7 +115,9 @@ pub(crate) fn estimate(
     }
     // The curve knows the length of the filter in samples, taps over decimation, far better than each of the two.
     let scatter = scatters.iter().sum::<f64>() / scatters.len() as f64;
-    let is_as_good = |of: &&Hypothesis| of.total() - best.total() <= RISE_AT_BOUNDS * scatter;
+    // Where the channels differ among themselves by more than chance, a common filter is known so much less.
+    let disagreement = birge_ratio(&contradictions(&mut joint, best, &scatters, &shown).rises);
+    let is_as_good = |of: &&Hypothesis| of.total() - best.total() <= RISE_AT_BOUNDS * scatter * disagreement;
     let from_nominal = |of: &&Hypothesis| (of.filter.decimation / nominal_decimation).ln().abs();
     let as_good: Vec<&Hypothesis> = tried.iter().filter(is_as_good).collect();
     // The simpler of two that fit alike: every value recorded.
@@ -310,14 +312,20 @@ fn contradictions(
     found
 }
 
+/// By how much the channels differ among themselves: the sum of the `rises` of their deviances over its expectation, at least 1
+/// (R. Birge, Phys. Rev. 40, 1932).
+fn birge_ratio(rises: &[f64]) -> f64 {
+    (rises.iter().sum::<f64>() / (rises.len() as f64 - 1.0).max(1.0)).max(1.0)
+}
+
 /// 95 % bounds of the common decimation by its profile likelihood: where the sum of the deviances rises by 3.84 times its
-/// scatter. If the channels differ among themselves by more than chance, so much wider (R. Birge, Phys. Rev. 40, 1932).
+/// scatter. If the channels differ among themselves by more than chance, so much wider.
 fn bounds(joint: &mut [ChannelDeviance], filter: MovingAverageFilter, rises: &[f64], scatter: f64) -> BoundedEstimate {
     let value = filter.decimation;
     if value == 1.0 {
         return BoundedEstimate { value, low: value, high: value };
     }
-    let birge = (rises.iter().sum::<f64>() / (rises.len() as f64 - 1.0).max(1.0)).max(1.0);
+    let birge = birge_ratio(rises);
     let mut total = |decimation: f64| -> f64 {
         let read = MovingAverageFilter { decimation, ..filter };
         joint.iter_mut().map(|channel| channel.deviance(read)).sum()
