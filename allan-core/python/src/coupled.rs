@@ -16,7 +16,7 @@ const OVERLAP: usize = 8;
 /// Index of the covariate, sensitivity with its lower and upper bound, and its significance in standard deviations.
 type Row = (usize, f64, f64, f64, f64);
 /// Samples of one channel: the bytes of an `int32` array, or of a `float64` array if there is a grid of origin and LSB.
-type Samples<'py> = (Bound<'py, PyBytes>, Option<(f64, f64)>);
+type Samples<'py> = (Bound<'py, PyBytes>, Option<Grid>);
 
 /// The channels, the channel of interest first, and the coupling of each with each one before it.
 #[derive(Clone)]
@@ -78,8 +78,7 @@ impl CoupledEstimators {
     /// Adds samples that were taken together. `first` is the index of the first one in the user's arrays, for messages.
     /// Nothing is added if a value is refused.
     fn push(&self, py: Python, channels: Vec<Samples>, first: u64) -> PyResult<()> {
-        let grid = |grid: &Option<(f64, f64)>| grid.map(|(origin, lsb)| Grid { origin, lsb });
-        let chunks = channels.iter().map(|(bytes, own)| Chunk { bytes: bytes.as_bytes(), grid: grid(own), first });
+        let chunks = channels.iter().map(|(bytes, grid)| Chunk { bytes: bytes.as_bytes(), grid: *grid, first });
         let chunks: Vec<Chunk> = chunks.collect();
         py.detach(|| {
             let columns = chunks.into_iter().map(Chunk::counts).collect::<PyResult<Vec<_>>>()?;

@@ -96,8 +96,7 @@ impl Estimator {
     /// Adds samples: the bytes of an `int32` array, or those of a `float64` array if `grid` is `(origin, lsb)`.
     ///
     /// `first` is the index of the first one in the user's array, for messages. Nothing is added if a value is refused.
-    fn push(&self, py: Python, samples: &[u8], grid: Option<(f64, f64)>, first: u64) -> PyResult<()> {
-        let grid = grid.map(|(origin, lsb)| Grid { origin, lsb });
+    fn push(&self, py: Python, samples: &[u8], grid: Option<Grid>, first: u64) -> PyResult<()> {
         py.detach(|| self.lock().push(Chunk { bytes: samples, grid, first }))
     }
 

@@ -26,7 +26,7 @@ mod _native {
     #[pymodule_export]
     use super::model::{NativeModel, fit};
     #[pymodule_export]
-    use super::quantizer::automatic_quantizer;
+    use super::quantizer::{automatic_quantizer, gaps};
     #[pymodule_export]
     use super::trace::trace;
 }

@@ -1,18 +1,14 @@
-//! Samples in a unit as the counts of a grid: value = origin + count·lsb.
+//! What Python passes on: samples in a unit, and time stamps. Their arithmetic is that of allan-core.
 
+use allan_core::{Quantizer, SampleError, TimeStampError, TimeStamps};
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::*;
 
-/// Steps of the automatic grid in the standard deviation of white noise with the same differences: rounding then adds
-/// `2⁻³²/12`, or 2·10⁻¹¹, of its variance, and the 32 bits of a count reach 32,768 of these deviations to either side.
-const STEPS: f64 = 65_536.0;
+/// Ticks of a sample period, in which time stamps are rounded.
+const TICKS: u32 = 1 << 20;
 
-/// The grid of an estimator.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Grid {
-    pub(crate) origin: f64,
-    pub(crate) lsb: f64,
-}
+/// Origin and LSB of a quantizer.
+pub(crate) type Grid = (f64, f64);
 
 /// A chunk of samples as Python passes it on: the bytes of an array in the byte order of this machine, the grid if they are
 /// `float64` and not `int32`, and the index of the first one in the user's array, for messages.
@@ -26,28 +22,28 @@ pub(crate) struct Chunk<'a> {
 impl Chunk<'_> {
     /// The samples in counts; `None` where a value is missing, that is NaN.
     pub(crate) fn counts(self) -> PyResult<Vec<Option<i32>>> {
-        let Some(grid) = self.grid else { return Ok(int32(self.bytes)?.into_iter().map(Some).collect()) };
-        float64(self.bytes)?.zip(self.first..).map(|(value, index)| grid.count(value, index)).collect()
+        let Some((origin, lsb)) = self.grid else { return Ok(int32(self.bytes)?.into_iter().map(Some).collect()) };
+        let quantizer = Quantizer::new(origin, lsb)
+            .ok_or_else(|| PyValueError::new_err(format!("no grid has lsb={lsb} and origin={origin}")))?;
+        float64(self.bytes)?.zip(self.first..).map(|(value, index)| count(&quantizer, value, index)).collect()
     }
 }
 
-impl Grid {
-    fn count(self, value: f64, index: u64) -> PyResult<Option<i32>> {
-        if value.is_nan() {
-            return Ok(None);
+/// The count of a sample; `None` where it is missing.
+fn count(quantizer: &Quantizer, value: f64, index: u64) -> PyResult<Option<i32>> {
+    match quantizer.count(value) {
+        Ok(count) => Ok(Some(count)),
+        Err(SampleError::NotANumber) => Ok(None),
+        Err(SampleError::Infinite) => {
+            Err(PyValueError::new_err(format!("sample {index} is {value}: a missing sample is NaN")))
         }
-        if value.is_infinite() {
-            return Err(PyValueError::new_err(format!("sample {index} is {value}: a missing sample is NaN")));
-        }
-        let count = ((value - self.origin) / self.lsb).round_ties_even();
-        if count.abs() > f64::from(i32::MAX) {
-            let Self { origin, lsb } = self;
-            return Err(PyOverflowError::new_err(format!(
+        Err(SampleError::OutOfRange) => {
+            let (origin, lsb) = (quantizer.origin(), quantizer.lsb());
+            Err(PyOverflowError::new_err(format!(
                 "sample {index} is {value}, more than 2**31 steps of lsb={lsb} from origin={origin}: choose a coarser lsb \
                  or another origin"
-            )));
+            )))
         }
-        Ok(Some(count as i32))
     }
 }
 
@@ -69,27 +65,48 @@ fn whole(rest: &[u8]) -> PyResult<()> {
     if rest.is_empty() { Ok(()) } else { Err(PyValueError::new_err("the bytes end within a sample")) }
 }
 
-/// Origin and LSB of a grid that is fine enough for the `float64` samples in `samples`: the first value, and the largest
-/// power of two below `1/65536` of the root mean square of `(x[i+1] − x[i])/√2`.
-///
-/// `None` if no two neighbouring samples are finite and different.
+/// Origin and LSB of [`Quantizer::for_samples`] for the `float64` samples in `samples`.
 #[pyfunction]
-pub(crate) fn automatic_quantizer(py: Python, samples: &[u8]) -> PyResult<Option<(f64, f64)>> {
+pub(crate) fn automatic_quantizer(py: Python, samples: &[u8]) -> PyResult<Option<Grid>> {
     py.detach(|| {
-        let (mut origin, mut previous) = (None, f64::NAN);
-        let (mut sum, mut count) = (0.0, 0_u64);
-        for value in float64(samples)? {
-            if value.is_finite() {
-                origin.get_or_insert(value);
-            }
-            let difference = value - previous;
-            previous = value;
-            if difference.is_finite() {
-                sum += difference * difference / 2.0;
-                count += 1;
+        let quantizer = Quantizer::for_samples(float64(samples)?);
+        Ok(quantizer.map(|quantizer| (quantizer.origin(), quantizer.lsb())))
+    })
+}
+
+/// The gaps that [`TimeStamps`] finds: index of the sample after each and its length in samples, and the time in s at which
+/// the last sample was expected. `times` are the `float64` time stamps in s, `previous` is the time at which the sample before
+/// the first of them was expected.
+#[pyfunction]
+pub(crate) fn gaps(
+    py: Python,
+    times: &[u8],
+    rate: f64,
+    previous: Option<f64>,
+) -> PyResult<(Vec<(usize, u32)>, Option<f64>)> {
+    py.detach(|| {
+        let times = float64(times)?;
+        let Some(mut stamps) = TimeStamps::new(TICKS.into()) else { return Ok((Vec::new(), previous)) };
+        let (mut gaps, mut start) = (Vec::new(), previous);
+        let ticks_a_second = rate * f64::from(TICKS);
+        if previous.is_some() {
+            stamps.missing(0).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        }
+        for (index, time) in times.enumerate() {
+            let ticks = ((time - *start.get_or_insert(time)) * ticks_a_second).round();
+            // Further away a tick count would not fit; the largest gap is 2³² samples.
+            let found = match ticks.abs() < (1_u64 << 62) as f64 {
+                true => stamps.missing(ticks as i64 as u64),
+                false if ticks < 0.0 => Err(TimeStampError::NotLater),
+                false => Err(TimeStampError::TooLate),
+            };
+            match found {
+                Ok(0) => {}
+                Ok(missing) => gaps.push((index, missing)),
+                Err(error) => return Err(PyValueError::new_err(format!("time stamp {index}, {time} s: {error}"))),
             }
         }
-        let lsb = ((sum / count as f64).sqrt() / STEPS).log2().floor().exp2();
-        Ok(origin.filter(|_| lsb.is_normal()).map(|origin| (origin, lsb)))
+        let last = stamps.last().map(|ticks| ticks as i64 as f64 / ticks_a_second);
+        Ok((gaps, start.zip(last).map(|(start, last)| start + last)))
     })
 }

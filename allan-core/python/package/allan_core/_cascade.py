@@ -16,7 +16,7 @@ from ._samples import (
     check_lsb,
     check_rate,
     chunks,
-    missing_before,
+    gaps,
     seconds,
 )
 
@@ -57,7 +57,8 @@ class Cascade:
         """Adds samples in order: a number, or an array of any integer or float dtype, strided or not, or a pandas series.
 
         NaN marks a missing sample. With `times` (in s, or `datetime64`) and the nominal `rate` in Hz, samples are also
-        missing where a time stamp is more than one period after the one before, which may be in an earlier call.
+        missing where no time stamp is near a time at which one is expected, between calls too. The expected times follow
+        the stamps: a rate that is off by up to 1 % is followed, and a jitter of a quarter of a period tolerated.
 
         Either all samples are added or, if an exception is raised (Ctrl-C included), none.
 
@@ -84,9 +85,8 @@ class Cascade:
             if len(stamps) != len(array):
                 raise ValueError(f"{len(stamps)} time stamps for {len(array)} samples")
             if len(array):
-                missing_samples = missing_before(stamps, last_time, check_rate(rate))
-                last_time = float(stamps[-1])
-                _push_with_gaps(estimator, array, grid, missing_samples)
+                found, last_time = gaps(stamps, last_time, check_rate(rate))
+                _push_with_gaps(estimator, array, grid, found)
         self._estimator, self._grid, self._last_time = estimator, grid, last_time
 
     def gap(self, samples: int) -> None:
@@ -186,9 +186,11 @@ def _push(estimator: _native.Estimator, array: npt.NDArray[Any], grid: Grid | No
 
 
 def _push_with_gaps(
-    estimator: _native.Estimator, array: npt.NDArray[Any], grid: Grid | None, missing: npt.NDArray[np.int64]
+    estimator: _native.Estimator, array: npt.NDArray[Any], grid: Grid | None, found: list[tuple[int, int]]
 ) -> None:
-    starts = [0, *(int(index) for index in np.flatnonzero(missing[1:]) + 1), len(array)]
-    for start, end in zip(starts[:-1], starts[1:], strict=True):
-        estimator.gap(int(missing[start]))
-        _push(estimator, array[start:end], grid, start)
+    start = 0
+    for index, missing in found:
+        _push(estimator, array[start:index], grid, start)
+        estimator.gap(missing)
+        start = index
+    _push(estimator, array[start:], grid, start)

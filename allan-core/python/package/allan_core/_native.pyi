@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import final
 
-__all__ = ["CoupledEstimators", "Curve", "Estimator", "Model", "automatic_quantizer", "fit", "trace"]
+__all__ = ["CoupledEstimators", "Curve", "Estimator", "Model", "automatic_quantizer", "fit", "gaps", "trace"]
 
 _Grid = tuple[float, float]  # origin and LSB
 _Interval = tuple[float, float, float]  # value, lower and upper bound
@@ -73,3 +73,4 @@ def trace(
     bool,
 ]: ...
 def automatic_quantizer(samples: bytes) -> _Grid | None: ...
+def gaps(times: bytes, rate: float, previous: float | None) -> tuple[list[tuple[int, int]], float | None]: ...

@@ -77,20 +77,16 @@ def seconds(times: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def missing_before(
+def gaps(
     times: npt.NDArray[np.float64], previous: float | None, rate: float
-) -> npt.NDArray[np.int64]:
-    """Samples missing before each one, from time stamps rounded to whole sample periods after the one before."""
+) -> tuple[list[tuple[int, int]], float | None]:
+    """Index of the sample after each gap and the number of missing ones, and the time at which the last one was expected.
+
+    `previous` is that time for the samples before.
+    """
     if not np.isfinite(times).all():
         raise ValueError(f"time stamp {int((~np.isfinite(times)).argmax())} is not finite")
-    start = times[0] - 1.0 / rate if previous is None else previous
-    periods = np.rint(np.diff(times, prepend=start) * rate)
-    if (periods < 1).any():
-        index = int((periods < 1).argmax())
-        raise ValueError(
-            f"time stamp {index}, {float(times[index])} s, is less than half a sample period after the one before"
-        )
-    return periods.astype(np.int64) - 1
+    return _native.gaps(np.ascontiguousarray(times).tobytes(), rate, previous)
 
 
 def check_rate(rate: float) -> float:
