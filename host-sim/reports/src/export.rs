@@ -33,6 +33,8 @@ pub enum ExportFormat {
     KfGins,
     /// A Python module that makes GTSAM's `PreintegrationCombinedParams`.
     Gtsam,
+    /// The entries on the IMU's noise in Basalt's calibration file.
+    Basalt,
     /// A Gazebo model with an IMU sensor, in SDF.
     Gazebo,
     /// A table of every parameter of every channel with its bounds.
@@ -53,6 +55,7 @@ pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> R
         ExportFormat::Gazebo => simulators::gazebo(report),
         ExportFormat::KfGins => filters::kf_gins(report),
         ExportFormat::Gtsam => filters::gtsam(report),
+        ExportFormat::Basalt => filters::basalt(report),
         ExportFormat::Csv => Ok(Export { text: table(report), missing: Vec::new() }),
     }
 }

@@ -167,6 +167,21 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
     for (key, _, expected) in gtsam() {
         assert_number(&file, key, &expected);
     }
+    let basalt = std::fs::read(exported(&dir, &report(), &["basalt"])).expect("a file");
+    let basalt: Value = serde_json::from_slice(&basalt).expect("JSON");
+    // Basalt's `Calibration` calls all four continuous and multiplies the first two by sqrt(imu_update_rate).
+    for (key, expected) in [
+        ("accel_noise_std", si(ACCL, 0)),
+        ("gyro_noise_std", si(GYRO, 0)),
+        ("accel_bias_std", si(ACCL, 2)),
+        ("gyro_bias_std", si(GYRO, 2)),
+    ] {
+        let found = basalt["value0"][key].as_array().expect(key).iter();
+        assert_close(&found.map(|value| value.as_f64().expect("a number")).collect::<Vec<_>>(), &expected, key);
+    }
+    assert_eq!(basalt["value0"]["imu_update_rate"], RATE_HZ);
+    let comment = basalt["value0"]["comment"].as_str().expect("a text");
+    assert!(comment.starts_with("continuous") && comment.contains("gyro_y") && comment.contains("bound"), "{comment}");
     let matlab = std::fs::read_to_string(exported(&dir, &report(), &["matlab"])).expect("a file");
     for (sensor, class) in [(GYRO, "gyroparams"), (ACCL, "accelparams")] {
         let block = matlab.split_once(class).expect(class).1;

@@ -1,4 +1,4 @@
-//! GTSAM and KF-GINS: numbers for each axis.
+//! GTSAM, Basalt and KF-GINS: numbers for each axis.
 
 use super::exported_file::{Export, ExportError, scientific};
 use super::inertial_noise::{AxisNoise, Coefficient, Sensor, gauss_markov};
@@ -38,6 +38,31 @@ pub(super) fn gtsam(report: &SavedReport) -> Result<Export, ExportError> {
          \x20   params.setIntegrationCovariance(integration_covariance * np.eye(3))\n\
          \x20   return params\n",
     );
+    Ok(Export { text, missing: Vec::new() })
+}
+
+/// The entries on the IMU's noise in Basalt's calibration file, which has cameras and constant biases beside them.
+pub(super) fn basalt(report: &SavedReport) -> Result<Export, ExportError> {
+    let [gyroscope, accelerometer] = both(report)?;
+    let mut text = String::from("{\n    \"value0\": {\n");
+    let mut about = String::from(
+        "continuous: Basalt multiplies the noise by sqrt(imu_update_rate); rad/s and m/s^2, s; axes x, y, z",
+    );
+    let mut entries = String::new();
+    for (name, axes, of) in [
+        ("accel_noise_std", &accelerometer, WHITE),
+        ("gyro_noise_std", &gyroscope, WHITE),
+        ("accel_bias_std", &accelerometer, WALK),
+        ("gyro_bias_std", &gyroscope, WALK),
+    ] {
+        let values = axes.each_ref().map(of);
+        let [x, y, z] = values.map(|of| scientific(of.value));
+        about += &bounds(axes, &values);
+        let _ = write!(entries, ",\n        \"{name}\": [{x}, {y}, {z}]");
+    }
+    let rate = report.sample_rate_hz;
+    let _ =
+        write!(text, "        \"comment\": \"{about}\",\n        \"imu_update_rate\": {rate:?}{entries}\n    }}\n}}\n");
     Ok(Export { text, missing: Vec::new() })
 }
 
