@@ -138,14 +138,14 @@ impl Display for Estimate {
 
 /// An estimate in `unit`, whose prefix `m` or `u` keeps the value at 0.1 or above.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantity<'a> {
+pub struct EstimateInUnit<'a> {
     /// Value and bounds in the unit; bounds that equal the value are not written.
     pub estimate: Estimate,
     /// The unit without a prefix.
     pub unit: &'a str,
 }
 
-impl<'a> Quantity<'a> {
+impl<'a> EstimateInUnit<'a> {
     /// A value without bounds.
     #[must_use]
     pub const fn new(value: f64, unit: &'a str) -> Self {
@@ -153,7 +153,7 @@ impl<'a> Quantity<'a> {
     }
 }
 
-impl Display for Quantity<'_> {
+impl Display for EstimateInUnit<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Estimate { value, bounds: (low, high) } = self.estimate;
         let (prefix, factor) = match libm::fabs(value) {
@@ -266,12 +266,13 @@ mod tests {
 
     #[test]
     fn quantities_have_prefixes_in_their_units() {
-        let line = Quantity { estimate: Estimate { value: 0.0516, bounds: (0.0446, 0.0586) }, unit: "deg/s/degC" };
+        let line =
+            EstimateInUnit { estimate: Estimate { value: 0.0516, bounds: (0.0446, 0.0586) }, unit: "deg/s/degC" };
         assert_eq!(line.to_string(), "52 +- 7 mdeg/s/degC");
         for (value, unit, text) in
             [(0.4, "deg/s", "0.400 deg/s"), (22.0e-6, "g", "22.0 ug"), (20.62, "Hz", "20.6 Hz"), (0.0, "g", "0 g")]
         {
-            assert_eq!(Quantity::new(value, unit).to_string(), text);
+            assert_eq!(EstimateInUnit::new(value, unit).to_string(), text);
         }
     }
 }

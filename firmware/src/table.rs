@@ -6,7 +6,7 @@ use crate::channels::{CHANNELS, ChannelSet, GYROS, INERTIAL, OCTAVES};
 use crate::device::DeviceState;
 use crate::epoch::Regressor;
 use crate::estimators::Estimators;
-use crate::number_text::{Count, Decimal, Estimate, Quantity, Span};
+use crate::number_text::{Count, Decimal, Estimate, EstimateInUnit, Span};
 use crate::report::running_sums;
 use adis16405_driver::Channel;
 use allan_core::NoiseTerm;
@@ -228,7 +228,7 @@ fn compensation(state: &DeviceState, number: usize) -> Option<TextLine> {
     let drift = state.learner.results[index].filter(|_| is_first)?.drift;
     let tau = Span(drift.n as f64 / state.config.sample_period().hz());
     let unit = CHANNELS[index].unit();
-    let (raw, compensated) = (Quantity::new(drift.raw, unit), Quantity::new(drift.compensated, unit));
+    let (raw, compensated) = (EstimateInUnit::new(drift.raw, unit), EstimateInUnit::new(drift.compensated, unit));
     Some(labelled("", format_args!("Subtracted, unseen epoch: {raw} at {tau} -> {compensated}.")))
 }
 
@@ -247,21 +247,22 @@ fn physics(channel: Channel, cause: Cause) -> TextLine {
             let half_width = NORMAL_975 * error;
             let estimate = Estimate { value, bounds: (value - half_width, value + half_width) };
             let unit = text_line(format_args!("{unit}/{per}"));
-            text_line(format_args!("The bias follows {name}: {}.", Quantity { estimate, unit: &unit }))
+            text_line(format_args!("The bias follows {name}: {}.", EstimateInUnit { estimate, unit: &unit }))
         }
         Cause::Term(term, value) => {
-            let size = Quantity::new(value, unit);
+            let size = EstimateInUnit::new(value, unit);
             match term {
                 NoiseTerm::Filtered(filter) => {
                     let taps = Decimal::significant(f64::from(filter.taps), 3);
                     text_line(format_args!("The part's low-pass filter of {taps} taps smooths the samples."))
                 }
                 NoiseTerm::Sinusoid(line) => {
-                    let frequency = Quantity::new(line.frequency, "Hz");
+                    let frequency = EstimateInUnit::new(line.frequency, "Hz");
                     text_line(format_args!("A vibration or hum at {frequency}: a narrow line of {size}."))
                 }
                 NoiseTerm::Resonance(line) => {
-                    let (frequency, width) = (Quantity::new(line.frequency, "Hz"), Quantity::new(line.bandwidth, "Hz"));
+                    let (frequency, width) =
+                        (EstimateInUnit::new(line.frequency, "Hz"), EstimateInUnit::new(line.bandwidth, "Hz"));
                     text_line(format_args!("A vibration around {frequency}, {width} wide: {size} rms."))
                 }
                 NoiseTerm::Markov(noise) => {
