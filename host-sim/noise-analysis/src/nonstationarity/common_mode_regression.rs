@@ -183,7 +183,7 @@ mod tests {
         // Allan variances of a sampled random walk and of white noise.
         let (walk, white) = (|n: f64| STEP * STEP * (2.0 * n * n + 1.0) / (6.0 * n), |n: f64| WHITE * WHITE / n);
         for octave in found.shares.iter().filter(|octave| octave.edf > 100.0) {
-            let n = octave.n as f64;
+            let n = (octave.tau_s * 100.0).round();
             let part = walk(n) / (walk(n) + white(n));
             // R² of two channels that share this part of their variance is its square; its deviation is below 2/√edf.
             for share in &octave.share[1..] {
@@ -195,7 +195,7 @@ mod tests {
         let at_weights = found
             .gains
             .iter()
-            .find(|octave| octave.n == found.weights_at)
+            .find(|octave| octave.tau_s == found.weights_tau_s)
             .expect("the octave at which the weights were estimated");
         assert!(at_weights.ratio[1] < 0.5 && at_weights.ratio[2] < 0.5, "{at_weights:?}");
         // At short averaging times the white noise of the other channel is added to the channel's own.
