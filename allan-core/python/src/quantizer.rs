@@ -74,16 +74,14 @@ pub(crate) fn automatic_quantizer(py: Python, samples: &[u8]) -> PyResult<Option
     })
 }
 
+/// Gaps, each with the index of the sample after it and its length in samples; and when the last sample was expected, s.
+type GapsBefore = (Vec<(usize, u32)>, Option<f64>);
+
 /// The gaps that [`TimeStamps`] finds: index of the sample after each and its length in samples, and the time in s at which
 /// the last sample was expected. `times` are the `float64` time stamps in s, `previous` is the time at which the sample before
 /// the first of them was expected.
 #[pyfunction]
-pub(crate) fn gaps(
-    py: Python,
-    times: &[u8],
-    rate: f64,
-    previous: Option<f64>,
-) -> PyResult<(Vec<(usize, u32)>, Option<f64>)> {
+pub(crate) fn gaps(py: Python, times: &[u8], rate: f64, previous: Option<f64>) -> PyResult<GapsBefore> {
     py.detach(|| {
         let times = float64(times)?;
         let Some(mut stamps) = TimeStamps::new(TICKS.into()) else { return Ok((Vec::new(), previous)) };

@@ -191,8 +191,16 @@ fn an_interrupted_simulation_leaves_a_log_that_can_be_read() {
     let dir = tempdir().expect("a folder");
     for (signal, file) in [("INT", "a.csv.gz"), ("HUP", "b.csv.gz"), ("KILL", "c.csv")] {
         let log = dir.path().join(file);
-        let mut record = Command::new(env!("CARGO_BIN_EXE_host-sim"))
-            .args(["record", name(&log), "--seconds", "50000"])
+        // A shell in the background lets its children ignore interrupts, and nohup hang-ups.
+        let mut record = Command::new("env")
+            .args([
+                "--default-signal=INT,HUP",
+                env!("CARGO_BIN_EXE_host-sim"),
+                "record",
+                name(&log),
+                "--seconds",
+                "50000",
+            ])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
