@@ -31,6 +31,14 @@ fn settings(terminal: &str) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
+/// A text without control sequences and blanks: the program moves the cursor over cells that are blank already.
+fn without_control(text: &str) -> String {
+    let mut parts = text.split("\u{1b}[");
+    let first = parts.next().unwrap_or_default().to_owned();
+    let after = parts.map(|part| part.split_once(|of: char| ('@'..='~').contains(&of)).map_or("", |(_, rest)| rest));
+    [first].into_iter().chain(after.map(str::to_owned)).collect::<String>().split_whitespace().collect()
+}
+
 /// A session of the program on a pseudo-terminal of 80 columns and 24 rows.
 struct Session {
     near: TTYPort,
@@ -71,16 +79,17 @@ impl Session {
         }
     }
 
+    /// Waits for a text of the screen, or for a control sequence.
     fn wait_for(&mut self, expected: &str) {
         let begun = Instant::now();
-        while !self.seen.contains(expected) {
+        while !self.seen.contains(expected) && !without_control(&self.seen).contains(&without_control(expected)) {
             assert!(begun.elapsed() < PATIENCE, "{expected}: {:?}", self.seen);
             self.read();
         }
     }
 
     /// Waits for the end; returns the exit code and whether the terminal is as it was.
-    fn end(mut self) -> (ExitStatus, bool, String) {
+    fn end(&mut self) -> (ExitStatus, bool, String) {
         let begun = Instant::now();
         let status = loop {
             self.read();
@@ -91,7 +100,14 @@ impl Session {
         };
         self.read();
         let restored = settings(&self.far.name().expect("a name")) == self.before && self.seen.contains(LEAVE);
-        (status, restored, self.seen)
+        (status, restored, std::mem::take(&mut self.seen))
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        // After a failed test; one that has ended is not there to be killed.
+        let _ = self.program.kill();
     }
 }
 
