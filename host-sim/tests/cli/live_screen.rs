@@ -82,7 +82,11 @@ impl Session {
     /// Waits for a text of the screen, or for a control sequence.
     fn wait_for(&mut self, expected: &str) {
         let begun = Instant::now();
-        while !self.seen.contains(expected) && !without_control(&self.seen).contains(&without_control(expected)) {
+        let has = |seen: &str| match expected.starts_with('\u{1b}') {
+            true => seen.contains(expected),
+            false => without_control(seen).contains(&without_control(expected)),
+        };
+        while !has(&self.seen) {
             assert!(begun.elapsed() < PATIENCE, "{expected}: {:?}", self.seen);
             self.read();
         }
