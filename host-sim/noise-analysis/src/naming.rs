@@ -27,6 +27,8 @@ const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Farthest that a line of the curve and the same line of the spectrum are apart, as a part of the frequency.
 const FREQUENCY_BY_OCTAVES: f64 = 0.2;
+/// Fewest periods in the record of a line that the curve alone shows, as in the search of the spectrum.
+const FEWEST_PERIODS: f64 = 8.0;
 /// Variance of the rounding error, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -81,7 +83,8 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Quantization if rounding_s > 0.0 => {}
             // Reported from the spectrum, which resolves them better than the curve. A line whose frequency moves may be in the
             // curve alone.
-            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if is_in_spectrum(&term.kind, &in_spectrum) => {}
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_)
+                if is_in_spectrum(&term.kind, &in_spectrum) || has_few_periods(&term.kind, duration_s) => {}
             // In the curve, random telegraph noise and a common-mode drift look like these.
             NoiseTerm::Markov(_) | NoiseTerm::RateRamp if telegraph.is_some() || common.is_some() => {}
             NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
@@ -122,16 +125,26 @@ fn is_shown(effect: &Effect, duration_s: f64) -> bool {
 /// Whether a line of the model is one of `lines`, the effects by the spectrum: its frequency by the curve, whose octaves tell it
 /// to some tenths, is that of an effect.
 fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
-    let frequency = match kind {
-        NoiseTerm::Sinusoid(line) => line.frequency,
-        NoiseTerm::Resonance(line) => line.frequency,
-        _ => return false,
-    };
+    let Some(frequency) = line_frequency(kind) else { return false };
     lines.iter().any(|line| {
         let value = |name: &str| line.parameters.get(name).map_or(0.0, |parameter| parameter.value);
         let reach = (FREQUENCY_BY_OCTAVES * frequency).max(0.5 * value("bandwidth"));
         (value("frequency") - frequency).abs() < reach
     })
+}
+
+/// Whether a line has fewer periods in the record than lines are searched for: its curve alone does not tell it from drift.
+fn has_few_periods(kind: &NoiseTerm, duration_s: f64) -> bool {
+    line_frequency(kind).is_some_and(|frequency| frequency * duration_s < FEWEST_PERIODS)
+}
+
+/// Frequency of a term that is a line, Hz.
+fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
+    match kind {
+        NoiseTerm::Sinusoid(line) => Some(line.frequency),
+        NoiseTerm::Resonance(line) => Some(line.frequency),
+        _ => None,
+    }
 }
 
 /// Length of the impulse response of the longest filter in a model, s.

@@ -78,7 +78,12 @@ fn two_sided(ratio: f64, edf: f64) -> f64 {
         upper_tail(z.abs())
     } else {
         let half = 0.5 * edf;
-        if ratio > 1.0 { gamma_ur(half, half * ratio) } else { gamma_lr(half, half * ratio) }
+        match half * ratio {
+            // Both functions are defined between 0 and infinity, where a variance of 0 or one without a model has no probability.
+            x if x <= 0.0 || x.is_infinite() => 0.0,
+            x if ratio > 1.0 => gamma_ur(half, x),
+            x => gamma_lr(half, x),
+        }
     };
     (2.0 * tail).min(1.0)
 }
