@@ -16,11 +16,9 @@ fn band(count: f64) -> RangeInclusive<f64> {
 }
 
 fn assert_counts(counts: &Counts, expected: &[(&str, f64)]) {
-    for &(name, expected) in expected {
-        let count = counts.number(name);
-        println!("{name}: {count} instructions");
-        assert!(band(expected).contains(&count), "{name} takes {count} instructions, not {expected} ± 10 %");
-    }
+    let counted = expected.iter().map(|&(name, expected)| (name, counts.number(name), expected));
+    let others: Vec<_> = counted.filter(|(_, count, expected)| !band(*expected).contains(count)).collect();
+    assert!(others.is_empty(), "name, instructions, and expected instructions ± 10 %: {others:?}");
 }
 
 #[test]
@@ -34,7 +32,7 @@ fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m4f() {
             ("push_p4", 164.0),
             ("push_p8", 197.0),
             ("push_p16", 213.0),
-            ("early_push_p8", 347.0),
+            ("early_push_p8", 418.0),
             ("push_p8_24_bits", 694.0),
             ("worst_push_p8", 3_811.0),
             ("lossy_push_p8", 222.0),
@@ -43,7 +41,7 @@ fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m4f() {
             ("longest_gap_p8", 19_146.0),
             ("coupling_p8", 1_506.0),
             ("hadamard_p8", 1_299.0),
-            ("fractional_p8", 579.0),
+            ("fractional_p8", 1_252.0),
         ],
     );
 }
@@ -72,8 +70,8 @@ fn the_estimator_takes_as_many_instructions_as_measured_on_a_cortex_m0_plus() {
 /// Name, instructions, and a bound on the bytes of stack, an interrupt's included. The tone is a square wave, which
 /// adds two terms: such a trace is about the longest one.
 const FITS: [(&str, f64, f64); 5] = [
-    ("fit", 30.1e6, 7_000.0),
-    ("goodness", 2.87e6, 5_000.0),
+    ("fit", 30.1e6, 7_100.0),
+    ("goodness", 2.87e6, 5_200.0),
     ("trace_nothing", 135e6, 9_300.0),
     ("trace_tone", 2.6e9, 10_000.0),
     ("sensitivities", 50.4e6, 11_800.0),
@@ -82,12 +80,9 @@ const FITS: [(&str, f64, f64); 5] = [
 #[test]
 fn fit_and_trace_take_instructions_and_stack_as_measured_on_a_cortex_m4f() {
     let counts = M4F.counts();
-    for (name, instructions, limit) in FITS {
-        assert_counts(counts, &[(name, instructions)]);
-        let stack = counts.number(&format!("{name}_stack"));
-        println!("{name}: {stack} bytes of stack");
-        assert!(stack <= limit, "{name} takes {stack} bytes of stack, more than {limit}");
-    }
+    assert_counts(counts, &FITS.map(|(name, instructions, _)| (name, instructions)));
+    let stacks = FITS.map(|(name, _, limit)| (name, counts.number(&format!("{name}_stack")), limit));
+    assert!(stacks.iter().all(|(_, stack, limit)| stack <= limit), "name, bytes of stack, and their limit: {stacks:?}");
 }
 
 #[test]
