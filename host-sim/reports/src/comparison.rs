@@ -9,6 +9,9 @@ use std::io::{self, Write};
 
 /// Coefficients that are compared, by their names in a report.
 const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
+/// Channels of the conditions under which a sensor is recorded: two records differ in them whatever the sensor is, and the
+/// rounding of a temperature to counts, which are larger than its noise, is no white noise.
+const CONDITIONS: [&str; 2] = ["temp", "supply"];
 /// The lowest point of the measured Allan deviation, which data sheets call in-run bias stability.
 const LOWEST: &str = "lowest_allan_deviation";
 
@@ -82,13 +85,14 @@ impl From<BoundedEstimate> for Bounded {
 /// A coefficient before its verdict: channel, kind, unit, first, second.
 type Pair = (String, &'static str, String, BoundedEstimate, BoundedEstimate);
 
-/// Compares the final models of `second` with those of `first`.
+/// Compares the final models of `second` with those of `first`, but those of temperature and supply.
 ///
 /// # Errors
 /// A channel has different units, or nothing is in both.
 pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Comparison, ComparisonError> {
     let mut pairs = Vec::new();
-    for (one, other) in first.channels.iter().filter_map(|one| Some((one, second.channel(&one.name)?))) {
+    let of_sensor = first.channels.iter().filter(|channel| !CONDITIONS.contains(&channel.name.as_str()));
+    for (one, other) in of_sensor.filter_map(|one| Some((one, second.channel(&one.name)?))) {
         if one.unit != other.unit {
             return Err(ComparisonError::Units {
                 channel: one.name.clone(),
