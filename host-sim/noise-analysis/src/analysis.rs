@@ -14,7 +14,6 @@ use crate::OCTAVES;
 use crate::assessment::{AssessedModels, Assessment};
 use crate::causes;
 use crate::figure_data;
-use crate::findings::Effect;
 use crate::first_half::{FirstHalf, FirstHalfFit};
 use crate::nonstationarity::CommonModeRegression;
 use crate::part_report;
@@ -44,9 +43,9 @@ pub fn analyze(measurement: &Measurement) -> Report {
     } else {
         TracedRecord::new(&measurement.before(measurement.middle())).effects()
     };
-    let mut channels = channel_reports(&record, &first_half, effects);
+    let mut channels = channel_reports(&record, &first_half);
     let duration_s = measurement.periods() as f64 * measurement.period_s();
-    let findings = causes::find(&mut channels, &effects_of_half, &measurement.profile, duration_s);
+    let findings = causes::find(&mut channels, &effects, &effects_of_half, &measurement.profile, duration_s);
     let part = part_report::report(measurement, &record.filter);
     // The samples are transformed once more for the figures: what is not needed then is released.
     drop((record, first_half));
@@ -92,8 +91,8 @@ fn keep_terms_that_held(record: &mut TracedRecord, first_half: &FirstHalf) {
     }
 }
 
-/// The report of every channel, in the order of the channels, with its `effects`.
-fn channel_reports(record: &TracedRecord, first_half: &FirstHalf, effects: Vec<Vec<Effect>>) -> Vec<ChannelReport> {
+/// The report of every channel, in the order of the channels, without its effects.
+fn channel_reports(record: &TracedRecord, first_half: &FirstHalf) -> Vec<ChannelReport> {
     let TracedRecord { measurement, estimators, traced, .. } = record;
     let models: Vec<(&ChannelTrace, &FirstHalfFit)> = record.channels.iter().zip(&first_half.channels).collect();
     let assessments = in_parallel(&models, |(trace, half)| Assessed::new(record, trace, half));
@@ -134,9 +133,8 @@ fn channel_reports(record: &TracedRecord, first_half: &FirstHalf, effects: Vec<V
             figure_data: FigureData::default(),
         }
     };
-    let reports = models.iter().zip(&estimators.measured).zip(assessments);
-    let with_effects = |(report, effects)| ChannelReport { effects, ..report };
-    reports.map(|(models, assessed)| report(models, assessed)).zip(effects).map(with_effects).collect()
+    let channels = models.iter().zip(&estimators.measured).zip(assessments);
+    channels.map(|(models, assessed)| report(models, assessed)).collect()
 }
 
 /// What the samples of a channel say beside its fits.

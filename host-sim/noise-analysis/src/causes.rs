@@ -39,18 +39,17 @@ const ONCE_A_UNIT: [&str; 2] = ["common_mode", "shared_drift"];
 /// its density at low frequencies: 1/(1 + 3²).
 const WITHIN_COMMON_MODE: f64 = 3.0;
 
-/// The causes of what all channels show. The effects of each channel become those by which it reports a cause, and refer to
-/// the finding; `first_half` are the effects of the same channels from the first half alone.
+/// The causes of the `effects` of all channels. Each channel is given the effects by which it reports a cause, which refer to the
+/// finding; `first_half` are the effects of the same channels from the first half alone.
 pub(crate) fn find(
     channels: &mut [ChannelReport],
+    effects: &[Vec<Effect>],
     first_half: &[Vec<Effect>],
     profile: &SensorProfile,
     duration_s: f64,
 ) -> Vec<Finding> {
-    let shown = |channel: &ChannelReport| (channel.unit.clone(), channel.effects.clone());
-    let (units, whole): (Vec<String>, Vec<Vec<Effect>>) = channels.iter().map(shown).unzip();
-    let causes = merged(&with_units(&units, &whole), duration_s);
-    let half = merged(&with_units(&units, first_half), 0.5 * duration_s);
+    let causes = merged(&with_units(channels, effects), duration_s);
+    let half = merged(&with_units(channels, first_half), 0.5 * duration_s);
     let findings: Vec<Finding> = causes.iter().map(|cause| finding(cause, channels, &half, profile)).collect();
     let mut reported: Vec<Vec<Effect>> = vec![Vec::new(); channels.len()];
     for (number, cause) in causes.into_iter().enumerate() {
@@ -64,8 +63,8 @@ pub(crate) fn find(
     findings
 }
 
-fn with_units<'e>(units: &'e [String], effects: &'e [Vec<Effect>]) -> Vec<(&'e str, &'e [Effect])> {
-    units.iter().map(String::as_str).zip(effects.iter().map(Vec::as_slice)).collect()
+fn with_units<'e>(channels: &'e [ChannelReport], effects: &'e [Vec<Effect>]) -> Vec<(&'e str, &'e [Effect])> {
+    channels.iter().map(|channel| channel.unit.as_str()).zip(effects.iter().map(Vec::as_slice)).collect()
 }
 
 /// The causes of the effects of all channels, each with its unit, in the order in which the channels first show them.

@@ -7,7 +7,7 @@ use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
-use crate::spectral_lines::MergedLine;
+use crate::spectral_lines::{FEW_PERIODS, MergedLine};
 use crate::uniform_series::UniformSeries;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
@@ -27,8 +27,6 @@ const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Farthest that a line of the curve and the same line of the spectrum are apart, as a part of the frequency.
 const FREQUENCY_BY_OCTAVES: f64 = 0.2;
-/// Fewest periods in the record of a line that the curve alone shows, as in the search of the spectrum.
-const FEWEST_PERIODS: f64 = 8.0;
 /// Variance of the rounding error, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -135,7 +133,7 @@ fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
 
 /// Whether a line has fewer periods in the record than lines are searched for: its curve alone does not tell it from drift.
 fn has_few_periods(kind: &NoiseTerm, duration_s: f64) -> bool {
-    line_frequency(kind).is_some_and(|frequency| frequency * duration_s < FEWEST_PERIODS)
+    line_frequency(kind).is_some_and(|frequency| frequency * duration_s < FEW_PERIODS)
 }
 
 /// Frequency of a term that is a line, Hz.

@@ -116,7 +116,8 @@ pub(crate) fn estimate(
     // The curve knows the length of the filter in samples, taps over decimation, far better than each of the two.
     let scatter = scatters.iter().sum::<f64>() / scatters.len() as f64;
     // Where the channels differ among themselves by more than chance, a common filter is known so much less.
-    let disagreement = birge_ratio(&contradictions(&mut joint, best, &scatters, &shown).rises);
+    let of_best = contradictions(&mut joint, best, &scatters, &shown);
+    let disagreement = birge_ratio(&of_best.rises);
     let is_as_good = |of: &&Hypothesis| of.total() - best.total() <= RISE_AT_BOUNDS * scatter * disagreement;
     let from_nominal = |of: &&Hypothesis| (of.filter.decimation / nominal_decimation).ln().abs();
     let as_good: Vec<&Hypothesis> = tried.iter().filter(is_as_good).collect();
@@ -128,7 +129,8 @@ pub(crate) fn estimate(
     let filter = chosen.filter;
     let others: BTreeSet<u16> = as_good.iter().map(|of| of.filter.taps).filter(|taps| *taps != filter.taps).collect();
     let other_taps = others.into_iter().collect();
-    let contradicting = contradictions(&mut joint, chosen, &scatters, &shown);
+    let is_best = filter == best.filter;
+    let contradicting = if is_best { of_best } else { contradictions(&mut joint, chosen, &scatters, &shown) };
     let decimation = bounds(&mut joint, filter, &contradicting.rises, scatter);
     let contradicting = contradicting.channels;
     Ok(PartFilter { filter, decimation, shown: (showing, joint.len()), contradicting, other_taps })

@@ -24,6 +24,7 @@ pub(crate) fn common_mode(channels: &[ChannelProfile], samples: &[UniformSeries]
     let drift = transforms.fit_markov(&members)?;
     Some(ChannelsInCommon { channels: members.iter().map(|&member| channels[member]).collect(), gain, drift })
 }
+
 /// Whether the means of the first and of the last tenth of a series are at least half as far apart as a ramp of `slope`, in its
 /// unit per s, would take them. To the longest octaves of a curve a slow oscillation looks like a ramp, which would go much
 /// farther.

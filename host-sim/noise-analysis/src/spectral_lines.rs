@@ -29,7 +29,7 @@ const MIN_PHASE_CHANGES: f64 = 30.0;
 /// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
 const MIN_OWN_DEVIATION: f64 = 0.5;
 /// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
-const FEW_PERIODS: f64 = 8.0;
+pub(crate) const FEW_PERIODS: f64 = 8.0;
 /// Power gain of a filter below which the spectrum holds leakage from other frequencies.
 const LEAKAGE_GAIN: f64 = 0.1;
 
