@@ -4,6 +4,11 @@
 //! The deviances of the channels' curves are added, each channel with noise terms of its own beside the common filter. White
 //! noise of the rounding to counts, `q²/12` of a count `q`, is known and taken off first: it enters after the filter, so that a
 //! channel with small noise would otherwise show less correlation than the others.
+//!
+//! A channel whose curve no filter describes, such as an accelerometer on a platform that sways, has a large deviance with every
+//! one of them, and differences between these that say nothing of the filter. Its deviances are divided by its smallest one per
+//! degree of freedom, as those of overdispersed observations are (P. McCullagh and J. Nelder, "Generalized Linear Models",
+//! chapter 9).
 
 use crate::OCTAVES;
 use crate::findings::{BoundedEstimate, SIGNIFICANCE};
@@ -90,6 +95,9 @@ pub(crate) fn estimate(
     }
     let mut joint: Vec<ChannelDeviance> =
         dithered().zip(&curves).map(|(channel, curve)| ChannelDeviance::new(channel, curve)).collect();
+    for channel in &mut joint {
+        channel.divide_by_dispersion(filters);
+    }
     let unfiltered: Vec<f64> = joint.iter_mut().map(|channel| channel.unfiltered()).collect();
     let tried = filters.iter().flat_map(|&filter| [Some(filter), slowest_deviance(&mut joint, filter)]).flatten();
     let tried: Vec<Hypothesis> =
@@ -168,6 +176,8 @@ struct ChannelDeviance<'a> {
     model: &'a Model,
     /// The terms of the channel beside its white noise.
     others: Vec<NoiseTerm>,
+    /// By how much the deviance exceeds that of a curve which a filter describes, at least 1; what it is divided by.
+    dispersion: f64,
 }
 
 impl<'a> ChannelDeviance<'a> {
@@ -176,16 +186,39 @@ impl<'a> ChannelDeviance<'a> {
         let kinds = model.terms().iter().map(|term| term.kind).filter(|kind| !is_white(kind));
         // With room for the filter and the white noise after it.
         let others = kinds.take(MAX_TERMS - 2).collect();
-        Self { name: channel.name, comparison: DevianceComparison::new(curve, model), curve, model, others }
+        Self {
+            name: channel.name,
+            comparison: DevianceComparison::new(curve, model),
+            curve,
+            model,
+            others,
+            dispersion: 1.0,
+        }
+    }
+
+    /// Sets the dispersion by the least deviance with any of `filters`, at their own rate or read slowly, or with none.
+    fn divide_by_dispersion(&mut self, filters: &[MovingAverageFilter]) {
+        let mut least = self.unfiltered();
+        for &filter in filters {
+            least = least.min(self.deviance(filter));
+            if let Some(slow) = slowest_deviance(std::slice::from_mut(self), filter) {
+                least = least.min(self.deviance(slow));
+            }
+        }
+        // The white noise, the other terms, and the decimation are fitted.
+        let freedom = self.curve.points().len().saturating_sub(self.others.len() + 2).max(1);
+        if least.is_finite() {
+            self.dispersion = (least / freedom as f64).max(1.0);
+        }
     }
 
     fn unfiltered(&mut self) -> f64 {
-        self.comparison.deviance(&[&[NoiseTerm::AngleRandomWalk], self.others.as_slice()].concat())
+        self.comparison.deviance(&[&[NoiseTerm::AngleRandomWalk], self.others.as_slice()].concat()) / self.dispersion
     }
 
     fn deviance(&mut self, filter: MovingAverageFilter) -> f64 {
         let kinds = self.kinds(filter);
-        self.comparison.deviance(&kinds)
+        self.comparison.deviance(&kinds) / self.dispersion
     }
 
     /// At the filter's own rate the curve tells white noise after the filter from what passed it; read slowly it does not.

@@ -1,4 +1,5 @@
-//! Periodic causes: lines of several channels at one frequency, and the harmonics and sidebands of one fundamental.
+//! Periodic causes: lines of several channels at one frequency, the harmonics and sidebands of one fundamental, and lines whose
+//! amplitude changes.
 
 use super::cause::{Cause, Shown};
 use crate::distributions::NORMAL_975;
@@ -109,8 +110,82 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
         causes.push(harmonic_cause(members));
         frequencies = others;
     }
+    while let Some(places) = modulated_line(&frequencies) {
+        let (modulated, others): (Vec<_>, Vec<_>) =
+            frequencies.into_iter().enumerate().partition(|(number, _)| places.contains(number));
+        causes.push(modulated_cause(modulated.into_iter().map(|(_, frequency)| frequency).collect()));
+        frequencies = others.into_iter().map(|(_, frequency)| frequency).collect();
+    }
     causes.extend(frequencies.into_iter().map(|frequency| harmonic_cause(vec![(Multiple::Harmonic(1), frequency)])));
     causes
+}
+
+/// A line between two others of one channel that are equally strong and equally far from it: what a sinusoid has whose amplitude
+/// swells and fades. The least likely by chance, if chance is unlikely.
+///
+/// Unrelated lines between which another one lies have it anywhere, and amplitudes as different as those of any lines.
+fn modulated_line(frequencies: &[Frequency]) -> Option<[usize; 3]> {
+    let places = 0..frequencies.len();
+    let triples: Vec<[usize; 3]> = places
+        .clone()
+        .flat_map(|low| {
+            (low + 1..frequencies.len())
+                .flat_map(move |at| (at + 1..frequencies.len()).map(move |high| [low, at, high]))
+        })
+        .collect();
+    let by_chance = |triple: &[usize; 3]| {
+        let [below, line, above] = triple.map(|place| frequencies[place].best());
+        let distance = above.frequency - below.frequency;
+        let within = NORMAL_995 * line.error.hypot(0.5 * below.error.hypot(above.error));
+        let is_in_the_middle = (0.5 * (below.frequency + above.frequency) - line.frequency).abs() < within;
+        let is_slow = distance < line.frequency;
+        (is_in_the_middle && is_slow && has_equal_sidebands(triple.map(|place| &frequencies[place])))
+            .then(|| 2.0 * within / distance * SQUARE_BY_CHANCE * triples.len() as f64)
+    };
+    let likely = triples.iter().filter_map(|triple| Some((by_chance(triple)?, *triple)));
+    let (p_value, triple) = likely.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (p_value < BY_CHANCE).then_some(triple)
+}
+
+/// Whether a channel shows all three lines, the outer ones with amplitudes that are equal within [`SQUARE_TOLERANCE`] and their
+/// errors, and smaller than that of the line between them.
+fn has_equal_sidebands([below, line, above]: [&Frequency; 3]) -> bool {
+    line.lines.iter().any(|line| {
+        let of = |of: &Frequency| of.lines.iter().find(|other| other.channel == line.channel)?.amplitude();
+        let (Some(below), Some(amplitude), Some(above)) = (of(below), line.amplitude(), of(above)) else {
+            return false;
+        };
+        let error = |of: &Parameter| (of.high - of.low) / (2.0 * NORMAL_975);
+        let mean = 0.5 * (below.value + above.value);
+        let joint = error(&below).hypot(error(&above));
+        (below.value - above.value).abs() < SQUARE_TOLERANCE * mean + SQUARE_SIGMAS * joint && mean < amplitude.value
+    })
+}
+
+/// A line whose amplitude changes, by the three lines of [`modulated_line`]: no effect that has a name.
+fn modulated_cause(lines: Vec<Frequency>) -> Cause {
+    let [below, line, above] = [0, 1, 2].map(|place| lines[place].best());
+    let size = |of: &Line| of.amplitude().map_or(0.0, |amplitude| amplitude.value);
+    let lacking = |amplitudes: [f64; 2]| 100.0 * amplitudes[0].hypot(amplitudes[1]) / size(line).max(f64::MIN_POSITIVE);
+    let bound =
+        |of: fn(&Parameter) -> f64| lacking([below, above].map(|line| line.amplitude().map_or(0.0, |a| of(&a))));
+    let excess = Parameter::new(lacking([size(below), size(above)]), bound(|of| of.low), bound(|of| of.high), "%");
+    let frequency = line.effect.parameters["frequency"].clone();
+    let evidence = format!(
+        "a line at {:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every {:.0} s, which no sinusoid \
+         of one amplitude does; {}",
+        line.frequency,
+        0.5 * (above.frequency - below.frequency),
+        2.0 / (above.frequency - below.frequency),
+        line.effect.evidence,
+    );
+    let effect = Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence);
+    let mut by_channel: BTreeMap<usize, Vec<Effect>> = BTreeMap::new();
+    for line in lines.iter().flat_map(|frequency| &frequency.lines) {
+        by_channel.entry(line.channel).or_default().push(line.effect.clone());
+    }
+    let shown = by_channel.into_iter().map(|(channel, parts)| Shown { channel, effect: effect.clone(), parts });
+    Cause { shown: shown.collect() }
 }
 
 /// What a line is to the fundamental.

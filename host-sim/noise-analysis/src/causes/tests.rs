@@ -123,6 +123,23 @@ fn sidebands_belong_to_their_line_and_other_lines_do_not() {
 }
 
 #[test]
+fn a_line_whose_amplitude_changes_is_unexplained() {
+    // (1 + 0.5·sin 2π·0.05t)·sin 2π·12t has lines of a quarter of the amplitude at 12 ± 0.05 Hz.
+    let steady = |frequency: f64, amplitude: f64| {
+        let mut line = line(frequency, amplitude);
+        line.parameters.insert("frequency".to_owned(), parameter(frequency, 5e-5, "Hz"));
+        line
+    };
+    let modulated = vec![steady(12.0, 1.0), steady(11.95, 0.25), steady(12.05, 0.25)];
+    assert_eq!(causes(std::slice::from_ref(&modulated)), [("unexplained".to_owned(), vec![0])]);
+    // Sidebands of unequal strength, or at unequal distances, are lines of their own.
+    let unequal = vec![steady(12.0, 1.0), steady(11.95, 0.25), steady(12.05, 0.05)];
+    assert_eq!(causes(&[unequal]).len(), 3);
+    let apart = vec![steady(12.0, 1.0), steady(11.95, 0.25), steady(12.06, 0.25)];
+    assert_eq!(causes(&[apart]).len(), 3);
+}
+
+#[test]
 fn wide_lines_are_near_a_multiple_by_chance() {
     let wide = |frequency: f64, width: f64| {
         let parameters = [
