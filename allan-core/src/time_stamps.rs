@@ -92,6 +92,7 @@ impl TimeStamps {
     /// |---|---|---|
     /// | instructions on average | 321 | 794 |
     /// | stack, bytes | 196 | 292 |
+    /// | flash, bytes | 5,200 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
