@@ -40,4 +40,13 @@ check() { # PACKAGE OLDEST_RUST
 
 check adis16405-driver 1.85
 check allan-core 1.88
+
+# The interface against that of the last release.
+last=$(git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null || true)
+if [ -z "$last" ]; then
+    echo "the interfaces are not compared: no release is tagged v…"
+else
+    cargo semver-checks --version >/dev/null 2>&1 || run cargo install --locked cargo-semver-checks
+    run cargo semver-checks --package adis16405-driver --package allan-core --all-features --baseline-rev "$last"
+fi
 echo "both packages are complete"

@@ -156,8 +156,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// | `Cascade::push` | Cortex-M4F | Cortex-M0+ |
     /// |---|---|---|
     /// | instructions on average | 199 | 509 |
-    /// | instructions at most | 3,880 | 12,400 |
-    /// | stack, bytes | 116 | 260 |
+    /// | instructions at most | 3,690 | 11,900 |
+    /// | stack, bytes | 108 | 284 |
+    /// | flash, bytes | 4,890 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
@@ -196,31 +197,35 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             self.close_gap(sample);
         }
         let mut middle = self.sum;
-        self.elapsed += 1;
-        self.sum = middle.wrapping_add(i64::from(sample));
+        let (elapsed, newest) = (self.elapsed + 1, middle.wrapping_add(i64::from(sample)));
+        (self.elapsed, self.sum) = (elapsed, newest);
         for (k, octave) in self.octaves[..Self::FINE].iter_mut().enumerate() {
-            let oldest = self.recent[Self::slot(self.elapsed.wrapping_sub(2 << k))];
-            if self.elapsed - octave.resumed >= 2 << k {
-                octave.moments.add_unrounded(second_difference(self.sum, middle, oldest));
+            let oldest = self.recent[Self::slot(elapsed.wrapping_sub(2 << k))];
+            if elapsed - octave.resumed >= 2 << k {
+                octave.moments.add_unrounded(second_difference(newest, middle, oldest));
             }
             middle = oldest;
         }
-        let middle = replace(&mut self.recent[Self::slot(self.elapsed)], self.sum);
+        let middle = replace(&mut self.recent[Self::slot(elapsed)], newest);
         self.advance(0, middle);
     }
 
     /// Passes `middle`, the sum that left the line above `level`, down all lines of which the newest sample ends a stride.
     #[inline(never)]
     fn advance(&mut self, level: usize, mut middle: i64) {
-        let due = (self.elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
-        let lines = self.octaves.iter_mut().enumerate().take(Self::FINE + due).skip(Self::FINE + level);
-        for (at, octave) in lines {
-            let level = at - Self::FINE;
-            let oldest = octave.exchange(self.elapsed >> level, middle);
-            if self.elapsed - octave.resumed >= 2 << at {
-                octave.moments.add(at, second_difference(self.sum, middle, oldest));
+        let (elapsed, newest) = (self.elapsed, self.sum);
+        let due = (elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
+        // As a slice: chained iterators would be kept on the stack, and the code for an index's panic linked.
+        let lines = self.octaves.get_mut(Self::FINE + level..Self::FINE + due).unwrap_or_default();
+        // Doubled and halved from line to line, as shifts of 64 bits by a variable take ten instructions. The slot in a line
+        // is given by bits of the time below the 31st.
+        let (mut step, mut reach) = ((elapsed >> level) as u32, 2 << (Self::FINE + level));
+        for (at, octave) in (Self::FINE + level..).zip(lines) {
+            let oldest = octave.exchange(step.into(), middle);
+            if elapsed - octave.resumed >= reach {
+                octave.moments.add(at, second_difference(newest, middle, oldest));
             }
-            middle = oldest;
+            (step, reach, middle) = (step >> 1, reach << 1, oldest);
         }
     }
 
@@ -234,6 +239,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 6,840 | 11,800 |
     /// | stack, bytes | 140 | 216 |
+    /// | flash, bytes | 1,070 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn merge(&mut self, later: &Self) {
@@ -259,6 +265,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 1,360 | 1,800 |
     /// | stack, bytes | 24 | 32 |
+    /// | flash, bytes | 0 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn reset(&mut self) {
@@ -348,7 +355,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     pub fn newest_difference(&self, octave: usize) -> Option<i64> {
         let level = octave.saturating_sub(Self::FINE);
         let n = 1 << (octave - level);
-        (self.ends_stride(level) && self.spans(octave, 2 << octave))
+        (self.ends_stride(level) && self.span(octave) >= 2 << octave)
             .then(|| second_difference(self.sum, self.sum_before(level, n), self.sum_before(level, 2 * n)))
     }
 
@@ -358,13 +365,20 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.elapsed.trailing_zeros() as usize >= level
     }
 
-    /// Whether `samples` samples were taken since the last gap that `octave` does not bridge.
+    /// Sample periods since the last gap that `octave` does not bridge.
     #[inline]
-    pub(crate) const fn spans(&self, octave: usize, samples: u64) -> bool {
-        self.elapsed - self.octaves[octave].resumed >= samples
+    pub(crate) const fn span(&self, octave: usize) -> u64 {
+        self.elapsed - self.octaves[octave].resumed
     }
 
-    /// The running sum of `back ≤ 2·OVERLAP` strides of `level` before the newest sample, which ends a stride.
+    /// The running sum up to the newest sample.
+    #[inline]
+    pub(crate) const fn newest_sum(&self) -> i64 {
+        self.sum
+    }
+
+    /// The running sum of `back ≤ 2·OVERLAP` strides of `level` before the newest sample, which ends a stride. `back` is not
+    /// 0: the search for the line would pass all levels down to the newest sum.
     #[inline]
     pub(crate) fn sum_before(&self, level: usize, back: u64) -> i64 {
         let (mut level, mut back) = (level, back);

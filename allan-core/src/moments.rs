@@ -31,7 +31,9 @@ impl Moments {
 
     /// Adds one difference of any octave.
     pub(crate) fn add(&mut self, octave: usize, difference: i64) {
-        if is_small(difference) {
+        if octave < ROUNDED {
+            self.add_unrounded(difference);
+        } else if is_small(difference) {
             let bits = unit_bits(octave);
             let rounded = (difference as i32 + (1 << bits >> 1)) >> bits;
             let square = u64::from((rounded * rounded) as u32);

@@ -129,6 +129,7 @@ impl Quantizer {
     /// |---|---|---|
     /// | instructions on average | 901 | 1,950 |
     /// | stack, bytes | 140 | 196 |
+    /// | flash, bytes | 3,120 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///

@@ -433,6 +433,19 @@ enum allan_status allan_24_8_curve(const struct allan_24_8 *estimator,
                                    struct allan_curve *curve);
 
 /**
+ * As `allan_24_8_curve`, in single precision and without confidence: `low` is 0, `high` infinite, `kurtosis` NaN,
+ * `power_law` white noise, and `edf` the number of differences that do not overlap. It takes a small part of the
+ * instructions and of the code; the fits give nearly the same coefficients.
+ *
+ * # Safety
+ * As `allan_24_8_curve`.
+ */
+enum allan_status allan_24_8_curve_without_confidence(const struct allan_24_8 *estimator,
+                                                      double sample_period,
+                                                      double lsb,
+                                                      struct allan_curve *curve);
+
+/**
  * Writes the whole state, with version and checksum, into `buffer` and its length into `length`.
  * `ALLAN_24_8_SAVED_SIZE` bytes are always enough.
  *
@@ -535,6 +548,19 @@ enum allan_status allan_20_4_curve(const struct allan_20_4 *estimator,
                                    struct allan_curve *curve);
 
 /**
+ * As `allan_20_4_curve`, in single precision and without confidence: `low` is 0, `high` infinite, `kurtosis` NaN,
+ * `power_law` white noise, and `edf` the number of differences that do not overlap. It takes a small part of the
+ * instructions and of the code; the fits give nearly the same coefficients.
+ *
+ * # Safety
+ * As `allan_20_4_curve`.
+ */
+enum allan_status allan_20_4_curve_without_confidence(const struct allan_20_4 *estimator,
+                                                      double sample_period,
+                                                      double lsb,
+                                                      struct allan_curve *curve);
+
+/**
  * Writes the whole state, with version and checksum, into `buffer` and its length into `length`.
  * `ALLAN_20_4_SAVED_SIZE` bytes are always enough.
  *
@@ -601,6 +627,19 @@ enum allan_status allan_fit(const struct allan_curve *curve,
                             size_t count,
                             bool shapes,
                             struct allan_model *model);
+
+/**
+ * Fits the coefficients of `count` power laws, ALLAN_QUANTIZATION to ALLAN_RATE_RAMP, in single precision, with bounds
+ * that need none of the curve's. The `p_value` of the model is NaN. A program that calls no other fit links half of the
+ * code.
+ *
+ * # Safety
+ * As `allan_fit`.
+ */
+enum allan_status allan_fit_power_laws(const struct allan_curve *curve,
+                                       const struct allan_term *terms,
+                                       size_t count,
+                                       struct allan_model *model);
 
 /**
  * Modelled Allan variance at averaging factor `n`; NaN if `model` is not a model or `n` is 0.

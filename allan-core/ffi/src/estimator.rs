@@ -3,7 +3,7 @@
 use crate::curve::{Points, allan_curve, put_curve};
 use crate::status::allan_status::{self, *};
 use crate::storage::{Object, check, elements, initialise_zeroed, object, object_mut, store};
-use allan_core::{Cascade, OctaveSums};
+use allan_core::{Cascade, Curve, OctaveSums};
 
 /// The object behind an estimator.
 pub(crate) type Estimator<const OCTAVES: usize, const OVERLAP: usize> = Cascade<OCTAVES, OVERLAP>;
@@ -53,17 +53,52 @@ where
     Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
 {
     // SAFETY: as the caller promises.
-    let estimator: &Estimator<OCTAVES, OVERLAP> = unsafe { object(estimator)? };
-    if ![sample_period, lsb].into_iter().all(|number| number > 0.0 && number.is_finite()) {
-        return Err(ALLAN_ERROR_RANGE);
-    }
-    // SAFETY: as the caller promises.
-    let curve = unsafe { put_curve(curve)? };
+    let (estimator, curve) = unsafe { curve_of(estimator, [sample_period, lsb], curve)? };
     let sums = |octave: usize| -> OctaveSums { estimator.octave_sums(octave).unwrap_or_default() };
     // The points of an estimator with fewer octaves are the first ones of a curve with room for more.
     Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_curve(curve, sample_period, estimator.len(), sums);
     curve.scale(lsb);
     Ok(())
+}
+
+/// # Safety
+/// As [`curve`].
+pub(crate) unsafe fn curve_without_confidence<const OCTAVES: usize, const OVERLAP: usize, M>(
+    estimator: *const M,
+    sample_period: f64,
+    lsb: f64,
+    curve: *mut allan_curve,
+) -> Result<(), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    // SAFETY: as the caller promises.
+    let (estimator, curve) = unsafe { curve_of(estimator, [sample_period, lsb], curve)? };
+    let sums = |octave: usize| -> OctaveSums { estimator.octave_sums(octave).unwrap_or_default() };
+    Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_without_confidence(curve, sample_period, estimator.len(), sums);
+    curve.scale(lsb);
+    Ok(())
+}
+
+/// The estimator, and the memory of its curve, which is empty at first; an error if a number is not positive.
+///
+/// # Safety
+/// As [`curve`].
+unsafe fn curve_of<'a, const OCTAVES: usize, const OVERLAP: usize, M>(
+    estimator: *const M,
+    numbers: [f64; 2],
+    curve: *mut allan_curve,
+) -> Result<(&'a Estimator<OCTAVES, OVERLAP>, &'a mut Curve<{ Points::OCTAVES }>), allan_status>
+where
+    Estimator<OCTAVES, OVERLAP>: Object<Memory = M>,
+{
+    // SAFETY: as the caller promises.
+    let estimator = unsafe { object(estimator)? };
+    if !numbers.into_iter().all(|number| number > 0.0 && number.is_finite()) {
+        return Err(ALLAN_ERROR_RANGE);
+    }
+    // SAFETY: as the caller promises.
+    Ok((estimator, unsafe { put_curve(curve)? }))
 }
 
 /// # Safety

@@ -4,7 +4,7 @@ use crate::curve::{allan_curve, curve};
 use crate::status::allan_status::{self, *};
 use crate::status::{contained, status};
 use crate::storage::{elements, object_ref, store};
-use allan_core::fit::{fit, fit_shapes, goodness};
+use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{MAX_SHAPE, Markov, MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Model, NoiseTerm, PowerLaw};
@@ -188,6 +188,22 @@ impl allan_model {
     }
 }
 
+/// The kinds of 1 to [`ALLAN_MAX_TERMS`] different terms, in the first places.
+fn kinds_of(terms: &[allan_term]) -> Result<[NoiseTerm; ALLAN_MAX_TERMS], allan_status> {
+    if terms.is_empty() || terms.len() > ALLAN_MAX_TERMS {
+        return Err(ALLAN_ERROR_KIND);
+    }
+    let mut kinds = [NoiseTerm::AngleRandomWalk; ALLAN_MAX_TERMS];
+    for (at, term) in terms.iter().enumerate() {
+        let term = term.term()?;
+        if kinds[..at].contains(&term) {
+            return Err(ALLAN_ERROR_KIND);
+        }
+        kinds[at] = term;
+    }
+    Ok(kinds)
+}
+
 /// Fits the coefficients of `count` terms to `curve`, and their shapes too if `shapes` is true. Of each term, `kind` and
 /// where it has one the shape are read.
 ///
@@ -205,21 +221,36 @@ pub unsafe extern "C" fn allan_fit(
     status(|| {
         // SAFETY: as the caller promises.
         let (curve, terms) = unsafe { (self::curve(curve)?, elements(terms, count)?) };
-        if terms.is_empty() || terms.len() > ALLAN_MAX_TERMS {
-            return Err(ALLAN_ERROR_KIND);
-        }
-        let mut kinds = [NoiseTerm::AngleRandomWalk; ALLAN_MAX_TERMS];
-        for (at, term) in terms.iter().enumerate() {
-            let term = term.term()?;
-            if kinds[..at].contains(&term) {
-                return Err(ALLAN_ERROR_KIND);
-            }
-            kinds[at] = term;
-        }
+        let kinds = kinds_of(terms)?;
         let kinds = &kinds[..terms.len()];
         let fitted = if shapes { fit_shapes(curve, kinds) } else { fit(curve, kinds) };
         // SAFETY: as the caller promises.
         unsafe { store(model, allan_model::new(&fitted, goodness(curve, &fitted).p_value)) }
+    })
+}
+
+/// Fits the coefficients of `count` power laws, ALLAN_QUANTIZATION to ALLAN_RATE_RAMP, in single precision, with bounds
+/// that need none of the curve's. The `p_value` of the model is NaN. A program that calls no other fit links half of the
+/// code.
+///
+/// # Safety
+/// As `allan_fit`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn allan_fit_power_laws(
+    curve: *const allan_curve,
+    terms: *const allan_term,
+    count: usize,
+    model: *mut allan_model,
+) -> allan_status {
+    status(|| {
+        // SAFETY: as the caller promises.
+        let (curve, terms) = unsafe { (self::curve(curve)?, elements(terms, count)?) };
+        if terms.iter().any(|term| term.kind > allan_kind::ALLAN_RATE_RAMP as i32) {
+            return Err(ALLAN_ERROR_KIND);
+        }
+        let fitted = fit_power_laws(curve, &kinds_of(terms)?[..terms.len()]);
+        // SAFETY: as the caller promises.
+        unsafe { store(model, allan_model::new(&fitted, f64::NAN)) }
     })
 }
 

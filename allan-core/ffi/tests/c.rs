@@ -3,7 +3,7 @@
 #[path = "c/build.rs"]
 mod build;
 
-use allan_core::fit::{fit, goodness};
+use allan_core::fit::{fit, fit_power_laws, goodness};
 use allan_core::trace::{LineCandidates, Trace, trace_while};
 use allan_core::{Cascade, Curve, Model, NoiseTerm};
 use build::{ARM_GCC, ARM_TARGETS, Program, header_text, library, ours, run, tool};
@@ -30,11 +30,15 @@ fn print_curve<const OCTAVES: usize>(text: &mut String, name: &str, curve: &Curv
     }
 }
 
-fn print_model(text: &mut String, name: &str, model: &Model, p_value: f64) {
+fn print_terms(text: &mut String, name: &str, model: &Model) {
     for (term, kind) in model.terms().iter().zip(1..) {
         let [value, low, high] = [term.value, term.low, term.high].map(f64::to_bits);
         writeln!(text, "{name} {kind} {value:016x} {low:016x} {high:016x}").expect("memory");
     }
+}
+
+fn print_model(text: &mut String, name: &str, model: &Model, p_value: f64) {
+    print_terms(text, name, model);
     writeln!(text, "{name} {:016x} {:016x}", p_value.to_bits(), model.avar(64).to_bits()).expect("memory");
 }
 
@@ -60,6 +64,9 @@ fn expected() -> String {
     print_curve(&mut text, "large", &curve);
     let model = fit(&curve, &NoiseTerm::BASELINE);
     print_model(&mut text, "fit", &model, goodness(&curve, &model).p_value);
+    let model = fit_power_laws(&large.curve_without_confidence(0.01).scaled(0.05), &NoiseTerm::BASELINE);
+    print_terms(&mut text, "power laws", &model);
+    writeln!(text, "power laws: p is NaN: 1").expect("memory");
     let (mut trace, mut calls) = (Trace::baseline(&curve), 0);
     let completed = trace_while(&mut trace, &curve, LineCandidates::Curve, &[], &mut || {
         calls += 1;
@@ -125,6 +132,48 @@ fn the_example_of_the_documentation_runs() {
     let source = folder.path().join("example.c");
     std::fs::write(&source, block("c")).expect("room");
     assert_eq!(run(Program::on_host(&[source], &["-O2"]).command()), block("text"));
+}
+
+/// Rows of the table in docs/c.md, and the macro of `programs/flash.c`.
+const PROGRAMS: [(&str, &str); 5] = [
+    ("`init`, `push`, `gap`", "PUSH"),
+    ("and `curve_without_confidence`", "VARIANCES"),
+    ("and `allan_fit_power_laws`", "POWER_LAWS"),
+    ("`init`, `push`, `gap` and `curve`", "CURVE"),
+    ("and `allan_fit`", "FIT"),
+];
+
+/// A kB is 1,024 bytes.
+#[test]
+fn programs_take_the_flash_of_the_documentation() {
+    let name = "programs_take_the_flash_of_the_documentation";
+    if !tool(ARM_GCC) {
+        return note_skipped(name, &format!("{ARM_GCC} is not installed"));
+    }
+    let page = std::fs::read_to_string(ours("../../docs/c.md")).expect("docs/c.md");
+    let mut wrong = String::new();
+    for (row, part) in PROGRAMS {
+        let size = f64::from(build::flash_bytes(&ARM_TARGETS[0], &ours("tests/programs/flash.c"), part)) / 1024.0;
+        println!("{row}: {size:.1} kB");
+        let cell = page.lines().find_map(|line| line.strip_prefix(&format!("| {row} | "))?.split(" kB").next());
+        let documented: Option<f64> = cell.and_then(|cell| cell.parse().ok());
+        // A twentieth with the compilers.
+        if documented.is_none_or(|documented| (documented - size).abs() > 0.05 * size) {
+            wrong += &format!("{row}: {size:.1} kB, not {cell:?}\n");
+        }
+    }
+    assert_eq!(wrong, "", "\n{wrong}");
+}
+
+#[test]
+fn cmake_and_pkg_config_know_the_version() {
+    let text = |file| std::fs::read_to_string(ours(file)).expect("a file");
+    let [package, cmake] = [text("cmake/allan_core.pc.in"), text("cmake/allan_coreConfigVersion.cmake")];
+    let whole = env!("CARGO_PKG_VERSION");
+    assert!(package.contains(&format!("Version: {whole}\n")), "{package}");
+    assert!(cmake.contains(&format!("set(PACKAGE_VERSION {whole})")), "{cmake}");
+    let minor = concat!("FIND_VERSION_MINOR EQUAL ", env!("CARGO_PKG_VERSION_MINOR"));
+    assert!(cmake.contains(minor), "{cmake}");
 }
 
 #[test]

@@ -48,6 +48,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 4,280 | 7,520 |
     /// | stack, bytes | 72 | 120 |
+    /// | flash, bytes | 180 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn restore(&mut self, samples: u64, missing: u64, sums: impl Fn(usize) -> OctaveSums) {
@@ -70,6 +71,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 6.7 million | 20.4 million |
     /// | stack, bytes | 2,190 | 2,100 |
+    /// | flash, bytes | 19,700 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
@@ -88,7 +90,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// | `Cascade::allan_variance` | Cortex-M4F | Cortex-M0+ |
     /// |---|---|---|
     /// | instructions | 3,160 | 6,880 |
-    /// | stack, bytes | 332 | 332 |
+    /// | stack, bytes | 436 | 452 |
+    /// | flash, bytes | 4,740 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
@@ -112,6 +115,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 18,500 | 50,800 |
     /// | stack, bytes | 520 | 556 |
+    /// | flash, bytes | 1,760 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[must_use]
@@ -202,6 +206,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 53,200 | 83,600 |
     /// | stack, bytes | 208 | 280 |
+    /// | flash, bytes | 3,430 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///

@@ -44,11 +44,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// # Cost
     /// | `Cascade::gap` | Cortex-M4F | Cortex-M0+ |
     /// |---|---|---|
-    /// | instructions | 20 | 31 |
-    /// | instructions of the next sample, 1 missing | 4,960 | 14,100 |
-    /// | instructions of the next sample, 100 missing | 9,650 | 21,200 |
-    /// | instructions of the next sample, 2²⁰ missing | 19,700 | 35,700 |
-    /// | stack, bytes | 308 | 532 |
+    /// | instructions | 19 | 31 |
+    /// | instructions of the next sample, 1 missing | 4,670 | 13,300 |
+    /// | instructions of the next sample, 100 missing | 9,120 | 20,300 |
+    /// | instructions of the next sample, 2²⁰ missing | 18,500 | 35,700 |
+    /// | stack, bytes | 292 | 564 |
+    /// | flash, bytes | 4,930 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn gap(&mut self, missing: u32) {
@@ -59,6 +60,10 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     }
 
     /// Closes the pending gap before `next`, the first sample after it.
+    ///
+    /// Kept out of line: its locals would take the registers of every sample near the start.
+    #[cold]
+    #[inline(never)]
     pub(super) fn close_gap(&mut self, next: i32) {
         let missing = core::mem::take(&mut self.pending);
         let (start, end) = (self.elapsed, self.elapsed + missing);

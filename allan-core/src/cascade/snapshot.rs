@@ -88,6 +88,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// |---|---|---|
     /// | instructions | 2,600 | 4,320 |
     /// | stack, bytes | 60 | 80 |
+    /// | flash, bytes | 452 | — |
     ///
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     pub fn snapshot_into(&self, snapshot: &mut Snapshot<OCTAVES, OVERLAP>) {

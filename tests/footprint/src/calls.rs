@@ -1,7 +1,8 @@
 //! One call of allan-core, or none: the one that the environment variable `ALLAN_CALL` names when this is compiled.
 
-use allan_core::fit::{fit, fit_power_laws, goodness};
+use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
 use allan_core::regression::CovariateRegression;
+use allan_core::term::Markov;
 use allan_core::trace::{LineCandidates, trace};
 use allan_core::{
     Cascade, Coupling, Curve, FractionalOctaves, Hadamard, Model, NoiseTerm, Quantizer, Snapshot, TimeStamps,
@@ -47,6 +48,23 @@ pub(crate) fn run() {
         "Coupling::observe" => black_box(Coupling::new()).observe(&cascade, black_box(&cascade)),
         "Hadamard::observe" => black_box(Hadamard::new()).observe(&cascade),
         "FractionalOctaves::observe" => black_box(FractionalOctaves::new()).observe(&cascade),
+        "Coupling::points" => _ = black_box(black_box(Coupling::<24>::new()).points()),
+        "Hadamard::points" => _ = black_box(black_box(Hadamard::new()).points(&cascade, black_box(0.01))),
+        "FractionalOctaves::curve" => {
+            _ = black_box(black_box(FractionalOctaves::new()).curve::<96>(&cascade, black_box(0.01)));
+        }
+        "Curve::from_points" => {
+            _ = black_box(Curve::<24>::from_points(
+                black_box(0.01),
+                black_box(1_000),
+                8,
+                black_box(&[(1, 1.0), (2, 0.5)]),
+            ));
+        }
+        "fit::fit_shapes" => {
+            let markov = NoiseTerm::Markov(Markov { time_constant: black_box(1.0) });
+            _ = black_box(fit_shapes(&curve, &[NoiseTerm::AngleRandomWalk, markov]));
+        }
         "fit::fit" => _ = black_box(fit(&curve, &NoiseTerm::BASELINE)),
         "fit::fit_power_laws" => _ = black_box(fit_power_laws(&curve, &NoiseTerm::BASELINE)),
         "fit::goodness" => _ = black_box(goodness(&curve, &black_box(Model::new(1.0, [])))),

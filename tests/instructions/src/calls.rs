@@ -7,7 +7,8 @@ mod emulator;
 #[path = "../../../allan-core/tests/support/late_state.rs"]
 mod late_state;
 
-use allan_core::fit::{fit, fit_power_laws, goodness};
+use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
+use allan_core::term::Markov;
 use allan_core::{
     Cascade, Coupling, Curve, FractionalOctaves, Hadamard, NoiseTerm, OctaveSums, Quantizer, Snapshot, TimeStamps,
 };
@@ -52,6 +53,11 @@ fn count(name: &str, metric: &str, times: usize, work: impl FnOnce()) {
 
 fn stack(name: &str, work: impl FnOnce()) {
     hprintln!("call {} stack {}", name, stack_bytes(work));
+}
+
+fn measure(name: &str, work: &mut dyn FnMut()) {
+    count(name, "average", 1, &mut *work);
+    stack(name, work);
 }
 
 fn sample_by_sample() {
@@ -173,6 +179,12 @@ fn other_estimators() {
     stack("Coupling::observe", || coupling.observe(black_box(&last), black_box(&last)));
     stack("Hadamard::observe", || hadamard.observe(black_box(&last)));
     stack("FractionalOctaves::observe", || fractional.observe(black_box(&last)));
+    // Each of them has seen a difference at every octave now.
+    measure("Coupling::points", &mut || _ = black_box(black_box(&coupling).points()));
+    measure("Hadamard::points", &mut || _ = black_box(black_box(&hadamard).points(&last, 0.01)));
+    measure("FractionalOctaves::curve", &mut || {
+        _ = black_box(black_box(&fractional).curve::<{ 4 * OCTAVES }>(&last, 0.01));
+    });
 }
 
 fn observed(samples: &[i32; SAMPLES], mut observe: impl FnMut(&Estimator, &Estimator)) -> u64 {
@@ -199,11 +211,13 @@ fn fits() {
     });
     let curve = black_box(Curve::<20>::from_points(1.0 / 204.8, SAMPLES, 8, &table).expect("a table"));
     let mut model = allan_core::Model::new(1.0, []);
-    let measure = |name: &str, work: &mut dyn FnMut()| {
-        count(name, "average", 1, &mut *work);
-        stack(name, work);
-    };
+    measure("Curve::from_points", &mut || {
+        _ = black_box(Curve::<20>::from_points(1.0 / 204.8, SAMPLES, 8, black_box(&table)));
+    });
     measure("fit::fit", &mut || model = black_box(fit(black_box(&curve), &NoiseTerm::BASELINE)));
     measure("fit::fit_power_laws", &mut || _ = black_box(fit_power_laws(black_box(&curve), &NoiseTerm::BASELINE)));
+    // A time constant of 100 s to start with.
+    let shapes = [NoiseTerm::AngleRandomWalk, NoiseTerm::Markov(Markov { time_constant: 100.0 })];
+    measure("fit::fit_shapes", &mut || _ = black_box(fit_shapes(black_box(&curve), &shapes)));
     measure("fit::goodness", &mut || _ = black_box(goodness(black_box(&curve), &model)));
 }

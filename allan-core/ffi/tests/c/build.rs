@@ -60,27 +60,21 @@ pub(crate) fn header_text() -> String {
     String::from_utf8(text).expect("UTF-8")
 }
 
-/// The static library for a target, or for this machine.
+/// The static library for a target, compiled for size, or for this machine.
 pub(crate) fn library(target: Option<&str>) -> PathBuf {
     let workspace = ours("../..");
     let folder = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
     // Not the folder of the tests, which the cargo that runs the tests may have locked.
     let folder = workspace.join(folder).join("ffi");
+    let profile = if target.is_some() { "image" } else { "release" };
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(workspace).args([
-        "build",
-        "--package",
-        "allan-core-ffi",
-        "--release",
-        "--locked",
-        "--target-dir",
-    ]);
-    cargo.arg(&folder);
+    cargo.current_dir(workspace).args(["build", "--package", "allan-core-ffi", "--locked", "--profile", profile]);
+    cargo.arg("--target-dir").arg(&folder);
     if let Some(target) = target {
         cargo.args(["--target", target]);
     }
     run(&mut cargo);
-    folder.join(target.unwrap_or("")).join("release/liballan_core.a")
+    folder.join(target.unwrap_or("")).join(profile).join("liballan_core.a")
 }
 
 /// Copies the library, the header and the files for CMake and pkg-config to where users have them.
@@ -88,6 +82,20 @@ pub(crate) fn install(folder: &Path) -> PathBuf {
     let prefix = folder.join("prefix");
     run(Command::new("sh").arg(ours("install.sh")).arg(library(None)).arg(&prefix));
     prefix
+}
+
+/// Bytes of flash of a program without start-up code, of which the macro `part` chooses the calls.
+pub(crate) fn flash_bytes(target: &ArmTarget, source: &Path, part: &str) -> u32 {
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = folder.path().join("program");
+    let mut compiler = Command::new(ARM_GCC);
+    compiler.args(["-mthumb", "-Os", "-Wall", "-Wextra", "-Werror", "-nostartfiles", "-Wl,-ereset,--gc-sections"]);
+    compiler.args(target.options).arg(format!("-D{part}")).arg("-I").arg(ours("include")).arg(source);
+    run(compiler.arg(library(Some(target.name))).arg("-lm").arg("-o").arg(&program));
+    let sizes = run(Command::new("arm-none-eabi-size").arg(&program));
+    // A row of titles; then code with constants, and initialised data, both of which lie in the flash.
+    let row = sizes.lines().nth(1).expect("a row of sizes");
+    row.split_whitespace().take(2).map(|size| size.parse::<u32>().expect("a size")).sum()
 }
 
 /// A linked program.

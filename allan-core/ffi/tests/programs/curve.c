@@ -8,7 +8,7 @@
 
 static allan_24_8 large, later;
 static allan_20_4 small_one, restored;
-static allan_curve curve;
+static allan_curve curve, unbounded;
 static allan_trace_result traced;
 static uint8_t saved[ALLAN_20_4_SAVED_SIZE];
 static uint64_t state = 1;
@@ -42,12 +42,16 @@ static void print_curve(const char *name) {
     }
 }
 
-static void print_model(const char *name, const allan_model *model) {
+static void print_terms(const char *name, const allan_model *model) {
     for (size_t index = 0; index < model->count; index++) {
         const allan_term *term = &model->terms[index];
         printf("%s %ld %016llx %016llx %016llx\n", name, (long)term->kind, bits(term->value), bits(term->low),
                bits(term->high));
     }
+}
+
+static void print_model(const char *name, const allan_model *model) {
+    print_terms(name, model);
     printf("%s %016llx %016llx\n", name, bits(model->p_value), bits(allan_model_avar(model, 64)));
 }
 
@@ -90,6 +94,10 @@ int main(void) {
     allan_model model;
     CHECK(allan_fit(&curve, terms, 3, false, &model));
     print_model("fit", &model);
+    CHECK(allan_24_8_curve_without_confidence(&large, 0.01, 0.05, &unbounded));
+    CHECK(allan_fit_power_laws(&unbounded, terms, 3, &model));
+    print_terms("power laws", &model);
+    printf("power laws: p is NaN: %d\n", model.p_value != model.p_value);
     int calls = 0;
     printf("trace: %s", allan_status_text(allan_trace(&curve, NULL, 0, a_few_times, &calls, &traced)));
     printf(" after %d calls\n", calls);

@@ -88,7 +88,11 @@ int main(void) {
     for (int k = 0; k < 4; k++) {
         EXPECT(ALLAN_ERROR_RANGE, allan_24_8_curve(estimator, wrong[k], 1.0, curve));
         EXPECT(ALLAN_ERROR_RANGE, allan_24_8_curve(estimator, 1.0, wrong[k], curve));
+        EXPECT(ALLAN_ERROR_RANGE, allan_24_8_curve_without_confidence(estimator, wrong[k], 1.0, curve));
+        EXPECT(ALLAN_ERROR_RANGE, allan_24_8_curve_without_confidence(estimator, 1.0, wrong[k], curve));
     }
+    EXPECT(ALLAN_ERROR_NULL, allan_24_8_curve_without_confidence(estimator, 1.0, 1.0, NULL));
+    EXPECT(ALLAN_ERROR_NULL, allan_24_8_curve_without_confidence(NULL, 1.0, 1.0, curve));
     EXPECT(ALLAN_ERROR_NULL, allan_24_8_curve(estimator, 1.0, 1.0, NULL));
     EXPECT(ALLAN_ERROR_INDEX, allan_curve_point(curve, allan_curve_len(curve), &point));
     EXPECT(ALLAN_ERROR_INDEX, allan_curve_point(curve, SIZE_MAX, &point));
@@ -103,6 +107,7 @@ int main(void) {
     }
     EXPECT(ALLAN_OK, allan_24_8_curve(estimator, 1.0, 1.0, curve)); /* without points */
     EXPECT(ALLAN_OK, allan_fit(curve, terms, 5, false, &model));
+    EXPECT(ALLAN_OK, allan_fit_power_laws(curve, terms, 5, &model));
     EXPECT(ALLAN_OK, allan_trace(curve, NULL, 0, NULL, NULL, traced));
     for (int k = 0; k < 5000; k++) {
         EXPECT(ALLAN_OK, allan_24_8_push(estimator, 7)); /* never changes */
@@ -110,6 +115,14 @@ int main(void) {
     EXPECT(ALLAN_OK, allan_24_8_curve(estimator, 1.0, 1.0, curve));
     EXPECT(ALLAN_OK, allan_fit(curve, terms, 5, false, &model));
     EXPECT(0, model.terms[1].value != 0.0);
+    EXPECT(ALLAN_OK, allan_24_8_curve_without_confidence(estimator, 1.0, 1.0, curve));
+    EXPECT(ALLAN_OK, allan_fit_power_laws(curve, terms, 5, &model));
+    EXPECT(0, model.terms[1].value != 0.0);
+    EXPECT(ALLAN_ERROR_KIND, allan_fit_power_laws(curve, terms, 0, &model));
+    EXPECT(ALLAN_ERROR_KIND, allan_fit_power_laws(curve, terms, 6, &model)); /* no power law */
+    EXPECT(ALLAN_ERROR_NULL, allan_fit_power_laws(NULL, terms, 1, &model));
+    EXPECT(ALLAN_ERROR_NULL, allan_fit_power_laws(curve, NULL, 1, &model));
+    EXPECT(ALLAN_ERROR_NULL, allan_fit_power_laws(curve, terms, 1, NULL));
     EXPECT(ALLAN_OK, allan_trace(curve, NULL, 0, keep_on, NULL, traced));
     EXPECT(ALLAN_ERROR_KIND, allan_fit(curve, terms, 0, false, &model));
     EXPECT(ALLAN_ERROR_KIND, allan_fit(curve, terms, 9, false, &model));
@@ -122,6 +135,7 @@ int main(void) {
     EXPECT(ALLAN_ERROR_KIND, allan_fit(curve, terms, 2, false, &model)); /* twice */
     terms[1].kind = INT32_MIN;
     EXPECT(ALLAN_ERROR_KIND, allan_fit(curve, terms, 2, false, &model));
+    EXPECT(ALLAN_ERROR_KIND, allan_fit_power_laws(curve, terms, 2, &model));
     EXPECT(ALLAN_ERROR_NULL, allan_fit(curve, NULL, 2, false, &model));
     EXPECT(ALLAN_ERROR_NULL, allan_fit(curve, terms, 1, false, NULL));
     model.count = SIZE_MAX;
