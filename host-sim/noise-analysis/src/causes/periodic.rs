@@ -20,6 +20,9 @@ const SQUARE_TOLERANCE: f64 = 0.36;
 /// amplitudes are spread evenly over the logarithm of two decades: ln(1.36/0.64)/ln 100.
 const SQUARE_BY_CHANCE: f64 = 0.164;
 
+/// By which part of the record's resolution lines that are a few resolutions apart move each other's frequency.
+const SHIFT_OF_NEIGHBOURS: f64 = 0.1;
+
 /// Whether an effect is a line of the spectrum.
 pub(super) fn is_line(effect: &Effect) -> bool {
     matches!(effect.kind.as_str(), "sinusoid" | "resonance")
@@ -110,7 +113,7 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
         causes.push(harmonic_cause(members));
         frequencies = others;
     }
-    while let Some(places) = modulated_line(&frequencies) {
+    while let Some(places) = modulated_line(&frequencies, duration_s) {
         let (modulated, others): (Vec<_>, Vec<_>) =
             frequencies.into_iter().enumerate().partition(|(number, _)| places.contains(number));
         causes.push(modulated_cause(modulated.into_iter().map(|(_, frequency)| frequency).collect()));
@@ -124,27 +127,31 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
 /// swells and fades. The least likely by chance, if chance is unlikely.
 ///
 /// Unrelated lines between which another one lies have it anywhere, and amplitudes as different as those of any lines.
-fn modulated_line(frequencies: &[Frequency]) -> Option<[usize; 3]> {
-    let places = 0..frequencies.len();
-    let triples: Vec<[usize; 3]> = places
-        .clone()
-        .flat_map(|low| {
-            (low + 1..frequencies.len())
-                .flat_map(move |at| (at + 1..frequencies.len()).map(move |high| [low, at, high]))
-        })
-        .collect();
+fn modulated_line(frequencies: &[Frequency], duration_s: f64) -> Option<[usize; 3]> {
+    let count = frequencies.len();
+    let pairs = (0..count).flat_map(|low| (low + 1..count).map(move |line| [low, line]));
+    let triples = pairs.flat_map(|[low, line]| (line + 1..count).map(move |high| [low, line, high]));
+    let lines = |triple: [usize; 3]| triple.map(|place| &frequencies[place]);
+    let of_one_channel: Vec<[usize; 3]> = triples.filter(|triple| is_in_one_channel(lines(*triple))).collect();
     let by_chance = |triple: &[usize; 3]| {
-        let [below, line, above] = triple.map(|place| frequencies[place].best());
+        let [below, line, above] = lines(*triple).map(Frequency::best);
         let distance = above.frequency - below.frequency;
-        let within = NORMAL_995 * line.error.hypot(0.5 * below.error.hypot(above.error));
+        let errors = line.error.hypot(0.5 * below.error.hypot(above.error));
+        let within = NORMAL_995 * errors + SHIFT_OF_NEIGHBOURS / duration_s;
         let is_in_the_middle = (0.5 * (below.frequency + above.frequency) - line.frequency).abs() < within;
         let is_slow = distance < line.frequency;
-        (is_in_the_middle && is_slow && has_equal_sidebands(triple.map(|place| &frequencies[place])))
-            .then(|| 2.0 * within / distance * SQUARE_BY_CHANCE * triples.len() as f64)
+        (is_in_the_middle && is_slow && has_equal_sidebands(lines(*triple)))
+            .then(|| 2.0 * within / distance * SQUARE_BY_CHANCE * of_one_channel.len() as f64)
     };
-    let likely = triples.iter().filter_map(|triple| Some((by_chance(triple)?, *triple)));
+    let likely = of_one_channel.iter().filter_map(|triple| Some((by_chance(triple)?, *triple)));
     let (p_value, triple) = likely.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (p_value < BY_CHANCE).then_some(triple)
+}
+
+/// Whether a channel shows all of these lines.
+fn is_in_one_channel([first, others @ ..]: [&Frequency; 3]) -> bool {
+    let shows = |of: &Frequency, channel: usize| of.lines.iter().any(|line| line.channel == channel);
+    first.lines.iter().any(|line| others.iter().all(|other| shows(other, line.channel)))
 }
 
 /// Whether a channel shows all three lines, the outer ones with amplitudes that are equal within [`SQUARE_TOLERANCE`] and their
