@@ -87,7 +87,11 @@ impl Process for MovingAverageFilter {
 
     fn density(&self, frequency: f64, sample_period: f64) -> f64 {
         let angle = 2.0 * PI * abs(frequency) * sample_period;
-        let waves = (1..=self.reach()).map(f64::from).map(|j| self.autocorrelation(j) * cos(j * angle));
-        (self.autocorrelation(0.0) + 2.0 * waves.sum::<f64>()) / self.sum()
+        let at_zero = self.autocorrelation(0.0);
+        let (sum, waves) = (1..=self.reach()).map(f64::from).fold((at_zero, at_zero), |(sum, waves), j| {
+            let both_sides = 2.0 * self.autocorrelation(j);
+            (sum + both_sides, waves + both_sides * cos(j * angle))
+        });
+        waves / sum
     }
 }

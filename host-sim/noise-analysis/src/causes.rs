@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Kinds that the sensor, its bus or its surroundings have once: whatever channels show one of them show the same cause.
-const ONCE: [&str; 9] = [
+const ONCE: [&str; 10] = [
     "dropped_samples",
     "repeated_samples",
     "sample_clock",
@@ -32,6 +32,7 @@ const ONCE: [&str; 9] = [
     "thermal_lag",
     "supply",
     "acceleration",
+    "vibration_rectification",
 ];
 /// Kinds that are one cause in the channels of one unit.
 const ONCE_A_UNIT: [&str; 2] = ["common_mode", "shared_drift"];

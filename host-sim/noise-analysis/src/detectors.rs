@@ -5,13 +5,15 @@
 //!         ├► spikes                                        single samples
 //!         ├► effective_lsb                                 values rounded to several counts
 //!         ├► output_range                                  values that are cut off, and noise below a count
-//!         └► block_means ─► gls_regression ─► bias         steps, ramps, covariates of the bias; thermal_response
+//!         └► block_means ─► gls_regression ─► bias         steps, ramps, covariates of the bias: thermal_response,
+//!                                                          vibration_rectification (bias_response)
 //! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
 //! ```
 //!
 //! Each returns the effect with its parameters, and the correction that removes it from the samples where there is one.
 
-pub mod bias;
+pub(crate) mod bias;
+pub(crate) mod bias_response;
 mod bias_step;
 pub mod block_means;
 pub(crate) mod effective_lsb;
@@ -22,7 +24,8 @@ pub(crate) mod output_range;
 pub(crate) mod random_telegraph;
 pub(crate) mod spikes;
 mod telegraph_models;
-pub mod thermal_response;
+mod thermal_response;
+pub(crate) mod vibration_rectification;
 
 #[cfg(test)]
 mod knock_tests;

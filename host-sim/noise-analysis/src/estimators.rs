@@ -127,7 +127,7 @@ impl RecordEstimators {
         // Nothing is estimated twice.
         let mut distinct = vec![Exclusion::None];
         let is_distinct =
-            |of: Exclusion| preprocessing.excludes_any(of) || (of == both && preprocessing.has_thermal_response());
+            |of: Exclusion| preprocessing.excludes_any(of) || (of == both && preprocessing.has_responses());
         distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
         let parts = in_parallel(&distinct, |&exclusion| halves(exclusion));
         let of = |exclusion: Exclusion| match distinct.iter().position(|of| *of == exclusion) {

@@ -98,7 +98,7 @@ impl FirstHalfFit {
             .filter(|(regressor, _)| regressor.quantity.is_environment())
             .map(|(regressor, series)| (*regressor, series))
             .unzip();
-        let bias_changes = bias::find(&halves[own], &slow_halves, &record.noise_grids);
+        let bias_changes = bias::find(&halves[own], &slow_halves, &[], &record.noise_grids);
         let sensitivity = |regressor: ChannelProfile| {
             let is_of = |(number, _): &&(usize, bias::BiasSensitivity)| slow[*number] == regressor;
             bias_changes.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)

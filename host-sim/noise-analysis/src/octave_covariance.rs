@@ -12,7 +12,9 @@ use allan_core::confidence::{NORMAL_975, octave_correlation};
 use allan_core::model::FittedTerm;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// Longest averaging factor whose covariance is integrated. The longest filter has 2 × 64 taps; at 512 samples the correlation of
 /// neighbours is over.
@@ -27,16 +29,12 @@ const STEPS: usize = 8192;
 pub(crate) fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMatrix<f64> {
     let period = model.sample_period();
     let step = 0.5 / period / STEPS as f64;
-    let frequencies = || (0..STEPS).map(|index| (index as f64 + 0.5) * step);
-    let densities: Vec<f64> = frequencies().map(|frequency| model.density(frequency)).collect();
+    let density = |index| model.density((f64::from(index) + 0.5) * step);
+    let densities: Vec<f64> = (0..STEPS as u32).map(density).collect();
     // S·H of each point, divided by its integral.
     let weighted = |point: &&AllanPoint| {
-        let n = point.n as f64;
-        let transfer = |frequency: f64| {
-            let angle = PI * frequency * period;
-            (n * angle).sin().powi(4) / (n * angle.sin()).powi(2)
-        };
-        let product = frequencies().zip(&densities).map(|(frequency, density)| density * transfer(frequency));
+        let transfer = transfer_function(point.n);
+        let product = transfer.iter().zip(&densities).map(|(transfer, density)| density * transfer);
         let product = DVector::from_iterator(STEPS, product);
         let integral = product.sum() * step;
         product / integral
@@ -53,6 +51,23 @@ pub(crate) fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMat
         let correlation = octave_correlation(octaves, fractions[a], fractions[b]);
         2.0 * correlation / (model.edf(first) * model.edf(second)).sqrt()
     })
+}
+
+/// `H_n` in the middle of each step from 0 to the Nyquist frequency. It depends on neither record nor sample rate, so that of
+/// an octave is computed once.
+fn transfer_function(n: u64) -> Cow<'static, [f64]> {
+    static OF_OCTAVES: [OnceLock<Vec<f64>>; LONGEST.ilog2() as usize + 1] =
+        [const { OnceLock::new() }; LONGEST.ilog2() as usize + 1];
+    let factor = n as f64;
+    let at = |index: usize| {
+        let angle = 0.5 * PI * (index as f64 + 0.5) / STEPS as f64;
+        (factor * angle).sin().powi(4) / (factor * angle.sin()).powi(2)
+    };
+    let compute = || (0..STEPS).map(at).collect::<Vec<f64>>();
+    match OF_OCTAVES.get(n.ilog2() as usize).filter(|_| n.is_power_of_two()) {
+        Some(octave) => Cow::Borrowed(octave.get_or_init(compute)),
+        None => Cow::Owned(compute()),
+    }
 }
 
 /// `model` with wider bounds of its white noise where it has a filter: the model was fitted to `curve` with the degrees of

@@ -1,15 +1,16 @@
 //! Preprocessing: what the detectors find in the samples of each channel, and the series without it.
 //!
 //! Repeated samples become gaps of every channel, knocks and spikes gaps of the channel that shows them; a bias step is
-//! subtracted, and so is a response to temperature behind a lag or with a curvature. A ramp is reported and stays in the samples, because
+//! subtracted, and so is a response to vibration, or to temperature behind a lag or with a curvature. A ramp is reported and stays in the samples, because
 //! the noise model has a term for it. A sensitivity to temperature or supply stays in them too, and is kept for the
 //! regression on covariates.
 
 use crate::detectors::bias::{BiasChanges, BiasSensitivity};
+use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::spikes::{self, SpikeRule};
-use crate::detectors::thermal_response::ThermalResponse;
+use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::detectors::{bias, effective_lsb, output_range};
 use crate::findings::{Correction, Detection, Effect};
 use crate::sampling_faults;
@@ -53,8 +54,9 @@ pub(crate) struct Preprocessing {
     exclusions: Vec<(ChannelProfile, ChannelExclusion)>,
     /// By channel: the first sample period from which on an offset is subtracted, and the offset in the channel's unit.
     offsets: Vec<(ChannelProfile, u64, f64)>,
-    /// By channel: a response to temperature that is subtracted, as the first half and as the whole record show it.
-    thermal: Vec<(ChannelProfile, [Option<ThermalResponse>; 2])>,
+    /// By channel: responses to temperature and vibration that are subtracted, as the first half and as the whole record show
+    /// them.
+    responses: Vec<(ChannelProfile, [Vec<BiasResponse>; 2])>,
     /// A channel, the temperature or supply that it depends on, and how much.
     sensitivities: Vec<(ChannelProfile, ChannelProfile, BiasSensitivity)>,
     /// Channels whose values are all multiples of several counts, and of how many.
@@ -69,8 +71,8 @@ struct ChannelFindings {
     knocks: Vec<Detection>,
     spikes: Option<Detection>,
     bias_changes: BiasChanges,
-    /// As the first half shows it, if the whole record shows one.
-    thermal_of_first_half: Option<ThermalResponse>,
+    /// As the first half shows them, if the whole record shows any.
+    responses_of_first_half: Vec<BiasResponse>,
     /// Channels that the bias may depend on, in the order of the sensitivities in `bias_changes`.
     regressors: Vec<ChannelProfile>,
     exclusion: ChannelExclusion,
@@ -121,18 +123,23 @@ impl Preprocessing {
                 .filter(|(regressor, _)| may_depend(traced[at], *regressor))
                 .map(|(regressor, series)| (*regressor, series))
                 .unzip();
-            let bias_changes = bias::find(&without_slow_lines(quiet.without(&exclusion.spikes)), &others, noise_grids);
-            let thermal_of_first_half = bias_changes.thermal.as_ref().and_then(|_| {
-                let middle = measurement.middle();
-                let halves: Vec<Series> = others.iter().map(|other| other.before(middle)).collect();
-                let half = series[at].before(middle).without(&exclusion.by_first_half);
-                bias::find(&half, &halves.iter().collect::<Vec<_>>(), noise_grids).thermal
-            });
+            let quiet = without_slow_lines(quiet.without(&exclusion.spikes));
+            let bias_changes = bias::find(&quiet, &others, &accelerations(traced, &series, traced[at]), noise_grids);
+            let responses_of_first_half = if bias_changes.responses.is_empty() {
+                Vec::new()
+            } else {
+                let first_half = |of: &Series| of.before(measurement.middle());
+                let others: Vec<Series> = others.iter().copied().map(first_half).collect();
+                let all: Vec<Series> = series.iter().map(first_half).collect();
+                let own = first_half(&series[at]).without(&exclusion.by_first_half);
+                let others: Vec<&Series> = others.iter().collect();
+                bias::find(&own, &others, &accelerations(traced, &all, traced[at]), noise_grids).responses
+            };
             ChannelFindings {
                 lsb: effective_lsb::find(&measured(traced[at])),
                 range,
                 knocks: knocks.detections(&series[at], at, traced),
-                thermal_of_first_half,
+                responses_of_first_half,
                 bias_changes,
                 regressors: profiles,
                 spikes,
@@ -146,14 +153,14 @@ impl Preprocessing {
                 knocks,
                 spikes,
                 bias_changes,
-                thermal_of_first_half,
+                responses_of_first_half,
                 regressors,
                 exclusion,
             } = found;
-            let BiasChanges { step, ramp, sensitivities, thermal } = bias_changes;
-            if let Some(thermal) = thermal {
-                preprocessing.channel_effects.push((channel, thermal.effect.clone()));
-                preprocessing.thermal.push((channel, [thermal_of_first_half, Some(thermal)]));
+            let BiasChanges { step, ramp, sensitivities, responses } = bias_changes;
+            if !responses.is_empty() {
+                preprocessing.channel_effects.extend(responses.iter().map(|of| (channel, of.effect.clone())));
+                preprocessing.responses.push((channel, [responses_of_first_half, responses]));
             }
             if let Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) = &step {
                 preprocessing.offsets.push((channel, *from, *size));
@@ -209,24 +216,24 @@ impl Preprocessing {
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
     pub(crate) fn offset(&self, channel: ChannelProfile, exclusion: Exclusion, slot: u64) -> f64 {
         let steps = self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from);
-        let thermal = self.thermal_response(channel, exclusion).map_or(0.0, |response| response.bias(slot));
-        steps.map(|(.., size)| size).sum::<f64>() + thermal
+        let followed = self.responses(channel, exclusion).iter().map(|response| response.bias(slot));
+        steps.map(|(.., size)| *size).chain(followed).sum()
     }
 
-    /// The response of a channel to temperature that is subtracted from its samples.
-    fn thermal_response(&self, channel: ChannelProfile, exclusion: Exclusion) -> Option<&ThermalResponse> {
-        let (_, [first_half, whole]) = self.thermal.iter().find(|(of, _)| *of == channel)?;
-        if exclusion == Exclusion::ByWhole { whole.as_ref() } else { first_half.as_ref() }
+    /// The responses of a channel to temperature and vibration that are subtracted from its samples.
+    fn responses(&self, channel: ChannelProfile, exclusion: Exclusion) -> &[BiasResponse] {
+        let own = self.responses.iter().find(|(of, _)| *of == channel);
+        own.map_or(&[], |(_, [first_half, whole])| if exclusion == Exclusion::ByWhole { whole } else { first_half })
     }
 
-    /// Whether the first half shows another response to temperature than the whole record.
-    pub(crate) fn has_thermal_response(&self) -> bool {
-        !self.thermal.is_empty()
+    /// Whether the first half may show other responses to temperature and vibration than the whole record.
+    pub(crate) fn has_responses(&self) -> bool {
+        !self.responses.is_empty()
     }
 
     /// Whether a channel responds to temperature behind a lag or with a curvature.
     pub(crate) fn responds_to_temperature(&self, channel: ChannelProfile) -> bool {
-        self.thermal.iter().any(|(of, _)| *of == channel)
+        self.responses(channel, Exclusion::ByWhole).iter().any(|of| of.effect.kind != "vibration_rectification")
     }
 
     /// A channel's series after preprocessing.
@@ -236,7 +243,7 @@ impl Preprocessing {
         for &(_, from, size) in self.offsets.iter().filter(|(of, ..)| *of == channel) {
             series = series.lowered_from(from, size);
         }
-        if let Some(response) = self.thermal_response(channel, exclusion) {
+        for response in self.responses(channel, exclusion) {
             series.values.iter_mut().zip(&series.slots).for_each(|(value, slot)| *value -= response.bias(*slot));
         }
         series.without(&self.excluded(channel, exclusion))
@@ -310,6 +317,21 @@ impl KnocksInChannels {
         };
         self.by_whole[at].iter().map(detection).collect()
     }
+}
+
+/// The accelerometers of `series`, of the channels `traced`, as what may shake `channel`.
+fn accelerations<'s>(
+    traced: &[ChannelProfile],
+    series: &'s [Series],
+    channel: ChannelProfile,
+) -> Vec<Acceleration<'s>> {
+    let all = traced.iter().zip(series).filter(|(of, _)| of.quantity == Quantity::SpecificForce);
+    let acceleration = |(of, series): (&ChannelProfile, &'s Series)| Acceleration {
+        name: of.name,
+        series,
+        largest: largest_sensitivity(channel.range, of.range),
+    };
+    all.map(acceleration).collect()
 }
 
 /// A series without sinusoids of a few periods, which the regressions on its block means would take for ramps and steps; the

@@ -8,7 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 
 const RATE_HZ: f64 = 100.0;
 
@@ -147,6 +147,55 @@ fn a_bias_behind_a_lag_and_one_with_a_curvature_are_told_from_a_proportional_one
     assert_eq!(walk.parameters["value"].low, 0.0, "{walk:?}");
     let worst = channel.after.unseen.worst_sigma.expect("a curve");
     assert!(worst.abs() < 4.0, "{worst}");
+}
+
+/// An angle from 0 to 2π that looks like chance, by the bits of the sample's number and of `salt`.
+fn scrambled(time: f64, salt: u64) -> f64 {
+    let mut bits = ((time * RATE_HZ).round() as u64 + (salt << 40)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    bits = (bits ^ (bits >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    TAU * ((bits ^ (bits >> 32)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[test]
+fn a_bias_that_follows_the_strength_of_a_vibration_is_its_rectification() {
+    const SECONDS: f64 = 2400.0;
+    // deg/s/g², and the vibration of accl_x in g rms: it runs up and down twice, the second time farther.
+    let sensitivity = 0.4;
+    let strength = |time: f64| 0.15 * (TAU * time / 1200.0).sin().powi(2) * (0.5 + time / SECONDS);
+    let waveform = |name: &str, time: f64| match name {
+        "accl_x" => SQRT_2 * strength(time) * scrambled(time, 1).cos(),
+        "gyro_y" => sensitivity * strength(time).powi(2),
+        "temp" => 25.0,
+        _ => 0.0,
+    };
+    let report = analyze(&recorded(SECONDS, 4, &waveform));
+    let finding = report.findings.iter().find(|of| of.kind == "vibration_rectification");
+    let finding = finding.unwrap_or_else(|| panic!("{:?}", kinds(&report)));
+    assert_eq!(finding.channels, ["gyro_y"]);
+    let found = &finding.parameters["sensitivity"];
+    assert_eq!(found.unit, "deg/s/g^2");
+    // Four standard deviations. White noise of 0.4 deg/s leaves 0.4/√240,000 of a mean and, of a course that moves by 0.01 g²,
+    // some 0.08 of this sensitivity.
+    let half = 4.0 * (found.high - found.low) / (2.0 * 1.96);
+    assert!((found.value - sensitivity).abs() < half && half < 0.5, "{found:?}");
+    // Nothing of it is left: neither a drift nor a walk is needed.
+    let gyro = report.channels.iter().find(|of| of.name == "gyro_y").expect("recorded");
+    assert_eq!(gyro.effects.len(), 1, "{:?}", kinds(&report));
+}
+
+#[test]
+fn a_vibration_that_nothing_follows_and_a_knock_are_no_rectification() {
+    let strength = |time: f64| if (700.0..703.0).contains(&time) { 0.3 } else { 0.05 * (time / 1200.0) };
+    let waveform = |name: &str, time: f64| match name {
+        "accl_x" => SQRT_2 * strength(time) * scrambled(time, 1).cos(),
+        // A drift of the gyro that has nothing to do with it, and an impossible one: 300 deg/s over (18 g)² is 0.93 deg/s/g².
+        "gyro_y" => 0.02 * (TAU * time / 500.0).sin(),
+        "gyro_z" => 20.0 * strength(time).powi(2),
+        "temp" => 25.0,
+        _ => 0.0,
+    };
+    let report = analyze(&recorded(1200.0, 5, &waveform));
+    assert!(report.findings.iter().all(|of| of.kind != "vibration_rectification"), "{:?}", report.findings);
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn note(fit: &WhiteNoiseFit, fitted: &Model) -> Option<String> {
             fit.widened
         )
     });
-    let by_fit = white_noise_of(fitted)?;
+    let by_fit = white_noise_of(fitted);
     let n = fit.angle_random_walk;
     let (apart, reach) = if n.value > by_fit.value {
         (n.value - by_fit.value, (n.value - n.low).hypot(by_fit.high - by_fit.value))
@@ -71,19 +71,21 @@ fn note(fit: &WhiteNoiseFit, fitted: &Model) -> Option<String> {
     if apart <= reach {
         return misfit;
     }
+    if by_fit.value == 0.0 {
+        return Some("the fitted model has no white noise: the curve does not tell it from its other terms".to_owned());
+    }
     let percent = 100.0 * (n.value / by_fit.value - 1.0);
     let reason = misfit.unwrap_or_else(|| "the fitted model lacks something".to_owned());
     Some(format!("{percent:+.1} % from the fit, more than the two intervals allow: {reason}"))
 }
 
-/// The white noise of a model at low frequencies, behind a filter or not; `None` if it has none.
-fn white_noise_of(model: &Model) -> Option<BoundedEstimate> {
+/// The white noise of a model at low frequencies, behind a filter or not.
+fn white_noise_of(model: &Model) -> BoundedEstimate {
     let is_white = |kind: &NoiseTerm| matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_));
     let white = || model.terms().iter().filter(|term| is_white(&term.kind));
-    let sum = BoundedEstimate {
+    BoundedEstimate {
         value: white().map(|term| term.value * term.value).sum::<f64>().sqrt(),
         low: white().map(|term| term.low * term.low).sum::<f64>().sqrt(),
         high: white().map(|term| term.high * term.high).sum::<f64>().sqrt(),
-    };
-    (sum.value > 0.0).then_some(sum)
+    }
 }

@@ -18,13 +18,20 @@ pub(super) struct Cause {
 }
 
 impl Cause {
-    /// The channel that shows the cause most clearly: whose principal parameter has the narrowest interval for its value.
+    /// The channel that shows the cause most clearly: whose principal parameter has the narrowest interval for its value. Of
+    /// a line that has a width in some channels it is one of these: a channel in which it is weaker may not resolve it.
     pub(super) fn clearest(&self) -> &Shown {
-        let width =
-            |shown: &Shown| shown.effect.parameters.values().map(relative_width).fold(f64::INFINITY, size_width);
-        let narrower = |best, next| if width(next) < width(best) { next } else { best };
+        let has_width = |shown: &&Shown| shown.effect.kind == "resonance";
+        if let Some(widest) = self.shown.iter().filter(has_width).reduce(narrower) {
+            return widest;
+        }
         self.shown[1..].iter().fold(&self.shown[0], narrower)
     }
+}
+
+fn narrower<'s>(best: &'s Shown, next: &'s Shown) -> &'s Shown {
+    let width = |shown: &Shown| shown.effect.parameters.values().map(relative_width).fold(f64::INFINITY, size_width);
+    if width(next) < width(best) { next } else { best }
 }
 
 /// Width of the interval of a parameter over its value, of one that says how large an effect is.

@@ -16,6 +16,8 @@ const LEVEL: f64 = 0.01;
 const NOT_COMPARED: [&str; 6] = ["time", "from", "to", "taps", "harmonics", "excess_percent"];
 /// Kinds that happen once, or that are no statement about the samples' distribution.
 const ONCE: [&str; 5] = ["bias_step", "knock", "motion", "saturated", "unexplained"];
+/// The filter of the part. Its `value` is the white noise behind it, which may change over the record while the filter does not.
+const FILTER: &str = "filter_bandwidth";
 /// Farthest that the lines of two halves may be apart, as a part of their frequency, to be taken for the same line.
 const FARTHEST_LINE: f64 = 0.1;
 
@@ -43,7 +45,9 @@ pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
         .iter()
         .filter(|(whole, _)| !ONCE.contains(&whole.kind.as_str()))
         .flat_map(|(whole, half)| {
-            let compared = whole.parameters.iter().filter(|(name, _)| !NOT_COMPARED.contains(&name.as_str()));
+            let compared = whole.parameters.iter().filter(|(name, _)| {
+                !NOT_COMPARED.contains(&name.as_str()) && !(whole.kind == FILTER && name.as_str() == "value")
+            });
             compared.filter_map(|(name, of_whole)| deviation(of_whole, half.parameters.get(name)?))
         })
         .collect();

@@ -1,13 +1,15 @@
-//! What changes the bias of a channel over the record: a ramp, a step, regressors such as the temperature, or several.
+//! What changes the bias of a channel over the record: a ramp, a step, regressors such as the temperature, vibration, or several.
 //!
 //! In the differences of the Allan variance a change over the whole record has a few degrees of freedom and is lost in slow
 //! noise. Here each candidate is tested on block means against every mixture of white, flicker and random-walk noise, and
 //! against the other candidates: the one that explains the data best is accepted, then the next one given the first.
 
+use super::bias_response::BiasResponse;
 use super::bias_step::{self, StepPosition};
 use super::block_means::{BlockMeans, NoiseGrid, NoiseGrids};
 use super::gls_regression::{GlsRegression, RegressionEstimate};
-use super::thermal_response::{self, Lag, TemperatureCourse, ThermalResponse};
+use super::thermal_response::{self, Lag, TemperatureCourse};
+use super::vibration_rectification::{Acceleration, Vibration};
 use crate::distributions::NORMAL_975;
 use crate::findings::{Detection, Effect, Parameter};
 use crate::series::Series;
@@ -15,7 +17,7 @@ use nalgebra::DVector;
 
 /// Highest p-value of a ramp or a regressor. Three or four candidates are tried in each of six channels, so that about one
 /// recording in a hundred has a false one.
-pub const SIGNIFICANCE: f64 = 5e-4;
+pub(crate) const SIGNIFICANCE: f64 = 5e-4;
 /// Least fraction of a channel's samples that a regressor must have too.
 const LEAST_COMMON: f64 = 0.9;
 /// Largest number of candidates that are accepted.
@@ -23,7 +25,7 @@ const MOST: usize = 4;
 
 /// Sensitivity of the bias to a regressor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BiasSensitivity {
+pub(crate) struct BiasSensitivity {
     /// In the channel's unit over the regressor's.
     pub sensitivity: f64,
     /// Standard deviation of the sensitivity.
@@ -32,15 +34,24 @@ pub struct BiasSensitivity {
 
 /// What changes the bias of one channel.
 #[derive(Debug, Default, Clone, PartialEq)]
-pub struct BiasChanges {
+pub(crate) struct BiasChanges {
     /// A step.
     pub step: Option<Detection>,
     /// A ramp over the whole record.
     pub ramp: Option<Detection>,
     /// Indices of the regressors that the bias depends on, with the sensitivity to each.
     pub sensitivities: Vec<(usize, BiasSensitivity)>,
-    /// A response to temperature behind a lag or with a curvature.
-    pub thermal: Option<ThermalResponse>,
+    /// Responses to temperature behind a lag or with a curvature, and to vibration.
+    pub responses: Vec<BiasResponse>,
+}
+
+/// What a bias may follow that was measured.
+struct Followed<'a> {
+    /// Block means of each regressor, with its index.
+    regressors: Vec<(usize, DVector<f64>)>,
+    /// The regressor that is the temperature.
+    temperature: Option<(usize, TemperatureCourse)>,
+    vibrations: Vec<Vibration<'a>>,
 }
 
 /// A candidate that may explain changes of the bias.
@@ -52,6 +63,8 @@ enum Candidate {
     Lagged(Lag),
     /// The square of the temperature.
     Squared,
+    /// One of the vibrations.
+    Vibration(usize),
 }
 
 /// A candidate that was accepted.
@@ -64,9 +77,15 @@ struct Accepted {
 }
 
 /// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of
-/// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out.
+/// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations`
+/// may shake the channel.
 #[must_use]
-pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> BiasChanges {
+pub(crate) fn find(
+    series: &Series,
+    regressors: &[&Series],
+    accelerations: &[Acceleration],
+    grids: &NoiseGrids,
+) -> BiasChanges {
     let regressors: Vec<(usize, &Series)> =
         regressors.iter().copied().enumerate().filter(|(_, regressor)| covers(regressor, series)).collect();
     if regressors.iter().any(|(_, regressor)| regressor.slots != series.slots) {
@@ -76,9 +95,9 @@ pub fn find(series: &Series, regressors: &[&Series], grids: &NoiseGrids) -> Bias
             regressors.iter().map(|&(index, regressor)| (index, regressor.clone().in_common(&[&series]))).collect();
         let regressors: Vec<(usize, &Series)> =
             regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
-        return find_on_common_samples(&series, &regressors, grids);
+        return find_on_common_samples(&series, &regressors, accelerations, grids);
     }
-    find_on_common_samples(series, &regressors, grids)
+    find_on_common_samples(series, &regressors, accelerations, grids)
 }
 
 /// Whether `regressor` has at least the fraction [`LEAST_COMMON`] of the samples of `series`.
@@ -87,7 +106,12 @@ fn covers(regressor: &Series, series: &Series) -> bool {
 }
 
 /// [`find`] where all have samples in the same sample periods.
-fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grids: &NoiseGrids) -> BiasChanges {
+fn find_on_common_samples(
+    series: &Series,
+    regressors: &[(usize, &Series)],
+    accelerations: &[Acceleration],
+    grids: &NoiseGrids,
+) -> BiasChanges {
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
     let grid = grids.get(&blocks);
     let series_of = |index: usize| regressors.iter().find(|(of, _)| *of == index).map(|(_, series)| *series);
@@ -101,9 +125,11 @@ fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grid
     let temperature = regressors
         .iter()
         .find_map(|(index, _)| Some((*index, TemperatureCourse::new(series_of(*index)?, blocks.width)?)));
+    let vibrations = accelerations.iter().filter_map(|of| Vibration::new(*of, &blocks)).collect();
+    let followed = Followed { regressors, temperature, vibrations };
     let mut accepted: Vec<Accepted> = Vec::new();
     while accepted.len() < MOST
-        && let Some(next) = best_candidate(series, &blocks, &grid, &regressors, temperature.as_ref(), &accepted)
+        && let Some(next) = best_candidate(series, &blocks, &grid, &followed, &accepted)
     {
         accepted.push(next);
     }
@@ -121,18 +147,21 @@ fn find_on_common_samples(series: &Series, regressors: &[(usize, &Series)], grid
             Candidate::Regressor(index) => {
                 let RegressionEstimate { size: sensitivity, error, .. } = estimate;
                 changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error }));
-                if temperature.as_ref().is_some_and(|(of, _)| of == index) {
+                if followed.temperature.as_ref().is_some_and(|(of, _)| of == index) {
                     linear = Some(estimate);
                 }
             }
             Candidate::Lagged(lag) => lagged = Some((lag, estimate)),
             Candidate::Squared => squared = Some(estimate),
+            Candidate::Vibration(at) => {
+                changes.responses.push(followed.vibrations[*at].response(&estimate, series.unit));
+            }
         }
     }
-    if let Some((_, course)) = &temperature {
+    if let Some((_, course)) = &followed.temperature {
         let curved = squared.map(|estimate| course.squared_response(linear.as_ref(), &estimate, series.unit));
         let behind_lag = lagged.map(|(lag, estimate)| course.lag_response(lag, &estimate, series.unit));
-        changes.thermal = behind_lag.or(curved);
+        changes.responses.extend(behind_lag.or(curved));
     }
     changes
 }
@@ -147,10 +176,10 @@ fn best_candidate(
     series: &Series,
     blocks: &BlockMeans,
     grid: &NoiseGrid,
-    regressors: &[(usize, DVector<f64>)],
-    temperature: Option<&(usize, TemperatureCourse)>,
+    followed: &Followed,
     accepted: &[Accepted],
 ) -> Option<Accepted> {
+    let Followed { regressors, temperature, vibrations } = followed;
     let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
     let regression = GlsRegression::new(blocks, grid, &known);
     let ramp = blocks.ramp();
@@ -185,6 +214,16 @@ fn best_candidate(
             let RegressionEstimate { p_value, deviance, .. } = lag.estimate;
             let accepted = Accepted { candidate: Candidate::Lagged(lag), regressor, p_value };
             rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
+        }
+    }
+    let is_shaken = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Vibration(_)));
+    for (at, vibration) in vibrations.iter().enumerate().filter(|_| !is_shaken) {
+        let regressor = vibration.regressor(blocks);
+        if let Some(RegressionEstimate { size, p_value, deviance, .. }) = regression.estimate(&regressor)
+            && p_value < SIGNIFICANCE
+            && vibration.is_possible(size)
+        {
+            rivals.push((deviance, Accepted { candidate: Candidate::Vibration(at), regressor, p_value }));
         }
     }
     let has_step = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Step(_)));

@@ -229,7 +229,7 @@ impl KnockRule {
         let size = block.differences.len();
         let at = block.differences.start / size;
         let first = at.saturating_sub(NEIGHBOURS + 1);
-        let blocks = first..(at + NEIGHBOURS + 2).min(differences.squares.len() / size);
+        let blocks = first..(at + NEIGHBOURS + 2).min(differences.len() / size);
         let levels: Vec<Option<f64>> =
             blocks.map(|block| differences.half_level(block * size..(block + 1) * size)).collect();
         let freedom = HALF_EFFICIENCY * block.freedom.block;
@@ -306,8 +306,8 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     let length = block.differences.len();
     // ln likelihood ratio of each difference; correlated differences count as fewer.
     let weight = 0.5 * block.freedom.block / length as f64;
-    let window = block.differences.start.saturating_sub(4 * length)
-        ..(block.differences.end + 4 * length).min(differences.squares.len());
+    let window =
+        block.differences.start.saturating_sub(4 * length)..(block.differences.end + 4 * length).min(differences.len());
     let gain = |square: f64| {
         // A difference with a missing sample has no square, and says nothing.
         if !square.is_finite() {
@@ -316,7 +316,7 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
         let ratio = (square / quiet).min(LARGEST_SQUARE * block.ratio);
         weight * (ratio * (1.0 - 1.0 / tried) - tried.ln())
     };
-    let gains: Vec<f64> = differences.squares[window.clone()].iter().map(|&square| gain(square)).collect();
+    let gains: Vec<f64> = differences.squares(window.clone()).map(gain).collect();
     // Running sums of the gains: a stretch gains the difference of two of them.
     let mut sums = vec![0.0];
     for gain in &gains {
@@ -336,11 +336,9 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     let (end_low, end_high) = bounds(&mut ends(), end);
     // The level of what belongs to it for certain.
     let certain = if end_low > start_high + FEWEST_DIFFERENCES { start_high..end_low } else { start..end };
-    let inside = &differences.squares[window.start + certain.start..window.start + certain.end];
-    let (sum, count) = inside
-        .iter()
-        .filter(|square| square.is_finite())
-        .fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+    let inside = differences.squares(window.start + certain.start..window.start + certain.end);
+    let (sum, count) =
+        inside.filter(|square| square.is_finite()).fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
     let ratio = sum / f64::max(count, 1.0) / quiet;
     let freedom = block.freedom.block * count / length as f64;
     let half = NORMAL_975 * (2.0 / freedom + 2.0 / block.freedom.neighbours).sqrt();

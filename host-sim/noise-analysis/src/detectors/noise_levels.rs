@@ -51,9 +51,7 @@ pub(super) struct SquaredDifferences {
     /// First sample period of the first average.
     start: u64,
     /// `NaN` where an average has too few samples.
-    pub(super) squares: Vec<f64>,
-    /// Degrees of freedom of the mean of [`DIFFERENCES`] trimmed squares, by the correlation of the differences.
-    freedom: f64,
+    differences: Vec<f64>,
 }
 
 impl SquaredDifferences {
@@ -78,9 +76,17 @@ impl SquaredDifferences {
             // White noise has the same variance in every difference, however many samples are missing.
             (sums[at + 1] / b - sums[at] / a) / (0.5 * n as f64 * (1.0 / a + 1.0 / b)).sqrt()
         };
-        let differences: Vec<f64> = (0..count.saturating_sub(1)).map(difference).collect();
-        let freedom = degrees_of_freedom(&differences);
-        Self { n, start, squares: differences.into_iter().map(|value| value * value).collect(), freedom }
+        Self { n, start, differences: (0..count.saturating_sub(1)).map(difference).collect() }
+    }
+
+    /// Number of differences.
+    pub(super) fn len(&self) -> usize {
+        self.differences.len()
+    }
+
+    /// The squares of some differences.
+    pub(super) fn squares(&self, differences: Range<usize>) -> impl Iterator<Item = f64> + '_ {
+        self.differences[differences].iter().map(|value| value * value)
     }
 
     /// Number of the first difference that begins at or after a sample period.
@@ -106,8 +112,8 @@ impl SquaredDifferences {
 
     fn level_without(&self, left_out: f64, differences: Range<usize>) -> Option<f64> {
         let all = differences.len();
-        let mut present: Vec<f64> =
-            self.squares.get(differences)?.iter().copied().filter(|square| square.is_finite()).collect();
+        let within = self.differences.get(differences)?.iter().map(|value| value * value);
+        let mut present: Vec<f64> = within.filter(|square| square.is_finite()).collect();
         if present.is_empty() || 2 * present.len() < all {
             return None;
         }
@@ -120,34 +126,72 @@ impl SquaredDifferences {
 
     /// Levels of the blocks of [`DIFFERENCES`] differences.
     pub(super) fn levels(&self) -> Vec<Option<f64>> {
-        let blocks = self.squares.len() / DIFFERENCES;
+        let blocks = self.differences.len() / DIFFERENCES;
         (0..blocks).map(|block| self.trimmed_level(block * DIFFERENCES..(block + 1) * DIFFERENCES)).collect()
     }
 
-    /// Degrees of freedom of the shortest block.
+    /// Degrees of freedom of the shortest block, by the correlation of the differences: `m/(1 + 2 Σ (1 − k/m) ρ_k²)` with
+    /// their autocorrelation ρ, for `m` = [`DIFFERENCES`] of them.
     pub(super) fn freedom(&self) -> f64 {
-        self.freedom
+        let covariances = Covariances::new(&self.differences);
+        let variance = covariances.at(0).0;
+        let m = DIFFERENCES as f64;
+        let squares = |lag: usize| {
+            let (covariance, count) = covariances.at(lag);
+            // The square of an estimated correlation is too large by about one over the number of products.
+            let square = (covariance / variance).powi(2) - f64::max(count, 1.0).recip();
+            (1.0 - lag as f64 / m) * square.max(0.0)
+        };
+        let sum: f64 = if variance > 0.0 { (1..DIFFERENCES).map(squares).sum() } else { 0.0 };
+        EFFICIENCY * m / (1.0 + 2.0 * sum)
     }
 }
 
-/// `m/(1 + 2 Σ (1 − k/m) ρ_k²)` with the autocorrelation ρ of the differences, for `m` = [`DIFFERENCES`] of them.
-fn degrees_of_freedom(differences: &[f64]) -> f64 {
-    let product = |lag: usize| {
-        let pairs = differences.iter().zip(&differences[lag.min(differences.len())..]).map(|(a, b)| a * b);
-        let (sum, count) =
-            pairs.filter(|product| product.is_finite()).fold((0.0, 0.0), |(sum, count), of| (sum + of, count + 1.0));
-        (sum / f64::max(count, 1.0), count)
-    };
-    let (variance, _) = product(0);
-    let m = DIFFERENCES as f64;
-    let squares = |lag: usize| {
-        let (covariance, count) = product(lag);
-        // The square of an estimated correlation is too large by about one over the number of products.
-        let square = (covariance / variance).powi(2) - f64::max(count, 1.0).recip();
-        (1.0 - lag as f64 / m) * square.max(0.0)
-    };
-    let sum: f64 = if variance > 0.0 { (1..DIFFERENCES).map(squares).sum() } else { 0.0 };
-    EFFICIENCY * m / (1.0 + 2.0 * sum)
+/// Mean products of differences some places apart.
+struct Covariances {
+    /// 0 where a difference is missing.
+    values: Vec<f64>,
+    /// 1 of each difference that is there, 0 of a missing one; empty where none is missing.
+    present: Vec<f64>,
+}
+
+impl Covariances {
+    fn new(differences: &[f64]) -> Self {
+        let is_missing = |value: &f64| !value.is_finite();
+        let present = if differences.iter().any(is_missing) {
+            differences.iter().map(|value| f64::from(u8::from(!is_missing(value)))).collect()
+        } else {
+            Vec::new()
+        };
+        let values = differences.iter().map(|value| if is_missing(value) { 0.0 } else { *value }).collect();
+        Self { values, present }
+    }
+
+    /// Mean product at a distance of `lag`, and the number of products.
+    fn at(&self, lag: usize) -> (f64, f64) {
+        let later = |of: &'_ [f64]| lag.min(of.len());
+        let count = if self.present.is_empty() {
+            self.values.len().saturating_sub(lag) as f64
+        } else {
+            sum_of_products(&self.present, &self.present[later(&self.present)..])
+        };
+        (sum_of_products(&self.values, &self.values[later(&self.values)..]) / f64::max(count, 1.0), count)
+    }
+}
+
+/// Sum of the products of the elements of two slices, up to the end of the shorter one, in eight sums that a processor adds
+/// to at once.
+fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let length = a.len().min(b.len());
+    let ((a, a_rest), (b, b_rest)) = (a[..length].as_chunks::<LANES>(), b[..length].as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// Means of `2^doublings` neighbouring levels each; `None` where half of them are missing.
@@ -163,7 +207,7 @@ pub(super) fn longer_levels(levels: &[Option<f64>], doublings: u32) -> Vec<Optio
 /// Sizes of the blocks, as doublings of the shortest one, at which a record is examined: as long as a block has neighbours.
 pub(super) fn doublings(differences: &SquaredDifferences, period_s: f64) -> impl Iterator<Item = u32> {
     let shortest_s = (DIFFERENCES * differences.n) as f64 * period_s;
-    let blocks = differences.squares.len() / DIFFERENCES;
+    let blocks = differences.len() / DIFFERENCES;
     let is_examined = move |doublings: &u32| {
         let size = 1_usize << doublings;
         blocks / size >= 2 * FEWEST_NEIGHBOURS + 3 && (*doublings == 0 || size as f64 * shortest_s <= LONGEST_BLOCK_S)

@@ -1,0 +1,75 @@
+//! A bias that follows the course of something that was measured: the course in fractions of a block, and the response that the
+//! samples are corrected for.
+
+use super::block_means::BlockMeans;
+use super::gls_regression::RegressionEstimate;
+use crate::distributions::NORMAL_975;
+use crate::findings::{Effect, Parameter};
+use nalgebra::DVector;
+
+/// Fractions of a block in which a course is known.
+pub(super) const FRACTIONS: u64 = 32;
+
+/// A quantity over the record, one value for each stretch of some sample periods.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Course {
+    /// Sample periods of a stretch.
+    pub width: u64,
+    /// At least one.
+    pub values: Vec<f64>,
+}
+
+/// A response that the samples can be corrected for.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct BiasResponse {
+    /// As reported.
+    pub effect: Effect,
+    bias: Course,
+}
+
+impl Course {
+    /// Averages over the blocks.
+    pub(super) fn in_blocks(&self, blocks: &BlockMeans) -> DVector<f64> {
+        let size = (blocks.width as f64 / self.width as f64).max(1.0);
+        let mean = |&number: &usize| {
+            let end = |block: usize| ((block as f64 * size).round() as usize).min(self.values.len());
+            let within = &self.values[end(number).min(self.values.len() - 1)..end(number + 1)];
+            if within.is_empty() {
+                self.values[self.values.len() - 1]
+            } else {
+                within.iter().sum::<f64>() / within.len() as f64
+            }
+        };
+        DVector::from_iterator(blocks.numbers.len(), blocks.numbers.iter().map(mean))
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.values.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    /// The bias that follows the course with `sensitivity`; 0 at the mean of the course.
+    pub(super) fn response(&self, sensitivity: f64, effect: Effect) -> BiasResponse {
+        let mean = self.mean();
+        let values = self.values.iter().map(|value| sensitivity * (value - mean)).collect();
+        BiasResponse { effect, bias: Course { width: self.width, values } }
+    }
+}
+
+impl BiasResponse {
+    /// The bias in the sample period `slot`, in the channel's unit; 0 at the mean of what it follows.
+    #[must_use]
+    pub(crate) fn bias(&self, slot: u64) -> f64 {
+        let Course { width, values } = &self.bias;
+        let place = (slot as f64 / *width as f64 - 0.5).clamp(0.0, (values.len() - 1) as f64);
+        let before = place.floor() as usize;
+        let after = (before + 1).min(values.len() - 1);
+        let part = place - before as f64;
+        values[before] * (1.0 - part) + values[after] * part
+    }
+}
+
+/// A regression coefficient with its 95 % interval.
+pub(super) fn interval(of: &RegressionEstimate, unit: String) -> Parameter {
+    let half = NORMAL_975 * of.error;
+    Parameter::new(of.size, of.size - half, of.size + half, unit)
+}
