@@ -104,6 +104,17 @@ pub fn plain(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// A probability with two digits, as a decimal fraction from 0.001 on. One below the smallest number is not 0.
+#[must_use]
+pub fn probability(p: f64) -> String {
+    match p {
+        p if !p.is_finite() => NONE.to_owned(),
+        p if p < 1e-300 => "< 1e-300".to_owned(),
+        p if p < 9.95e-4 => format!("{p:.1e}"),
+        p => significant(p, 2),
+    }
+}
+
 /// Prefixes and their factors.
 const PREFIXES: [(&str, f64); 7] =
     [("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9), ("p", 1e-12)];
@@ -250,6 +261,20 @@ mod tests {
         ] {
             let parameter = Parameter::new(value, value - half_width, value + half_width, name);
             assert_eq!(rounded_quantity(&parameter), text, "{value} ± {half_width}");
+        }
+    }
+
+    #[test]
+    fn probabilities_have_two_digits_and_are_never_zero() {
+        for (p, text) in [
+            (1.0, "1.0"),
+            (0.633, "0.63"),
+            (0.028_3, "0.028"),
+            (1.63e-7, "1.6e-7"),
+            (0.0, "< 1e-300"),
+            (f64::NAN, NONE),
+        ] {
+            assert_eq!(probability(p), text, "{p:e}");
         }
     }
 
