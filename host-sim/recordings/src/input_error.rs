@@ -28,7 +28,7 @@ pub enum Reason {
     #[error("{0}")]
     Io(io::Error),
     /// A folder where a file is expected.
-    #[error("is a directory, not a file")]
+    #[error("is a directory, not a file; of a ROS 2 bag, give the .mcap or .db3 file in it")]
     Directory,
     /// A folder without a table in it.
     #[error("no file in it ends in .csv or .csv.gz")]

@@ -1,6 +1,7 @@
 //! Two reports, or a report and the data sheet, coefficient by coefficient: rows for programs, and a table for the terminal.
 
 use crate::formatting::number;
+use crate::rounding::probability;
 use crate::saved_report::{SavedChannel, SavedPoint, SavedReport};
 use noise_analysis::comparison::{Verdict, verdicts};
 use noise_analysis::findings::BoundedEstimate;
@@ -186,7 +187,7 @@ impl Comparison {
                 bounded(row.second),
                 row.unit.clone(),
                 verdict.to_owned(),
-                format!("{:.2e}", row.p_value),
+                probability(row.p_value),
             ]);
         }
         writeln!(out, "{table}")

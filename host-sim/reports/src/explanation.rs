@@ -33,9 +33,9 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", item(&sentence(note)))?;
     }
     let followed = || report.channels.iter().filter_map(|channel| Some((channel, channel.nonstationarity.as_ref()?)));
-    for (channel, changes) in followed() {
+    for (channel, _) in followed() {
         writeln!(out, "\n{}", channel_list(std::slice::from_ref(&channel.name)))?;
-        for text in paragraphs(channel, changes) {
+        for text in paragraphs(channel) {
             writeln!(out, "{}", item(&text))?;
         }
     }
@@ -90,11 +90,19 @@ fn chance(p_value: f64) -> String {
 }
 
 /// What is said of one channel.
-fn paragraphs(channel: &ChannelReport, changes: &Nonstationarity) -> Vec<String> {
-    let mut told = vec![model(channel), stationarity(changes), movement(changes)];
-    told.push(tracking(changes));
-    told.extend(changes.related_line.as_ref().map(|related| related_line(&channel.name, related)));
-    told
+fn paragraphs(channel: &ChannelReport) -> Vec<String> {
+    [model(channel)].into_iter().chain(course(channel)).collect()
+}
+
+/// How the noise of a channel changes in the course of the record; nothing where the record is too short for it.
+pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
+    let Some(changes) = &channel.nonstationarity else { return Vec::new() };
+    let related = changes.related_line.as_ref().map(|related| related_line(&channel.name, related));
+    [stationarity(changes), movement(changes), tracking(changes)]
+        .into_iter()
+        .chain(related)
+        .map(|text| sentence(&text))
+        .collect()
 }
 
 /// The terms, and the errors on the second half.

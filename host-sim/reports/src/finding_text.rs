@@ -2,7 +2,7 @@
 //! sentence.
 
 use crate::formatting::{capital, words};
-use crate::rounding::{bounded_quantity, plain, quantity, significant, span};
+use crate::rounding::{bounded_quantity, plain, quantity, rounded_quantity, significant, span};
 use noise_analysis::report::{Finding, Parameter, Validation};
 
 /// Every kind of finding that has its own sentences, in the order of `docs/findings.md`.
@@ -35,6 +35,12 @@ pub const KINDS: [&str; 26] = [
     "unexplained",
 ];
 
+/// Frequency of a line below which nothing that turns or hums makes it, Hz.
+const SLOW_HZ: f64 = 0.2;
+/// Advice for such a line.
+const CYCLING: &str =
+    "Look for what cycles at this period, such as a thermostat, an air conditioner or a load on the supply.";
+
 /// What is said of a finding.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FindingText {
@@ -54,7 +60,7 @@ pub struct FindingText {
 #[must_use]
 pub fn describe(finding: &Finding) -> FindingText {
     let (physics, advice) = sentences(finding, bounded_quantity, &reaches(finding));
-    let (brief, _) = sentences(finding, |parameter| quantity(parameter.value, &parameter.unit), "");
+    let (brief, _) = sentences(finding, rounded_quantity, "");
     FindingText { channels: channel_list(&finding.channels), physics, brief, advice, weight: weight(finding) }
 }
 
@@ -74,8 +80,19 @@ fn weight(finding: &Finding) -> String {
 /// Characters of the evidence that a line has room for.
 const CLAUSE: usize = 70;
 
+/// The evidence of the analysis as it is printed. A probability below the smallest number is not 0.
+#[must_use]
+pub(crate) fn printed_evidence(evidence: &str) -> String {
+    let words = evidence.split(' ').map(|word| match word.strip_prefix("0e0") {
+        Some(mark) if mark.chars().all(|of| ",;.".contains(of)) => format!("below 1e-300{mark}"),
+        _ => word.to_owned(),
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
 /// The evidence of the analysis up to its first semicolon, or as much of it as there is room for.
 fn first_clause(evidence: &str) -> String {
+    let evidence = printed_evidence(evidence);
     let clause = evidence.split(';').next().unwrap_or_default();
     let short = clause.split(" before it was added").next().unwrap_or_default().trim_end_matches('.');
     if short.chars().count() <= CLAUSE {
@@ -129,6 +146,25 @@ fn sentences(finding: &Finding, amount: impl Fn(&Parameter) -> String, reaches: 
                 "Nothing to repair; N holds below the bandwidth, and the samples are correlated above it.",
             ),
         },
+        "sinusoid" if value("frequency").is_some_and(|frequency| frequency < SLOW_HZ) => (
+            format!(
+                "A periodic change at {}, every {}{reaches}: an amplitude of {}.",
+                sized("frequency"),
+                value("frequency").map_or_else(|| "unknown time".to_owned(), |frequency| span(1.0 / frequency)),
+                sized("amplitude")
+            ),
+            format!("{CYCLING}{}", off()),
+        ),
+        "resonance" if value("frequency").is_some_and(|frequency| frequency < SLOW_HZ) => (
+            format!(
+                "A fluctuation around {}, every {} or so{}: {} (1 σ).",
+                sized("frequency"),
+                value("frequency").map_or_else(|| "unknown time".to_owned(), |frequency| span(1.0 / frequency)),
+                if reaches.is_empty() { String::new() } else { format!(",{reaches}") },
+                sized("deviation")
+            ),
+            format!("{CYCLING}{}", off()),
+        ),
         "sinusoid" => (
             format!("A vibration or hum at {}{reaches}: a narrow line of {}.", sized("frequency"), sized("amplitude")),
             format!("Look for a fan, a motor or the mains; a notch there would help.{}", off()),
@@ -144,14 +180,16 @@ fn sentences(finding: &Finding, amount: impl Fn(&Parameter) -> String, reaches: 
             format!("Look for a fan whose speed wanders or a loose mount; stiffen the mount or notch the band.{}", off()),
         ),
         "square_wave" => (
-            format!("A square wave of {} switches by {}.", sized("frequency"), sized("amplitude")),
+            format!("A square wave of {} with an amplitude of {}.", sized("frequency"), sized("amplitude")),
             format!("Look for a load on the supply or a heater that switches at this rate.{}", off()),
         ),
         "telegraph" => (
+            // Between two jumps of a symmetrical telegraph signal lie two correlation times on average.
             format!(
-                "The bias jumps between two levels {} apart and stays for {} on average.",
+                "The bias jumps between two levels {} apart, on average every {}: a time constant of {}.",
                 sized("amplitude"),
-                at("time_constant")
+                value("time_constant").map_or_else(|| "unknown time".to_owned(), |time| span(2.0 * time)),
+                parameter("time_constant").map_or_else(|| "unknown length".to_owned(), &amount)
             ),
             "Random telegraph noise lies in the part; try another part, or model it as a Markov process of this time constant."
                 .to_owned(),
@@ -211,7 +249,10 @@ fn sentences(finding: &Finding, amount: impl Fn(&Parameter) -> String, reaches: 
                 .filter_map(|axis| Some(format!("{} ({axis})", amount(parameter(&format!("sensitivity_{axis}"))?))))
                 .collect();
             (
-                format!("The rate follows the specific force: {}.", axes.join(", ")),
+                format!(
+                    "The rate follows the specific force: {}.",
+                    if axes.is_empty() { "unknown size".to_owned() } else { axes.join(", ") }
+                ),
                 format!("Subtract these sensitivities times the accelerometers, or mount the part more stiffly.{}", off()),
             )
         }
@@ -271,7 +312,7 @@ fn sentences(finding: &Finding, amount: impl Fn(&Parameter) -> String, reaches: 
         ),
         "unexplained" => (format!("{} fits no known effect.", capital(&unexplained_place(finding))), "Look at the channel's figures at that place; a longer record, or temperature and supply beside it, may tell the cause.".to_owned()),
         kind => (
-            format!("{}: {}.", words(kind), finding.evidence.trim_end_matches('.')),
+            format!("{}: {}.", words(kind), printed_evidence(&finding.evidence).trim_end_matches('.')),
             "This version of the report has no words for it; the evidence is that of the analysis.".to_owned(),
         ),
     }
@@ -289,7 +330,14 @@ fn share(fraction: Option<f64>) -> String {
 
 /// Where something is unexplained, and by how much.
 #[must_use]
-pub(crate) fn unexplained_place(finding: &Finding) -> String {
+fn unexplained_place(finding: &Finding) -> String {
+    let (place, excess) = place_and_excess(finding);
+    excess
+        .map_or_else(|| format!("what is measured {place}"), |excess| format!("{} {place}", signed_percent(&[excess])))
+}
+
+/// Where something is unexplained, and by how many percent.
+pub(crate) fn place_and_excess(finding: &Finding) -> (String, Option<f64>) {
     let value = |name: &str| finding.parameters.get(name).map(|parameter| parameter.value);
     let place = match (value("tau"), value("frequency"), value("time")) {
         (Some(tau), ..) => format!("at averaging times around {}", span(tau)),
@@ -297,13 +345,16 @@ pub(crate) fn unexplained_place(finding: &Finding) -> String {
         (None, None, Some(time)) => format!("at {} into the record", span(time)),
         _ => "somewhere".to_owned(),
     };
-    match value("excess_percent") {
-        Some(excess) => {
-            let sign = if excess < 0.0 { "−" } else { "+" };
-            format!("{sign}{} % {place}", significant(excess.abs(), 2))
-        }
-        None => format!("what is measured {place}"),
-    }
+    (place, value("excess_percent"))
+}
+
+/// Percentages with their signs, as a range where there are several: `−2.1 … −3.6 %`.
+pub(crate) fn signed_percent(values: &[f64]) -> String {
+    let low = values.iter().copied().fold(f64::INFINITY, |low, of| if of.abs() < f64::abs(low) { of } else { low });
+    let high = values.iter().copied().fold(0.0, |high, of| if of.abs() > f64::abs(high) { of } else { high });
+    let text = |value: f64| format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), 2));
+    let (low, high) = (text(low), text(high));
+    if low == high { format!("{low} %") } else { format!("{low} … {high} %") }
 }
 
 /// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
@@ -347,27 +398,150 @@ mod tests {
         }
     }
 
-    #[test]
-    fn every_kind_has_its_words_and_its_section_in_the_documentation() {
+    /// The page with single spaces in the place of line breaks.
+    fn documentation() -> String {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/findings.md");
         let page = std::fs::read_to_string(path).expect("docs/findings.md");
+        page.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// What stands in the place of a parameter that a finding lacks.
+    const UNKNOWN: [&str; 5] = ["unknown size", "unknown length", "an unknown time", "unknown time", "some hertz"];
+
+    /// The words of a text between its numbers, units and names: what does not depend on the parameters.
+    fn fixed_words(text: &str) -> Vec<String> {
+        let text = UNKNOWN.iter().fold(text.to_owned(), |text, unknown| text.replace(unknown, "0"));
+        let names = [
+            "x", "y", "z", "gyro", "gyros", "accel", "accels", "g", "mg", "µg", "s", "ms", "min", "h", "d", "V", "Hz",
+            "mHz",
+        ];
+        let mut runs = vec![Vec::new()];
+        for word in text.split_whitespace() {
+            let bare = word.trim_matches(|letter: char| ".,:;()!*".contains(letter));
+            let is_word =
+                bare.chars().all(|letter| letter.is_alphabetic() || "-'".contains(letter)) && !bare.is_empty();
+            if is_word && !names.contains(&bare) {
+                runs.last_mut().expect("one at least").push(bare);
+            }
+            if !is_word || names.contains(&bare) || bare != word {
+                runs.push(Vec::new());
+            }
+        }
+        runs.iter().filter(|run| run.len() > 1).map(|run| run.join(" ")).collect()
+    }
+
+    /// A finding of `kind` with those of all parameters that any finding has whose names `wanted` accepts.
+    fn finding_with(kind: &str, wanted: impl Fn(&str) -> bool) -> Finding {
+        let known = [
+            ("amplitude", "deg/s"),
+            ("bandwidth", "Hz"),
+            ("curvature", "deg/s/degC^2"),
+            ("decimation", ""),
+            ("deviation", "deg/s"),
+            ("excess_percent", "%"),
+            ("fraction", ""),
+            ("frequency", "Hz"),
+            ("from", "s"),
+            ("level", ""),
+            ("rate", "1/h"),
+            ("rate_hz", "Hz"),
+            ("sensitivity", "deg/s/degC"),
+            ("sensitivity_x", "deg/s/g"),
+            ("sensitivity_y", "deg/s/g"),
+            ("sensitivity_z", "deg/s/g"),
+            ("size", "deg/s"),
+            ("slope", "deg/s^2"),
+            ("step", "deg/s"),
+            ("taps", ""),
+            ("tau", "s"),
+            ("time", "s"),
+            ("time_constant", "s"),
+            ("to", "s"),
+            ("value", "deg"),
+        ];
+        let mut finding = finding(kind);
+        for (name, unit) in known.into_iter().filter(|(name, _)| wanted(name)) {
+            finding.parameters.insert(name.to_owned(), Parameter::new(7.0, 6.0, 8.0, unit));
+        }
+        finding
+    }
+
+    /// Every combination of parameters that chooses between the sentences of a kind: all, none, one alone, all but one.
+    fn variants(kind: &str) -> Vec<Finding> {
+        let names: Vec<String> = finding_with(kind, |_| true).parameters.into_keys().collect();
+        let mut variants = vec![finding_with(kind, |_| true), finding_with(kind, |_| false)];
+        for name in &names {
+            variants.push(finding_with(kind, |of| of == name));
+            variants.push(finding_with(kind, |of| of != name));
+        }
+        // The filter of a part whose every sample is read.
+        let mut every_sample = finding_with(kind, |_| true);
+        every_sample.parameters.insert("decimation".to_owned(), Parameter::new(1.0, 1.0, 1.0, ""));
+        let mut slow = finding_with(kind, |_| true);
+        slow.parameters.insert("frequency".to_owned(), Parameter::new(0.012, 0.011, 0.013, "Hz"));
+        // Several channels, a share, and what the second half says.
+        let mut shared = finding_with(kind, |_| true);
+        shared.channels.push("accl_x".to_owned());
+        shared.share_percent.insert("gyro_z".to_owned(), 60.0);
+        shared.validated = Validation::Yes;
+        let mut refuted = shared.clone();
+        refuted.validated = Validation::No;
+        variants.extend([every_sample, slow, shared, refuted]);
+        variants
+    }
+
+    #[test]
+    fn every_sentence_of_every_kind_is_in_the_documentation() {
+        let page = documentation();
+        let general = page.split("## The findings").nth(1).and_then(|rest| rest.split("### `").next()).expect("a part");
+        assert!(UNKNOWN.iter().all(|unknown| general.contains(unknown)), "{general}");
         for kind in KINDS {
-            let heading = format!("### `{kind}`\n");
-            let section = page.split(&heading).nth(1).unwrap_or_else(|| panic!("{kind} has no section"));
-            let section = section.split("\n### ").next().unwrap_or_default();
-            let section = section.split_whitespace().collect::<Vec<_>>().join(" ");
-            let text = describe(&finding(kind));
-            // Without parameters the sentence still is one, and it is not that of a kind without words.
-            assert!(
-                text.physics.ends_with('.') && !text.physics.contains("of the analysis"),
-                "{kind}: {}",
-                text.physics
-            );
-            let quoted = section.split("Advice: *").nth(1).and_then(|rest| rest.split('*').next()).expect("an advice");
-            assert!(text.advice.starts_with(quoted.trim_end_matches('.')), "{kind}: {} / {quoted}", text.advice);
+            let section =
+                page.split(&format!("### `{kind}` ")).nth(1).unwrap_or_else(|| panic!("{kind} has no section"));
+            let section = section.split(" ### `").next().unwrap_or_default();
+            for finding in variants(kind) {
+                let text = describe(&finding);
+                assert!(text.physics.ends_with('.') && text.advice.ends_with('.'), "{kind}: {text:?}");
+                // Not that of a kind without words.
+                assert!(!text.physics.contains("of the analysis"), "{kind}: {}", text.physics);
+                for words in [&text.physics, &text.brief, &text.advice].into_iter().flat_map(|text| fixed_words(text)) {
+                    // Parameters in words, and the gain, are explained once for all kinds.
+                    let is_known = section.contains(&words) || general.contains(&words);
+                    assert!(is_known, "{kind}: the page lacks \"{words}\" of {text:?}");
+                }
+                if text.weight != "of the analysis" {
+                    let words = fixed_words(&capital(&text.weight));
+                    assert!(words.iter().all(|words| general.contains(&capital(words))), "{kind}: {}", text.weight);
+                }
+            }
         }
         // A kind without words is told by its evidence.
         assert!(describe(&finding("something_new")).physics.contains("something new: of the analysis."));
+    }
+
+    #[test]
+    fn sizes_in_words_are_those_of_their_definitions() {
+        // A symmetrical telegraph signal with the covariance (A/2)²·exp(−t/T) jumps every 2 T on average.
+        let mut telegraph = finding("telegraph");
+        telegraph.parameters.insert("amplitude".to_owned(), Parameter::new(0.3, 0.29, 0.31, "deg/s"));
+        telegraph.parameters.insert("time_constant".to_owned(), Parameter::new(20.0, 15.0, 27.0, "s"));
+        let physics = describe(&telegraph).physics;
+        assert!(physics.contains("0.300 ± 0.010 °/s apart, on average every 40 s: a time constant of 20"), "{physics}");
+        // The amplitude of a square wave is half the distance of its levels.
+        let mut square = finding("square_wave");
+        square.parameters.insert("amplitude".to_owned(), Parameter::new(9e-4, 8e-4, 1e-3, "g"));
+        assert!(
+            describe(&square).physics.ends_with("with an amplitude of 900 ± 100 µg."),
+            "{}",
+            describe(&square).physics
+        );
+    }
+
+    #[test]
+    fn a_probability_that_underflows_is_bounded() {
+        let line = "line at 20.5 Hz, 220 sigma, by chance anywhere 0e0; a steady line of 10e0 and 0e0x";
+        let printed = "line at 20.5 Hz, 220 sigma, by chance anywhere below 1e-300; a steady line of 10e0 and 0e0x";
+        assert_eq!(printed_evidence(line), printed);
     }
 
     #[test]

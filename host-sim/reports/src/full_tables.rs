@@ -1,7 +1,8 @@
 //! Every table of a report as text: at most 100 columns, the same in a terminal and in a file.
 
 use crate::coefficients::{self, CoefficientRow};
-use crate::finding_text::FindingText;
+use crate::explanation;
+use crate::finding_text::{FindingText, printed_evidence};
 use crate::formatting::{
     NONE, TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
     parameter_name, percent, recording_advice, unit, words, worst_deviations, wrap,
@@ -42,6 +43,13 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
     writeln!(out, "rms: 100·√(mean (½ ln(v/m))²) %; v measured, m modelled Allan variance, n ≤ M/8.")?;
     writeln!(out, "worst σ: largest deviation of a point over all τ; beyond ±4 it is told in words.")?;
+    writeln!(out, "first half's curve: the measured curve taken for a model; what the second half does not repeat.")?;
+    if report.channels.iter().any(summary::is_fitted_to_later_quarter) {
+        writeln!(
+            out,
+            "later quarter: the model is fitted to the later quarter of the first half, as the noise changes."
+        )?;
+    }
     writeln!(out, "by PSD: σ(τ) by equation (5), from the measured spectrum instead of differences of means.")?;
     if report.channels.iter().any(|channel| channel.after.unseen_excluding.is_some()) {
         writeln!(out, "excluding: without what the first half's rules for spikes and knocks find in the unseen half.")?;
@@ -111,7 +119,14 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
     }
     for effect in &channel.effects {
-        writeln!(out, "{}", wrap(&format!("• {}: {}", words(&effect.kind), effect.evidence), WIDTH.into()))?;
+        writeln!(
+            out,
+            "{}",
+            wrap(&format!("• {}: {}", words(&effect.kind), printed_evidence(&effect.evidence)), WIDTH.into())
+        )?;
+    }
+    for text in explanation::course(channel) {
+        writeln!(out, "{}", wrap(&format!("• {text}"), WIDTH.into()))?;
     }
     if same && channel.effects.is_empty() {
         writeln!(out, "No effect was added to the baseline model: after equals before.")?;
@@ -162,7 +177,8 @@ fn term_table(terms: &[TermReport]) -> TextTable {
 }
 
 fn error_table(channel: &ChannelReport) -> TextTable {
-    let rows = [("before", &channel.before), ("after", &channel.after)].into_iter().flat_map(|(name, model)| {
+    let after = if summary::is_fitted_to_later_quarter(channel) { "after, later quarter" } else { "after" };
+    let models = [("before", &channel.before), (after, &channel.after)].into_iter().flat_map(|(name, model)| {
         let all = vec![
             name.to_owned(),
             percent(model.fitted.rms_percent),
@@ -185,6 +201,17 @@ fn error_table(channel: &ChannelReport) -> TextTable {
         });
         [Some(all), excluding].into_iter().flatten()
     });
+    let own = &channel.first_half_curve;
+    let own_curve = vec![
+        "first half's curve".to_owned(),
+        String::new(),
+        percent(own.rms_percent),
+        String::new(),
+        optional(own.deviance_per_point),
+        String::new(),
+        optional(own.worst_sigma),
+    ];
+    let rows = models.chain([own_curve]);
     let header = ["model error", "rms fitted", "unseen", "deviance fitted", "unseen", "worst σ fitted", "unseen"];
     table(&header, 1, rows)
 }

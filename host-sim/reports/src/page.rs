@@ -3,11 +3,12 @@
 
 mod tables;
 
+use crate::explanation;
 use crate::figure::{self, Plot};
-use crate::finding_text::{FindingText, describe};
+use crate::finding_text::{FindingText, describe, printed_evidence};
 use crate::formatting::{
-    count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit, words,
-    worst_deviations,
+    capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit,
+    words, worst_deviations,
 };
 use crate::rounding::bounded_quantity;
 use crate::summary;
@@ -177,7 +178,10 @@ fn finding_section(report: &Report, index: usize, finding: &Finding, text: &Find
         section.finding id={ "evidence-" (index + 1) } {
             h3 { (index + 1) ". " (words(&finding.kind)) " " small { (text.channels) } }
             p { (text.physics) " " (text.advice) }
-            p.faint { @if !finding.evidence.starts_with(&text.weight) { "In the record: " (text.weight) ". " } (finding.evidence) }
+            p.faint {
+                @if !finding.evidence.starts_with(&text.weight) { "In the record: " (text.weight) ". " }
+                (capital(printed_evidence(&finding.evidence).trim_end_matches('.'))) "."
+            }
             (parameters(finding))
             @if let Some(plot) = figure::evidence(report, index) { (drawing(&plot)) }
         }
@@ -221,6 +225,13 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
                         p { "Findings: " @for index in own {
                             a href={ "#evidence-" (index + 1) } { (index + 1) " " (words(&report.findings[index].kind)) } " " } }
                     }
+                }
+            }
+            @let course = explanation::course(channel);
+            @if !course.is_empty() {
+                details {
+                    summary { "How the noise changes in the course of the record" }
+                    ul { @for text in &course { li { (text) } } }
                 }
             }
             details {

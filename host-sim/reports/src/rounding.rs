@@ -32,19 +32,22 @@ fn decimals(half_width: f64) -> usize {
     if !half_width.is_finite() || half_width <= 0.0 {
         return 3;
     }
+    place(half_width).clamp(0, 9) as usize
+}
+
+/// Decimals that an uncertainty supports; below 0 left of the decimal point.
+fn place(half_width: f64) -> i32 {
     let exponent = half_width.log10().floor();
     let leading = half_width / 10f64.powf(exponent);
     let digits = if leading < 2.95 { 1.0 } else { 0.0 };
-    (digits - exponent).clamp(0.0, 9.0) as usize
+    (digits - exponent) as i32
 }
 
 /// `value` rounded to whole multiples of the place that `half_width` supports, left of the decimal point too.
 fn at_place(value: f64, half_width: f64) -> f64 {
     if half_width >= 29.5 && half_width.is_finite() {
-        let exponent = half_width.log10().floor();
-        let digits = if half_width / 10f64.powf(exponent) < 2.95 { 1.0 } else { 0.0 };
-        let place = 10f64.powf(exponent - digits);
-        return (value / place).round() * place;
+        let unit = 10f64.powi(-place(half_width));
+        return (value / unit).round() * unit;
     }
     value
 }
@@ -101,6 +104,17 @@ pub fn plain(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// A probability with two digits, as a decimal fraction from 0.001 on. One below the smallest number is not 0.
+#[must_use]
+pub fn probability(p: f64) -> String {
+    match p {
+        p if !p.is_finite() => NONE.to_owned(),
+        p if p < 1e-300 => "< 1e-300".to_owned(),
+        p if p < 9.95e-4 => format!("{p:.1e}"),
+        p => significant(p, 2),
+    }
+}
+
 /// Prefixes and their factors.
 const PREFIXES: [(&str, f64); 7] =
     [("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9), ("p", 1e-12)];
@@ -136,6 +150,18 @@ pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
         magnitude => prefix(magnitude, spelled == "Hz"),
     };
     format!("{} {prefix}{spelled}", significant(value / factor, digits))
+}
+
+/// The same for a parameter, with the digits that its interval supports, but without the interval: two at least, four at most.
+#[must_use]
+pub fn rounded_quantity(parameter: &Parameter) -> String {
+    let half_width = (parameter.high - parameter.low) / 2.0;
+    let digits = if half_width > 0.0 && half_width.is_finite() && parameter.value != 0.0 {
+        parameter.value.abs().log10().floor() as i32 + 1 + place(half_width)
+    } else {
+        2
+    };
+    quantity_digits(parameter.value, &parameter.unit, digits.clamp(2, 4))
 }
 
 /// The same for a parameter, with the precision that its interval supports: `20.70 ± 0.10 Hz`.
@@ -218,6 +244,37 @@ mod tests {
             (0.0, "g", "0 g"),
         ] {
             assert_eq!(quantity(value, name), text, "{value} {name}");
+        }
+    }
+
+    #[test]
+    fn a_quantity_without_its_interval_has_the_digits_that_the_interval_supports() {
+        for (value, half_width, name, text) in [
+            (816.427, 0.036, "Hz", "816.4 Hz"),
+            (20.5, 0.002, "Hz", "20.50 Hz"),
+            (20.7, 1.2, "Hz", "20.7 Hz"),
+            (0.2003, 0.0018, "deg/s", "0.2003 °/s"),
+            (0.00179, 0.0003, "deg/s", "1.8 m°/s"),
+            (240.0, 180.0, "Hz", "240 Hz"),
+            (-0.0043, 0.0004, "deg/s/degC", "−4.3 m°/s/°C"),
+            (8.0, 0.0, "Hz", "8.0 Hz"),
+        ] {
+            let parameter = Parameter::new(value, value - half_width, value + half_width, name);
+            assert_eq!(rounded_quantity(&parameter), text, "{value} ± {half_width}");
+        }
+    }
+
+    #[test]
+    fn probabilities_have_two_digits_and_are_never_zero() {
+        for (p, text) in [
+            (1.0, "1.0"),
+            (0.633, "0.63"),
+            (0.028_3, "0.028"),
+            (1.63e-7, "1.6e-7"),
+            (0.0, "< 1e-300"),
+            (f64::NAN, NONE),
+        ] {
+            assert_eq!(probability(p), text, "{p:e}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Several recordings of one sensor in the terminal: whether they show the same noise, and the inflation while a machine runs.
 
 use crate::formatting::number;
+use crate::rounding::probability;
 use comfy_table::{Table, presets};
 use noise_analysis::several::{NoiseAgreement, NoiseInflation};
 use std::io::{self, Write};
@@ -40,9 +41,9 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
                 (_, false) => "differs",
             }
             .to_owned(),
-            channel.p_value.map_or_else(String::new, |p| format!("{p:.2e}")),
+            channel.p_value.map_or_else(String::new, probability),
             worst.map_or_else(String::new, |(ratio, octave)| {
-                format!("{ratio:.3} at {} s (p {:.1e})", number(octave.tau_s), octave.p_value)
+                format!("{ratio:.3} at {} s (p {})", number(octave.tau_s), probability(octave.p_value))
             }),
             joint.collect::<Vec<_>>().join("\n"),
         ]);

@@ -2,10 +2,11 @@
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{FindingText, channel_list, describe, unexplained_place};
-use crate::formatting::{capital, count, words};
+use crate::finding_text::{FindingText, channel_list, describe, place_and_excess, signed_percent};
+use crate::formatting::{capital, count, unit, words};
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span};
 use noise_analysis::findings::BoundedEstimate;
+use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
 use noise_analysis::units::conversions;
@@ -225,6 +226,7 @@ fn report_length_s(report: &Report) -> f64 {
 pub fn record_sentences(report: &Report) -> Vec<String> {
     let mut sentences = vec![rest(report), losses(report)];
     sentences.extend(length_advice(report));
+    sentences.extend(recent_fit(report));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
 }
@@ -246,20 +248,50 @@ pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     sentences
 }
 
-/// Where and by how much the data departs from every model, in one text; `None` where it does not.
+/// Where and by how much the data departs from every model, in one text; `None` where it does not. Channels that depart at the same
+/// place, to the same side, are told together.
 #[must_use]
 pub fn unexplained(report: &Report) -> Option<String> {
+    struct Departure {
+        place: String,
+        channels: Vec<String>,
+        excesses: Vec<f64>,
+    }
+    let mut departures: Vec<Departure> = Vec::new();
+    for finding in report.findings.iter().filter(|finding| finding.kind == "unexplained") {
+        let (place, excess) = place_and_excess(finding);
+        let is_same_side = |of: &Departure| match (of.excesses.first(), excess) {
+            (Some(first), Some(excess)) => first.signum() == excess.signum(),
+            (first, excess) => first.is_none() && excess.is_none(),
+        };
+        let of_other_channels = |of: &Departure| finding.channels.iter().all(|name| !of.channels.contains(name));
+        let known = departures.iter_mut().find(|of| of.place == place && is_same_side(of) && of_other_channels(of));
+        match known {
+            Some(departure) => {
+                departure.channels.extend(finding.channels.iter().cloned());
+                departure.excesses.extend(excess);
+            }
+            None => departures.push(Departure {
+                place,
+                channels: finding.channels.clone(),
+                excesses: excess.into_iter().collect(),
+            }),
+        }
+    }
     let mut text = String::new();
     let mut before = None;
-    for finding in report.findings.iter().filter(|finding| finding.kind == "unexplained") {
-        let place = unexplained_place(finding);
-        if before == Some(&finding.channels) {
-            text += &format!(", {place}");
+    for Departure { place, channels, excesses } in &departures {
+        let told = match excesses.as_slice() {
+            [] => format!("what is measured {place}"),
+            excesses => format!("{} {place}", signed_percent(excesses)),
+        };
+        if before == Some(channels) {
+            text += &format!(", {told}");
         } else {
             let separator = if text.is_empty() { "" } else { "; " };
-            text += &format!("{separator}{}: {place}", channel_list(&finding.channels));
+            text += &format!("{separator}{}: {told}", channel_list(channels));
         }
-        before = Some(&finding.channels);
+        before = Some(channels);
     }
     (!text.is_empty()).then_some(text)
 }
@@ -331,6 +363,24 @@ fn length_advice(report: &Report) -> Option<String> {
     (!parts.is_empty()).then(|| format!("For ±20 %: {}.", parts.join("; ")))
 }
 
+/// Which models of the first half are those of its later quarter; `None` where none is.
+fn recent_fit(report: &Report) -> Option<String> {
+    let recent: Vec<String> =
+        inertial(report).filter(|channel| is_fitted_to_later_quarter(channel)).map(|of| of.name.clone()).collect();
+    (!recent.is_empty()).then(|| {
+        format!(
+            "The noise changes: the error of {} is that of a fit to the later quarter of the first half.",
+            channel_list(&recent)
+        )
+    })
+}
+
+/// Whether the model `after` of a channel is fitted to the later quarter of the first half instead of to all of it.
+#[must_use]
+pub fn is_fitted_to_later_quarter(channel: &ChannelReport) -> bool {
+    channel.nonstationarity.as_ref().is_some_and(|of| of.fitted_to == FittedPart::LaterQuarter)
+}
+
 /// Hours with two digits.
 fn hours(hours: f64) -> String {
     match hours {
@@ -356,26 +406,38 @@ pub fn conditions(report: &Report) -> Vec<String> {
             range => format!("{label} moved by {}", quantity(range, &channel.unit)),
         })
     };
-    let magnetometers: Vec<f64> = report
-        .channels
-        .iter()
-        .filter(|channel| channel.name.starts_with("magn_"))
-        .filter_map(|channel| Some(1e3 * coefficient(channel, LETTERS[0].0)?.value))
-        .collect();
-    let magnetometers = (!magnetometers.is_empty()).then(|| {
-        let each: Vec<String> = magnetometers.iter().map(|value| significant(*value, 2)).collect();
-        format!("magnetometers N {} mgauss/√Hz", each.join(", "))
-    });
     let unknown = report.channels.iter().all(|channel| channel.name != "temp");
     [
         moved("temp", "temperature"),
         unknown.then(|| "temperature was not recorded".to_owned()),
         moved("supply", "supply"),
-        magnetometers,
     ]
     .into_iter()
     .flatten()
+    .chain(magnetometers(report))
     .collect()
+}
+
+/// N of the magnetometers, and those whose noise is not that of N, B and K: a bound on N by a model that fails says nothing.
+fn magnetometers(report: &Report) -> Vec<String> {
+    let all = report.channels.iter().filter(|channel| channel.name.starts_with("magn_"));
+    let (failed, described): (Vec<_>, Vec<_>) = all.partition(|channel| is_high(channel));
+    let noise: Vec<(String, Parameter)> =
+        described.iter().filter_map(|of| Some((of.name.clone(), coefficient(of, LETTERS[0].0)?))).collect();
+    let mut told = Vec::new();
+    if let Some((_, first)) = noise.first() {
+        let sizes = noise.iter().map(|(_, n)| if n.value > 0.0 { n.value } else { n.high });
+        let (prefix, factor) = column_prefix(sizes);
+        let each: Vec<String> =
+            noise.iter().map(|(_, n)| estimate(n.value / factor, n.low / factor, n.high / factor)).collect();
+        let names: Vec<String> = noise.iter().map(|(name, _)| name.clone()).collect();
+        told.push(format!("{} N {} {prefix}{}", channel_list(&names), each.join(", "), unit(&first.unit)));
+    }
+    if !failed.is_empty() {
+        let names: Vec<String> = failed.iter().map(|channel| channel.name.clone()).collect();
+        told.push(format!("the noise of {} is not that of N, B and K", channel_list(&names)));
+    }
+    told
 }
 
 /// The findings in words, in the order of the report, those that nothing explains apart.
@@ -388,8 +450,39 @@ pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
     };
     // A cause in a gyro or an accelerometer comes before one in a channel that is a condition.
     let (inertial, others): (Vec<_>, Vec<_>) = named.into_iter().partition(|finding| of_inertial(&finding));
-    let words = |list: Vec<&noise_analysis::report::Finding>| list.into_iter().map(describe).collect::<Vec<_>>();
+    let words = |list: Vec<&noise_analysis::report::Finding>| {
+        let text = |finding| {
+            let mut text = describe(finding);
+            if let Some(related) = related_line(report, finding) {
+                text.weight =
+                    [text.weight, related].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
+            }
+            text
+        };
+        list.into_iter().map(text).collect::<Vec<_>>()
+    };
     (words(inertial.into_iter().chain(others).collect()), words(unexplained))
+}
+
+/// Largest difference of the frequency of a finding from that of a line that is followed, as a part of it: half of the distance to
+/// the next whole ratio that is tried.
+const SAME_LINE: f64 = 0.1;
+
+/// The line of another channel that moves with the line of a finding; `None` where none does.
+fn related_line(report: &Report, finding: &noise_analysis::report::Finding) -> Option<String> {
+    let frequency = finding.parameters.get("frequency")?.value;
+    let of = finding.channels.iter().find_map(|name| {
+        let channel = report.channels.iter().find(|channel| channel.name == *name)?;
+        let related = channel.nonstationarity.as_ref()?.related_line.as_ref()?;
+        let followed = related.line_hz.iter().sum::<f64>() / related.line_hz.len().max(1) as f64;
+        ((frequency / followed - 1.0).abs() < SAME_LINE).then_some(related)
+    })?;
+    let other = channel_list(std::slice::from_ref(&of.channel));
+    let at = match of.ratio {
+        (1, 1) => "at the same frequency".to_owned(),
+        (above, below) => format!("at {above}/{below} of the frequency"),
+    };
+    Some(format!("a line of {other} moves with it, {at}"))
 }
 
 /// What the data contradicts, one text each, the most serious first.
@@ -469,12 +562,42 @@ pub fn next_steps(report: &Report) -> Vec<String> {
     if inertial(report).next().is_some() {
         steps.push("For a filter: add --export kalibr=imu.yaml.".to_owned());
     }
-    let high: Vec<String> = inertial(report).filter(|of| is_high(of)).map(|channel| channel.name.clone()).collect();
-    if !high.is_empty() {
-        steps.push(format!(
-            "! The model of {} fails on the unseen half: its error is far above 1.",
-            channel_list(&high)
-        ));
-    }
+    steps.extend(failures(report));
     steps
+}
+
+/// The models that fail on the unseen half. Where the first half's own curve fails too, no model of the first half can hold: the
+/// noise has changed. Where it does not, the model lacks something.
+fn failures(report: &Report) -> Vec<String> {
+    // The curve is compared with the second half as recorded, so not with an error that excludes samples.
+    let own_curve = |channel: &ChannelReport| {
+        channel.first_half_curve.deviance_per_point.filter(|_| channel.after.unseen_excluding.is_none())
+    };
+    let failed = || inertial(report).filter(|channel| is_high(channel));
+    let told = |wanted: &dyn Fn(Option<f64>) -> bool, reason: &dyn Fn(&str) -> String| {
+        let channels: Vec<&ChannelReport> = failed().filter(|channel| wanted(own_curve(channel))).collect();
+        let names: Vec<String> = channels.iter().map(|channel| channel.name.clone()).collect();
+        let (low, high) = channels
+            .iter()
+            .filter_map(|channel| own_curve(channel))
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), of| (low.min(of), high.max(of)));
+        let (low, high) = (significant(low, 2), significant(high, 2));
+        let range = if low == high { low } else { format!("{low} … {high}") };
+        (!names.is_empty())
+            .then(|| format!("! The model of {} fails on the unseen half{}", channel_list(&names), reason(&range)))
+    };
+    let changed = |own: Option<f64>| own.is_some_and(|own| own > HIGH_DEVIANCE);
+    let lacking = |own: Option<f64>| own.is_some_and(|own| own <= HIGH_DEVIANCE);
+    [
+        told(&changed, &|range| format!(", and so does the first half's own curve ({range}): the noise has changed.")),
+        told(&lacking, &|range| {
+            format!(
+                ": its error is far above 1. The first half's own curve holds ({range}): the model lacks something."
+            )
+        }),
+        told(&|own| own.is_none(), &|_| ": its error is far above 1.".to_owned()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }

@@ -110,6 +110,30 @@ fn impossible_durations_are_refused() {
     }
 }
 
+/// A device whose text, in a message and in the crash record of its start, has sequences that a terminal obeys.
+fn hostile_messages() -> [link::Message; 2] {
+    let boot = link::Boot { crash_record: text("\x1b[2J\x07panic at app.rs:7"), ..link::Boot::default() };
+    let hello = link::Hello {
+        firmware: (1, 2, 3),
+        product_id: 0x4015,
+        gyro_full_scale: 300,
+        filter_taps_log2: 4,
+        sample_rate_hz: 204.8,
+        measured_rate_hz: None,
+        spi_clock_hz: 1_000_000,
+        uptime_us: 1_500_000,
+        sampling: true,
+        epoch: 0,
+        epoch_s: 0,
+        boot,
+    };
+    [link::Message::Hello(hello), link::Message::Log(text("\x1b]0;title\x07 of a message"))]
+}
+
+fn text(text: &str) -> link::TextLine {
+    text.try_into().expect("a short text")
+}
+
 /// A device may send any bytes: those that a terminal obeys are shown, not sent on.
 #[test]
 fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
@@ -123,13 +147,17 @@ fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
     let mut encoder = link::Encoder::new();
     while program.try_wait().expect("a status").is_none() {
         let mut bytes = Vec::new();
-        encoder.encode(link::MessageRef::Log("\x1b]0;title\x07 of a message"), &mut |sent| bytes.extend(sent));
+        for message in &hostile_messages() {
+            encoder.encode(message.into(), &mut |sent| bytes.extend(sent));
+        }
         let _ = near.write_all(&bytes);
         std::thread::sleep(Duration::from_millis(50));
     }
     let output = program.wait_with_output().expect("an end");
     drop(far);
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(text.contains("title"), "{text:?}");
+    for expected in ["crash record: ", "panic at app.rs:7", "title"] {
+        assert!(text.contains(expected), "{expected}: {text:?}");
+    }
     assert!(!output.stdout.contains(&0x1B) && !output.stdout.contains(&0x07), "{text:?}");
 }

@@ -40,8 +40,25 @@ pub struct Export {
     pub missing: Vec<String>,
 }
 
+/// A sample rate with nine digits: a measured rate has no more, and its last bits are those of a division.
+pub(super) fn rate(hz: f64) -> f64 {
+    format!("{hz:.8e}").parse().unwrap_or(hz)
+}
+
 /// Seven digits and an exponent with its sign: YAML 1.1, which Python's parser reads, takes `4.7e1` for a text.
 pub(super) fn scientific(value: f64) -> String {
     let text = format!("{value:.6e}");
     if text.contains("e-") { text } else { text.replace('e', "e+") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_has_nine_digits() {
+        for (hz, text) in [(200.000_000_000_000_14, "200"), (199.999_993_310_439_78, "199.999993"), (819.2, "819.2")] {
+            assert_eq!(format!("{}", rate(hz)), text);
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! GTSAM, Basalt and KF-GINS: numbers for each axis.
 
-use super::exported_file::{Export, ExportError, scientific};
+use super::exported_file::{Export, ExportError, rate, scientific};
 use super::inertial_noise::{AxisNoise, Coefficient, Sensor, gauss_markov};
 use crate::saved_report::SavedReport;
 use noise_analysis::gauss_markov::GaussMarkovFit;
@@ -60,7 +60,7 @@ pub(super) fn basalt(report: &SavedReport) -> Result<Export, ExportError> {
         about += &bounds(axes, &values);
         let _ = write!(entries, ",\n        \"{name}\": [{x}, {y}, {z}]");
     }
-    let rate = report.sample_rate_hz;
+    let rate = rate(report.sample_rate_hz);
     let _ =
         write!(text, "        \"comment\": \"{about}\",\n        \"imu_update_rate\": {rate:?}{entries}\n    }}\n}}\n");
     Ok(Export { text, missing: Vec::new() })

@@ -1,6 +1,6 @@
 //! MATLAB and Gazebo, which simulate the sensor: numbers for each axis, and a noise that does not show is left out.
 
-use super::exported_file::{Export, ExportError, scientific};
+use super::exported_file::{Export, ExportError, rate, scientific};
 use super::inertial_noise::{AxisNoise, Coefficient, Sensor, gauss_markov};
 use crate::saved_report::SavedReport;
 use std::fmt::Write;
@@ -45,7 +45,7 @@ pub(super) fn matlab(report: &SavedReport) -> Result<Export, ExportError> {
     let _ = writeln!(
         text,
         "imu = imuSensor('accel-gyro', 'SampleRate', {}{}{});",
-        report.sample_rate_hz,
+        rate(report.sample_rate_hz),
         if text.contains("gyro = ") { ", 'Gyroscope', gyro" } else { "" },
         if text.contains("accel = ") { ", 'Accelerometer', accel" } else { "" },
     );
@@ -57,7 +57,7 @@ pub(super) fn matlab(report: &SavedReport) -> Result<Export, ExportError> {
 /// Gazebo's bias obeys `b ← e^(−Δt/T)·b + N(0, σ_d²)` with `σ_d² = −σ_b²·T/2·(e^(−2Δt/T) − 1)`: `dynamic_bias_stddev` is σ_b, the
 /// density of the driving noise. A process of standard deviation s has `σ_b = s·√(2/T)`.
 pub(super) fn gazebo(report: &SavedReport) -> Result<Export, ExportError> {
-    let rate = report.sample_rate_hz;
+    let rate = rate(report.sample_rate_hz);
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n\
          <!-- stddev is discrete: the deviation of samples at update_rate; change both together (stddev grows with the root of the rate).\n\

@@ -1,6 +1,6 @@
 //! Kalibr, OpenVINS, VINS-Fusion and ORB-SLAM3: white noise and random walk, one number a sensor.
 
-use super::exported_file::{AxisChoice, Export, ExportError, scientific};
+use super::exported_file::{AxisChoice, Export, ExportError, rate, scientific};
 use super::inertial_noise::{AxisNoise, Coefficient, Sensor, combine};
 use crate::saved_report::SavedReport;
 use std::fmt::Write;
@@ -47,7 +47,7 @@ const fn field(
 pub(super) fn kalibr(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let head = "# Kalibr imu.yaml. Noise of the continuous process: the discrete deviation at a rate f is density*sqrt(f), the step walk/sqrt(f).\n";
     let mut export = fields(head, &KALIBR, "", report, axes)?;
-    let _ = writeln!(export.text, "update_rate: {}  # Hz\nrostopic: /imu0", report.sample_rate_hz);
+    let _ = writeln!(export.text, "update_rate: {}  # Hz\nrostopic: /imu0", rate(report.sample_rate_hz));
     Ok(export)
 }
 
@@ -60,7 +60,7 @@ pub(super) fn openvins(report: &SavedReport, axes: AxisChoice) -> Result<Export,
     let _ = writeln!(
         export.text,
         "  rostopic: /imu0\n  time_offset: 0.0\n  update_rate: {:?}\n  model: \"kalibr\"",
-        report.sample_rate_hz
+        rate(report.sample_rate_hz)
     );
     for (matrix, diagonal) in [("Tw", 1.0), ("R_IMUtoGYRO", 1.0), ("Ta", 1.0), ("R_IMUtoACC", 1.0), ("Tg", 0.0)] {
         let _ = writeln!(export.text, "  {matrix}:");
@@ -96,7 +96,7 @@ pub(super) fn vins(report: &SavedReport, axes: AxisChoice) -> Result<Export, Exp
 pub(super) fn orbslam3(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let head = "%YAML:1.0\n# The IMU's part of ORB-SLAM3's settings. Noise of the continuous process: ORB-SLAM3 multiplies and divides by sqrt(IMU.Frequency) itself.\n\n";
     let mut export = fields(head, &ORB_SLAM3, "", report, axes)?;
-    let _ = writeln!(export.text, "IMU.Frequency: {}  # Hz", report.sample_rate_hz);
+    let _ = writeln!(export.text, "IMU.Frequency: {}  # Hz", rate(report.sample_rate_hz));
     Ok(export)
 }
 

@@ -98,8 +98,10 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
         html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) }
         @if let Some(sigma) = error.worst_sigma { span.under { (number(sigma)) " σ" } } } }
     };
+    let after =
+        if summary::is_fitted_to_later_quarter(channel) { "after, fitted to the later quarter" } else { "after" };
     let rows = html! {
-        @for (name, model) in [("before", &channel.before), ("after", &channel.after)] {
+        @for (name, model) in [("before", &channel.before), (after, &channel.after)] {
             tr {
                 th scope="row" { (name)
                     span.under { "rms, deviance a point, largest deviation" } }
@@ -114,6 +116,12 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
                     (cell(error))
                 }
             }
+        }
+        tr {
+            th scope="row" { "the first half's own curve"
+                span.under { "taken for a model: what the second half does not repeat" } }
+            td {}
+            (cell(&channel.first_half_curve))
         }
     };
     table("", &[text("model"), numbers("fitted half"), numbers("unseen half")], &rows)

@@ -62,6 +62,22 @@ fn the_screen_has_verdict_curve_findings_health_and_keys_in_80_columns() {
     assert!(left.matches(['x', 'y', 'z']).count() >= 4, "{left}");
 }
 
+/// Against the files beside this one. After a change that is meant, delete the file, run the test, and read what it wrote.
+#[test]
+fn the_screen_is_as_it_was_read() {
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = text(&drawn(&view(), columns, rows, CurveGroup::Gyros, false));
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/live/{columns}x{rows}.txt"));
+        match std::fs::read_to_string(&file) {
+            Ok(expected) => assert_eq!(screen, expected, "{columns} columns"),
+            Err(_) => {
+                std::fs::write(&file, &screen).expect("the snapshot");
+                panic!("{} was missing and is written: read it", file.display());
+            }
+        }
+    }
+}
+
 #[test]
 fn the_other_group_of_curves_is_shown_on_request() {
     let group = CurveGroup::Gyros.other();

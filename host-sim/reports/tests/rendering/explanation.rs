@@ -4,8 +4,8 @@ use super::fixture::report;
 use noise_analysis::nonstationarity::{
     Baselines, EpochParameters, FittedPart, IntervalCoverage, RelatedLine, Stationarity, TrackedSet, TrackingErrors,
 };
-use noise_analysis::report::{CommonModeRegression, Nonstationarity, Report};
-use reports::explanation;
+use noise_analysis::report::{CommonModeRegression, Finding, Nonstationarity, Parameter, Report, Validation};
+use reports::{explanation, summary};
 
 /// The text, with single spaces in the place of line breaks.
 fn text(report: &Report) -> String {
@@ -89,4 +89,47 @@ fn the_explanation_tells_every_figure_of_the_report() {
 fn a_record_too_short_for_epochs_is_said_to_be() {
     let text = text(&report());
     assert!(text.contains("has enough samples to be cut into epochs"), "{text}");
+}
+
+/// What the analysis knows of the course of a record is in every form of the report, and not only in the explanation.
+#[test]
+fn every_report_tells_how_the_noise_changes() {
+    let mut report = report();
+    report.channels[2].nonstationarity = Some(changes());
+    let line = |frequency: f64| Finding {
+        kind: "resonance".to_owned(),
+        channels: vec!["gyro_z".to_owned()],
+        parameters: [("frequency".to_owned(), Parameter::new(frequency, frequency - 0.1, frequency + 0.1, "Hz"))]
+            .into(),
+        evidence: String::new(),
+        validated: Validation::Yes,
+        share_percent: Default::default(),
+    };
+    // The line that is followed is at 21.1 Hz in the first half; the other finding is another line.
+    report.findings = vec![line(20.7), line(40.0)];
+    let (found, _) = summary::findings(&report);
+    assert!(
+        found[0].weight.ends_with("; a line of accel x moves with it, at 1/2 of the frequency"),
+        "{}",
+        found[0].weight
+    );
+    assert!(!found[1].weight.contains("accel x"), "{}", found[1].weight);
+    let quarter = "The noise changes: the error of gyro z is that of a fit to the later quarter of the first half.";
+    assert!(summary::record_sentences(&report).contains(&quarter.to_owned()));
+
+    let mut out = Vec::new();
+    reports::full_tables::write(&report, None, &mut out).expect("a vector can be written");
+    let full = String::from_utf8(out).expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = std::fs::read_to_string(reports::page::write(&report, folder.path()).expect("a page")).expect("text");
+    // The fixture's curve of the first half leaves 1.711.
+    for told in [
+        "fitted to the later quarter",
+        "with the line where accel x has it in the second half, the model leaves 3.9; this uses the second half of accel x",
+        "1.711",
+    ] {
+        for (form, text) in [("--full", full.to_lowercase()), ("page", page.to_lowercase())] {
+            assert!(text.contains(&told.to_lowercase()), "{form} lacks {told:?}");
+        }
+    }
 }

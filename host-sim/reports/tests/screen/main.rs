@@ -134,6 +134,75 @@ fn what_is_not_known_is_not_claimed() {
     assert!(plain(&report, 80).join("\n").contains("It moved: at rest for 10 min of 2 h 47 min."));
 }
 
+/// A magnetometer with this N, in gauss/√Hz, and deviance on the unseen half.
+fn magnetometer(name: &str, [n, low, high]: [f64; 3], deviance: f64) -> noise_analysis::report::ChannelReport {
+    let mut channel = fixture::channel(name, "gauss");
+    channel.refitted.terms.retain(|term| term.kind == "angle_random_walk");
+    let value = Parameter::new(n, low, high, "gauss/sqrt(Hz)");
+    channel.refitted.terms[0].parameters.insert("value".to_owned(), value);
+    channel.after.unseen.deviance_per_point = Some(deviance);
+    channel
+}
+
+#[test]
+fn magnetometers_have_their_digits_and_a_prefix_and_those_whose_model_fails_have_no_noise() {
+    let mut report = report();
+    report.channels.extend([
+        magnetometer("magn_x", [47.776e-6, 47.695e-6, 47.857e-6], 0.6),
+        magnetometer("magn_y", [0.0, 0.0, 1.44e-6], 1.8),
+        magnetometer("magn_z", [0.0, 0.0, 1.04e-6], 414.0),
+    ]);
+    let conditions = reports::summary::conditions(&report);
+    // ±0.081 supports two decimals.
+    assert!(conditions.contains(&"magn x y N 47.78 ± 0.08, < 1.4 µgauss/√Hz".to_owned()), "{conditions:?}");
+    assert!(conditions.contains(&"the noise of magn z is not that of N, B and K".to_owned()), "{conditions:?}");
+}
+
+#[test]
+fn a_failing_model_is_held_beside_the_first_half_s_own_curve() {
+    let warnings = |own_curve: f64, excluding: bool| {
+        let mut report = report();
+        let channel = &mut report.channels[4];
+        channel.first_half_curve.deviance_per_point = Some(own_curve);
+        channel.after.unseen_excluding = excluding.then(|| channel.after.unseen.clone());
+        let steps = reports::summary::next_steps(&report);
+        steps.into_iter().filter(|step| step.starts_with('!')).collect::<Vec<_>>()
+    };
+    // The curve of the first half fails as well: nothing that the first half shows holds in the second.
+    assert_eq!(
+        warnings(41.4, false),
+        [
+            "! The model of accel y fails on the unseen half, and so does the first half's own curve (41): the noise has changed."
+        ]
+    );
+    // It holds, so the model is what is wrong.
+    assert_eq!(
+        warnings(1.71, false),
+        [
+            "! The model of accel y fails on the unseen half: its error is far above 1. The first half's own curve holds (1.7): \
+          the model lacks something."
+        ]
+    );
+    // The curve's error includes samples that the model's error leaves out: the two are not compared.
+    assert_eq!(warnings(41.4, true), ["! The model of accel y fails on the unseen half: its error is far above 1."]);
+}
+
+#[test]
+fn departures_at_one_place_are_told_together() {
+    let mut report = report();
+    let departure = |channel: &str, percent: f64| {
+        let tau = ("tau", parameter(0.0012, 0.0, "s"));
+        finding("unexplained", &[channel], &[tau, ("excess_percent", parameter(percent, 0.1, "%"))], 0.0)
+    };
+    report.findings = vec![departure("gyro_x", -3.6), departure("gyro_y", -2.1), departure("gyro_z", -2.1)];
+    let told = reports::summary::unexplained(&report).expect("a text");
+    assert_eq!(told, "gyros: −2.1 … −3.6 % at averaging times around 1.2 ms");
+    // Above and below the model are two departures.
+    report.findings[2] = departure("gyro_z", 2.1);
+    let told = reports::summary::unexplained(&report).expect("a text");
+    assert!(told.ends_with("; gyro z: +2.1 % at averaging times around 1.2 ms"), "{told}");
+}
+
 /// The parts of a sentence between numbers, names and punctuation that have two words or more.
 fn phrases(sentence: &str) -> Vec<String> {
     let is_word = |word: &str| !word.is_empty() && word.chars().all(|letter| letter.is_alphabetic() || letter == '-');
@@ -164,8 +233,12 @@ fn the_documentation_explains_every_sentence_about_the_record() {
     moved.part.note = Some("without time stamps the clock is not measured; why".to_owned());
     moved.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
     moved.dropped.clear();
+    let mut changed = report();
+    changed.channels[4].first_half_curve.deviance_per_point = Some(41.4);
+    changed.channels.push(magnetometer("magn_x", [47.776e-6, 47.695e-6, 47.857e-6], 0.6));
+    changed.channels.push(magnetometer("magn_y", [0.0, 0.0, 1.44e-6], 414.0));
     let mut checked = 0;
-    for report in [report(), moved, fixture::report(), fixture::empty()] {
+    for report in [report(), moved, changed, fixture::report(), fixture::empty()] {
         let sentences = [
             reports::summary::record_sentences_in_short(&report),
             reports::summary::contradictions(&report),

@@ -1,0 +1,21 @@
+#!/bin/sh
+# Draws the pictures of the documentation anew, as --pictures draws them:
+#
+#     docs/pictures.sh
+#
+#   docs/report.png       gyro x of the simulated hour that the program makes without a command
+#   docs/run1-gyro_z.svg  gyro z of the first measured recording, if ADIS_RECORDINGS names the folder (docs/recordings.md)
+set -eu
+cd "$(dirname "$0")/.."
+drawn=$(mktemp -d)
+trap 'rm -rf "$drawn"' EXIT
+
+cargo run --release -- --quiet --page "$drawn/page" --pictures "$drawn/simulated"
+cp "$drawn/simulated/gyro_x-allan.png" docs/report.png
+
+if [ -n "${ADIS_RECORDINGS:-}" ]; then
+    cargo run --release -- analyze "$ADIS_RECORDINGS/adis16405-static/run1.csv.gz" --rate 100 --quiet --pictures "$drawn/run1"
+    cp "$drawn/run1/gyro_z-allan.svg" docs/run1-gyro_z.svg
+else
+    echo "docs/run1-gyro_z.svg is left as it was: ADIS_RECORDINGS names no folder" >&2
+fi
