@@ -45,9 +45,8 @@ pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
         .iter()
         .filter(|(whole, _)| !ONCE.contains(&whole.kind.as_str()))
         .flat_map(|(whole, half)| {
-            let compared = whole.parameters.iter().filter(|(name, _)| {
-                !NOT_COMPARED.contains(&name.as_str()) && !(whole.kind == FILTER && name.as_str() == "value")
-            });
+            let is_left_out = |name: &str| NOT_COMPARED.contains(&name) || (whole.kind == FILTER && name == "value");
+            let compared = whole.parameters.iter().filter(|(name, _)| !is_left_out(name));
             compared.filter_map(|(name, of_whole)| deviation(of_whole, half.parameters.get(name)?))
         })
         .collect();
