@@ -46,7 +46,7 @@ pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
         .filter(|(whole, _)| !ONCE.contains(&whole.kind.as_str()))
         .flat_map(|(whole, half)| {
             let is_left_out = |name: &str| NOT_COMPARED.contains(&name) || (whole.kind == FILTER && name == "value");
-            let compared = whole.parameters.iter().filter(|(name, _)| !is_left_out(name));
+            let compared = whole.parameters.iter().filter(move |(name, _)| !is_left_out(name));
             compared.filter_map(|(name, of_whole)| deviation(of_whole, half.parameters.get(name)?))
         })
         .collect();
