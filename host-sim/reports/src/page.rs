@@ -113,7 +113,7 @@ fn contents(report: &Report) -> Markup {
 fn verdict(report: &Report) -> Markup {
     html! {
         section.verdict aria-label="Verdict" {
-            @for sentence in summary::record_sentences(report) { p { (sentence) } }
+            @for sentence in summary::record_sentences(report) { p { (unparted(&sentence)) } }
             @let conditions = summary::conditions(report);
             @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
             (tables::coefficients_of_all(report))
@@ -122,6 +122,11 @@ fn verdict(report: &Report) -> Markup {
             }
         }
     }
+}
+
+/// `text` whose per cent signs stay on the line of their numbers.
+fn unparted(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
 }
 
 /// What the data contradicts, and what to do.
@@ -268,7 +273,7 @@ fn assessment(assessment: &Assessment) -> Markup {
             @if let Some(time) = &assessment.markov_time_by_autocorrelation {
                 li { b { "Markov time by the autocorrelation" } ": " (bounded_quantity(time)) }
             }
-            @for record in &assessment.record { li { (recording_advice(record)) } }
+            @for record in &assessment.record { li { (unparted(&recording_advice(record))) } }
         }
     }
 }

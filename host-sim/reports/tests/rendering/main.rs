@@ -288,6 +288,8 @@ fn the_page_shows_every_channel_and_coefficient() {
     {
         assert!(page.contains(expected), "{expected}");
     }
+    // A line does not end between a number and its per cent sign.
+    assert!(page.contains("bias instability to ±20\u{a0}%: record"));
     // The overview and one Allan deviation a channel: the fixture has no spectrum and no bias over time.
     assert_eq!(page.matches("<svg").count(), 7);
 }
