@@ -2,8 +2,8 @@
 //! first half leaves on the second.
 
 use crate::finding_text::{FindingText, channel_list};
-use crate::formatting::{NONE, count, duration, number, words, wrap};
-use crate::rounding::{significant, span};
+use crate::formatting::{count, duration, words, wrap};
+use crate::rounding::{NONE, quantity_digits, significant, span};
 use crate::summary;
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
@@ -20,7 +20,12 @@ const COMMON_MODE_TAU_S: [f64; 3] = [0.01, 40.0, 160.0];
 /// `out` cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let length = duration(report.samples as f64 / report.sample_rate_hz);
-    writeln!(out, "{} samples at {} Hz, {length}.", count(report.samples), number(report.sample_rate_hz))?;
+    writeln!(
+        out,
+        "{} samples at {}, {length}.",
+        count(report.samples),
+        quantity_digits(report.sample_rate_hz, "Hz", 4)
+    )?;
     writeln!(out, "\nWhat was found")?;
     let (named, unexplained) = summary::findings(report);
     if named.is_empty() && unexplained.is_empty() {

@@ -128,7 +128,7 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
     }
     let [frame] = frames([380.0]);
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let label = format!("Allan deviation σ(τ), {}", crate::formatting::unit(&first.unit));
+    let label = format!("Allan deviation σ(τ), {}", crate::rounding::unit(&first.unit));
     let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
     let each: Vec<String> = channels
         .iter()

@@ -2,7 +2,7 @@
 //! sentence.
 
 use crate::formatting::{capital, words};
-use crate::rounding::{bounded_quantity, plain, quantity, rounded_quantity, significant, span};
+use crate::rounding::{bounded_quantity, plain, quantity, quantity_digits, rounded_quantity, significant, span};
 use noise_analysis::report::{Finding, Parameter, Validation};
 
 /// Every kind of finding that has its own sentences, in the order of `docs/findings.md`.
@@ -80,14 +80,28 @@ fn weight(finding: &Finding) -> String {
 /// Characters of the evidence that a line has room for.
 const CLAUSE: usize = 70;
 
-/// The evidence of the analysis as it is printed. A probability below the smallest number is not 0.
+/// First parts of the units that evidence is in.
+const UNITS: [&str; 8] = ["deg", "g", "gauss", "V", "Hz", "s", "degC", "1"];
+
+/// The evidence of the analysis as it is printed. A probability below the smallest number is not 0, and a number with a unit has a
+/// prefix in that instead of an exponent.
 #[must_use]
 pub(crate) fn printed_evidence(evidence: &str) -> String {
-    let words = evidence.split(' ').map(|word| match word.strip_prefix("0e0") {
-        Some(mark) if mark.chars().all(|of| ",;.".contains(of)) => format!("below 1e-300{mark}"),
-        _ => word.to_owned(),
-    });
-    words.collect::<Vec<_>>().join(" ")
+    let mut printed = Vec::new();
+    let mut words = evidence.split(' ').peekable();
+    while let Some(word) = words.next() {
+        let value = word.contains('e').then(|| word.parse::<f64>().ok()).flatten();
+        let unit = words.peek().map_or("", |next| next.trim_end_matches([',', ';', '.', ':']));
+        match (value, word.strip_prefix("0e0")) {
+            (Some(value), _) if unit.split('/').next().is_some_and(|first| UNITS.contains(&first)) => {
+                let mark = words.next().map_or("", |next| &next[unit.len()..]);
+                printed.push(format!("{}{mark}", quantity_digits(value, unit, 3)));
+            }
+            (_, Some(mark)) if mark.chars().all(|of| ",;.".contains(of)) => printed.push(format!("below 1e-300{mark}")),
+            _ => printed.push(word.to_owned()),
+        }
+    }
+    printed.join(" ")
 }
 
 /// The evidence of the analysis up to its first semicolon, or as much of it as there is room for.
@@ -541,6 +555,9 @@ mod tests {
     fn a_probability_that_underflows_is_bounded() {
         let line = "line at 20.5 Hz, 220 sigma, by chance anywhere 0e0; a steady line of 10e0 and 0e0x";
         let printed = "line at 20.5 Hz, 220 sigma, by chance anywhere below 1e-300; a steady line of 10e0 and 0e0x";
+        assert_eq!(printed_evidence(line), printed);
+        let line = "moves with accl_x at 2.92e0 deg/s/g, 5 sigma; -3.1e-5 g, by chance 3e-9; 1e-12 of it";
+        let printed = "moves with accl_x at 2.92 °/s/g, 5 sigma; −31.0 µg, by chance 3e-9; 1e-12 of it";
         assert_eq!(printed_evidence(line), printed);
     }
 

@@ -1,37 +1,16 @@
 //! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
+use crate::rounding::{NONE, quantity_digits, significant};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
 use std::fmt;
 
-/// Shown in the place of a number that is absent or not finite.
-pub const NONE: &str = "–";
-
-/// `value` with four significant digits: plain from 0.001 to 999,900, else with an exponent that is a multiple
-/// of three. [`NONE`] for what is not finite.
+/// `value` with four significant digits; [`NONE`] for what is not finite. An exponent has only what is too large or too small to be
+/// a result, such as the deviance of a model that is zero. Values with a unit have a prefix in it: [`Scale`](crate::rounding::Scale).
 pub fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return NONE.to_owned();
-    }
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    // `{:.3e}` rounds, and carries: 9999.6 becomes 1.000e4.
-    let rounded = format!("{value:.3e}");
-    let Some((mantissa, exponent)) = rounded.split_once('e') else {
-        return rounded;
-    };
-    let (Ok(mantissa), Ok(exponent)) = (mantissa.parse::<f64>(), exponent.parse::<i32>()) else {
-        return rounded;
-    };
-    let shift = if (-3..6).contains(&exponent) { exponent } else { exponent.rem_euclid(3) };
-    let decimals = usize::try_from(3 - shift).unwrap_or(0);
-    let digits = format!("{:.decimals$}", mantissa * 10f64.powi(shift));
-    match exponent - shift {
-        0 => digits,
-        power => format!("{digits}e{power}"),
-    }
+    let is_usual = value == 0.0 || (1e-9..1e15).contains(&value.abs());
+    if is_usual || !value.is_finite() { significant(value, 4) } else { format!("{value:.3e}") }
 }
 
 /// `value`, or [`NONE`].
@@ -80,10 +59,7 @@ pub fn missing_samples(missing: &MissingSamples) -> String {
 pub fn duration(seconds: f64) -> String {
     // Beyond 2^53 s the whole seconds are no longer exact.
     if !(59.5..9.0e15).contains(&seconds) {
-        return match number(seconds) {
-            text if text == NONE => text,
-            text => format!("{text} s"),
-        };
+        return quantity_digits(seconds, "s", 4);
     }
     let whole = seconds.round() as u64;
     let parts = [(whole / 86_400, "d"), (whole / 3600 % 24, "h"), (whole / 60 % 60, "min"), (whole % 60, "s")];
@@ -123,14 +99,6 @@ pub fn parameter_name(name: &str) -> String {
     }
 }
 
-/// A unit of the JSON schema as it is printed: `deg/sqrt(s)` becomes `°/√s`.
-pub fn unit(name: &str) -> String {
-    let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
-    let powers = [("^2", "²"), ("^3", "³")];
-    let spelled = symbols.iter().chain(&powers).fold(name.to_owned(), |name, (plain, sign)| name.replace(plain, sign));
-    if spelled.starts_with("ug") { spelled.replacen("ug", "µg", 1) } else { spelled }
-}
-
 /// Smallest p-value of the whiteness test at which innovations are called white.
 const WHITE: f64 = 0.01;
 
@@ -165,7 +133,7 @@ const FAR_OFF: f64 = 4.0;
 pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     let (sigma, tau, ratio) = (error.worst_sigma?, error.worst_tau_s?, error.worst_ratio?);
     let times = |factor: f64| match factor {
-        factor if factor < 1.1 => format!("{} % above", number(100.0 * (factor - 1.0))),
+        factor if factor < 1.1 => format!("{} % above", significant(100.0 * (factor - 1.0), 2)),
         factor => format!("{} times", number(factor)),
     };
     let text = if ratio > 1.0 {
@@ -271,21 +239,21 @@ mod tests {
             (1.0, "1.000"),
             (0.0368, "0.03680"),
             (0.001_234_4, "0.001234"),
-            (0.000_123_44, "123.4e-6"),
-            (0.000_099_994, "99.99e-6"),
-            (0.000_099_996, "100.0e-6"),
-            (1.234_56e-5, "12.35e-6"),
-            (1.234_56e-7, "123.5e-9"),
+            (0.000_123_44, "0.0001234"),
+            (0.000_099_994, "0.00009999"),
+            (0.000_099_996, "0.0001000"),
+            (1.234_56e-5, "0.00001235"),
+            (1.234_56e-7, "0.0000001235"),
             (9.999_6, "10.00"),
-            (-273.149, "-273.1"),
-            (9_999.6, "10000"),
+            (-273.149, "−273.1"),
+            (9_999.6, "10,000"),
             (163.84, "163.8"),
-            (524_288.0, "524300"),
-            (999_960.0, "1.000e6"),
-            (1.5e6, "1.500e6"),
-            (1.5e8, "150.0e6"),
-            (f64::MAX, "179.8e306"),
-            (f64::MIN_POSITIVE, "22.25e-309"),
+            (524_288.0, "524,300"),
+            (999_960.0, "1,000,000"),
+            (1.5e6, "1,500,000"),
+            (1.5e8, "150,000,000"),
+            (f64::MAX, "1.798e308"),
+            (f64::MIN_POSITIVE, "2.225e-308"),
             (f64::NAN, NONE),
             (f64::INFINITY, NONE),
         ] {
@@ -310,7 +278,7 @@ mod tests {
     #[test]
     fn durations_are_split_into_days_hours_minutes_and_seconds() {
         for (value, text) in [
-            (0.01, "0.01000 s"),
+            (0.01, "10.00 ms"),
             (59.4, "59.40 s"),
             (59.7, "1 min"),
             (3600.0, "1 h"),
@@ -324,19 +292,12 @@ mod tests {
     }
 
     #[test]
-    fn names_and_units_become_readable() {
+    fn names_become_readable() {
         assert_eq!(words("angle_random_walk"), "angle random walk");
         assert_eq!(parameter_name("value"), "");
         assert_eq!(parameter_name("frequency_hz"), "frequency");
         assert_eq!(parameter_name("correlation_time_s"), "correlation time");
         assert_eq!(parameter_name("at_s"), "time");
-        assert_eq!(unit("deg/sqrt(s)"), "°/√s");
-        assert_eq!(unit("deg/s/sqrt(s)"), "°/s/√s");
-        assert_eq!(unit("degC"), "°C");
-        assert_eq!(unit("gauss"), "gauss");
-        assert_eq!(unit("ug/sqrt(Hz)"), "µg/√Hz");
-        assert_eq!(unit("deg/h/sqrt(h)"), "°/h/√h");
-        assert_eq!(unit("m/s^3/sqrt(Hz)"), "m/s³/√Hz");
     }
 
     #[test]

@@ -1,16 +1,18 @@
 //! Every table of a report as text: at most 100 columns, the same in a terminal and in a file.
 
 use crate::coefficients::{self, CoefficientRow};
+use crate::curve_numbers::curve_numbers;
 use crate::explanation;
 use crate::finding_text::{FindingText, printed_evidence};
 use crate::formatting::{
-    NONE, TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
-    parameter_name, percent, recording_advice, unit, words, worst_deviations, wrap,
+    TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
+    parameter_name, percent, recording_advice, words, worst_deviations, wrap,
 };
+use crate::rounding::{NONE, Scale, bounded_quantity, parameter_magnitude, probability, quantity_digits, unit};
 use crate::summary;
 use noise_analysis::assessment::navigation::CALIBRATION_S;
 use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
-use noise_analysis::report::{ChannelReport, Parameter, Report, TermReport};
+use noise_analysis::report::{ChannelReport, Report, TermReport};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
@@ -29,7 +31,7 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
         None => writeln!(out, "{title}")?,
     }
     writeln!(out, "{}", "═".repeat(title.chars().count()))?;
-    writeln!(out, "sample rate  {} Hz", number(report.sample_rate_hz))?;
+    writeln!(out, "sample rate  {}", quantity_digits(report.sample_rate_hz, "Hz", 4))?;
     let length = duration(report.samples as f64 / report.sample_rate_hz);
     writeln!(out, "samples      {} used, {length}", count(report.samples))?;
     writeln!(out, "dropped      {}", by_cause(&report.dropped))?;
@@ -144,35 +146,30 @@ fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String
 }
 
 fn coefficient_table(channel: &ChannelReport) -> TextTable {
-    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit", "95 % interval"];
+    let header = ["coefficient", "unit", "by slope", "slope found, s", "fit, 95 % interval"];
     let row = |row: CoefficientRow<'_>| {
+        let shown = row.slope_value.map(|value| value.value).into_iter().chain(row.fit.map(parameter_magnitude));
+        let scale = Scale::new(shown, row.unit);
         let (by_slope, found) = match (row.slope_value, row.slope) {
-            (Some(value), _) => (number(value.value), interval(value.from_s, value.to_s)),
+            (Some(value), _) => (scale.number(value.value, 3), interval(value.from_s, value.to_s)),
             (None, "") => (NONE.to_owned(), NONE.to_owned()),
             (None, _) => (NONE.to_owned(), "no such slope".to_owned()),
         };
-        let [fit, bounds] = fitted(row.fit);
-        vec![words(row.kind), unit(row.unit), by_slope, found, fit, bounds]
+        let fit = row.fit.map_or_else(|| NONE.to_owned(), |fit| scale.estimate(fit));
+        vec![words(row.kind), scale.unit, by_slope, found, fit]
     };
     table(&header, 2, coefficients::rows(channel).into_iter().map(row))
-}
-
-/// Estimate and interval.
-fn fitted(parameter: Option<&Parameter>) -> [String; 2] {
-    match parameter {
-        Some(p) => [number(p.value), interval(p.low, p.high)],
-        None => [NONE.to_owned(), NONE.to_owned()],
-    }
 }
 
 fn term_table(terms: &[TermReport]) -> TextTable {
     let rows = terms.iter().flat_map(|term| {
         term.parameters.iter().map(|(name, parameter)| {
-            let [fit, bounds] = fitted(Some(parameter));
-            vec![words(&term.kind), parameter_name(name), unit(&parameter.unit), fit, bounds]
+            let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
+            let fit = scale.estimate(parameter);
+            vec![words(&term.kind), parameter_name(name), scale.unit, fit]
         })
     });
-    let header = ["with the effects", "parameter", "unit", "fit", "95 % interval"];
+    let header = ["with the effects", "parameter", "unit", "fit, 95 % interval"];
     table(&header, 3, rows)
 }
 
@@ -217,27 +214,8 @@ fn error_table(channel: &ChannelReport) -> TextTable {
 }
 
 fn curve_table(channel: &ChannelReport) -> TextTable {
-    let same = channel.after == channel.before;
-    let mut header = vec!["n", "τ, s", "σ(τ)", "low", "high", "edf", "accuracy, %", "by PSD"];
-    header.extend(if same { &["model"][..] } else { &["before", "after"] });
-    let rows = channel.curve.iter().enumerate().map(|(index, point)| {
-        let mut row = vec![
-            count(point.n),
-            number(point.tau_s),
-            number(point.adev),
-            number(point.low),
-            number(point.high),
-            number(point.edf),
-            number(point.accuracy_percent),
-            optional(point.adev_by_spectrum),
-            optional(channel.before.adev.get(index).copied()),
-        ];
-        if !same {
-            row.push(optional(channel.after.adev.get(index).copied()));
-        }
-        row
-    });
-    table(&header, 0, rows)
+    let (headings, rows) = curve_numbers(channel);
+    table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
 }
 
 /// What the model is good for: other units, drift, a filter's innovations, longer records.
@@ -255,15 +233,12 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
             innovations.count,
             number(innovations.normalised),
             interval(innovations.low, innovations.high),
-            number(innovations.whiteness_p),
+            probability(innovations.whiteness_p),
             filter_consistency(innovations)
         );
         writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
     }
-    let by_spectrum = assessment
-        .angle_random_walk_by_spectrum
-        .as_ref()
-        .map(|n| format!("{} {} ({})", number(n.value), unit(&n.unit), interval(n.low, n.high)));
+    let by_spectrum = assessment.angle_random_walk_by_spectrum.as_ref().map(bounded_quantity);
     let told = match (by_spectrum, &assessment.angle_random_walk_by_spectrum_note) {
         (Some(value), Some(note)) => Some(format!("{value}; {note}")),
         (Some(value), None) => Some(value),
@@ -274,34 +249,30 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
         writeln!(out, "{}", wrap(&format!("• N by the spectrum: {told}."), WIDTH.into()))?;
     }
     if let Some(time) = &assessment.markov_time_by_autocorrelation {
-        let value = format!("{} {}", number(time.value), unit(&time.unit));
-        writeln!(out, "• Markov time by the autocorrelation: {value} ({}).", interval(time.low, time.high))?;
+        writeln!(out, "• Markov time by the autocorrelation: {}.", bounded_quantity(time))?;
     }
     assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
 }
 
 fn unit_table(coefficients: &[Coefficient]) -> TextTable {
     let row = |coefficient: &Coefficient| {
-        let value = &coefficient.value;
+        let scale = Scale::new([parameter_magnitude(&coefficient.value)], &coefficient.value.unit);
         let sense = if coefficient.discrete { "discrete, of samples" } else { "continuous" };
-        let kind = words(&coefficient.kind);
-        vec![kind, sense.to_owned(), unit(&value.unit), number(value.value), interval(value.low, value.high)]
+        let value = scale.estimate(&coefficient.value);
+        vec![words(&coefficient.kind), sense.to_owned(), scale.unit, value]
     };
-    let header = ["in other units", "", "unit", "value", "95 % interval"];
+    let header = ["in other units", "", "unit", "value, 95 % interval"];
     table(&header, 3, coefficients.iter().map(row))
 }
 
 fn drift_table(drifts: &[NavigationDrift]) -> TextTable {
     let row = |drift: &NavigationDrift| {
         let observed = drift.observed.as_ref();
-        vec![
-            duration(drift.seconds),
-            unit(&drift.unit),
-            number(drift.predicted),
-            observed.map_or_else(|| "too short".to_owned(), |observed| number(observed.value)),
-            observed.map_or_else(String::new, |observed| interval(observed.low, observed.high)),
-        ]
+        let scale = Scale::new([drift.predicted].into_iter().chain(observed.map(parameter_magnitude)), &drift.unit);
+        let predicted = scale.number(drift.predicted, 3);
+        let observed = observed.map_or_else(|| "too short".to_owned(), |observed| scale.estimate(observed));
+        vec![duration(drift.seconds), scale.unit, predicted, observed]
     };
-    let header = ["error after", "unit", "predicted", "unseen half", "95 % interval"];
+    let header = ["error after", "unit", "predicted", "unseen half, 95 % interval"];
     table(&header, 1, drifts.iter().map(row))
 }

@@ -3,6 +3,7 @@
 
 pub mod coefficients;
 pub mod comparison;
+mod curve_numbers;
 pub mod explanation;
 pub mod export;
 pub mod figure;

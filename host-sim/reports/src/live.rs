@@ -186,7 +186,7 @@ impl LiveView {
             .filter_map(|curve| Some((curve.channel.strip_prefix(group.prefix())?, logarithmic(curve))))
             .collect();
         let unit = self.curves.iter().find(|curve| curve.channel.starts_with(group.prefix()));
-        let unit = unit.map_or_else(String::new, |curve| crate::formatting::unit(&curve.unit));
+        let unit = unit.map_or_else(String::new, |curve| crate::rounding::unit(&curve.unit));
         let name = match group {
             CurveGroup::Gyros => "gyros",
             CurveGroup::Accelerometers => "accels",

@@ -7,10 +7,10 @@ use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{FindingText, describe, printed_evidence};
 use crate::formatting::{
-    capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, unit,
-    words, worst_deviations,
+    capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
+    worst_deviations,
 };
-use crate::rounding::bounded_quantity;
+use crate::rounding::{bounded_quantity, probability, unit};
 use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::assessment::Assessment;
@@ -113,7 +113,7 @@ fn contents(report: &Report) -> Markup {
 fn verdict(report: &Report) -> Markup {
     html! {
         section.verdict aria-label="Verdict" {
-            @for sentence in summary::record_sentences(report) { p { (sentence) } }
+            @for sentence in summary::record_sentences(report) { p { (unparted(&sentence)) } }
             @let conditions = summary::conditions(report);
             @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
             (tables::coefficients_of_all(report))
@@ -122,6 +122,11 @@ fn verdict(report: &Report) -> Markup {
             }
         }
     }
+}
+
+/// `text` whose per cent signs stay on the line of their numbers.
+fn unparted(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
 }
 
 /// What the data contradicts, and what to do.
@@ -256,21 +261,19 @@ fn assessment(assessment: &Assessment) -> Markup {
                 li { b { "Kalman filter of the model" } ", unseen half: " (filter_consistency(innovations)) "."
                     span.parameter { (count(innovations.count as u64)) " innovations, " (number(innovations.normalised))
                         " of the expected variance (" (interval(innovations.low, innovations.high))
-                        " for a true model), whiteness p = " (number(innovations.whiteness_p)) }
+                        " for a true model), whiteness p = " (probability(innovations.whiteness_p)) }
                 }
             }
             @if let Some(spectrum) = &assessment.angle_random_walk_by_spectrum {
-                li { b { "N by the spectrum" } ": " (number(spectrum.value)) " " (unit(&spectrum.unit))
-                    " (" (interval(spectrum.low, spectrum.high)) ")"
+                li { b { "N by the spectrum" } ": " (bounded_quantity(spectrum))
                     @if let Some(note) = &assessment.angle_random_walk_by_spectrum_note { span.parameter { (note) } } }
             } @else if let Some(note) = &assessment.angle_random_walk_by_spectrum_note {
                 li { b { "N by the spectrum" } ": none, " (note) "." }
             }
             @if let Some(time) = &assessment.markov_time_by_autocorrelation {
-                li { b { "Markov time by the autocorrelation" } ": " (number(time.value)) " " (unit(&time.unit))
-                    " (" (interval(time.low, time.high)) ")" }
+                li { b { "Markov time by the autocorrelation" } ": " (bounded_quantity(time)) }
             }
-            @for record in &assessment.record { li { (recording_advice(record)) } }
+            @for record in &assessment.record { li { (unparted(&recording_advice(record))) } }
         }
     }
 }

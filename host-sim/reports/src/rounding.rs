@@ -1,12 +1,22 @@
 //! Estimates as they are printed: rounded to what their interval supports, in units with an SI prefix.
 
-use crate::formatting::{NONE, unit};
 use noise_analysis::report::Parameter;
+
+/// Shown in the place of a number that is absent or not finite.
+pub const NONE: &str = "–";
 
 /// Widest relative half-width at which an interval is written as `± half`, if it is also as wide on either side.
 const SYMMETRIC: f64 = 0.25;
 /// Largest ratio of the wider to the narrower side of such an interval.
 const SKEW: f64 = 1.3;
+
+/// A unit of the JSON schema as it is printed: `deg/sqrt(s)` becomes `°/√s`.
+pub fn unit(name: &str) -> String {
+    let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
+    let powers = [("^2", "²"), ("^3", "³")];
+    let spelled = symbols.iter().chain(&powers).fold(name.to_owned(), |name, (plain, sign)| name.replace(plain, sign));
+    if spelled.starts_with("ug") { spelled.replacen("ug", "µg", 1) } else { spelled }
+}
 
 /// `value` with so many decimals, its thousands separated.
 fn fixed(value: f64, decimals: usize) -> String {
@@ -62,7 +72,7 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
     if !(low.is_finite() && high.is_finite()) || high <= low {
         return plain(value, 3);
     }
-    if low <= 0.0 && value <= high / 1e3 {
+    if is_upper_bound(value, low, high) {
         return format!("< {}", significant(high, 2));
     }
     let (below, above) = (value - low, high - value);
@@ -76,6 +86,11 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
         return format!("{} (< {})", significant(value, 2), significant(high, 2));
     }
     format!("{} ({} … {})", significant(value, 2), significant(low, 2), significant(high, 2))
+}
+
+/// Whether only the upper bound of an estimate is known.
+fn is_upper_bound(value: f64, low: f64, high: f64) -> bool {
+    low <= 0.0 && (0.0..=high / 1e3).contains(&value)
 }
 
 /// `value` with so many significant digits, without an exponent.
@@ -127,7 +142,27 @@ fn prefix(magnitude: f64, enlarging: bool) -> (&'static str, f64) {
     fitting.or(usable.next_back()).copied().filter(|_| magnitude > 0.0 && magnitude.is_finite()).unwrap_or(("", 1.0))
 }
 
-/// A quantity with three significant digits and a prefix in its unit: `0.27 °/s` is `270 m°/s`, `2.2e-5 g` is `22.0 µg`.
+/// A unit with the prefix that fits `magnitude`, and the factor by which values are divided for it. A unit that has a prefix already
+/// gets another one: `ug` is `g` times 10⁻⁶.
+fn prefixed(magnitude: f64, name: &str) -> (String, f64) {
+    let spelled = unit(name);
+    // A tenth of a degree is written 0.1 °; µ and m come below that.
+    let takes_no_prefix = spelled.starts_with(|first: char| first.is_ascii_digit())
+        || matches!(spelled.as_str(), "" | "%" | "°C" | "min" | "h");
+    let (bare, of_name) = match spelled.strip_prefix('µ') {
+        Some(bare) => (bare, 1e-6),
+        None if spelled.starts_with("mgauss") => (&spelled["m".len()..], 1e-3),
+        None => (spelled.as_str(), 1.0),
+    };
+    let magnitude = of_name * magnitude;
+    if takes_no_prefix || (0.0995..1000.0).contains(&magnitude) {
+        return (bare.to_owned(), 1.0 / of_name);
+    }
+    let (prefix, factor) = prefix(magnitude, bare == "Hz");
+    (format!("{prefix}{bare}"), factor / of_name)
+}
+
+/// A quantity with two significant digits and a prefix in its unit: `0.012 °/s` is `12 m°/s`, `2.2e-5 g` is `22 µg`.
 #[must_use]
 pub fn quantity(value: f64, name: &str) -> String {
     quantity_digits(value, name, 2)
@@ -139,48 +174,75 @@ pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
     }
-    let spelled = unit(name);
-    if spelled.is_empty() {
-        return significant(value, digits);
-    }
-    // A tenth of a degree is written 0.1 °; µ and m come below that.
-    let takes_prefix = !matches!(spelled.as_str(), "%" | "°C" | "min" | "h");
-    let (prefix, factor) = match value.abs() {
-        magnitude if !takes_prefix || (0.0995..1000.0).contains(&magnitude) => ("", 1.0),
-        magnitude => prefix(magnitude, spelled == "Hz"),
-    };
-    format!("{} {prefix}{spelled}", significant(value / factor, digits))
+    let (unit, factor) = prefixed(value.abs(), name);
+    format!("{} {unit}", significant(value / factor, digits)).trim_end().to_owned()
 }
 
-/// The same for a parameter, with the digits that its interval supports, but without the interval: two at least, four at most.
+/// Significant digits of `value` that its interval supports: two at least, four at most.
 #[must_use]
-pub fn rounded_quantity(parameter: &Parameter) -> String {
-    let half_width = (parameter.high - parameter.low) / 2.0;
-    let digits = if half_width > 0.0 && half_width.is_finite() && parameter.value != 0.0 {
-        parameter.value.abs().log10().floor() as i32 + 1 + place(half_width)
+pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
+    let half_width = (high - low) / 2.0;
+    if half_width > 0.0 && half_width.is_finite() && value != 0.0 && value.is_finite() {
+        (value.abs().log10().floor() as i32 + 1 + place(half_width)).clamp(2, 4)
     } else {
         2
-    };
-    quantity_digits(parameter.value, &parameter.unit, digits.clamp(2, 4))
+    }
+}
+
+/// The same for a parameter, with the digits that its interval supports, but without the interval.
+#[must_use]
+pub fn rounded_quantity(parameter: &Parameter) -> String {
+    let &Parameter { value, low, high, ref unit } = parameter;
+    quantity_digits(value, unit, supported_digits(value, low, high))
 }
 
 /// The same for a parameter, with the precision that its interval supports: `20.70 ± 0.10 Hz`.
 #[must_use]
 pub fn bounded_quantity(parameter: &Parameter) -> String {
-    let Parameter { value, low, high, unit: name } = parameter;
-    let spelled = unit(name);
-    let magnitude = value.abs();
-    let (prefix, factor) = if spelled.is_empty() || (0.0995..1000.0).contains(&magnitude) {
-        ("", 1.0)
-    } else {
-        prefix(magnitude, spelled == "Hz")
-    };
-    let text = if *value < 0.0 {
-        format!("−{}", estimate(-value / factor, -high / factor, -low / factor))
-    } else {
-        estimate(value / factor, low / factor, high / factor)
-    };
-    format!("{text} {prefix}{spelled}").trim_end().to_owned()
+    let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
+    format!("{} {}", scale.estimate(parameter), scale.unit).trim_end().to_owned()
+}
+
+/// What of a parameter is printed: its value, or its upper bound where that is all that is known.
+#[must_use]
+pub fn parameter_magnitude(parameter: &Parameter) -> f64 {
+    let &Parameter { value, low, high, .. } = parameter;
+    if is_upper_bound(value, low, high) { high } else { value }
+}
+
+/// One unit, with its prefix, for all the numbers of a row or a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    /// The unit as it is printed.
+    pub unit: String,
+    factor: f64,
+}
+
+impl Scale {
+    /// The prefix fits the largest of `values`, which are in the unit `name` of the JSON schema.
+    #[must_use]
+    pub fn new(values: impl IntoIterator<Item = f64>, name: &str) -> Self {
+        let finite = values.into_iter().map(f64::abs).filter(|value| value.is_finite());
+        let (unit, factor) = prefixed(finite.fold(0.0, f64::max), name);
+        Self { unit, factor }
+    }
+
+    /// `value` with so many significant digits.
+    #[must_use]
+    pub fn number(&self, value: f64, digits: i32) -> String {
+        significant(value / self.factor, digits)
+    }
+
+    /// A parameter with its bounds.
+    #[must_use]
+    pub fn estimate(&self, &Parameter { value, low, high, .. }: &Parameter) -> String {
+        let scaled = |of: f64| of / self.factor;
+        if value < 0.0 {
+            format!("−{}", estimate(scaled(-value), scaled(-high), scaled(-low)))
+        } else {
+            estimate(scaled(value), scaled(low), scaled(high))
+        }
+    }
 }
 
 /// The prefix for a column of a table by the largest of its `values`, and its factor; none from 0.1 on.
@@ -262,6 +324,40 @@ mod tests {
             let parameter = Parameter::new(value, value - half_width, value + half_width, name);
             assert_eq!(rounded_quantity(&parameter), text, "{value} ± {half_width}");
         }
+    }
+
+    #[test]
+    fn units_become_readable() {
+        assert_eq!(unit("deg/sqrt(s)"), "°/√s");
+        assert_eq!(unit("deg/s/sqrt(s)"), "°/s/√s");
+        assert_eq!(unit("degC"), "°C");
+        assert_eq!(unit("gauss"), "gauss");
+        assert_eq!(unit("ug/sqrt(Hz)"), "µg/√Hz");
+        assert_eq!(unit("deg/h/sqrt(h)"), "°/h/√h");
+        assert_eq!(unit("m/s^3/sqrt(Hz)"), "m/s³/√Hz");
+    }
+
+    #[test]
+    fn the_numbers_of_a_row_share_a_prefix_that_their_unit_takes() {
+        for (values, name, spelled, text) in [
+            (vec![37.14e-6, 36.8e-6], "g/sqrt(Hz)", "µg/√Hz", "36.8"),
+            (vec![36.8], "ug/sqrt(Hz)", "µg/√Hz", "36.8"),
+            (vec![0.0368], "ug", "ng", "36.8"),
+            (vec![36_800.0], "ug", "mg", "36.8"),
+            (vec![0.0368], "mgauss", "µgauss", "36.8"),
+            (vec![f64::NAN, 0.5, 36.8e-3], "deg/s", "°/s", "0.0368"),
+            (vec![0.0368], "%", "%", "0.0368"),
+            (vec![0.0368], "1/h", "1/h", "0.0368"),
+        ] {
+            let scale = Scale::new(values.iter().copied(), name);
+            assert_eq!(
+                (scale.unit.as_str(), scale.number(values[values.len() - 1], 3).as_str()),
+                (spelled, text),
+                "{name}"
+            );
+        }
+        // Only the upper bound is known: its prefix.
+        assert_eq!(bounded_quantity(&Parameter::new(0.0, 0.0, 19e-6, "g")), "< 19 µg");
     }
 
     #[test]

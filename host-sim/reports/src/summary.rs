@@ -3,8 +3,8 @@
 
 use crate::coefficients;
 use crate::finding_text::{FindingText, channel_list, describe, place_and_excess, signed_percent};
-use crate::formatting::{capital, count, unit, words};
-use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span};
+use crate::formatting::{capital, count, words};
+use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span, unit};
 use noise_analysis::findings::BoundedEstimate;
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;

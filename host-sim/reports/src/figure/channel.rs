@@ -2,8 +2,8 @@
 
 use super::axis::{Axis, has_logarithm};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
-use crate::formatting::{unit, words};
-use crate::rounding::{quantity, quantity_digits, span};
+use crate::formatting::words;
+use crate::rounding::{quantity, quantity_digits, span, unit};
 use allan_core::NoiseTerm;
 use allan_core::model::cube_root_deviation;
 use noise_analysis::figure_data::noise_term;

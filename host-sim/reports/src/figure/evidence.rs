@@ -5,8 +5,8 @@ use super::axis::Axis;
 use super::channel::{deviation_plot, is_line, spectrum_plot, time_unit};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
 use crate::finding_text::channel_list;
-use crate::formatting::{unit, words};
-use crate::rounding::{quantity_digits, span};
+use crate::formatting::words;
+use crate::rounding::{quantity_digits, span, unit};
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
 /// A line is shown with the frequencies from this part of its own to its inverse.

@@ -1,10 +1,12 @@
 //! The tables of the page.
 
-use crate::formatting::{NONE, count, duration, interval, number, optional, parameter_name, percent, unit, words};
+use crate::curve_numbers::curve_numbers;
+use crate::formatting::{duration, number, optional, parameter_name, percent, words};
+use crate::rounding::{NONE, Scale, parameter_magnitude};
 use crate::summary;
 use maud::{Markup, html};
 use noise_analysis::assessment::{Coefficient, NavigationDrift};
-use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Parameter, Report};
+use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Report};
 
 /// Content of a column's heading, and whether the column holds numbers.
 type Heading = (Markup, bool);
@@ -33,16 +35,6 @@ fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
             }
         }
     }
-}
-
-/// An estimate above its interval.
-fn estimate(parameter: &Parameter) -> Markup {
-    html! { (number(parameter.value)) span.under { (interval(parameter.low, parameter.high)) } }
-}
-
-/// An estimate above its interval, or a dash.
-fn estimate_if_any(parameter: Option<&Parameter>) -> Markup {
-    parameter.map_or_else(|| html! { (NONE) }, estimate)
 }
 
 /// N, B and K of the gyros and accelerometers in the units of their users, the data sheet's, and the error before and after.
@@ -81,10 +73,11 @@ pub(super) fn terms(model: &ModelReport) -> Markup {
     let rows = html! {
         @for term in &model.terms {
             @for (name, parameter) in &term.parameters {
+                @let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
                 tr {
                     th scope="row" { (words(&term.kind)) span.under { (parameter_name(name)) } }
-                    td { (unit(&parameter.unit)) }
-                    td.number { (estimate(parameter)) }
+                    td { (scale.unit) }
+                    td.number { (scale.estimate(parameter)) }
                 }
             }
         }
@@ -131,11 +124,12 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
 pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
     let rows = html! {
         @for coefficient in coefficients {
+            @let scale = Scale::new([parameter_magnitude(&coefficient.value)], &coefficient.value.unit);
             tr {
                 th scope="row" { (words(&coefficient.kind)) }
-                td { (unit(&coefficient.value.unit)) }
+                td { (scale.unit) }
                 @for discrete in [false, true] {
-                    td.number { @if coefficient.discrete == discrete { (estimate(&coefficient.value)) } }
+                    td.number { @if coefficient.discrete == discrete { (scale.estimate(&coefficient.value)) } }
                 }
             }
         }
@@ -147,11 +141,13 @@ pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
 pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
     let rows = html! {
         @for drift in drifts {
+            @let observed = drift.observed.as_ref();
+            @let scale = Scale::new([drift.predicted].into_iter().chain(observed.map(parameter_magnitude)), &drift.unit);
             tr {
                 th scope="row" { (duration(drift.seconds)) }
-                td { (unit(&drift.unit)) }
-                td.number { (number(drift.predicted)) }
-                td.number { (estimate_if_any(drift.observed.as_ref())) }
+                td { (scale.unit) }
+                td.number { (scale.number(drift.predicted, 3)) }
+                td.number { (observed.map_or_else(|| NONE.to_owned(), |observed| scale.estimate(observed))) }
             }
         }
     };
@@ -160,24 +156,10 @@ pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
 
 /// The measured curve with its intervals, beside the models.
 pub(super) fn curve(channel: &ChannelReport) -> Markup {
-    let same = channel.after == channel.before;
-    let models = if same { &["model"][..] } else { &["before", "after"] };
-    let names = ["n", "τ, s", "σ(τ)", "95 % low", "95 % high", "edf", "accuracy, %", "by PSD"];
-    let headings: Vec<Heading> = names.iter().chain(models).copied().map(numbers).collect();
+    let (headings, rows) = curve_numbers(channel);
+    let headings: Vec<Heading> = headings.iter().map(|heading| numbers(heading)).collect();
     let rows = html! {
-        @for (index, point) in channel.curve.iter().enumerate() {
-            tr {
-                td.number { (count(point.n)) }
-                @for value in [point.tau_s, point.adev, point.low, point.high, point.edf, point.accuracy_percent] {
-                    td.number { (number(value)) }
-                }
-                td.number { (optional(point.adev_by_spectrum)) }
-                td.number { (optional(channel.before.adev.get(index).copied())) }
-                @if !same {
-                    td.number { (optional(channel.after.adev.get(index).copied())) }
-                }
-            }
-        }
+        @for row in &rows { tr { @for value in row { td.number { (value) } } } }
     };
     table("curve", &headings, &rows)
 }

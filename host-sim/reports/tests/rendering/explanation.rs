@@ -1,11 +1,13 @@
 //! The long form of a report whose numbers are known.
 
 use super::fixture::report;
+use super::phrases::{documentation, phrases};
 use noise_analysis::nonstationarity::{
     Baselines, EpochParameters, FittedPart, IntervalCoverage, RelatedLine, Stationarity, TrackedSet, TrackingErrors,
 };
 use noise_analysis::report::{CommonModeRegression, Finding, Nonstationarity, Parameter, Report, Validation};
 use reports::{explanation, summary};
+use std::collections::BTreeSet;
 
 /// The text, with single spaces in the place of line breaks.
 fn text(report: &Report) -> String {
@@ -49,8 +51,8 @@ fn changes() -> Nonstationarity {
     }
 }
 
-#[test]
-fn the_explanation_tells_every_figure_of_the_report() {
+/// A report with everything that the explanation tells.
+fn followed() -> Report {
     let mut report = report();
     report.channels[2].nonstationarity = Some(changes());
     report.common_mode = Some(CommonModeRegression {
@@ -64,6 +66,12 @@ fn the_explanation_tells_every_figure_of_the_report() {
         }],
         gains: vec![noise_analysis::nonstationarity::HoldOutGain { tau_s: 40.96, ratio: vec![0.91, 1.54] }],
     });
+    report
+}
+
+#[test]
+fn the_explanation_tells_every_figure_of_the_report() {
+    let report = followed();
     let text = text(&report);
     // The fixture's curve of the first half leaves 1.711.
     for told in [
@@ -83,6 +91,40 @@ fn the_explanation_tells_every_figure_of_the_report() {
     ] {
         assert!(text.contains(told), "{told:?} is not in\n{text}");
     }
+}
+
+#[test]
+fn the_documentation_explains_every_sentence_of_the_explanation() {
+    let page = documentation();
+    let with = |change: &dyn Fn(&mut Nonstationarity)| {
+        let mut report = followed();
+        report.channels[2].nonstationarity.iter_mut().for_each(change);
+        report.channels[2].after.unseen_excluding = Some(report.channels[2].after.unseen.clone());
+        report
+    };
+    let forms = [
+        report(),
+        followed(),
+        with(&|of| of.quarters = None),
+        with(&|of| (of.fitted_to, of.tracked) = (FittedPart::FirstHalf, TrackedSet::Nothing)),
+        with(&|of| of.tracked = TrackedSet::Level),
+        with(&|of| of.related_line.iter_mut().for_each(|line| line.ratio = (1, 1))),
+        with(&|of| of.quarters.iter_mut().for_each(|quarters| quarters.p_value = 1e-16)),
+        with(&|of| of.quarters.iter_mut().for_each(|quarters| quarters.p_value = 0.8)),
+    ];
+    let (mut checked, mut lacking) = (0, BTreeSet::new());
+    for report in &forms {
+        let whole = text(report);
+        // Before it is what was found, whose sentences have a test of their own.
+        let own = whole.find("• N, B and K of").or(whole.find("No gyro or")).map_or("", |start| &whole[start..]);
+        for sentence in own.split(". ").flat_map(|text| text.split("• ")) {
+            let told = phrases(&sentence.replace("All channels", "").replace(" (", ", ("));
+            checked += told.len();
+            lacking.extend(told.into_iter().filter(|phrase| !page.contains(phrase)));
+        }
+    }
+    assert!(lacking.is_empty(), "docs/findings.md lacks {lacking:#?}");
+    assert!(checked > 100, "{checked} phrases");
 }
 
 #[test]

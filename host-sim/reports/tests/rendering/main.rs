@@ -2,9 +2,10 @@
 
 mod explanation;
 mod fixture;
+mod phrases;
 
 use fixture::{channel, empty, report};
-use noise_analysis::report::{ChannelReport, ModelErrorReport, Report};
+use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
 use reports::{figure, full_tables, page};
 use roxmltree::{Document, Node};
 
@@ -166,39 +167,100 @@ fn the_terminal_stays_within_a_hundred_columns() {
     }
 }
 
+/// What a browser shows of a page: the text of its elements, without scripts and styles.
+fn visible(page: &str) -> String {
+    let mut text = String::new();
+    let mut hidden = None;
+    for piece in page.split('<') {
+        let (tag, content) = piece.split_once('>').unwrap_or((piece, ""));
+        let name = tag.split_whitespace().next().unwrap_or_default();
+        hidden = match hidden {
+            Some(of) if name.strip_prefix('/') == Some(of) => None,
+            None if ["script", "style"].contains(&name) => Some(name),
+            other => other,
+        };
+        if hidden.is_none() {
+            text = text + " " + content;
+        }
+    }
+    text
+}
+
+/// Numbers with an exponent.
+fn with_exponent(text: &str) -> Vec<&str> {
+    let words = text.split(|letter: char| letter.is_whitespace() || "│()[];…".contains(letter));
+    let bare = words.map(|word| word.trim_matches([',', '.', ':']));
+    bare.filter(|word| word.contains('e') && word.replace('−', "-").parse::<f64>().is_ok()).collect()
+}
+
+#[test]
+fn no_number_with_a_unit_has_an_exponent() {
+    assert_eq!(
+        with_exponent("N 805.1e-6 (−8.0e-4 … 8.2e-4), 1e6; the 12 µg"),
+        ["805.1e-6", "−8.0e-4", "8.2e-4", "1e6"]
+    );
+    let mut small = report();
+    small.channels.push(channel("magn_x", "gauss"));
+    // The accelerometers' N is 36.8 µg/√Hz; a gyro as quiet as this, and its line, are below the prefix m.
+    let gyro = &mut small.channels[2];
+    for point in &mut gyro.curve {
+        point.adev *= 1e-5;
+        point.low *= 1e-5;
+        point.high *= 1e-5;
+    }
+    for model in [&mut gyro.before, &mut gyro.after, &mut gyro.refitted] {
+        model.adev.iter_mut().for_each(|adev| *adev *= 1e-5);
+        for parameter in model.terms.iter_mut().flat_map(|term| term.parameters.values_mut()) {
+            *parameter = Parameter::new(
+                1e-5 * parameter.value,
+                1e-5 * parameter.low,
+                1e-5 * parameter.high,
+                parameter.unit.as_str(),
+            );
+        }
+    }
+    small.sample_rate_hz = 2e6;
+    let mut explained = Vec::new();
+    reports::explanation::write(&small, &mut explained).expect("a vector can be written");
+    let explained = String::from_utf8(explained).expect("text");
+    for (form, shown) in [("--full", text(&small)), ("page", visible(&html(&small))), ("explain", explained)] {
+        assert!(!shown.is_empty(), "{form}");
+        assert_eq!(with_exponent(&shown), Vec::<&str>::new(), "{form}");
+    }
+}
+
 /// Texts that the tables must contain for [`report`], in the format of [`reports::formatting`].
-const EXPECTED: [&str; 33] = [
+const EXPECTED: [&str; 32] = [
     "gyro_x",
     "gyro_y",
     "gyro_z",
     "accl_x",
     "accl_y",
     "accl_z",
-    "0.03714",
-    "0.01430",
-    "0.001217",
-    "0.03680",
-    "0.009300",
-    "0.001300",
-    "37.14e-6",
-    "36.80e-6",
+    "37.1",
+    "14.3",
+    "1.22",
+    "36.8 ± 2.4",
+    "9.3 ± 0.6",
+    "1.30 ± 0.08",
+    "m°/√s",
+    "µg/√Hz",
     "0.01000 … 2.560",
     "1,000,000",
     "2 h 46 min 40 s",
     "1,804",
     "21.84 %",
     "3.946 %",
-    "°/√s",
     "no such slope",
     "°/√h",
-    "2.208",
-    "0.3681",
-    "0.1700",
-    "0.1810",
+    "2.21 ± 0.22",
+    "0.37 ± 0.04",
+    "0.170",
+    "0.181 ± 0.018",
     "10 min",
-    "0.4321",
+    "0.43",
     "enough for a filter",
-    "0.03677",
+    "37 ± 4 m°/√s",
     "Markov time by the autocorrelation",
     "bias instability to ±20 %: record 7 h 30 min more",
 ];
@@ -226,6 +288,8 @@ fn the_page_shows_every_channel_and_coefficient() {
     {
         assert!(page.contains(expected), "{expected}");
     }
+    // A line does not end between a number and its per cent sign.
+    assert!(page.contains("bias instability to ±20\u{a0}%: record"));
     // The overview and one Allan deviation a channel: the fixture has no spectrum and no bias over time.
     assert_eq!(page.matches("<svg").count(), 7);
 }
@@ -285,7 +349,7 @@ fn a_model_that_fails_at_one_averaging_time_is_told_in_words() {
     let mut report = report();
     let error = &mut report.channels[0].after.unseen;
     (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(-12.34), Some(1310.72), Some(38.7));
-    let words = "at τ = 21 min 51 s the model is 38.70 times what is measured in the unseen half (-12.34 sigma)";
+    let words = "at τ = 21 min 51 s the model is 38.70 times what is measured in the unseen half (−12.34 sigma)";
     let flat = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(flat(text(&report)).contains(words), "{}", text(&report));
     assert!(html(&report).contains(words));
@@ -296,14 +360,15 @@ fn a_model_that_fails_at_one_averaging_time_is_told_in_words() {
     assert!(flat(text(&report)).contains(words) && html(&report).contains(words));
     // A deviation as chance has it is a number in the table only.
     let usual = fixture::report();
-    assert!(!text(&usual).contains("what is measured") && text(&usual).contains("-1.876"));
-    assert!(html(&usual).contains("-1.876 σ"));
+    assert!(!text(&usual).contains("what is measured") && text(&usual).contains("−1.876"));
+    assert!(html(&usual).contains("−1.876 σ"));
 }
 
 #[test]
 fn the_deviation_by_the_spectrum_stands_beside_the_curve() {
     let report = report();
-    let by_spectrum = reports::formatting::number(report.channels[0].curve[3].adev_by_spectrum.expect("resolved"));
+    // 1.003 times the measured deviation, m°/s; the interval of the measured one is narrower than 1 %.
+    let by_spectrum = format!("{:.1}", 1e3 * report.channels[0].curve[3].adev_by_spectrum.expect("resolved"));
     for shown in [text(&report), html(&report)] {
         assert!(shown.contains("by PSD") && shown.contains(&by_spectrum), "{by_spectrum}");
         assert!(shown.contains("+1.9 % from the fit"));

@@ -4,8 +4,11 @@
 #[path = "../rendering/fixture.rs"]
 #[allow(dead_code)]
 mod fixture;
+#[path = "../rendering/phrases.rs"]
+mod phrases;
 
 use noise_analysis::report::{Finding, Parameter, Report, Stretch, Validation};
+use phrases::{documentation, phrases};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -203,32 +206,9 @@ fn departures_at_one_place_are_told_together() {
     assert!(told.ends_with("; gyro z: +2.1 % at averaging times around 1.2 ms"), "{told}");
 }
 
-/// The parts of a sentence between numbers, names and punctuation that have two words or more.
-fn phrases(sentence: &str) -> Vec<String> {
-    let is_word = |word: &str| !word.is_empty() && word.chars().all(|letter| letter.is_alphabetic() || letter == '-');
-    let is_name = |word: &str| {
-        ["gyro", "gyros", "accel", "accels", "x", "y", "z", "N", "B", "K", "h", "s", "min", "d", "ms"].contains(&word)
-    };
-    let mut phrases = vec![String::new()];
-    for word in sentence.split_whitespace() {
-        let bare = word.trim_matches(|letter: char| ".,:;()!".contains(letter));
-        let last = phrases.last_mut().expect("one at least");
-        if is_word(bare) && !is_name(bare) {
-            *last += &format!("{}{bare}", if last.is_empty() { "" } else { " " });
-        }
-        if !is_word(bare) || is_name(bare) || bare != word {
-            phrases.push(String::new());
-        }
-    }
-    phrases.retain(|phrase| phrase.contains(' '));
-    phrases
-}
-
 #[test]
 fn the_documentation_explains_every_sentence_about_the_record() {
-    let page =
-        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/findings.md")).expect("the page");
-    let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    let page = documentation();
     let mut moved = report();
     moved.part.note = Some("without time stamps the clock is not measured; why".to_owned());
     moved.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
