@@ -54,9 +54,8 @@ where
 {
     // SAFETY: as the caller promises.
     let (estimator, curve) = unsafe { curve_of(estimator, [sample_period, lsb], curve)? };
-    let sums = |octave: usize| -> OctaveSums { estimator.octave_sums(octave).unwrap_or_default() };
-    // The points of an estimator with fewer octaves are the first ones of a curve with room for more.
-    Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_curve(curve, sample_period, estimator.len(), sums);
+    let (samples, sums) = (estimator.len(), octave_sums(estimator));
+    Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_curve(curve, sample_period, samples, sums);
     curve.scale(lsb);
     Ok(())
 }
@@ -74,10 +73,18 @@ where
 {
     // SAFETY: as the caller promises.
     let (estimator, curve) = unsafe { curve_of(estimator, [sample_period, lsb], curve)? };
-    let sums = |octave: usize| -> OctaveSums { estimator.octave_sums(octave).unwrap_or_default() };
-    Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_without_confidence(curve, sample_period, estimator.len(), sums);
+    let (samples, sums) = (estimator.len(), octave_sums(estimator));
+    Cascade::<{ Points::OCTAVES }, OVERLAP>::rebuild_without_confidence(curve, sample_period, samples, sums);
     curve.scale(lsb);
     Ok(())
+}
+
+/// The sums of each octave; those of an octave that the estimator does not have are empty, so that its points are the first ones
+/// of a curve with room for more.
+fn octave_sums<const OCTAVES: usize, const OVERLAP: usize>(
+    estimator: &Estimator<OCTAVES, OVERLAP>,
+) -> impl Fn(usize) -> OctaveSums + '_ {
+    |octave| estimator.octave_sums(octave).unwrap_or_default()
 }
 
 /// The estimator, and the memory of its curve, which is empty at first; an error if a number is not positive.
