@@ -96,7 +96,7 @@ pub(crate) fn estimate(
     let mut joint: Vec<ChannelDeviance> =
         dithered().zip(&curves).map(|(channel, curve)| ChannelDeviance::new(channel, curve)).collect();
     for channel in &mut joint {
-        channel.divide_by_dispersion(filters);
+        channel.fit_alone(filters);
     }
     let unfiltered: Vec<f64> = joint.iter_mut().map(|channel| channel.unfiltered()).collect();
     let tried = filters.iter().flat_map(|&filter| [Some(filter), slowest_deviance(&mut joint, filter)]).flatten();
@@ -178,6 +178,8 @@ struct ChannelDeviance<'a> {
     others: Vec<NoiseTerm>,
     /// By how much the deviance exceeds that of a curve which a filter describes, at least 1; what it is divided by.
     dispersion: f64,
+    /// Each filter that may be read slowly, at the decimation that fits this channel best.
+    slowest: Vec<MovingAverageFilter>,
 }
 
 impl<'a> ChannelDeviance<'a> {
@@ -193,16 +195,19 @@ impl<'a> ChannelDeviance<'a> {
             model,
             others,
             dispersion: 1.0,
+            slowest: Vec::new(),
         }
     }
 
-    /// Sets the dispersion by the least deviance with any of `filters`, at their own rate or read slowly, or with none.
-    fn divide_by_dispersion(&mut self, filters: &[MovingAverageFilter]) {
+    /// Sets the dispersion by the least deviance with any of `filters`, at their own rate or read slowly, or with none; and the
+    /// decimations that fit best.
+    fn fit_alone(&mut self, filters: &[MovingAverageFilter]) {
         let mut least = self.unfiltered();
         for &filter in filters {
             least = least.min(self.deviance(filter));
             if let Some(slow) = slowest_deviance(std::slice::from_mut(self), filter) {
                 least = least.min(self.deviance(slow));
+                self.slowest.push(slow);
             }
         }
         // The white noise, the other terms, and the decimation are fitted.
@@ -337,7 +342,8 @@ fn contradictions(
     let required = chi_squared_quantile(1.0 - SIGNIFICANCE, 1.0);
     let fits = joint.iter_mut().zip(&common.deviances).zip(scatters).zip(shown).filter(|(_, shown)| **shown);
     for (((channel, deviance), scatter), _) in fits {
-        let Some(own) = slowest_deviance(std::slice::from_mut(channel), filter) else { continue };
+        let is_same = |of: &&MovingAverageFilter| (of.stages, of.taps) == (filter.stages, filter.taps);
+        let Some(&own) = channel.slowest.iter().find(is_same) else { continue };
         let rise = ((deviance - channel.deviance(own)) / scatter).max(0.0);
         found.rises.push(rise);
         if rise > required {

@@ -1,9 +1,9 @@
 //! Preprocessing: what the detectors find in the samples of each channel, and the series without it.
 //!
 //! Repeated samples become gaps of every channel, knocks and spikes gaps of the channel that shows them; a bias step is
-//! subtracted, and so is a response to vibration, or to temperature behind a lag or with a curvature. A ramp is reported and stays in the samples, because
-//! the noise model has a term for it. A sensitivity to temperature or supply stays in them too, and is kept for the
-//! regression on covariates.
+//! subtracted, and so is a response to vibration, or to temperature behind a lag or with a curvature. A ramp is reported and
+//! stays in the samples, because the noise model has a term for it. A sensitivity to temperature or supply stays in them too,
+//! and is kept for the regression on covariates.
 
 use crate::detectors::bias::{BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
@@ -130,9 +130,9 @@ impl Preprocessing {
             } else {
                 let first_half = |of: &Series| of.before(measurement.middle());
                 let others: Vec<Series> = others.iter().copied().map(first_half).collect();
-                let all: Vec<Series> = series.iter().map(first_half).collect();
-                let own = first_half(&series[at]).without(&exclusion.by_first_half);
                 let others: Vec<&Series> = others.iter().collect();
+                let all: Vec<Series> = series.iter().map(first_half).collect();
+                let own = all[at].clone().without(&exclusion.by_first_half);
                 bias::find(&own, &others, &accelerations(traced, &all, traced[at]), noise_grids).responses
             };
             ChannelFindings {
@@ -216,8 +216,8 @@ impl Preprocessing {
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
     pub(crate) fn offset(&self, channel: ChannelProfile, exclusion: Exclusion, slot: u64) -> f64 {
         let steps = self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from);
-        let followed = self.responses(channel, exclusion).iter().map(|response| response.bias(slot));
-        steps.map(|(.., size)| *size).chain(followed).sum()
+        let responses = self.responses(channel, exclusion).iter().map(|response| response.bias(slot));
+        steps.map(|(.., size)| *size).chain(responses).sum()
     }
 
     /// The responses of a channel to temperature and vibration that are subtracted from its samples.

@@ -22,10 +22,8 @@ impl Cause {
     /// a line that has a width in some channels it is one of these: a channel in which it is weaker may not resolve it.
     pub(super) fn clearest(&self) -> &Shown {
         let has_width = |shown: &&Shown| shown.effect.kind == "resonance";
-        if let Some(widest) = self.shown.iter().filter(has_width).reduce(narrower) {
-            return widest;
-        }
-        self.shown[1..].iter().fold(&self.shown[0], narrower)
+        let of_width = self.shown.iter().filter(has_width).reduce(narrower);
+        of_width.unwrap_or_else(|| self.shown[1..].iter().fold(&self.shown[0], narrower))
     }
 }
 

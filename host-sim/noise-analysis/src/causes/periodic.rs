@@ -19,7 +19,6 @@ const SQUARE_TOLERANCE: f64 = 0.36;
 /// Probability that an unrelated line has the amplitude of a harmonic of a square wave within [`SQUARE_TOLERANCE`], if
 /// amplitudes are spread evenly over the logarithm of two decades: ln(1.36/0.64)/ln 100.
 const SQUARE_BY_CHANCE: f64 = 0.164;
-
 /// By which part of the record's resolution lines that are a few resolutions apart move each other's frequency.
 const SHIFT_OF_NEIGHBOURS: f64 = 0.1;
 

@@ -45,8 +45,8 @@ pub(crate) struct BiasChanges {
     pub responses: Vec<BiasResponse>,
 }
 
-/// What a bias may follow that was measured.
-struct Followed<'a> {
+/// What was measured beside the channel that its bias may depend on.
+struct Covariates<'a> {
     /// Block means of each regressor, with its index.
     regressors: Vec<(usize, DVector<f64>)>,
     /// The regressor that is the temperature.
@@ -126,10 +126,10 @@ fn find_on_common_samples(
         .iter()
         .find_map(|(index, _)| Some((*index, TemperatureCourse::new(series_of(*index)?, blocks.width)?)));
     let vibrations = accelerations.iter().filter_map(|of| Vibration::new(*of, &blocks)).collect();
-    let followed = Followed { regressors, temperature, vibrations };
+    let covariates = Covariates { regressors, temperature, vibrations };
     let mut accepted: Vec<Accepted> = Vec::new();
     while accepted.len() < MOST
-        && let Some(next) = best_candidate(series, &blocks, &grid, &followed, &accepted)
+        && let Some(next) = best_candidate(series, &blocks, &grid, &covariates, &accepted)
     {
         accepted.push(next);
     }
@@ -147,18 +147,18 @@ fn find_on_common_samples(
             Candidate::Regressor(index) => {
                 let RegressionEstimate { size: sensitivity, error, .. } = estimate;
                 changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error }));
-                if followed.temperature.as_ref().is_some_and(|(of, _)| of == index) {
+                if covariates.temperature.as_ref().is_some_and(|(of, _)| of == index) {
                     linear = Some(estimate);
                 }
             }
             Candidate::Lagged(lag) => lagged = Some((lag, estimate)),
             Candidate::Squared => squared = Some(estimate),
             Candidate::Vibration(at) => {
-                changes.responses.push(followed.vibrations[*at].response(&estimate, series.unit));
+                changes.responses.push(covariates.vibrations[*at].response(&estimate, series.unit));
             }
         }
     }
-    if let Some((_, course)) = &followed.temperature {
+    if let Some((_, course)) = &covariates.temperature {
         let curved = squared.map(|estimate| course.squared_response(linear.as_ref(), &estimate, series.unit));
         let behind_lag = lagged.map(|(lag, estimate)| course.lag_response(lag, &estimate, series.unit));
         changes.responses.extend(behind_lag.or(curved));
@@ -176,10 +176,10 @@ fn best_candidate(
     series: &Series,
     blocks: &BlockMeans,
     grid: &NoiseGrid,
-    followed: &Followed,
+    covariates: &Covariates,
     accepted: &[Accepted],
 ) -> Option<Accepted> {
-    let Followed { regressors, temperature, vibrations } = followed;
+    let Covariates { regressors, temperature, vibrations } = covariates;
     let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
     let regression = GlsRegression::new(blocks, grid, &known);
     let ramp = blocks.ramp();
