@@ -228,3 +228,37 @@ impl MergedLine {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::find;
+    use crate::series::Series;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    /// 400 s at 50 Hz: white noise of deviation 1 with a sinusoid of amplitude 1 at 7.3 Hz, which swells and fades by `depth` five times.
+    fn series(depth: f64) -> Series {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let slots = 0..20_000_u64;
+        let value = |slot: u64| {
+            let time_s = 0.02 * slot as f64;
+            let amplitude = 1.0 + depth * (TAU * 5.0 * time_s / 400.0).sin();
+            amplitude * (TAU * 7.3 * time_s).sin() + random.sample::<f64, _>(StandardNormal)
+        };
+        let values = slots.clone().map(value).collect();
+        Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.02, resolution: 1e-6, unit: "g" }
+    }
+
+    #[test]
+    fn a_line_that_swells_and_fades_has_sidebands() {
+        let of =
+            |depth: f64| find(&series(depth), None, 0.0).first().map(|line| (line.frequency.value, line.sidebands));
+        let (frequency, sidebands) = of(0.5).expect("100 times the noise at its frequency");
+        // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
+        assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");
+        assert!((sidebands.expect("two at a quarter of the amplitude") - 5.0 / 400.0).abs() < 0.0025, "{sidebands:?}");
+        assert_eq!(of(0.0).map(|(_, sidebands)| sidebands), Some(None));
+    }
+}

@@ -177,7 +177,46 @@ fn two_sided(ratio: f64, edf: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::two_sided;
+    use super::{level_by_temperature, two_sided};
+    use crate::series::Series;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 64_000;
+
+    fn series(value: impl FnMut(usize) -> f64) -> Series {
+        let slots = 0..SAMPLES as u64;
+        let values = (0..SAMPLES).map(value).collect();
+        Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.01, resolution: 1e-6, unit: "deg/s" }
+    }
+
+    /// Three quarters of a period between 20 and 30 degC.
+    fn temperature_c(at: usize) -> f64 {
+        25.0 + 5.0 * (0.75 * TAU * at as f64 / SAMPLES as f64).sin()
+    }
+
+    #[test]
+    fn a_level_that_follows_the_temperature_is_found_and_others_are_not() {
+        let temperature = series(temperature_c);
+        let noise = |seed: u64, level: fn(usize) -> f64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            series(move |at| level(at) * random.sample::<f64, _>(StandardNormal))
+        };
+        // From 20 to 30 degC the deviation rises as exp(0.04·10): by 49 %. Of 64 blocks of 1,000 differences each, whose squares have
+        // the relative variance 3/1000, the slope over the range is known to 0.5·√(3/1000/64)/0.35, which is 1 % of 1.49.
+        let found =
+            level_by_temperature(&noise(1, |at| (0.04 * temperature_c(at)).exp()), &temperature).expect("follows");
+        let excess = found.parameters["excess_percent"].value;
+        assert!((excess - 100.0 * 0.4_f64.exp_m1()).abs() < 5.0, "{excess}");
+        // A constant level, and one that goes up and down twice in the meantime.
+        for seed in 2..12 {
+            assert!(level_by_temperature(&noise(seed, |_| 1.0), &temperature).is_none(), "{seed}");
+        }
+        let twice = |at: usize| 1.0 + 0.3 * (2.0 * TAU * at as f64 / SAMPLES as f64).sin();
+        assert!(level_by_temperature(&noise(12, twice), &temperature).is_none());
+    }
 
     /// Quantiles of χ² from tables (Abramowitz and Stegun, table 26.8): 0.5 % on either side.
     #[test]
