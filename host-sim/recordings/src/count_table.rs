@@ -3,6 +3,7 @@
 use crate::delimited_text::{self, Lines};
 use crate::frame_log;
 use crate::input_error::{InputError, Reason};
+use crate::read_monitor::ReadMonitor;
 use crate::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use std::path::{Path, PathBuf};
@@ -33,7 +34,15 @@ enum Column {
 /// The file cannot be read, the header has an unknown column or no channel, or a row does not have one field in range for
 /// each column.
 pub fn read(file: &Path, range: GyroRange) -> Result<Recording, InputError> {
-    let mut table = CountTable::open(file)?;
+    read_monitored(file, range, &ReadMonitor::default())
+}
+
+/// As [`read`]; `monitor` counts the bytes and may stop the reading.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_monitored(file: &Path, range: GyroRange, monitor: &ReadMonitor) -> Result<Recording, InputError> {
+    let mut table = CountTable::new(file, Lines::open_monitored(file, monitor)?)?;
     let mut recorder = Recorder::new(table.channels(), range);
     while let Some(row) = table.next()? {
         recorder.push(row.time_stamp, &Burst::from_counts(&row.counts));
@@ -74,6 +83,8 @@ pub struct CountTable {
     columns: Vec<Column>,
     line: u64,
     rows: u64,
+    /// Rows that the reader holds at most.
+    most_rows: u64,
     last: Option<TimeStamp>,
 }
 
@@ -92,7 +103,12 @@ impl CountTable {
             return Err(InputError::file(file, Reason::Empty));
         };
         let columns = columns(file, line, header)?;
-        Ok(Self { file: file.to_owned(), lines, columns, line, rows: 0, last: None })
+        Ok(Self { file: file.to_owned(), lines, columns, line, rows: 0, most_rows: MAX_SAMPLES, last: None })
+    }
+
+    /// The same table for a reader that does not hold its rows.
+    pub(crate) fn of_any_length(self) -> Self {
+        Self { most_rows: u64::MAX, ..self }
     }
 
     /// The channels that the table has, in the order of the burst.
@@ -100,6 +116,16 @@ impl CountTable {
         let mut channels: Vec<Channel> = self.columns.iter().filter_map(|c| c.channel()).collect();
         channels.sort();
         channels
+    }
+
+    /// Rows that were read.
+    pub(crate) fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Whether the reading was stopped before the end of the table.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.lines.is_stopped()
     }
 
     /// Line of the row that was read last, from 1.
@@ -122,7 +148,7 @@ impl CountTable {
         let checked =
             row(&self.columns, text).and_then(|row| order(self.last.unwrap_or_default(), row.time_stamp).map(|()| row));
         self.rows += 1;
-        if self.rows > MAX_SAMPLES {
+        if self.rows > self.most_rows {
             return Err(InputError::line(&self.file, line, Reason::TooManySamples));
         }
         match checked {
