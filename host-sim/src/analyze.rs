@@ -97,7 +97,7 @@ fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Repo
             interrupted(stream.description().samples);
         }
         note_all(stream.notes());
-        let bar = progress::fitting(stream.description().channels.len(), "fitting");
+        let bar = progress::analysing(Some(stream.description().channels.len()));
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
         return Ok(report);
@@ -109,7 +109,7 @@ fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Repo
         interrupted(measurement.len() as u64);
     }
     note_all(&notes);
-    let bar = progress::fitting(0, "analysing");
+    let bar = progress::analysing(None);
     let report = analyze(&measurement);
     bar.finish_and_clear();
     Ok(report)

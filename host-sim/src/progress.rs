@@ -16,7 +16,8 @@ use std::time::Duration;
 const INTERVAL: Duration = Duration::from_millis(100);
 const READING: &str = "reading {wide_bar} {bytes}/{total_bytes} {eta}";
 const READING_PIPE: &str = "reading {spinner} {bytes} {elapsed}";
-const FITTING: &str = "{msg} {wide_bar} {pos}/{len} {elapsed}";
+const FITTING: &str = "fitting {wide_bar} {pos}/{len} channels {elapsed}";
+const ANALYSING: &str = "analysing {spinner} {elapsed}";
 /// Exit status of a program that an interrupt has ended, as shells have it.
 const INTERRUPTED: i32 = 130;
 
@@ -86,9 +87,13 @@ impl Drop for Progress {
     }
 }
 
-/// The bar of `parts` parts of an analysis.
-pub(crate) fn fitting(parts: usize, what: &'static str) -> ProgressBar {
-    let bar = progress_bar(parts as u64, FITTING).with_message(what);
+/// The bar of an analysis of which `channels` channels are fitted one after the other; of one that does not tell how far it is, where
+/// that is `None`.
+pub(crate) fn analysing(channels: Option<usize>) -> ProgressBar {
+    let bar = match channels {
+        Some(channels) => progress_bar(channels as u64, FITTING),
+        None => progress_bar(0, ANALYSING),
+    };
     bar.enable_steady_tick(INTERVAL);
     bar
 }

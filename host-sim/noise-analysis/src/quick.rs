@@ -55,11 +55,12 @@ struct GappedEstimator {
 }
 
 impl GappedEstimator {
-    fn push(&mut self, count: i32) {
-        if self.missing > 0 {
+    /// Takes samples that follow each other.
+    fn push(&mut self, counts: &[i32]) {
+        if self.missing > 0 && !counts.is_empty() {
             self.cascade.gap(std::mem::take(&mut self.missing));
         }
-        self.cascade.push(count);
+        self.cascade.push_slice(counts);
     }
 
     fn miss(&mut self, samples: u64) {
@@ -145,29 +146,42 @@ impl CurveEstimators {
 impl ChannelEstimators {
     /// Takes the next samples of the channel; `last` is the sample period before them, `middle` the first of the second half.
     fn push(&mut self, slots: &[u64], channel: &MeasuredChannel, last: Option<u64>, middle: u64) {
-        let mut is_refused = vec![false; if channel.refused.is_empty() { 0 } else { slots.len() }];
+        let mut refused: Vec<usize> = channel.refused.values().flatten().copied().collect();
+        refused.sort_unstable();
         for (&cause, positions) in &channel.refused {
             *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
-            positions.iter().for_each(|&position| is_refused[position] = true);
         }
+        let steps: Vec<i32> = channel.counts.iter().map(|count| count.saturating_mul(STEPS_PER_COUNT as i32)).collect();
+        let second = slots.partition_point(|&slot| slot < middle);
+        let mut refused = refused.into_iter().peekable();
         let mut before = last;
-        for (position, (&slot, &count)) in slots.iter().zip(&channel.counts).enumerate() {
+        let mut first = 0;
+        while first < slots.len() {
+            // The samples from `first` on that follow each other in one half and are used; the one behind them may be refused.
+            let end_of_half = if first < second { second } else { slots.len() };
+            let refused_at = refused.peek().copied().unwrap_or(usize::MAX).min(end_of_half);
+            let follows = |&at: &usize| slots[at] - slots[at - 1] == 1;
+            let end = (first + 1..refused_at).take_while(follows).last().map_or(first, |last| last) + 1;
+            let (slot, is_second) = (slots[first], first >= second);
             let missing = before.map_or(0, |before| slot - before - 1);
-            before = Some(slot);
-            let is_second = slot >= middle;
             let half = &mut self.halves[usize::from(is_second)];
             if missing > 0 {
                 self.whole.miss(missing);
                 // Of a gap over the middle, each half has the samples on its side.
                 half.miss(if is_second { missing.min(slot - middle) } else { missing });
             }
-            if is_refused.get(position) == Some(&true) {
+            if refused.next_if_eq(&first).is_some() {
+                while refused.next_if_eq(&first).is_some() {}
                 self.whole.miss(1);
                 half.miss(1);
-            } else {
-                self.whole.push(count);
-                half.push(count.saturating_mul(STEPS_PER_COUNT as i32));
+                before = Some(slot);
+                first += 1;
+                continue;
             }
+            self.whole.push(&channel.counts[first..end]);
+            half.push(&steps[first..end]);
+            before = Some(slots[end - 1]);
+            first = end;
         }
     }
 }

@@ -129,6 +129,13 @@ impl Drop for Lines {
 
 /// The text of a line without the blanks around it.
 fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
+    let plain = bytes.trim_ascii();
+    if let [first, .., last] = plain
+        && first.is_ascii_graphic()
+        && last.is_ascii_graphic()
+    {
+        return std::str::from_utf8(plain);
+    }
     std::str::from_utf8(bytes).map(|text| text.trim_start_matches('\u{feff}').trim())
 }
 
