@@ -47,7 +47,7 @@ pub struct SampleStream {
 
 enum Content {
     Held(Box<Measurement>),
-    Counts(Source<GyroRange>),
+    Counts(Box<Source<GyroRange>>),
     Values(Box<Values>),
 }
 
@@ -128,7 +128,7 @@ impl SampleStream {
         };
         let mut description = RecordingDescription::from(&base.measurement);
         drop((recording, base.measurement));
-        let content = Content::Counts(source);
+        let content = Content::Counts(Box::new(source));
         description.samples = 0;
         let mut stream = Self { content, description, notes: Vec::new(), monitor: monitor.clone() };
         stream.survey()?;

@@ -150,8 +150,7 @@ impl StreamClock {
         let ready = if is_last { self.ahead.len() } else { (self.ahead.len() + 1).saturating_sub(MAX_QUEUE) };
         let envelope = minimum_ahead(&self.ahead, MAX_QUEUE);
         let mut placed = Vec::with_capacity(ready);
-        for at in 0..ready {
-            let (late, least) = (self.ahead[at], envelope[at]);
+        for ((&late, &least), &time_s) in self.ahead.iter().zip(&envelope).zip(&self.times_s).take(ready) {
             let excess = self.level.minimum().map_or(0.0, |level| least - self.missing as f64 - level);
             if excess >= LOSS {
                 // A float beyond the range of u64 saturates.
@@ -162,7 +161,7 @@ impl StreamClock {
             let period = self.missing.saturating_add(self.placed);
             self.placed += 1;
             if late - self.missing as f64 - self.level.minimum().unwrap_or(0.0) < 1.0 {
-                self.line.add(period as f64, self.times_s[at]);
+                self.line.add(period as f64, time_s);
             } else {
                 self.late += 1;
             }
