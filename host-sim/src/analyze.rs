@@ -2,6 +2,8 @@
 
 use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
 use crate::output::{self, note};
+use crate::progress::{self, Progress};
+use crate::{many, quick};
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
 use noise_analysis::analysis::analyze;
@@ -10,8 +12,9 @@ use noise_analysis::several::{self, NoiseAgreement, NoiseInflation};
 use recordings::any_sensor::{ReadOptions, SensorRecording};
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::recording::Recording;
+use recordings::sample_stream::{SampleStream, StreamError};
 use recordings::time_base::{StampQuality, time_base};
-use recordings::{ColumnSelection, Printable, count_table};
+use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
 use serde::Serialize;
 use simulation::Replay;
 use std::fs;
@@ -24,13 +27,24 @@ const GENERIC: &str = "generic";
 
 /// Analyses the recordings of the arguments and writes the report, or the summary of several.
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
-    let AnalyzeArguments { recording, more, against, output } = arguments;
-    let inputs: Vec<&Path> =
-        [&recording.input.file].into_iter().chain(more).chain(against).map(PathBuf::as_path).collect();
+    let AnalyzeArguments { recording, more, against, quick, reports, output } = arguments;
+    let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = files.iter().copied().chain(against.as_deref()).collect();
+    if let Some(folder) = reports {
+        let analyze = |file: &Path| {
+            let recording = of_file(recording, file);
+            if *quick { quick_report(&recording, &ReadMonitor::default()) } else { whole_report(&recording) }
+        };
+        return many::write_reports(&files, folder, output.quiet, analyze);
+    }
     output::check(output, &inputs)?;
     if more.is_empty() && against.is_none() {
         let source = output::source_name(&recording.input.file);
-        return output::write_report(&analyze(&read_measurement(recording)?), Some(&source), output);
+        let report = watched_report(recording, *quick)?;
+        return output::write_report(&report, Some(&source), output);
+    }
+    if *quick {
+        bail!("several recordings have a summary and no report: leave out --quick, or give --reports DIR");
     }
     let refused = [
         ("--page", output.page.is_some()),
@@ -42,12 +56,8 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     if !refused.is_empty() {
         bail!("several recordings have a summary and no report: leave out {}", refused.join(", "));
     }
-    let read_other = |file: &PathBuf| {
-        let input = InputArguments { file: file.clone(), ..recording.input.clone() };
-        read_measurement(&RecordingArguments { input, ..recording.clone() })
-    };
-    let still: Vec<Measurement> =
-        [&recording.input.file].into_iter().chain(more).map(read_other).collect::<Result<_>>()?;
+    let read_other = |file: &Path| read_measurement(&of_file(recording, file));
+    let still: Vec<Measurement> = files.into_iter().map(read_other).collect::<Result<_>>()?;
     let agreement = (still.len() > 1).then(|| several::compare(&still)).transpose()?;
     let inflation = match against {
         Some(file) => Some(several::inflation(&still, &read_other(file)?)?),
@@ -62,6 +72,80 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     output::print(|out| {
         agreement.as_ref().map_or(Ok(()), |agreement| reports::several::write_agreement(agreement, out))?;
         inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
+    })
+}
+
+/// The same arguments for another file.
+fn of_file(recording: &RecordingArguments, file: &Path) -> RecordingArguments {
+    let input = InputArguments { file: file.to_owned(), ..recording.input.clone() };
+    RecordingArguments { input, ..recording.clone() }
+}
+
+/// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
+fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Report> {
+    let mut progress = Progress::reading(&recording.input.file)?;
+    let monitor = progress.monitor().clone();
+    let interrupted = |samples: u64| {
+        note(format_args!(
+            "interrupted: this is the report of the first {samples} samples, which were read until then"
+        ));
+    };
+    if is_quick {
+        let mut stream = open_stream(recording, &monitor)?;
+        let estimators = quick::estimate(&mut stream)?;
+        if progress.end_reading() {
+            interrupted(stream.description().samples);
+        }
+        note_all(stream.notes());
+        let bar = progress::analysing(Some(stream.description().channels.len()));
+        let report = estimators.report(&|| bar.inc(1));
+        bar.finish_and_clear();
+        return Ok(report);
+    }
+    let read = read_with(recording, &monitor);
+    let is_interrupted = progress.end_reading();
+    let (measurement, notes) = read?;
+    if is_interrupted {
+        interrupted(measurement.len() as u64);
+    }
+    note_all(&notes);
+    let bar = progress::analysing(None);
+    let report = analyze(&measurement);
+    bar.finish_and_clear();
+    Ok(report)
+}
+
+/// The whole report of a recording.
+fn whole_report(recording: &RecordingArguments) -> Result<Report> {
+    Ok(analyze(&read_with(recording, &ReadMonitor::default())?.0))
+}
+
+/// The report of the curves of a recording alone.
+fn quick_report(recording: &RecordingArguments, monitor: &ReadMonitor) -> Result<Report> {
+    let mut stream = open_stream(recording, monitor)?;
+    Ok(quick::estimate(&mut stream)?.report(&|| {}))
+}
+
+fn note_all(notes: &[String]) {
+    notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
+}
+
+/// Opens a recording of any format to read it in blocks.
+fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor) -> Result<SampleStream> {
+    let name = || recording.input.file.display().to_string();
+    let opened = match open(&recording.input, monitor)? {
+        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate),
+        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, options, recording.rate),
+        Opened::Replayed(replayed) => {
+            let (measurement, notes) = on_time_base(&replayed, recording.rate).with_context(name)?;
+            note_all(&notes);
+            return Ok(SampleStream::held(measurement, monitor));
+        }
+    };
+    opened.map_err(|error| match error {
+        // The others name the file themselves.
+        StreamError::TimeBase(error) => anyhow::Error::from(error).context(name()),
+        error => error.into(),
     })
 }
 
@@ -88,7 +172,9 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
 pub(crate) fn analyze_recording(recording: &Recording, rate_hz: Option<f64>) -> Result<Report> {
-    Ok(analyze(&on_time_base(recording, rate_hz)?))
+    let (measurement, notes) = on_time_base(recording, rate_hz)?;
+    note_all(&notes);
+    Ok(analyze(&measurement))
 }
 
 /// What a file of any format holds.
@@ -99,38 +185,66 @@ pub(crate) enum Recorded {
     AnySensor(SensorRecording),
 }
 
-/// Reads a file of any format. What the user should know of an SPI log is noted.
-pub(crate) fn read(arguments: &InputArguments) -> Result<Recorded> {
+/// An open file, by the way in which it is read.
+enum Opened {
+    /// Register counts of an ADIS16405.
+    Counts(InputFile),
+    /// Numbers of any sensor.
+    AnySensor(InputFile, ReadOptions),
+    /// A log of the bus of an ADIS16405, which was read.
+    Replayed(Recording),
+}
+
+/// Opens a file of any format. What the user should know of an SPI log is noted.
+fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     let InputArguments { file, range, sensor, columns, units, topic } = arguments;
     let sensor = sensor.as_deref().map(sensor_profile).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
-    let input = InputFile::open(file)?;
+    let input = InputFile::open_monitored(file, monitor)?;
     let is_adis16405 = sensor.as_ref().is_none_or(|sensor| sensor.name == adis16405::NAME);
     match input.format() {
-        FileFormat::FrameLog | FileFormat::SpiExport => replayed(&input, *range).map(Recorded::Counts),
-        FileFormat::CountTable if is_adis16405 && selection.is_empty() => {
-            let recording = count_table::read(input.path(), (*range).into()).map_err(|error| input.rename(error))?;
-            Ok(Recorded::Counts(recording))
-        }
+        FileFormat::FrameLog | FileFormat::SpiExport => replayed(&input, *range).map(Opened::Replayed),
+        FileFormat::CountTable if is_adis16405 && selection.is_empty() => Ok(Opened::Counts(input)),
         _ => {
             let sensor = sensor.unwrap_or_else(SensorProfile::generic);
-            Ok(Recorded::AnySensor(input.read(&ReadOptions { sensor, selection, topic: topic.clone() })?))
+            Ok(Opened::AnySensor(input, ReadOptions { sensor, selection, topic: topic.clone() }))
         }
+    }
+}
+
+/// Reads a file of any format. What the user should know of an SPI log is noted.
+pub(crate) fn read(arguments: &InputArguments) -> Result<Recorded> {
+    read_content(arguments, &ReadMonitor::default())
+}
+
+fn read_content(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Recorded> {
+    match open(arguments, monitor)? {
+        Opened::Counts(input) => {
+            let recording = count_table::read_monitored(input.path(), arguments.range.into(), monitor);
+            Ok(Recorded::Counts(recording.map_err(|error| input.rename(error))?))
+        }
+        Opened::AnySensor(input, options) => Ok(Recorded::AnySensor(input.read(&options)?)),
+        Opened::Replayed(recording) => Ok(Recorded::Counts(recording)),
     }
 }
 
 /// The samples of a recording of any format on their time base. What the user should know is noted.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
+    let (measurement, notes) = read_with(arguments, &ReadMonitor::default())?;
+    note_all(&notes);
+    Ok(measurement)
+}
+
+/// The samples of a recording of any format on their time base, and what the user should know.
+fn read_with(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<(Measurement, Vec<String>)> {
     let RecordingArguments { input, rate } = arguments;
     let name = || input.file.display().to_string();
-    match read(input)? {
+    match read_content(input, monitor)? {
         Recorded::Counts(recording) => on_time_base(&recording, *rate).with_context(name),
         Recorded::AnySensor(recording) => {
-            let (base, notes) = recording.time_base(*rate).with_context(name)?;
-            for sentence in notes.into_iter().chain(base.stamps.iter().flat_map(StampQuality::notes)) {
-                note(format_args!("{sentence}"));
-            }
-            Ok(base.measurement)
+            let (base, mut notes) = recording.time_base(*rate).with_context(name)?;
+            notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
+            Ok((base.measurement, notes))
         }
     }
 }
@@ -139,21 +253,17 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
 fn replayed(input: &InputFile, range: GyroRangeArgument) -> Result<Recording> {
     let Replay { recording, other_transactions, timing } =
         simulation::replay(input.path(), range.into()).map_err(|error| input.rename(error))?;
-    for sentence in timing.notes() {
-        note(format_args!("{sentence}"));
-    }
+    note_all(&timing.notes());
     if other_transactions > 0 {
         note(format_args!("{other_transactions} transactions that are no bursts"));
     }
     Ok(recording)
 }
 
-fn on_time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Measurement> {
+fn on_time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<(Measurement, Vec<String>)> {
     let base = time_base(recording, rate_hz)?;
-    for sentence in base.stamps.iter().flat_map(StampQuality::notes) {
-        note(format_args!("{sentence}"));
-    }
-    Ok(base.measurement)
+    let notes = base.stamps.iter().flat_map(StampQuality::notes).collect();
+    Ok((base.measurement, notes))
 }
 
 /// The profile of a known sensor, or of a profile file.

@@ -211,12 +211,19 @@ pub(crate) struct AnalyzeArguments {
     /// The first recording, and how to read it and the others.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More recordings of the same sensor: one summary, and whether they show the same noise.
+    /// More recordings of the same sensor: one summary, and whether they show the same noise; with --reports of any sensors.
     #[arg(value_name = "FILE")]
     pub(crate) more: Vec<PathBuf>,
     /// A recording with motors running: its noise over that of the others, by channel and octave.
-    #[arg(long, value_name = "RUNNING")]
+    #[arg(long, value_name = "RUNNING", conflicts_with = "reports")]
     pub(crate) against: Option<PathBuf>,
+    /// Curves, models and errors alone, in memory that does not grow with the recording: no spectra, spikes, steps, temperature,
+    /// common causes or changes of the noise.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Write the report of each recording as NAME.json into this folder, as many recordings at a time as there are cores.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["full", "pictures", "json", "page", "exports", "axis"])]
+    pub(crate) reports: Option<PathBuf>,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,

@@ -1,13 +1,20 @@
 #!/usr/bin/env bash
-# Time and memory of this program and of a script of pandas and allantools on the same table, from the file to the curves, in
-# one run: tests/peers/recording.sh [ROWS]   (a million by default; six channels)
+# Time and memory of this program and of a script of pandas and allantools on the same table, plain and gzip, from the file to the
+# curves, in one run:
 #
-# allantools gives the curves alone; this program everything that a report has. Installs the script's packages into
-# target/peers.
+#     tests/peers/recording.sh [--quick-only] [ROWS…]   (a million rows by default, of six channels)
+#
+# allantools gives the curves alone, `analyze --quick` curves, models, errors and what the trace of the curves finds, `analyze`
+# everything that a report has. With --quick-only neither the script nor the whole analysis runs: for tables that they do not hold.
+# A table of a hundred million rows takes 1.6 GB. Installs the script's packages into target/peers.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-rows=${1:-1000000}
+only_quick=false
+if [ "${1:-}" = --quick-only ]; then
+    only_quick=true
+    shift
+fi
 target=${CARGO_TARGET_DIR:-$PWD/target}
 folder=$target/peers/recording
 mkdir -p "$folder"
@@ -17,25 +24,38 @@ if [ ! -x "$target/peers/python/bin/python" ]; then
 fi
 python=$target/peers/python/bin/python
 cargo build --release --locked --quiet --package host-sim
-table=$folder/$rows.csv
-[ -f "$table" ] || "$python" tests/peers/recording/table.py "$rows" "$table"
 
-# Prints wall time, processor time and the largest memory of a command.
+# Prints wall time, processor time, the largest memory and the processor time of a row of a command.
 measure() {
-    local name=$1
-    shift
-    "$python" - "$name" "$@" <<'MEASURE'
+    local name=$1 rows=$2
+    shift 2
+    "$python" - "$name" "$rows" "$@" <<'MEASURE'
 import os, subprocess, sys, time
 
+name, rows, command = sys.argv[1], float(sys.argv[2]), sys.argv[3:]
 began = time.perf_counter()
-process = subprocess.Popen(sys.argv[2:], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 messages = process.stderr.read()
 _, status, usage = os.wait4(process.pid, 0)
 if status:
-    sys.exit(f"{sys.argv[1]}: {messages.decode()}")
+    sys.exit(f"{name}: {messages.decode()}")
 wall, work = time.perf_counter() - began, usage.ru_utime + usage.ru_stime
-print(f"{sys.argv[1]:<32} {wall:8.2f} s {work:8.2f} s of processor time {usage.ru_maxrss / 1024:7.0f} MB")
+memory = usage.ru_maxrss / 1024
+print(f"{name:<36} {wall:8.2f} s {work:8.2f} s of processor {memory:7.0f} MB {1e6 * work / rows:8.3f} us a row", flush=True)
 MEASURE
 }
-measure "pandas and allantools.oadev" "$python" tests/peers/recording/curves.py "$table" 100
-measure "host-sim analyze" "$target/release/host-sim" analyze "$table" --rate 100 --quiet
+for rows in "${@:-1000000}"; do
+    table=$folder/$rows.csv
+    [ -f "$table" ] || "$python" tests/peers/recording/table.py "$rows" "$table"
+    [ -f "$table.gz" ] || gzip --keep --fast "$table"
+    for file in "$table" "$table.gz"; do
+        echo "$(basename "$file")"
+        if ! $only_quick; then
+            measure "pandas and allantools.oadev" "$rows" "$python" tests/peers/recording/curves.py "$file" 100
+        fi
+        measure "host-sim analyze --quick" "$rows" "$target/release/host-sim" analyze "$file" --rate 100 --quick --quiet
+        if ! $only_quick; then
+            measure "host-sim analyze" "$rows" "$target/release/host-sim" analyze "$file" --rate 100 --quiet
+        fi
+    done
+done

@@ -6,9 +6,11 @@
 //! [that of any sensor](SensorProfile::generic).
 
 pub mod adis16405;
+mod block;
 mod profile;
 pub mod profile_file;
 
+pub use block::{RecordingDescription, SampleBlock};
 pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity, SensorProfile};
 
 use std::collections::BTreeMap;

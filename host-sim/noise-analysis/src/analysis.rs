@@ -51,6 +51,7 @@ pub fn analyze(measurement: &Measurement) -> Report {
     drop((record, first_half));
     let mut report = Report {
         schema: SCHEMA,
+        quick: false,
         sample_rate_hz: measurement.sample_rate_hz,
         samples: measurement.len() as u64,
         dropped: by_cause(&measurement.dropped),

@@ -106,12 +106,7 @@ impl Assessment {
         let markov_time_by_autocorrelation =
             correlation_time(&whole, refitted).map(|time| Parameter::new(time.value, time.low, time.high, "s"));
         if !is_known(refitted) {
-            let note = if series.values.is_empty() {
-                "no sample of the channel was used"
-            } else {
-                "the channel never changes by a count: nothing is known of its noise but that it is below the rounding"
-            };
-            return Self { coefficients_note: Some(note.to_owned()), ..Self::default() };
+            return Self::unknown(!series.values.is_empty());
         }
         let by_spectrum = spectral_white_noise::estimate(&whole, refitted, series.resolution, series.unit);
         Self {
@@ -124,6 +119,31 @@ impl Assessment {
             markov_time_by_autocorrelation,
             record: record_lengths(refitted, whole.duration()),
         }
+    }
+}
+
+impl Assessment {
+    /// What the model `refitted` of a channel in `unit` says of it, which was fitted to a record of `duration_s` seconds, without the
+    /// samples; whether there are any.
+    pub(crate) fn of_model(refitted: &Model, unit: &str, duration_s: f64, has_samples: bool) -> Self {
+        if !is_known(refitted) {
+            return Self::unknown(has_samples);
+        }
+        Self {
+            coefficients: coefficients(refitted, unit),
+            record: record_lengths(refitted, duration_s),
+            ..Self::default()
+        }
+    }
+
+    /// Of a model of which nothing is known.
+    fn unknown(has_samples: bool) -> Self {
+        let note = if has_samples {
+            "the channel never changes by a count: nothing is known of its noise but that it is below the rounding"
+        } else {
+            "no sample of the channel was used"
+        };
+        Self { coefficients_note: Some(note.to_owned()), ..Self::default() }
     }
 }
 

@@ -67,6 +67,14 @@ impl ChannelFit {
         }
     }
 
+    /// The baseline model and what it lacks by the curve alone; `filters` are those that the sensor may have.
+    pub(crate) fn fit_curve(covariates: CovariateFit, filters: &[MovingAverageFilter]) -> Self {
+        let trace = trace(&covariates.curve, LineCandidates::Curve, filters);
+        let mut fit = Self { covariates, trace, recent: None };
+        fit.resolve(None);
+        fit
+    }
+
     /// Fits the terms of the model to `recent`, the curve of the latest stretch of the part: their coefficients and shapes, but
     /// for that of the filter, which the sensor has once.
     pub(crate) fn fit_to(&mut self, recent: &Curve<OCTAVES>) {
@@ -148,7 +156,11 @@ impl ChannelFit {
             }
             None => {}
         }
-        let decimation = common.map(|common| common.decimation);
+        self.resolve(common.map(|common| common.decimation));
+    }
+
+    /// Sets the bounds that the record resolves, and removes the terms of whose shape it resolves nothing.
+    fn resolve(&mut self, decimation: Option<BoundedEstimate>) {
         self.trace.after = with_resolved_bounds(&self.covariates.curve, &self.trace.after, decimation);
         while let Some(fit) = self.without_unresolved_term() {
             let (model, fitted, added) = fit;

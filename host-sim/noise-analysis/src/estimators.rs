@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 /// The estimators take integers: a count is divided into so many steps, because a bias step that preprocessing subtracts is
 /// not a whole number of counts.
-const STEPS_PER_COUNT: f64 = 16.0;
+pub(crate) const STEPS_PER_COUNT: f64 = 16.0;
 
 /// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
 #[derive(Clone)]
@@ -223,6 +223,12 @@ fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u
 }
 
 impl RecordPart {
+    /// Of one channel, whose estimator has counts of [`STEPS_PER_COUNT`] steps.
+    pub(crate) fn of_channel(channel: ChannelProfile, cascade: Cascade<OCTAVES, OVERLAP>, period_s: f64) -> Self {
+        let estimators = CoupledEstimators { cascades: vec![cascade], missing: vec![0], couplings: Vec::new() };
+        Self { channels: vec![channel], estimators, resolutions: vec![channel.lsb], period_s }
+    }
+
     /// Position of a channel.
     pub(crate) fn position(&self, channel: ChannelProfile) -> Option<usize> {
         self.channels.iter().position(|of| *of == channel)

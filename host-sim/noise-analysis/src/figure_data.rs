@@ -60,7 +60,7 @@ pub(crate) fn set(report: &mut Report, measurement: &Measurement) {
     }
 }
 
-fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
+pub(crate) fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
     let &DataSheetNoise { angle_random_walk, in_run_bias_stability, rate_random_walk } = noise;
     (*noise != DataSheetNoise::default()).then_some(DataSheetReport {
         angle_random_walk,

@@ -14,6 +14,8 @@
 //! Once the filter is agreed on, `nonstationarity` tells whether the noise changes while the record is made, which decides what
 //! the models of the first half are fitted to.
 //!
+//! [`quick`] makes the report of the curves alone, from samples that are read in blocks.
+//!
 //! [`analysis::analyze`] is the pipeline to a [`report::Report`]. `spectra` and `detectors` depend neither on the model nor on
 //! the report.
 
@@ -36,9 +38,11 @@ mod motion;
 mod naming;
 pub mod nonstationarity;
 mod octave_covariance;
+pub mod parallel;
 mod part_filter;
 mod part_report;
 mod preprocessing;
+pub mod quick;
 pub mod report;
 mod sampling_faults;
 pub mod series;

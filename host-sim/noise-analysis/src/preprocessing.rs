@@ -13,13 +13,13 @@ use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::detectors::{bias, effective_lsb, output_range};
 use crate::findings::{Correction, Detection, Effect};
+use crate::parallel;
 use crate::sampling_faults;
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
-use std::num::NonZero;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -375,7 +375,10 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
 
 /// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.
 pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let cores = parallel::threads();
+    if cores == 1 {
+        return items.iter().map(task).collect();
+    }
     let next = AtomicUsize::new(0);
     let work = || {
         let taken = std::iter::from_fn(|| {

@@ -21,6 +21,10 @@ pub const SCHEMA: u32 = 1;
 pub struct Report {
     /// [`SCHEMA`].
     pub schema: u32,
+    /// Whether the report is of the curves alone, without what needs the samples themselves: spectra, spikes, steps, covariates,
+    /// causes that channels have in common, and changes of the noise. Absent where it is not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub quick: bool,
     /// As the user states it or as the time stamps show it, Hz.
     pub sample_rate_hz: f64,
     /// Samples that the estimator used.

@@ -3,6 +3,7 @@
 use crate::delimited_text::{self, Lines};
 use crate::frame_log;
 use crate::input_error::{InputError, Reason};
+use crate::read_monitor::ReadMonitor;
 use crate::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use std::path::{Path, PathBuf};
@@ -33,7 +34,15 @@ enum Column {
 /// The file cannot be read, the header has an unknown column or no channel, or a row does not have one field in range for
 /// each column.
 pub fn read(file: &Path, range: GyroRange) -> Result<Recording, InputError> {
-    let mut table = CountTable::open(file)?;
+    read_monitored(file, range, &ReadMonitor::default())
+}
+
+/// As [`read`]; `monitor` counts the bytes and may stop the reading.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_monitored(file: &Path, range: GyroRange, monitor: &ReadMonitor) -> Result<Recording, InputError> {
+    let mut table = CountTable::new(file, Lines::open_monitored(file, monitor)?)?;
     let mut recorder = Recorder::new(table.channels(), range);
     while let Some(row) = table.next()? {
         recorder.push(row.time_stamp, &Burst::from_counts(&row.counts));
@@ -74,6 +83,8 @@ pub struct CountTable {
     columns: Vec<Column>,
     line: u64,
     rows: u64,
+    /// Rows that the reader holds at most.
+    most_rows: u64,
     last: Option<TimeStamp>,
 }
 
@@ -92,7 +103,12 @@ impl CountTable {
             return Err(InputError::file(file, Reason::Empty));
         };
         let columns = columns(file, line, header)?;
-        Ok(Self { file: file.to_owned(), lines, columns, line, rows: 0, last: None })
+        Ok(Self { file: file.to_owned(), lines, columns, line, rows: 0, most_rows: MAX_SAMPLES, last: None })
+    }
+
+    /// The same table for a reader that does not hold its rows.
+    pub(crate) fn of_any_length(self) -> Self {
+        Self { most_rows: u64::MAX, ..self }
     }
 
     /// The channels that the table has, in the order of the burst.
@@ -100,6 +116,16 @@ impl CountTable {
         let mut channels: Vec<Channel> = self.columns.iter().filter_map(|c| c.channel()).collect();
         channels.sort();
         channels
+    }
+
+    /// Rows that were read.
+    pub(crate) fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Whether the reading was stopped before the end of the table.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.lines.is_stopped()
     }
 
     /// Line of the row that was read last, from 1.
@@ -119,10 +145,10 @@ impl CountTable {
                 None => Err(InputError::file(&self.file, Reason::NoData)),
             };
         };
-        let checked =
-            row(&self.columns, text).and_then(|row| order(self.last.unwrap_or_default(), row.time_stamp).map(|()| row));
+        let row = plain_row(&self.columns, text.as_bytes()).map_or_else(|| row(&self.columns, text), Ok);
+        let checked = row.and_then(|row| order(self.last.unwrap_or_default(), row.time_stamp).map(|()| row));
         self.rows += 1;
-        if self.rows > MAX_SAMPLES {
+        if self.rows > self.most_rows {
             return Err(InputError::line(&self.file, line, Reason::TooManySamples));
         }
         match checked {
@@ -202,6 +228,59 @@ fn columns(file: &Path, line: u64, header: &str) -> Result<Vec<Column>, InputErr
     Ok(columns)
 }
 
+/// A row of whole numbers in range and of times, without blanks or quotation marks, which nearly all rows are: [`row`] takes four
+/// times as long. `None` for any other.
+fn plain_row(columns: &[Column], text: &[u8]) -> Option<CountRow> {
+    let mut time_stamp = TimeStamp::default();
+    let mut counts = NOT_RECORDED;
+    let mut rest = text;
+    for (position, &column) in columns.iter().enumerate() {
+        if position > 0 {
+            rest = rest.strip_prefix(b",")?;
+        }
+        match column {
+            Column::Counts(channel) => {
+                let (value, behind) = whole_number(rest)?;
+                let (low, high) = channel.limits();
+                counts[channel as usize] = i16::try_from(value).ok().filter(|count| (low..=high).contains(count))?;
+                rest = behind;
+            }
+            Column::Index => {
+                let (value, behind) = whole_number(rest)?;
+                time_stamp.index = Some(u64::try_from(value).ok()?);
+                rest = behind;
+            }
+            Column::Time => {
+                let end = rest.iter().position(|byte| *byte == b',').unwrap_or(rest.len());
+                let (field, behind) = rest.split_at(end);
+                let time: f64 = std::str::from_utf8(field).ok()?.parse().ok()?;
+                time_stamp.time_s = Some(time).filter(|time| time.is_finite());
+                time_stamp.time_s?;
+                rest = behind;
+            }
+        }
+    }
+    rest.is_empty().then(|| CountRow { time_stamp, counts: Counts::new(counts) })
+}
+
+/// The whole number of at most 18 digits at the start of `text`, and what is behind it.
+fn whole_number(text: &[u8]) -> Option<(i64, &[u8])> {
+    let (is_negative, digits) = match text.strip_prefix(b"-") {
+        Some(digits) => (true, digits),
+        None => (false, text),
+    };
+    let mut value = 0_i64;
+    let mut count = 0;
+    for &byte in digits.iter().take_while(|byte| byte.is_ascii_digit()) {
+        count += 1;
+        if count > 18 {
+            return None;
+        }
+        value = 10 * value + i64::from(byte - b'0');
+    }
+    (count > 0).then(|| (if is_negative { -value } else { value }, &digits[count..]))
+}
+
 fn row(columns: &[Column], text: &str) -> Result<CountRow, ColumnFault> {
     let mut time_stamp = TimeStamp::default();
     let mut counts = NOT_RECORDED;
@@ -253,4 +332,57 @@ fn order(before: TimeStamp, now: TimeStamp) -> Result<(), ColumnFault> {
         return Err((Some(Column::Time), Reason::TimeBackwards { before, now }));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Column, plain_row, row};
+    use adis16405_driver::Channel;
+
+    /// Of every row that the quick reader takes, the other one reads the same; what it does not take is left to the other.
+    #[test]
+    fn both_readers_of_a_row_agree() {
+        let columns = [Column::Index, Column::Time, Column::Counts(Channel::GyroX), Column::Counts(Channel::Temp)];
+        let fields = [
+            "0",
+            "-0",
+            "7",
+            "-7",
+            "+7",
+            "007",
+            "8191",
+            "8192",
+            "-8192",
+            "-8193",
+            "2047",
+            "2048",
+            "99999999999999999999",
+            "1.5",
+            "1e3",
+            "-1e-3",
+            "",
+            " 7",
+            "7 ",
+            "\"7\"",
+            "x",
+            "-",
+            "inf",
+            "nan",
+        ];
+        let mut taken = 0;
+        for index in fields {
+            for time in fields {
+                for gyro in fields {
+                    for (temperature, end) in [("12", ""), ("-2048", ""), ("2048", ""), ("12", ","), ("12", ",3")] {
+                        let text = format!("{index},{time},{gyro},{temperature}{end}");
+                        let Some(plain) = plain_row(&columns, text.as_bytes()) else { continue };
+                        taken += 1;
+                        assert_eq!(row(&columns, &text).ok(), Some(plain), "{text}");
+                    }
+                }
+            }
+        }
+        // 7 whole numbers that are no negative index and have less than 19 digits, 14 finite times, 8 counts in range, 2 temperatures.
+        assert!(taken > 1000, "{taken}");
+    }
 }

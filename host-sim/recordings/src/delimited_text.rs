@@ -5,6 +5,7 @@
 
 use crate::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input_error::{InputError, Reason};
+use crate::read_monitor::{Counted, ReadMonitor};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -23,6 +24,9 @@ pub(crate) struct Lines {
     bytes: Vec<u8>,
     /// Whether the line in `bytes` is read once more.
     again: bool,
+    monitor: ReadMonitor,
+    /// Whether the reading was stopped before the end of the file.
+    is_stopped: bool,
 }
 
 impl Lines {
@@ -31,6 +35,11 @@ impl Lines {
     /// # Errors
     /// The file is missing, unreadable, a directory or empty.
     pub(crate) fn open(file: &Path) -> Result<Self, InputError> {
+        Self::open_monitored(file, &ReadMonitor::default())
+    }
+
+    /// As [`open`](Self::open); `monitor` counts the bytes and may stop the reading.
+    pub(crate) fn open_monitored(file: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let fail = |reason| InputError::file(file, reason);
         let mut raw = File::open(file).map_err(|e| fail(Reason::Io(e)))?;
         if raw.metadata().map_err(|e| fail(Reason::Io(e)))?.is_dir() {
@@ -43,10 +52,20 @@ impl Lines {
             return Err(fail(Reason::Empty));
         }
         let compressed = start == GZIP_MAGIC;
-        let whole = BufReader::with_capacity(BUFFER_BYTES, Cursor::new(start).chain(raw));
+        monitor.begin();
+        let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
+        let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
         let bytes: Box<dyn Read> = if compressed { Box::new(GzipMembers::new(whole)) } else { Box::new(whole) };
         let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
-        Ok(Self { file: file.to_owned(), input, line: 0, bytes: Vec::new(), again: false })
+        Ok(Self {
+            file: file.to_owned(),
+            input,
+            line: 0,
+            bytes: Vec::new(),
+            again: false,
+            monitor: monitor.clone(),
+            is_stopped: false,
+        })
     }
 
     /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file.
@@ -55,13 +74,21 @@ impl Lines {
     /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or not UTF-8.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {
+            self.is_stopped |= self.monitor.take_stop();
+            if self.is_stopped {
+                return Ok(None);
+            }
             self.line += 1;
             self.bytes.clear();
-            let read = (&mut self.input)
-                .take(MAX_LINE_BYTES)
-                .read_until(b'\n', &mut self.bytes)
-                .map_err(|e| InputError::line(&self.file, self.line, read_failure(e)))?;
-            if read == 0 {
+            let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
+            let read = match read.map_err(read_failure) {
+                Ok(read) => read,
+                Err(Reason::TruncatedGzip) if self.monitor.is_cut() => 0,
+                Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
+            };
+            // The copy of a pipe that was stopped may end within a line.
+            if read == 0 || (self.monitor.is_cut() && self.bytes.last() != Some(&b'\n')) {
+                self.monitor.end();
                 return Ok(None);
             }
             if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
@@ -77,6 +104,11 @@ impl Lines {
         }
     }
 
+    /// Whether the reading was stopped before the end of the file.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
     /// The header without consuming it: what [`next`](Self::next) returns now, and will return once more. `None` for a file of
     /// blank lines.
     ///
@@ -89,8 +121,21 @@ impl Lines {
     }
 }
 
+impl Drop for Lines {
+    fn drop(&mut self) {
+        self.monitor.end();
+    }
+}
+
 /// The text of a line without the blanks around it.
 fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
+    let plain = bytes.trim_ascii();
+    if let [first, .., last] = plain
+        && first.is_ascii_graphic()
+        && last.is_ascii_graphic()
+    {
+        return std::str::from_utf8(plain);
+    }
     std::str::from_utf8(bytes).map(|text| text.trim_start_matches('\u{feff}').trim())
 }
 

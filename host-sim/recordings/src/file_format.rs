@@ -6,10 +6,14 @@ use crate::delimited_text::Lines;
 use crate::frame_log;
 use crate::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input_error::{InputError, Reason};
+use crate::read_monitor::{Counted, ReadMonitor};
 use crate::{ardupilot_log, matlab, numpy, ros_bag, serial, spi_export, text_table, ulog};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 use tempfile::NamedTempFile;
 
 /// Bytes that tell a format: several messages of the raw stream.
@@ -70,6 +74,7 @@ pub struct InputFile {
     name: PathBuf,
     copy: Option<NamedTempFile>,
     format: FileFormat,
+    monitor: ReadMonitor,
 }
 
 impl InputFile {
@@ -79,17 +84,26 @@ impl InputFile {
     /// # Errors
     /// The file cannot be read or copied, or it has none of the formats.
     pub fn open(name: &Path) -> Result<Self, InputError> {
+        Self::open_monitored(name, &ReadMonitor::default())
+    }
+
+    /// As [`open`](Self::open); `monitor` counts the bytes that are read of the recording, and may stop the reading of a pipe, of
+    /// text and of an array.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_monitored(name: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let fail = |error| InputError::file(name, Reason::Io(error));
         let mut copy = None;
         if name == Path::new("-") {
-            copy = Some(copied(io::stdin().lock()).map_err(fail)?);
+            copy = Some(copied_pipe(io::stdin(), monitor).map_err(fail)?);
         } else {
             let metadata = name.metadata().map_err(fail)?;
             if metadata.is_dir() {
                 return Err(InputError::file(name, Reason::Directory));
             }
             if !metadata.is_file() {
-                copy = Some(copied(File::open(name).map_err(fail)?).map_err(fail)?);
+                copy = Some(copied_pipe(File::open(name).map_err(fail)?, monitor).map_err(fail)?);
             }
         }
         let mut head = head(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
@@ -117,12 +131,17 @@ impl InputFile {
                 text_format(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(|error| renamed(error, name))?
             }
         };
-        Ok(Self { name: name.to_owned(), copy, format })
+        Ok(Self { name: name.to_owned(), copy, format, monitor: monitor.clone() })
     }
 
     /// What was recognised.
     pub fn format(&self) -> FileFormat {
         self.format
+    }
+
+    /// Who watches the reading.
+    pub fn monitor(&self) -> &ReadMonitor {
+        &self.monitor
     }
 
     /// Where the bytes are.
@@ -142,7 +161,7 @@ impl InputFile {
     pub fn read(&self, options: &ReadOptions) -> Result<SensorRecording, InputError> {
         let path = self.path();
         let table = match self.format {
-            FileFormat::CountTable | FileFormat::TextTable => text_table::read(path, options),
+            FileFormat::CountTable | FileFormat::TextTable => text_table::read(path, options, &self.monitor),
             FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(path, Reason::FrameLog)),
             FileFormat::Npy => numpy::read_npy(path, options),
             FileFormat::Npz => numpy::read_npz(path, options),
@@ -167,6 +186,55 @@ fn copied(mut input: impl Read) -> io::Result<NamedTempFile> {
     io::copy(&mut input, &mut copy)?;
     copy.flush()?;
     copy.seek(SeekFrom::Start(0))?;
+    Ok(copy)
+}
+
+/// How often a pipe that sends nothing is left for a request to stop.
+const STOP_INTERVAL: Duration = Duration::from_millis(50);
+/// Parts of a pipe that wait to be written.
+const PARTS: usize = 4;
+/// Bytes of a part.
+const PART_BYTES: usize = 1 << 16;
+
+/// A temporary file with all that comes through a pipe, until it ends or `monitor` stops the reading.
+///
+/// A thread reads the pipe, because a read waits until something comes. After a stop it waits for the end of the process.
+fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::Result<NamedTempFile> {
+    monitor.begin();
+    let (sender, parts) = mpsc::sync_channel::<io::Result<Vec<u8>>>(PARTS);
+    let mut input = Counted::new(input, monitor);
+    thread::spawn(move || {
+        loop {
+            let mut part = vec![0; PART_BYTES];
+            let read = match input.read(&mut part) {
+                Ok(0) => break,
+                Ok(count) => {
+                    part.truncate(count);
+                    Ok(part)
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => Err(error),
+            };
+            let is_failed = read.is_err();
+            if sender.send(read).is_err() || is_failed {
+                break;
+            }
+        }
+    });
+    let mut copy = NamedTempFile::new()?;
+    loop {
+        if monitor.take_stop() {
+            monitor.cut();
+            break;
+        }
+        match parts.recv_timeout(STOP_INTERVAL) {
+            Ok(part) => copy.write_all(&part?)?,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    copy.flush()?;
+    monitor.end();
     Ok(copy)
 }
 

@@ -9,8 +9,8 @@ const MAX_QUEUE: usize = 64;
 /// Windows, in samples, whose median duration gives a first period: the longest that the record has enough of.
 const WINDOWS: [usize; 4] = [4096, 256, 16, 1];
 /// Change of the envelope, in periods and in seconds, that is a step of the clock: more than a tick and a stall make.
-const STEP_PERIODS: f64 = 16.0;
-const STEP_S: f64 = 0.25;
+pub(crate) const STEP_PERIODS: f64 = 16.0;
+pub(crate) const STEP_S: f64 = 0.25;
 /// Shift of the phase that is followed, per sample.
 const PHASE_TRACKING: f64 = 1.0 / 64.0;
 /// Blocks whose mean residuals give the interval of the rate.

@@ -7,15 +7,17 @@ use crate::lower_envelope::{MinimumBehind, minimum_ahead};
 pub(crate) const SEARCH_QUEUE: usize = 64;
 /// Samples whose least envelope a rise of the envelope is measured from: a period that is wrong by a part in 32 causes no
 /// false loss.
-const MEMORY: usize = 16;
+pub(crate) const MEMORY: usize = 16;
 /// The same where stamps are coarse, in widths of the lateness: so many ticks tell where the envelope is.
 const TICKS_IN_MEMORY: f64 = 12.0;
 /// Width of the lateness, in periods, from which stamps count as coarse.
 pub(crate) const COARSE: f64 = 0.6;
 /// Rise of the envelope, in periods, that is a loss. Coarse stamps move the envelope by up to half a period, where two
 /// ticks are nearly an odd number of periods.
-const LOSS: f64 = 0.5;
+pub(crate) const LOSS: f64 = 0.5;
 const COARSE_LOSS: f64 = 0.7;
+/// Distance of a rise from a whole number of periods below which nothing but a loss explains it.
+pub(crate) const CERTAIN: f64 = 0.3;
 /// Times that an estimate of the period is improved by the alignment that it gives.
 const MAX_REFINEMENTS: usize = 12;
 /// Relative change of the period with which it is good enough to align by: a tenth of a period in a queue of 256 would be 4e-4.
@@ -105,7 +107,7 @@ impl Track {
                 // A float beyond the range of u64 saturates.
                 let lost = (excess.round() as u64).max(1);
                 missing = missing.saturating_add(lost);
-                let certain = (excess - excess.round()).abs() < 0.3;
+                let certain = (excess - excess.round()).abs() < CERTAIN;
                 // Stamps within a tick or two do not tell one loss from two.
                 match track.losses.last_mut().filter(|last| at - last.before <= undecided) {
                     Some(last) => {

@@ -1,7 +1,7 @@
 //! Arrays of numbers with names, as NumPy and MATLAB keep them: which of them are columns of one table.
 
 use crate::any_sensor::ReadOptions;
-use crate::column_selection::AvailableColumn;
+use crate::column_selection::{AvailableColumn, ChosenColumn};
 use crate::input_error::{InputError, Reason};
 use crate::sensor_table::{Number, SensorTable, TableBuilder};
 use crate::unit::Unit;
@@ -41,6 +41,14 @@ impl NamedArray {
             name: if heading.unit.is_some() { heading.name } else { name },
         }
     }
+}
+
+/// The columns to read of the only array of a file.
+pub(crate) fn choose(array: &NamedArray, options: &ReadOptions) -> Result<Vec<ChosenColumn>, Reason> {
+    let is_named = options.topic.as_ref().is_none_or(|topic| *topic == array.name);
+    let columns = (0..array.columns.len()).filter(|_| is_named);
+    let available: Vec<AvailableColumn> = columns.map(|column| array.available(column)).collect();
+    options.choose(&available).map_err(|error| Reason::Selection(Box::new(error)))
 }
 
 /// Reads the chosen columns of `arrays`; `read` gives those of an array, by their numbers.

@@ -1,15 +1,17 @@
 //! Arrays of NumPy: `.npy` and `.npz`.
 
 use crate::any_sensor::ReadOptions;
+use crate::column_selection::ChosenColumn;
 use crate::input_error::{InputError, Reason};
 use crate::named_arrays::{self, NamedArray};
+use crate::read_monitor::{Counted, ReadMonitor};
 use crate::recording::MAX_SAMPLES;
-use crate::sensor_table::{Number, SensorTable};
+use crate::sensor_table::{Number, SensorTable, TableBuilder};
 use crate::unit::Unit;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek};
-use std::path::Path;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
 /// Columns of a matrix beyond which it is no recording.
@@ -21,6 +23,94 @@ pub(crate) fn read_npy(file: &Path, options: &ReadOptions) -> Result<SensorTable
     let mut input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
     let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
     named_arrays::read(file, &[layout.array()], options, |_, columns| layout.columns(&mut input, columns))
+}
+
+/// Rows of an array that are read at once.
+const ROWS_AT_ONCE: usize = 4096;
+
+/// An open `.npy` file, read row by row.
+pub(crate) struct NpyRows {
+    file: PathBuf,
+    input: Counted<File>,
+    monitor: ReadMonitor,
+    layout: ArrayLayout,
+    chosen: Vec<ChosenColumn>,
+    /// Where the numbers begin, bytes.
+    start: u64,
+    next: usize,
+    /// Bytes of the rows that were read at once: of each chosen column, or of whole rows.
+    buffers: Vec<Vec<u8>>,
+    row: Vec<Number>,
+    is_stopped: bool,
+}
+
+impl NpyRows {
+    /// Opens a file and chooses its columns.
+    pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let io = |error| fail(Reason::Io(error));
+        monitor.begin();
+        let mut input = Counted::new(File::open(file).map_err(io)?, monitor);
+        let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+        let chosen = named_arrays::choose(&layout.array(), options).map_err(fail)?;
+        let start = input.stream_position().map_err(io)?;
+        let buffers = vec![Vec::new(); if layout.by_column { chosen.len() } else { 1 }];
+        let (file, monitor, row) = (file.to_owned(), monitor.clone(), Vec::with_capacity(chosen.len()));
+        Ok(Self { file, input, monitor, layout, chosen, start, next: 0, buffers, row, is_stopped: false })
+    }
+
+    /// The columns that are read.
+    pub(crate) fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    /// Whether the reading was stopped before the end of the array.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
+    /// Adds the next row to `builder`; false at the end.
+    pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
+        self.is_stopped |= self.monitor.take_stop();
+        if self.is_stopped || self.next == self.layout.rows {
+            self.monitor.end();
+            return Ok(false);
+        }
+        let at = self.next % ROWS_AT_ONCE;
+        if at == 0 {
+            self.fill().map_err(|reason| InputError::file(&self.file, reason))?;
+        }
+        let Self { layout, buffers, row, chosen, .. } = self;
+        row.clear();
+        row.extend(chosen.iter().enumerate().map(|(number, column)| {
+            let field = &layout.fields[column.position];
+            let (buffer, offset) = if layout.by_column { (number, 0) } else { (0, field.offset) };
+            decode(&field.encoding, &buffers[buffer][at * layout.stride + offset..])
+        }));
+        self.next += 1;
+        builder.push(&self.row).map(|()| true).map_err(|(column, reason)| {
+            let label = self.chosen.get(column).map_or("", |column| column.label.as_str());
+            InputError::row(&self.file, self.next as u64, label, reason)
+        })
+    }
+
+    /// Reads the rows from the next one on.
+    fn fill(&mut self) -> Result<(), Reason> {
+        let Self { layout, buffers, chosen, input, .. } = self;
+        let bytes = ROWS_AT_ONCE.min(layout.rows - self.next) * layout.stride;
+        for (buffer, column) in buffers.iter_mut().zip(chosen) {
+            if layout.by_column {
+                let first = (column.position * layout.rows + self.next) as u64;
+                input.seek(SeekFrom::Start(self.start + first * layout.stride as u64)).map_err(Reason::Io)?;
+            }
+            buffer.resize(bytes, 0);
+            input.read_exact(buffer).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::Io(error),
+            })?;
+        }
+        Ok(())
+    }
 }
 
 /// Reads an `.npz` file.
@@ -98,9 +188,6 @@ impl ArrayLayout {
         if inner > MAX_COLUMNS {
             return Err(unusable(format!("has {inner} columns, more than {MAX_COLUMNS}")));
         }
-        if outer > MAX_SAMPLES {
-            return Err(Reason::TooManySamples);
-        }
         let mut unit = None;
         let mut fields = Vec::new();
         let mut stride = 0usize;
@@ -139,6 +226,9 @@ impl ArrayLayout {
 
     /// The numbers of `columns`, from the end of the header on.
     fn columns(&self, input: &mut impl Read, columns: &[usize]) -> Result<Vec<Vec<Number>>, Reason> {
+        if self.rows as u64 > MAX_SAMPLES {
+            return Err(Reason::TooManySamples);
+        }
         let mut values: Vec<Vec<Number>> = columns.iter().map(|_| Vec::new()).collect();
         let mut bytes = vec![0; self.stride];
         let mut read = |bytes: &mut [u8]| {

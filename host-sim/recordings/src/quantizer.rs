@@ -36,12 +36,19 @@ pub(crate) struct Quantizer {
 impl Quantizer {
     /// The quantizer of `values`; those that are not finite have no influence.
     pub(crate) fn new(values: &[f64]) -> Self {
+        let largest = values.iter().copied().filter(|value| value.is_finite()).map(f64::abs).fold(0.0, f64::max);
+        let noise = difference_noise(values);
+        match step(values, largest).filter(|(lsb, _)| *lsb >= FINEST_STEP * noise) {
+            Some((lsb, offset)) => Self { lsb, offset, cost: None },
+            None => Self::without_step(values),
+        }
+    }
+
+    /// The quantizer of `values` that are no multiples of a step.
+    pub(crate) fn without_step(values: &[f64]) -> Self {
         let finite = || values.iter().copied().filter(|value| value.is_finite());
         let largest = finite().map(f64::abs).fold(0.0, f64::max);
         let noise = difference_noise(values);
-        if let Some((lsb, offset)) = step(values, largest).filter(|(lsb, _)| *lsb >= FINEST_STEP * noise) {
-            return Self { lsb, offset, cost: None };
-        }
         // A column that never changes is as good in one count as in many.
         let scale = if noise > 0.0 { noise * (12.0 * MAX_COST).sqrt() } else { largest };
         let mut lsb = if scale > 0.0 { scale.log2().floor().exp2() } else { 1.0 };
@@ -51,6 +58,12 @@ impl Quantizer {
         }
         let cost = if noise > 0.0 { lsb * lsb / 12.0 / (noise * noise) } else { 0.0 };
         Self { lsb, offset: 0.0, cost: Some(cost) }
+    }
+
+    /// Whether `value` is a multiple of the LSB, where all are; else true.
+    pub(crate) fn is_on_step(&self, value: f64) -> bool {
+        let steps = (value - self.offset) / self.lsb;
+        self.cost.is_some() || !value.is_finite() || (steps - steps.round()).abs() <= ON_STEP
     }
 
     /// The count of `value`; `None` where it is not finite or beyond the range of counts.

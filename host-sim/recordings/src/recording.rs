@@ -91,6 +91,11 @@ impl Recorder {
         self.recording.range = range;
     }
 
+    /// The samples that were added since they were taken last.
+    pub(crate) fn take_samples(&mut self) -> Vec<RecordedSample> {
+        std::mem::take(&mut self.recording.samples)
+    }
+
     /// The recording of all bursts that were added.
     pub fn finish(self) -> Recording {
         self.recording

@@ -120,8 +120,13 @@ pub(crate) fn slots(periods: &[u64]) -> Result<Vec<u64>, TimeBaseError> {
     // Periods beyond the range of u64 are all the same.
     let is_increasing = slots.is_sorted_by(|one, next| one < next);
     let (samples, span) = (slots.len() as u64, slots.last().copied().unwrap_or(0));
-    if !is_increasing || (span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS) {
+    if !is_increasing || is_too_sparse(samples, span) {
         return Err(TimeBaseError::TooSparse { samples, periods: span.saturating_add(1) });
     }
     Ok(slots)
+}
+
+/// Whether the gaps of `samples` samples that span so many periods are too long.
+pub(crate) fn is_too_sparse(samples: u64, span: u64) -> bool {
+    span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS
 }

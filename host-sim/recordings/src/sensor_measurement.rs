@@ -11,7 +11,7 @@ use measurement::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewest channels whose equal rows are one sample that was read twice; fewer are equal by chance.
-const MIN_CHANNELS_OF_REPEAT: usize = 3;
+pub(crate) const MIN_CHANNELS_OF_REPEAT: usize = 3;
 
 /// How often a range of the data sheet a value may be before it is no measurement.
 const MAX_RANGES: f64 = 2.0;
@@ -88,6 +88,32 @@ fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
     values.retain(|_| kept.next().copied().unwrap_or(true));
 }
 
+/// Why a value of a channel is no measurement, if so: 1 in it is `factor` in the channel's unit, in which it is `limit` at most.
+pub(crate) fn refusal(value: f64, factor: f64, limit: f64) -> Option<&'static str> {
+    match value {
+        value if value.is_nan() => Some("missing"),
+        value if value.is_infinite() => Some("not_finite"),
+        value if (value * factor).abs() > limit => Some("out_of_range"),
+        _ => None,
+    }
+}
+
+/// The largest value of a channel that is a measurement, in its unit.
+pub(crate) fn largest_value(profile: &ChannelProfile) -> f64 {
+    profile.range.map_or(f64::INFINITY, |range| MAX_RANGES * range)
+}
+
+/// What the user should know of the counts of a channel, which are `lsb` large.
+pub(crate) fn quantizer_note(profile: &ChannelProfile, quantizer: &Quantizer, lsb: f64) -> String {
+    let ChannelProfile { name, unit, .. } = profile;
+    match quantizer.cost {
+        None => format!("{name}: counts of {lsb:.6e} {unit}, as in the file"),
+        Some(cost) => {
+            format!("{name}: rounded to counts of {lsb:.6e} {unit}, which adds {cost:.1e} to the variance of its noise")
+        }
+    }
+}
+
 /// One channel as counts; `None` where no value is usable.
 fn channel(
     column: TableColumn,
@@ -95,15 +121,10 @@ fn channel(
     notes: &mut Vec<String>,
 ) -> Option<MeasuredChannel> {
     let TableColumn { profile, factor, mut values, .. } = column;
-    let limit = profile.range.map_or(f64::INFINITY, |range| MAX_RANGES * range);
+    let limit = largest_value(&profile);
     let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
     for (position, value) in values.iter_mut().enumerate() {
-        let cause = match *value {
-            value if value.is_nan() => "missing",
-            value if value.is_infinite() => "not_finite",
-            value if (value * factor).abs() > limit => "out_of_range",
-            _ => continue,
-        };
+        let Some(cause) = refusal(*value, factor, limit) else { continue };
         refused.entry(cause).or_default().push(position);
         *value = f64::NAN;
     }
@@ -119,13 +140,7 @@ fn channel(
         refused.entry("out_of_range").or_default().extend(beyond);
         refused.values_mut().for_each(|positions| positions.sort_unstable());
     }
-    match quantizer.cost {
-        None => notes.push(format!("{}: counts of {lsb:.6e} {}, as in the file", profile.name, profile.unit)),
-        Some(cost) => notes.push(format!(
-            "{}: rounded to counts of {lsb:.6e} {}, which adds {:.1e} to the variance of its noise",
-            profile.name, profile.unit, cost
-        )),
-    }
+    notes.push(quantizer_note(&profile, &quantizer, lsb));
     let mut seen = ChannelHealth::examine(&counts, profile.range.map(|range| range / lsb));
     if !profile.quantity.is_inertial() {
         // A temperature or a supply may well stay where it is.

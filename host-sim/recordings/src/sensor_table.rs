@@ -77,10 +77,25 @@ pub(crate) struct TableBuilder {
     times: Vec<f64>,
     origin: Option<Number>,
     indices: Vec<u64>,
+    last_time: Option<f64>,
+    last_index: Option<u64>,
     rows: u64,
+    /// Rows that are held at most.
+    most_rows: u64,
     backwards: u64,
     /// The first row whose time went back: number of the row, and by how much.
     first_backwards: Option<(u64, f64)>,
+}
+
+/// Consecutive rows.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RowBlock {
+    /// Time stamps in the unit of the file, from the first row of the file; empty where there are none.
+    pub(crate) times: Vec<f64>,
+    /// Running numbers; empty where there are none.
+    pub(crate) indices: Vec<u64>,
+    /// The numbers of each channel, in the unit of the file.
+    pub(crate) values: Vec<Vec<f64>>,
 }
 
 impl TableBuilder {
@@ -92,10 +107,23 @@ impl TableBuilder {
             times: Vec::new(),
             origin: None,
             indices: Vec::new(),
+            last_time: None,
+            last_index: None,
             rows: 0,
+            most_rows: MAX_SAMPLES,
             backwards: 0,
             first_backwards: None,
         }
+    }
+
+    /// The same for a reader that [takes the rows](Self::take_rows) in blocks.
+    pub(crate) fn of_any_length(self) -> Self {
+        Self { most_rows: u64::MAX, ..self }
+    }
+
+    /// Rows that were added, those that were left out included.
+    pub(crate) fn rows(&self) -> u64 {
+        self.rows
     }
 
     /// The columns that are read.
@@ -109,7 +137,7 @@ impl TableBuilder {
     /// Too many rows, or a time or an index that is none; with the position of the column.
     pub(crate) fn push(&mut self, row: &[Number]) -> Result<(), (usize, Reason)> {
         self.rows += 1;
-        if self.rows > MAX_SAMPLES {
+        if self.rows > self.most_rows {
             return Err((0, Reason::TooManySamples));
         }
         for (position, (column, &number)) in self.chosen.iter().zip(row).enumerate() {
@@ -119,20 +147,22 @@ impl TableBuilder {
                         return Err((position, Reason::NotFinite(number.value().to_string())));
                     }
                     let origin = *self.origin.get_or_insert(number);
-                    let (time, last) = (number.since(origin), self.times.last().copied());
-                    if let Some(last) = last.filter(|last| time < *last) {
+                    let time = number.since(origin);
+                    if let Some(last) = self.last_time.filter(|last| time < *last) {
                         self.backwards += 1;
                         self.first_backwards.get_or_insert((self.rows, last - time));
                         return Ok(());
                     }
+                    self.last_time = Some(time);
                     self.times.push(time);
                 }
                 Role::Index => match number {
                     Number::Integer(index) if index >= 0 => {
                         let now = index.unsigned_abs();
-                        if let Some(&before) = self.indices.last().filter(|before| now <= **before) {
+                        if let Some(before) = self.last_index.filter(|before| now <= *before) {
                             return Err((position, Reason::IndexBackwards { before, now }));
                         }
+                        self.last_index = Some(now);
                         self.indices.push(now);
                     }
                     other => return Err((position, Reason::NotInteger(other.value().to_string()))),
@@ -148,40 +178,61 @@ impl TableBuilder {
         Ok(())
     }
 
+    /// The rows that were added since they were taken last.
+    pub(crate) fn take_rows(&mut self) -> RowBlock {
+        let is_channel = |column: &ChosenColumn| matches!(column.role, Role::Channel(_));
+        let values = self.chosen.iter().zip(&mut self.values).filter(|(column, _)| is_channel(column));
+        let values: Vec<Vec<f64>> = values.map(|(_, values)| std::mem::take(values)).collect();
+        RowBlock { times: std::mem::take(&mut self.times), indices: std::mem::take(&mut self.indices), values }
+    }
+
+    /// Rows whose time goes back, which are left out, and a sentence that says so; `None` without one.
+    ///
+    /// # Errors
+    /// There is no row, or the times of many rows go back.
+    pub(crate) fn backwards(&self) -> Result<Option<(u64, String)>, Reason> {
+        if self.rows == self.backwards {
+            return Err(Reason::NoData);
+        }
+        let Some((row, by)) = self.first_backwards else { return Ok(None) };
+        if self.backwards as f64 > MAX_BACKWARDS * self.rows as f64 {
+            return Err(Reason::ClockSetBack { row, by, rows: self.backwards });
+        }
+        let note = format!("{} rows whose time goes back are left out, the first of them row {row}", self.backwards);
+        Ok(Some((self.backwards, note)))
+    }
+
+    /// The unit of the times, by the column or by the rows that are held, s, and what the user should know of it.
+    ///
+    /// # Errors
+    /// The unit cannot be told.
+    pub(crate) fn time_unit(&self) -> Result<(f64, Option<String>), Reason> {
+        let Some(time) = self.chosen.iter().find(|column| column.role == Role::Time) else { return Ok((1.0, None)) };
+        match time.unit {
+            Some(unit) => Ok((unit.factor, None)),
+            None => {
+                let unit = usual_unit(&self.times, self.origin.map_or(0.0, Number::value))
+                    .ok_or_else(|| Reason::NoTimeUnit(time.label.clone()))?;
+                Ok((unit.factor, Some(format!("the column {} is taken to be in {}", time.label, unit.name))))
+            }
+        }
+    }
+
     /// The table of all rows.
     ///
     /// # Errors
     /// There is no row, the times of many rows go back, or the unit of the times cannot be told.
     pub(crate) fn finish(self) -> Result<SensorTable, Reason> {
-        if self.rows == self.backwards {
-            return Err(Reason::NoData);
-        }
-        let mut notes = Vec::new();
         let mut dropped = BTreeMap::new();
-        if let Some((row, by)) = self.first_backwards {
-            if self.backwards as f64 > MAX_BACKWARDS * self.rows as f64 {
-                return Err(Reason::ClockSetBack { row, by, rows: self.backwards });
-            }
-            dropped.insert("time_backwards", self.backwards);
-            notes.push(format!(
-                "{} rows whose time goes back are left out, the first of them row {row}",
-                self.backwards
-            ));
+        let mut notes = Vec::new();
+        if let Some((backwards, note)) = self.backwards()? {
+            dropped.insert("time_backwards", backwards);
+            notes.push(note);
         }
-        let time = self.chosen.iter().find(|column| column.role == Role::Time);
+        let (factor, note) = self.time_unit()?;
+        notes.extend(note);
         let mut times = self.times;
-        if let Some(time) = time {
-            let unit = match time.unit {
-                Some(unit) => unit,
-                None => {
-                    let unit = usual_unit(&times, self.origin.map_or(0.0, Number::value))
-                        .ok_or_else(|| Reason::NoTimeUnit(time.label.clone()))?;
-                    notes.push(format!("the column {} is taken to be in {}", time.label, unit.name));
-                    unit
-                }
-            };
-            times.iter_mut().for_each(|time| *time *= unit.factor);
-        }
+        times.iter_mut().for_each(|time| *time *= factor);
         let has_index = self.chosen.iter().any(|column| column.role == Role::Index);
         let columns = self.chosen.into_iter().zip(self.values).filter_map(|(column, values)| match column.role {
             Role::Channel(profile) => Some(TableColumn { profile, factor: column.factor, label: column.label, values }),

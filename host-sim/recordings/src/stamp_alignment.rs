@@ -15,7 +15,7 @@ use crate::stamp_tick::tick;
 
 /// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is distinguished
 /// from a loss. The last samples of a record have fewer after them, so there a late delivery may count as a loss.
-const MAX_QUEUE: usize = 256;
+pub(crate) const MAX_QUEUE: usize = 256;
 
 /// Lengths, in samples, of the windows whose durations give estimates of the period.
 const WINDOWS: [usize; 6] = [1, 8, 32, 128, 512, 2048];

@@ -19,10 +19,10 @@ pub use crate::stamp_quality::StampQuality;
 pub use crate::time_base_error::TimeBaseError;
 
 /// Faults of one channel's word: the sample is left out in this channel alone.
-const REFUSED_IN_A_CHANNEL: Faults = Faults::IMPOSSIBLE_RATE.union(Faults::X_SIGN);
+pub(crate) const REFUSED_IN_A_CHANNEL: Faults = Faults::IMPOSSIBLE_RATE.union(Faults::X_SIGN);
 
 /// Faults for which a sample is left out in every channel. The others are warnings; their samples are used.
-const REFUSED: Faults = Faults::all()
+pub(crate) const REFUSED: Faults = Faults::all()
     .difference(REFUSED_IN_A_CHANNEL)
     .difference(Faults::REPEATED)
     .difference(Faults::ERROR_ALARM)
@@ -97,7 +97,7 @@ pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<Estimate
 }
 
 /// Positions of the samples that are refused in `channel` alone, by cause.
-fn refused_positions<'a>(
+pub(crate) fn refused_positions<'a>(
     channel: Channel,
     samples: impl Iterator<Item = &'a RecordedSample>,
 ) -> BTreeMap<&'static str, Vec<usize>> {

@@ -25,6 +25,9 @@ pub enum TimeBaseError {
         /// By the time stamps, Hz.
         measured_hz: f64,
     },
+    /// Stamps of a recording that is not held in memory, which need all of them to be understood.
+    #[error("the time stamps are too irregular to be read in blocks ({0}): leave out --quick")]
+    Irregular(String),
     /// No sample follows another one by one sample period.
     #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
     NoNeighbours(u64),

@@ -162,7 +162,7 @@ fn findings(report: &Report) -> Markup {
         section id="findings" {
             h2 { "What was found" }
             @if report.findings.is_empty() {
-                p { "Nothing: N, B and K describe every channel." }
+                p { (summary::nothing_found(report)) }
             } @else {
                 ol.list {
                     @for (index, finding) in report.findings.iter().enumerate() {

@@ -221,10 +221,25 @@ fn report_length_s(report: &Report) -> f64 {
     if length.is_finite() { length } else { 0.0 }
 }
 
+/// What a report of the curves alone does not look for.
+const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, motion, temperature and other causes that channels \
+                     have in common, and changes of the noise were not looked for.";
+
+/// What is said where nothing was found.
+#[must_use]
+pub fn nothing_found(report: &Report) -> &'static str {
+    if report.quick {
+        "Nothing in the curves: N, B and K describe those of every channel."
+    } else {
+        "Nothing: N, B and K describe every channel."
+    }
+}
+
 /// The record in sentences: rest, losses, length.
 #[must_use]
 pub fn record_sentences(report: &Report) -> Vec<String> {
     let mut sentences = vec![rest(report), losses(report)];
+    sentences.extend(report.quick.then(|| QUICK.to_owned()));
     sentences.extend(length_advice(report));
     sentences.extend(recent_fit(report));
     sentences.retain(|sentence| !sentence.is_empty());

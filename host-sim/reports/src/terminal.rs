@@ -68,7 +68,7 @@ impl Screen<'_> {
         lines.push(String::new());
         lines.push(styled(HEADING, "What was found"));
         if found.is_empty() && rest.is_empty() {
-            lines.push(" Nothing: N, B and K describe every channel.".to_owned());
+            lines.push(format!(" {}", summary::nothing_found(self.report)));
         }
         // Of what is contradicted, fewer lines where the findings need the room.
         let room = |contradicted: usize| {

@@ -1,5 +1,5 @@
 //! The command `host-sim`: input errors, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
-//! exports, conversions, the live screen, and a device on a serial port.
+//! exports, conversions, the live screen, quick reports, reports of many files, and a device on a serial port.
 
 mod analyze_and_replay;
 mod convert_and_simulate;
@@ -8,8 +8,10 @@ mod exports;
 mod formats;
 mod input_errors;
 mod live_screen;
+mod many_and_interrupted;
 mod measured_recordings;
 mod program;
+mod quick_report;
 mod report_output;
 mod serial_device;
 mod serial_faults;

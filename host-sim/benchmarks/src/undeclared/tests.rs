@@ -267,6 +267,7 @@ fn report(found: &[Found<'_>]) -> Report {
     };
     Report {
         schema: SCHEMA,
+        quick: false,
         sample_rate_hz: 204.8,
         samples: 0,
         dropped: BTreeMap::new(),

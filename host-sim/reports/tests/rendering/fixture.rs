@@ -34,6 +34,7 @@ pub(crate) fn report() -> Report {
     let dropped = [("gap", 212), ("no_new_data", 3)];
     Report {
         schema: SCHEMA,
+        quick: false,
         sample_rate_hz: RATE_HZ,
         samples: SAMPLES,
         dropped: dropped.map(|(cause, samples)| (cause.to_owned(), samples)).into(),

@@ -1,0 +1,60 @@
+//! A recording that is read in blocks, because it need not fit into memory.
+
+use crate::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
+use std::collections::BTreeMap;
+
+/// What is known of a recording before its samples are used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingDescription {
+    /// What is known of the sensor.
+    pub profile: SensorProfile,
+    /// Sample rate in Hz, as the user states it or as the time stamps show it.
+    pub sample_rate_hz: f64,
+    /// Usable samples.
+    pub samples: u64,
+    /// Sample periods from the first sample to the last, both included, with or without a sample.
+    pub periods: u64,
+    /// The channels that were recorded, in the order of the sensor's burst.
+    pub channels: Vec<ChannelProfile>,
+    /// As [`Measurement::dropped`].
+    pub dropped: BTreeMap<&'static str, u64>,
+    /// As [`Measurement::flagged`].
+    pub flagged: BTreeMap<&'static str, u64>,
+}
+
+impl RecordingDescription {
+    /// Sample period, s.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.sample_rate_hz
+    }
+
+    /// As [`Measurement::middle`].
+    #[must_use]
+    pub fn middle(&self) -> u64 {
+        self.periods / 2
+    }
+}
+
+impl From<&Measurement> for RecordingDescription {
+    fn from(measurement: &Measurement) -> Self {
+        Self {
+            profile: measurement.profile.clone(),
+            sample_rate_hz: measurement.sample_rate_hz,
+            samples: measurement.len() as u64,
+            periods: measurement.periods(),
+            channels: measurement.profiles().collect(),
+            dropped: measurement.dropped.clone(),
+            flagged: measurement.flagged.clone(),
+        }
+    }
+}
+
+/// Consecutive usable samples of a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SampleBlock {
+    /// Sample period in which each was taken, counted from the first sample of the recording; strictly increasing.
+    pub slots: Vec<u64>,
+    /// The channels, in the order of [`RecordingDescription::channels`]. Positions of refused samples are those in the block.
+    pub channels: Vec<MeasuredChannel>,
+}

@@ -1,0 +1,308 @@
+//! The report of the curves alone: measured Allan deviation, models, errors on the unseen half, and what the trace of the curves
+//! finds. The samples come in blocks and are not kept.
+//!
+//! Curves and gaps, the halves and the errors are those of [`analysis`](crate::analysis). What needs the samples themselves is not
+//! looked for: lines of the spectrum, spikes, steps, motion, telegraph noise, covariates, a filter or a drift that channels have in
+//! common, and changes of the noise. So a model may have a Markov process where the whole analysis has a temperature.
+
+use crate::assessment::Assessment;
+use crate::causes;
+use crate::channel_fit::ChannelFit;
+use crate::contradiction::Contradiction;
+use crate::covariates::CovariateFit;
+use crate::estimators::{RecordPart, STEPS_PER_COUNT};
+use crate::figure_data;
+use crate::findings::Effect;
+use crate::naming::{ChannelFindings, name_effects};
+use crate::parallel;
+use crate::preprocessing::in_parallel;
+use crate::report::{
+    ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
+    SlopeMethodReport, term_reports,
+};
+use crate::unexplained;
+use crate::{OCTAVES, OVERLAP};
+use allan_core::{Cascade, Curve, Model};
+use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
+use std::collections::BTreeMap;
+use std::thread;
+
+/// Why there is neither clock nor filter.
+const PART_NOTE: &str = "clock and filter of the part are not estimated in a quick report";
+
+/// The estimators of a recording whose samples come in blocks.
+pub struct CurveEstimators {
+    description: RecordingDescription,
+    channels: Vec<ChannelEstimators>,
+    /// Sample period of the last sample.
+    last: Option<u64>,
+}
+
+/// The estimators of one channel.
+struct ChannelEstimators {
+    whole: GappedEstimator,
+    /// In steps of a count, as those of the whole analysis.
+    halves: [GappedEstimator; 2],
+    /// Samples that are refused in this channel alone, by cause.
+    refused: BTreeMap<&'static str, u64>,
+}
+
+/// An estimator and the samples that are missing since its last one.
+#[derive(Default)]
+struct GappedEstimator {
+    cascade: Cascade<OCTAVES, OVERLAP>,
+    missing: u32,
+}
+
+impl GappedEstimator {
+    /// Takes samples that follow each other.
+    fn push(&mut self, counts: &[i32]) {
+        if self.missing > 0 && !counts.is_empty() {
+            self.cascade.gap(std::mem::take(&mut self.missing));
+        }
+        self.cascade.push_slice(counts);
+    }
+
+    fn miss(&mut self, samples: u64) {
+        self.missing = self.missing.saturating_add(u32::try_from(samples).unwrap_or(u32::MAX));
+    }
+}
+
+/// The report of a recording in memory.
+#[must_use]
+pub fn analyze(measurement: &Measurement) -> Report {
+    let mut estimators = CurveEstimators::new(RecordingDescription::from(measurement));
+    estimators.push(&SampleBlock { slots: measurement.slots.clone(), channels: measurement.channels.clone() });
+    estimators.report(&|| {})
+}
+
+impl CurveEstimators {
+    /// Of the recording of this description, without samples.
+    #[must_use]
+    pub fn new(description: RecordingDescription) -> Self {
+        let channel = |_: &ChannelProfile| ChannelEstimators {
+            whole: GappedEstimator::default(),
+            halves: [GappedEstimator::default(), GappedEstimator::default()],
+            refused: BTreeMap::new(),
+        };
+        Self { channels: description.channels.iter().map(channel).collect(), description, last: None }
+    }
+
+    /// Takes the next samples, the channels on as many threads as there are cores.
+    pub fn push(&mut self, block: &SampleBlock) {
+        let (last, middle) = (self.last, self.description.middle());
+        let threads = parallel::threads().min(self.channels.len()).max(1);
+        let each = self.channels.len().div_ceil(threads).max(1);
+        let parts = self.channels.chunks_mut(each).zip(block.channels.chunks(each));
+        let work = |(estimators, channels): (&mut [ChannelEstimators], &[MeasuredChannel])| {
+            estimators.iter_mut().zip(channels).for_each(|(of, channel)| of.push(&block.slots, channel, last, middle));
+        };
+        if threads == 1 {
+            parts.for_each(work);
+        } else {
+            thread::scope(|scope| parts.for_each(|part| drop(scope.spawn(move || work(part)))));
+        }
+        self.last = block.slots.last().copied().or(last);
+    }
+
+    /// The report; `done` is called for each channel that is fitted.
+    #[must_use]
+    pub fn report(&self, done: &(dyn Fn() + Sync)) -> Report {
+        let Self { description, channels, .. } = self;
+        let all: Vec<(&ChannelProfile, &ChannelEstimators)> = description.channels.iter().zip(channels).collect();
+        let fitted = in_parallel(&all, |(profile, estimators)| {
+            let fitted = FittedChannel::fit(description, **profile, estimators);
+            done();
+            fitted
+        });
+        let (effects, of_half): (Vec<Vec<Effect>>, Vec<Vec<Effect>>) =
+            fitted.iter().map(|channel| channel.effects(description)).unzip();
+        let mut channels: Vec<ChannelReport> =
+            fitted.iter().zip(channels).map(|(fitted, of)| fitted.report(description, of)).collect();
+        let duration_s = description.periods as f64 * description.period_s();
+        let findings = causes::find(&mut channels, &effects, &of_half, &description.profile, duration_s);
+        let owned = |counts: &BTreeMap<&'static str, u64>| {
+            counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
+        };
+        Report {
+            schema: SCHEMA,
+            quick: true,
+            sample_rate_hz: description.sample_rate_hz,
+            samples: description.samples,
+            dropped: owned(&description.dropped),
+            flagged: owned(&description.flagged),
+            part: PartReport {
+                name: description.profile.name.to_owned(),
+                note: Some(PART_NOTE.to_owned()),
+                ..PartReport::default()
+            },
+            findings,
+            common_mode: None,
+            channels,
+        }
+    }
+}
+
+impl ChannelEstimators {
+    /// Takes the next samples of the channel; `last` is the sample period before them, `middle` the first of the second half.
+    fn push(&mut self, slots: &[u64], channel: &MeasuredChannel, last: Option<u64>, middle: u64) {
+        let mut refused: Vec<usize> = channel.refused.values().flatten().copied().collect();
+        refused.sort_unstable();
+        for (&cause, positions) in &channel.refused {
+            *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
+        }
+        let steps: Vec<i32> = channel.counts.iter().map(|count| count.saturating_mul(STEPS_PER_COUNT as i32)).collect();
+        let second = slots.partition_point(|&slot| slot < middle);
+        let mut refused = refused.into_iter().peekable();
+        let mut before = last;
+        let mut first = 0;
+        while first < slots.len() {
+            // The samples from `first` on that follow each other in one half and are used; the one behind them may be refused.
+            let end_of_half = if first < second { second } else { slots.len() };
+            let refused_at = refused.peek().copied().unwrap_or(usize::MAX).min(end_of_half);
+            let follows = |&at: &usize| slots[at] - slots[at - 1] == 1;
+            let end = (first + 1..refused_at).take_while(follows).last().map_or(first, |last| last) + 1;
+            let (slot, is_second) = (slots[first], first >= second);
+            let missing = before.map_or(0, |before| slot - before - 1);
+            let half = &mut self.halves[usize::from(is_second)];
+            if missing > 0 {
+                self.whole.miss(missing);
+                // Of a gap over the middle, each half has the samples on its side.
+                half.miss(if is_second { missing.min(slot - middle) } else { missing });
+            }
+            if refused.next_if_eq(&first).is_some() {
+                while refused.next_if_eq(&first).is_some() {}
+                self.whole.miss(1);
+                half.miss(1);
+                before = Some(slot);
+                first += 1;
+                continue;
+            }
+            self.whole.push(&channel.counts[first..end]);
+            half.push(&steps[first..end]);
+            before = Some(slots[end - 1]);
+            first = end;
+        }
+    }
+}
+
+/// A channel with its models.
+struct FittedChannel {
+    profile: ChannelProfile,
+    whole: Curve<OCTAVES>,
+    first: RecordPart,
+    second: RecordPart,
+    both: RecordPart,
+    /// Of the first half.
+    half: ChannelFit,
+    /// Of the whole record.
+    fit: ChannelFit,
+}
+
+impl FittedChannel {
+    fn fit(description: &RecordingDescription, profile: ChannelProfile, estimators: &ChannelEstimators) -> Self {
+        let period_s = description.period_s();
+        let ChannelEstimators { whole, halves: [first, second], .. } = estimators;
+        let mut both = first.cascade.clone();
+        both.merge(&second.cascade);
+        let part = |cascade: Cascade<OCTAVES, OVERLAP>| RecordPart::of_channel(profile, cascade, period_s);
+        let [first, second, both] = [first.cascade.clone(), second.cascade.clone(), both].map(part);
+        let filters = &description.profile.filters;
+        let fit = |part: &RecordPart| {
+            let curve = CovariateFit::estimate(part, 0, false, |_| None);
+            if profile.quantity.is_inertial() {
+                ChannelFit::fit_curve(curve, filters)
+            } else {
+                ChannelFit::fit_baseline(curve)
+            }
+        };
+        let (half, mut fit) = (fit(&first), fit(&both));
+        // The terms that held on the second half are those of the whole record, as in the whole analysis.
+        if profile.quantity.is_inertial() && Contradiction::find(&half.trace.after, &second.curve(0)).is_none() {
+            fit.take_terms_that_held(&half.trace, None);
+        }
+        let whole = whole.cascade.curve(period_s).scaled(profile.lsb);
+        Self { profile, whole, first, second, both, half, fit }
+    }
+
+    /// The effects of the channel in the whole record and in its first half.
+    fn effects(&self, description: &RecordingDescription) -> (Vec<Effect>, Vec<Effect>) {
+        if !self.profile.quantity.is_inertial() {
+            return (Vec::new(), Vec::new());
+        }
+        let (profile, resolution) = (&description.profile, self.both.resolution(0));
+        let of = |fit: &ChannelFit| {
+            let findings = ChannelFindings {
+                channel: self.profile,
+                resolution,
+                fit,
+                sensitivities: Vec::new(),
+                lines: &[],
+                telegraph: None,
+                common: None,
+                rest: None,
+            };
+            let mut effects = name_effects(profile, &findings);
+            effects.extend(unexplained::by_curve(fit, profile, resolution));
+            effects
+        };
+        (of(&self.fit), of(&self.half))
+    }
+
+    fn report(&self, description: &RecordingDescription, estimators: &ChannelEstimators) -> ChannelReport {
+        let unit = self.profile.unit;
+        let (before, after) = (&self.half.trace.before, &self.half.trace.after);
+        let [first, second] = [&self.first, &self.second].map(|part| part.curve(0));
+        let whole = self.whole.clone().with_confidence(|point| before.variance_fractions(point.n));
+        let deviations = |model: &Model| whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect();
+        let of_half = |model: &Model| ModelReport {
+            terms: term_reports(model, unit),
+            adev: deviations(model),
+            fitted: ModelErrorReport::new(model, &first),
+            unseen: ModelErrorReport::new(model, &second),
+            unseen_excluding: None,
+        };
+        let (refitted, after_report) = (&self.fit.trace.after, of_half(after));
+        let duration_s = description.periods as f64 * description.period_s();
+        let has_samples = whole.samples() > 0;
+        ChannelReport {
+            name: self.profile.name.to_owned(),
+            unit: unit.to_owned(),
+            samples: description.samples,
+            missing: missing_samples(description, &self.both, estimators),
+            curve: whole.points().iter().map(|point| CurvePoint::new(point, whole.samples())).collect(),
+            read_off: SlopeMethodReport::from_curve(&whole, unit),
+            before: of_half(before),
+            effects: Vec::new(),
+            first_half_curve: ModelErrorReport::of_curve(&first, &second, after),
+            refitted: ModelReport {
+                terms: term_reports(refitted, unit),
+                adev: deviations(refitted),
+                ..after_report.clone()
+            },
+            after: after_report,
+            nonstationarity: None,
+            at_rest: Vec::new(),
+            assessment: Assessment::of_model(refitted, unit, duration_s, has_samples),
+            figure_data: FigureData {
+                data_sheet: figure_data::data_sheet(&self.profile.data_sheet),
+                ..FigureData::default()
+            },
+        }
+    }
+}
+
+/// Samples of a channel that are missing in its model.
+fn missing_samples(
+    description: &RecordingDescription,
+    both: &RecordPart,
+    estimators: &ChannelEstimators,
+) -> MissingSamples {
+    let mut refused: BTreeMap<String, u64> = BTreeMap::new();
+    let of_all = description.dropped.iter().filter(|(cause, _)| **cause != "gap");
+    for (&cause, &count) in of_all.chain(&estimators.refused).filter(|(_, count)| **count > 0) {
+        *refused.entry(cause.to_owned()).or_insert(0) += count;
+    }
+    let lost = description.dropped.get("gap").copied().unwrap_or(0);
+    MissingSamples { lost, refused, replaced: both.replaced(0) }
+}

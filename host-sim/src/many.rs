@@ -1,0 +1,93 @@
+//! `analyze --reports`: one report a recording, as many recordings at a time as there are cores.
+
+use crate::output::{self, note, progress_bar};
+use anyhow::{Context, Result, bail};
+use noise_analysis::parallel::{on_one_thread, threads};
+use noise_analysis::report::Report;
+use recordings::Printable;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::thread;
+
+/// Endings that the name of a report does not keep.
+const ENDINGS: [&str; 2] = [".gz", ".csv"];
+
+/// Writes the report of each of `files` into `folder`. A file that cannot be analysed does not keep the others from it.
+///
+/// # Errors
+/// Two files would have one report, the folder cannot be written, or a file could not be analysed.
+pub(crate) fn write_reports(
+    files: &[&Path],
+    folder: &Path,
+    is_quiet: bool,
+    analyze: impl Fn(&Path) -> Result<Report> + Sync,
+) -> Result<()> {
+    let reports = names(files, folder)?;
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let inputs: Vec<&Path> = files.to_vec();
+    for report in &reports {
+        output::check_file(report, &inputs).with_context(|| report.display().to_string())?;
+    }
+    let bar = progress_bar(files.len() as u64, "{wide_bar} {pos}/{len} {eta}");
+    let next = AtomicUsize::new(0);
+    let failures: Mutex<BTreeMap<usize, String>> = Mutex::default();
+    let work = || {
+        while let Some((at, file)) = Some(next.fetch_add(1, Relaxed)).and_then(|at| Some((at, files.get(at)?))) {
+            let written = on_one_thread(|| output::write_json(&analyze(file)?, &reports[at]));
+            if let Err(error) = written
+                && let Ok(mut failures) = failures.lock()
+            {
+                failures.insert(at, named(file, &error));
+            }
+            bar.inc(1);
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 0..threads().min(files.len()) {
+            scope.spawn(work);
+        }
+    });
+    bar.finish_and_clear();
+    let failures = failures.into_inner().unwrap_or_default();
+    failures.values().for_each(|failure| note(format_args!("no report: {failure}")));
+    let written = files.len() - failures.len();
+    if !is_quiet {
+        output::print(|out| {
+            writeln!(out, "{written} of {} reports in {}", files.len(), Printable(&folder.display().to_string()))
+        })?;
+    }
+    if !failures.is_empty() {
+        bail!("{} of {} recordings have no report", failures.len(), files.len());
+    }
+    Ok(())
+}
+
+/// An error with the name of its file before it, where it does not begin with it.
+fn named(file: &Path, error: &anyhow::Error) -> String {
+    let (name, text) = (file.display().to_string(), format!("{error:#}"));
+    if text.starts_with(&name) { text } else { format!("{name}: {text}") }
+}
+
+/// The report of each file.
+fn names(files: &[&Path], folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut known: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+    let mut reports = Vec::with_capacity(files.len());
+    for &file in files {
+        let name = output::source_name(file);
+        let stem = ENDINGS.iter().fold(name.as_str(), |name, ending| match name.strip_suffix(ending) {
+            Some("") | None => name,
+            Some(stem) => stem,
+        });
+        let report = folder.join(format!("{stem}.json"));
+        if let Some(other) = known.insert(report.clone(), file) {
+            let [one, other, report] = [other, file, &report].map(|path| path.display().to_string());
+            bail!("{} and {} would both have the report {}", Printable(&one), Printable(&other), Printable(&report));
+        }
+        reports.push(report);
+    }
+    Ok(reports)
+}

@@ -1,0 +1,142 @@
+//! `analyze --reports` of many files, and the interruption of the reading.
+
+use crate::program::{host_sim, json_of, write};
+use serde_json::Value;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::Duration;
+use tempfile::tempdir;
+
+/// White noise of 50 s at 100 Hz in one gyro, made by a linear congruential generator.
+fn table(seed: u64, rows: usize) -> String {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 59) as i64 - 16
+    };
+    let rows = (0..rows).map(|_| format!("{}\n", next()));
+    ["gyro_x_counts\n".to_owned()].into_iter().chain(rows).collect()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+#[test]
+fn each_report_of_many_is_that_of_the_file_alone() {
+    let dir = tempdir().expect("a folder");
+    let files = ["a.csv", "b.csv", "c.csv"].map(|name| write(&dir, name, table(name.len() as u64, 5000).as_bytes()));
+    let [a, b, c] = [&files[0], &files[1], &files[2]].map(|file| text(file));
+    let damaged = write(&dir, "damaged.csv", b"gyro_x_counts\n1\nx\n");
+    for quick in [&[][..], &["--quick"]] {
+        let reports = dir.path().join("reports");
+        let arguments = ["analyze", a, text(&damaged), b, c, "--rate", "100", "--reports", text(&reports)];
+        let output = host_sim(&[&arguments[..], quick].concat());
+        let (printed, errors) =
+            (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr).into_owned());
+        assert_eq!(output.status.code(), Some(1), "{errors}");
+        assert!(printed.contains("3 of 4 reports"), "{printed}");
+        assert!(errors.contains("damaged.csv: line 3") && errors.contains("1 of 4 recordings"), "{errors}");
+        for file in [a, b, c] {
+            let alone = json_of(&dir, &[&["analyze", file, "--rate", "100", "--quiet"][..], quick].concat());
+            let name = Path::new(file).with_extension("json");
+            let among = std::fs::read(reports.join(name.file_name().expect("a name"))).expect("a report");
+            assert!(alone == among, "{file}");
+        }
+        assert!(!reports.join("damaged.json").exists());
+        std::fs::remove_dir_all(&reports).expect("removed");
+    }
+}
+
+#[test]
+fn reports_of_one_name_are_refused_before_any_work() {
+    let dir = tempdir().expect("a folder");
+    let one = write(&dir, "imu.csv", table(1, 100).as_bytes());
+    std::fs::create_dir(dir.path().join("other")).expect("a folder");
+    let other = write(&dir, "other/imu.csv", table(2, 100).as_bytes());
+    let reports = dir.path().join("reports");
+    let arguments = ["analyze", text(&one), text(&other), "--rate", "100", "--reports", text(&reports)];
+    let output = host_sim(&arguments);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && error.contains("would both have the report"), "{error}");
+    assert!(!reports.exists());
+    // Several recordings without it are compared, which is not done quickly.
+    let output = host_sim(&["analyze", text(&one), text(&other), "--rate", "100", "--quick"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("--reports"));
+}
+
+/// The program with a named pipe as its recording, and the open end of the pipe to write to.
+fn reading(pipe: &Path, arguments: &[&str]) -> (Child, File) {
+    assert!(Command::new("mkfifo").arg(pipe).status().expect("mkfifo starts").success());
+    let program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(["analyze", text(pipe), "--rate", "100"])
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    // Returns when the program has opened the other end.
+    (program, OpenOptions::new().write(true).open(pipe).expect("the pipe"))
+}
+
+fn interrupt(program: &Child) {
+    assert!(Command::new("kill").args(["-INT", &program.id().to_string()]).status().expect("kill starts").success());
+}
+
+#[test]
+fn an_interrupt_while_a_pipe_is_read_gives_the_report_of_what_came() {
+    for (number, quick) in [&["--json", "-"][..], &["--json", "-", "--quick"]].into_iter().enumerate() {
+        let dir = tempdir().expect("a folder");
+        let (program, mut pipe) = reading(&dir.path().join(format!("pipe{number}")), quick);
+        // Ten times what a pipe holds, and a row that is not complete.
+        let table = table(3, 200_000);
+        pipe.write_all(table.as_bytes()).and_then(|()| pipe.write_all(b"1")).expect("the program reads");
+        // Until the program has taken the rest from the pipe.
+        thread::sleep(Duration::from_millis(500));
+        interrupt(&program);
+        let output = program.wait_with_output().expect("the program ends");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{errors}");
+        let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(report["samples"], 200_000);
+        assert!(errors.contains("interrupted") && errors.contains("first 200000 samples"), "{errors}");
+        drop(pipe);
+    }
+}
+
+#[test]
+fn a_second_interrupt_ends_the_program() {
+    let dir = tempdir().expect("a folder");
+    let (program, pipe) = reading(&dir.path().join("pipe"), &["--quiet"]);
+    // Nothing was read when the first one comes, so that the program ends by itself with an error, or by the second one.
+    interrupt(&program);
+    interrupt(&program);
+    let output = program.wait_with_output().expect("the program ends");
+    assert!(!output.status.success() && output.stdout.is_empty());
+    drop(pipe);
+}
+
+#[test]
+fn a_terminal_shows_how_far_the_reading_is() {
+    let dir = tempdir().expect("a folder");
+    let pipe = dir.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo starts").success());
+    let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_host-sim"), pipe.display());
+    let program = Command::new("script")
+        .args(["--quiet", "--return", "--command", &command, "/dev/null"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("script starts");
+    let mut input = OpenOptions::new().write(true).open(&pipe).expect("the pipe");
+    input.write_all(table(4, 5000).as_bytes()).expect("the program reads");
+    thread::sleep(Duration::from_millis(700));
+    drop(input);
+    let output = program.wait_with_output().expect("the program ends");
+    let shown = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && shown.contains("reading") && shown.contains("KiB"), "{shown}");
+}
