@@ -70,7 +70,7 @@ impl ChannelFit {
     /// The baseline model and what it lacks by the curve alone; `filters` are those that the sensor may have.
     pub(crate) fn fit_curve(covariates: CovariateFit, filters: &[MovingAverageFilter]) -> Self {
         let trace = trace(&covariates.curve, LineCandidates::Curve, filters);
-        let mut fit = Self { covariates, trace, recent: None };
+        let mut fit = Self { covariates, trace, markov_by_spectrum: None, recent: None };
         fit.resolve(None);
         fit
     }

@@ -45,8 +45,8 @@ pub(crate) struct ChannelFindings<'a> {
     pub fit: &'a ChannelFit,
     /// The covariates and the channel's sensitivities to them.
     pub sensitivities: Vec<(ChannelProfile, Sensitivity)>,
-    /// Lines of the spectrum.
-    pub lines: &'a [MergedLine],
+    /// Lines of the spectrum; `None` if they were not sought.
+    pub lines: Option<&'a [MergedLine]>,
     /// Random telegraph noise in the samples.
     pub telegraph: Option<&'a Detection>,
     /// Drift that the channel has in common with others.
@@ -75,8 +75,12 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     let telegraph = findings.telegraph.filter(|found| !is_rounding(found));
     let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
     let duration_s = fit.covariates.curve.samples() as f64 * period_s;
-    let in_spectrum: Vec<Effect> =
-        lines.iter().map(|line| line_effect(line, model, unit)).filter(|effect| is_shown(effect, duration_s)).collect();
+    let in_spectrum: Vec<Effect> = lines
+        .unwrap_or_default()
+        .iter()
+        .map(|line| line_effect(line, model, unit))
+        .filter(|effect| is_shown(effect, duration_s))
+        .collect();
     for found in &fit.trace.added {
         let term = &model.terms()[found.term];
         match term.kind {
@@ -91,7 +95,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
                 if is_in_spectrum(&term.kind, &in_spectrum) || has_few_periods(&term.kind, duration_s) => {}
             // In the curve alone: its frequency changes, or it is no line.
             NoiseTerm::Sinusoid(Sinusoid { frequency }) | NoiseTerm::Resonance(Resonance { frequency, .. })
-                if !is_band(term, duration_s) =>
+                if lines.is_some() && !is_band(term, duration_s) =>
             {
                 let what = format!("as by a line at {frequency:.4} Hz, where the spectrum has none");
                 effects.push(unexplained_octave(found, &fit.covariates.curve, &what));

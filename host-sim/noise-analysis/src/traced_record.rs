@@ -187,7 +187,7 @@ impl ChannelTrace {
             resolution: both.resolution_of(self.channel),
             fit: &self.fit,
             sensitivities: sensitivities.map(|(position, of)| (both.channels[position], *of)).collect(),
-            lines: &self.lines,
+            lines: Some(&self.lines),
             telegraph: self.telegraph.as_ref(),
             common,
             rest: self.rest.as_ref(),
