@@ -16,8 +16,8 @@ use crate::causes;
 use crate::figure_data;
 use crate::first_half::{FirstHalf, FirstHalfFit};
 use crate::nonstationarity::CommonModeRegression;
+use crate::parallel::in_parallel;
 use crate::part_report;
-use crate::preprocessing::in_parallel;
 use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelReport, Report, SCHEMA, SlopeMethodReport, term_reports,
 };

@@ -4,7 +4,8 @@
 //! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
 //! channels are taken where both have a sample.
 
-use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
+use crate::parallel::in_parallel;
+use crate::preprocessing::{Exclusion, Preprocessing};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
 use allan_core::{Cascade, Coupling, Curve};

@@ -2,7 +2,7 @@
 //! bias over time, condensed to at most [`MOST_POINTS`] points each.
 
 use crate::findings::Parameter;
-use crate::preprocessing::in_parallel;
+use crate::parallel::in_parallel;
 use crate::report::{BiasOverTime, ChannelReport, DataSheetReport, FigureData, Report, SpectrumReport, TermReport};
 use crate::series::Series;
 use crate::spectra::Welch;

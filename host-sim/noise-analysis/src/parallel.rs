@@ -3,6 +3,8 @@
 
 use std::cell::Cell;
 use std::num::NonZero;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 thread_local! {
     static IS_ALONE: Cell<bool> = const { Cell::new(false) };
@@ -25,4 +27,28 @@ pub fn on_one_thread<R>(task: impl FnOnce() -> R) -> R {
 #[must_use]
 pub fn threads() -> usize {
     if IS_ALONE.get() { 1 } else { std::thread::available_parallelism().map_or(1, NonZero::get) }
+}
+
+/// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.
+pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let cores = threads();
+    if cores == 1 {
+        return items.iter().map(task).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let taken = std::iter::from_fn(|| {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            Some((at, task(items.get(at)?)))
+        });
+        taken.collect::<Vec<_>>()
+    };
+    let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores.min(items.len())).map(|_| scope.spawn(work)).collect();
+        // A panic in a task is passed on to the caller.
+        let finished = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        finished.flatten().collect()
+    });
+    results.sort_unstable_by_key(|(at, _)| *at);
+    results.into_iter().map(|(_, result)| result).collect()
 }

@@ -13,15 +13,13 @@ use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::detectors::{bias, effective_lsb, output_range};
 use crate::findings::{Correction, Detection, Effect};
-use crate::parallel;
+use crate::parallel::in_parallel;
 use crate::sampling_faults;
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
-use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Which of the samples that the detectors found are left out. Samples that were read twice always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -371,30 +369,6 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     all.sort_unstable();
     all.dedup();
     all
-}
-
-/// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.
-pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = parallel::threads();
-    if cores == 1 {
-        return items.iter().map(task).collect();
-    }
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let taken = std::iter::from_fn(|| {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            Some((at, task(items.get(at)?)))
-        });
-        taken.collect::<Vec<_>>()
-    };
-    let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores.min(items.len())).map(|_| scope.spawn(work)).collect();
-        // A panic in a task is passed on to the caller.
-        let finished = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        finished.flatten().collect()
-    });
-    results.sort_unstable_by_key(|(at, _)| *at);
-    results.into_iter().map(|(_, result)| result).collect()
 }
 
 fn excluded(correction: &Option<Correction>) -> Vec<u64> {

@@ -14,8 +14,7 @@ use crate::estimators::{RecordPart, STEPS_PER_COUNT};
 use crate::figure_data;
 use crate::findings::Effect;
 use crate::naming::{ChannelFindings, name_effects};
-use crate::parallel;
-use crate::preprocessing::in_parallel;
+use crate::parallel::{self, in_parallel};
 use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
     SlopeMethodReport, term_reports,

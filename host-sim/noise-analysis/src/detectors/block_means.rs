@@ -88,6 +88,16 @@ pub struct NoiseCovariance {
     precision: DMatrix<f64>,
     /// Logarithm of the determinant of the covariance times the information on the constant, as REML has it.
     pub log_determinant: f64,
+    /// What it says of a step before each block: the same for every channel with these blocks.
+    steps: OnceLock<StepInformation>,
+}
+
+/// What a covariance says of a step.
+struct StepInformation {
+    /// On the size of a step before each block, were it the only regressor.
+    of_size: Vec<f64>,
+    /// Effective number of independent tests when a step is tried before every block.
+    independent: f64,
 }
 
 impl NoiseCovariance {
@@ -115,7 +125,7 @@ impl NoiseCovariance {
         let along = precision.column_sum();
         let constant = along.sum();
         precision.ger(-1.0 / constant, &along, &along, 1.0);
-        Some(Self { precision, log_determinant: log_covariance + constant.ln() })
+        Some(Self { precision, log_determinant: log_covariance + constant.ln(), steps: OnceLock::new() })
     }
 
     /// Product of the precision matrix with `values`.
@@ -129,30 +139,36 @@ impl NoiseCovariance {
     }
 
     /// Information on the size of a step before each block, were it the only regressor.
-    pub(super) fn step_information(&self) -> Vec<f64> {
-        let size = self.precision.nrows();
-        let mut information = vec![0.0; size];
-        let mut sum = 0.0;
-        for at in (0..size).rev() {
-            // The step before block `at` is that before the next block, and block `at` in addition.
-            let column = self.precision.column(at);
-            sum += column[at] + 2.0 * column.iter().skip(at + 1).sum::<f64>();
-            information[at] = sum;
-        }
-        information
+    pub(super) fn step_information(&self) -> &[f64] {
+        &self.steps.get_or_init(|| StepInformation::new(&self.precision)).of_size
     }
 
     /// Effective number of independent tests when a step is tried before every block: the sum of acos of the correlation
     /// of neighbouring steps, over π.
     pub(super) fn independent_steps(&self) -> f64 {
-        let information = self.step_information();
+        self.steps.get_or_init(|| StepInformation::new(&self.precision)).independent
+    }
+}
+
+impl StepInformation {
+    fn new(precision: &DMatrix<f64>) -> Self {
+        let size = precision.nrows();
+        let mut of_size = vec![0.0; size];
+        let mut sum = 0.0;
+        for at in (0..size).rev() {
+            // The step before block `at` is that before the next block, and block `at` in addition.
+            let column = precision.column(at);
+            sum += column[at] + 2.0 * column.iter().skip(at + 1).sum::<f64>();
+            of_size[at] = sum;
+        }
         let between = |at: usize| {
             // Two neighbouring steps differ in one block.
-            let shared = 0.5 * (information[at] + information[at + 1] - self.precision[(at, at)]);
-            let correlation = shared / (information[at] * information[at + 1]).sqrt();
+            let shared = 0.5 * (of_size[at] + of_size[at + 1] - precision[(at, at)]);
+            let correlation = shared / (of_size[at] * of_size[at + 1]).sqrt();
             if correlation.is_finite() { correlation.clamp(-1.0, 1.0).acos() / PI } else { 0.0 }
         };
-        (1..information.len() - 1).map(between).sum()
+        let independent = (1..size - 1).map(between).sum();
+        Self { of_size, independent }
     }
 }
 

@@ -11,6 +11,7 @@ use super::noise_levels::{
 };
 use crate::distributions::NORMAL_975;
 use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::parallel::in_parallel;
 use crate::series::Series;
 use std::ops::Range;
 
@@ -97,13 +98,14 @@ struct LoudBlock {
 /// Knocks in channels that were recorded together, by channel, in the order of time; `dithered_avar_counts2` as in the
 /// sensor's profile.
 pub(crate) fn find(channels: &[Series], dithered_avar_counts2: f64) -> Vec<Vec<Knock>> {
-    let rules: Vec<KnockRule> = channels.iter().map(|series| KnockRule::fit(series, dithered_avar_counts2)).collect();
+    let rules = in_parallel(channels, |series| KnockRule::fit(series, dithered_avar_counts2));
     find_by(&rules, channels)
 }
 
 /// As [`find`], with rules that were fitted to another part of the record; one rule a channel.
 pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series]) -> Vec<Vec<Knock>> {
-    let mut found: Vec<Vec<Knock>> = rules.iter().zip(channels).map(|(rule, series)| rule.find(series)).collect();
+    let pairs: Vec<(&KnockRule, &Series)> = rules.iter().zip(channels).collect();
+    let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series));
     let all: Vec<Knock> = found.iter().flatten().cloned().collect();
     for ((rule, series), own) in rules.iter().zip(channels).zip(&mut found) {
         for known in &all {

@@ -35,6 +35,10 @@ const MEDIAN_LOSS: f64 = std::f64::consts::FRAC_PI_2;
 const LEAST_FILL: f64 = 0.9;
 /// Blocks from which on their scatter bounds the degrees of freedom.
 const FEWEST_FOR_SCATTER: usize = 24;
+/// Stretches, and differences in each, from which the correlations of a long record are estimated: with 65,536 products each is
+/// known to 0.004, and the degrees of freedom to a thousandth.
+const STRETCHES: usize = 64;
+const STRETCH: usize = 1024;
 /// Degrees of freedom beyond which a level is taken to be exact.
 const MOST_FREEDOM: f64 = 1e6;
 /// The 90 % quantile of the standard normal distribution.
@@ -156,7 +160,21 @@ struct Covariances {
 }
 
 impl Covariances {
+    /// Of all `differences`, or of a long record of stretches that are spread evenly over it, with as many missing ones between
+    /// them as lags are asked for.
     fn new(differences: &[f64]) -> Self {
+        if differences.len() > 2 * STRETCHES * STRETCH {
+            let from = |stretch: usize| stretch * (differences.len() - STRETCH) / (STRETCHES - 1);
+            let apart = [f64::NAN; DIFFERENCES];
+            let parts = (0..STRETCHES).flat_map(|stretch| {
+                differences[from(stretch)..from(stretch) + STRETCH].iter().chain(&apart).copied().collect::<Vec<f64>>()
+            });
+            return Self::of_all(&parts.collect::<Vec<f64>>());
+        }
+        Self::of_all(differences)
+    }
+
+    fn of_all(differences: &[f64]) -> Self {
         let is_missing = |value: &f64| !value.is_finite();
         let present = if differences.iter().any(is_missing) {
             differences.iter().map(|value| f64::from(u8::from(!is_missing(value)))).collect()
