@@ -88,6 +88,8 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
             }
         }
     }
+    // What is left in one channel of a drift that others showed as a line is that line's.
+    causes.retain(|cause| cause.shown.len() > 1 || cause.shown[0].effect.kind != "common_mode");
     causes.sort_by_key(|cause| cause.shown[0].channel);
     causes
 }

@@ -6,6 +6,9 @@ use crate::estimators::RecordPart;
 use crate::findings::BoundedEstimate;
 use crate::octave_covariance::with_bounds_behind_a_filter;
 use crate::part_filter::{PartFilter, is_white};
+use crate::spectra::MarkovEstimate;
+use crate::spectra::cosine_spectrum::CosineSpectrum;
+use crate::spectral_lines::MergedLine;
 use allan_core::fit::{Goodness, fit_shapes_except, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter};
@@ -22,6 +25,9 @@ const POOR_FIT: f64 = 1e-3;
 /// times (χ² of one degree of freedom).
 const MAX_DEVIANCE_RISE: f64 = 10.0;
 
+/// Shortest time constant of a Markov process that is sought in the spectrum, in lengths of the filter's impulse response.
+const FILTER_LENGTHS: f64 = 4.0;
+
 /// Least decrease of the deviance by a term of two parameters that a trace adds.
 const COST_OF_A_TERM: f64 = 18.0;
 
@@ -29,6 +35,8 @@ const COST_OF_A_TERM: f64 = 18.0;
 pub(crate) struct ChannelFit {
     pub covariates: CovariateFit,
     pub trace: Trace,
+    /// The Markov process of the model that the spectrum shows and the curve does not, if there is one.
+    pub markov_by_spectrum: Option<MarkovEstimate>,
     /// The curve that the model with added terms is fitted to, where that is not the curve of the whole part.
     recent: Option<Curve<OCTAVES>>,
 }
@@ -37,7 +45,7 @@ impl ChannelFit {
     /// The baseline model alone.
     pub(crate) fn fit_baseline(covariates: CovariateFit) -> Self {
         let trace = Trace::baseline(&covariates.curve);
-        Self { covariates, trace, recent: None }
+        Self { covariates, trace, markov_by_spectrum: None, recent: None }
     }
 
     /// The baseline model and what it lacks; `lines` are those of the spectrum, `filters` those that the sensor may have.
@@ -47,17 +55,22 @@ impl ChannelFit {
     pub(crate) fn fit_traced(covariates: CovariateFit, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
         let by_spectrum = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
         if lines.is_empty() || by_spectrum.after_goodness.p_value > POOR_FIT {
-            return Self { covariates, trace: by_spectrum, recent: None };
+            return Self { covariates, trace: by_spectrum, markov_by_spectrum: None, recent: None };
         }
         let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
         let is_better = by_curve.after_goodness.deviance < by_spectrum.after_goodness.deviance;
-        Self { covariates, trace: if is_better { by_curve } else { by_spectrum }, recent: None }
+        Self {
+            covariates,
+            trace: if is_better { by_curve } else { by_spectrum },
+            markov_by_spectrum: None,
+            recent: None,
+        }
     }
 
     /// The baseline model and what it lacks by the curve alone; `filters` are those that the sensor may have.
     pub(crate) fn fit_curve(covariates: CovariateFit, filters: &[MovingAverageFilter]) -> Self {
         let trace = trace(&covariates.curve, LineCandidates::Curve, filters);
-        let mut fit = Self { covariates, trace, recent: None };
+        let mut fit = Self { covariates, trace, markov_by_spectrum: None, recent: None };
         fit.resolve(None);
         fit
     }
@@ -250,15 +263,62 @@ impl ChannelFit {
         if is_shown && better.deviance < fitted.deviance { (more, better) } else { (plain, fitted) }
     }
 
+    /// Adds the Markov process that the lowest frequencies of the spectrum show, where the model of the curve has none: the curve
+    /// tells it from a random walk by its longest octaves alone. Its time constant is that of the spectrum, the coefficients of
+    /// all terms are fitted again; a process to which the curve gives no variance is left out. `lines` are those of the spectrum.
+    pub(crate) fn add_markov_of_spectrum(&mut self, spectrum: &CosineSpectrum, lines: &[MergedLine]) {
+        let curve = &self.covariates.curve;
+        let model = &self.trace.after;
+        let has_room = model.terms().len() < MAX_TERMS && self.trace.added.len() < MAX_ADDED;
+        if !has_room || self.correlation_times().next().is_some() {
+            return;
+        }
+        let line = |term: &FittedTerm| match term.kind {
+            NoiseTerm::Sinusoid(line) => Some(line.frequency),
+            NoiseTerm::Resonance(line) => Some(line.frequency),
+            _ => None,
+        };
+        let lines: Vec<f64> =
+            model.terms().iter().filter_map(line).chain(lines.iter().map(|line| line.frequency.value)).collect();
+        let filter = model.terms().iter().find(|term| matches!(term.kind, NoiseTerm::Filtered(_)));
+        let Some(found) = spectrum.find_markov(&lines, FILTER_LENGTHS * filter_length_s(model)) else { return };
+        let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
+        let markov = NoiseTerm::Markov(Markov { time_constant: found.time_constant.value });
+        let kinds = [kinds.as_slice(), &[markov]].concat();
+        let fitted = fit_shapes_except(curve, &kinds, &kinds);
+        let octave = curve.points().iter().min_by(|a, b| {
+            let distance = |point: &AllanPoint| (point.tau / found.time_constant.value).ln().abs();
+            distance(a).total_cmp(&distance(b))
+        });
+        let (Some(term), Some(octave)) = (fitted.terms().last().filter(|term| term.value > 0.0), octave) else {
+            return;
+        };
+        let residual = residual(model, octave);
+        // The curve leaves the bounds of its deviation open; those of the spectrum hold.
+        let bounded = FittedTerm {
+            low: found.deviation.low.min(term.value),
+            high: found.deviation.high.max(term.value),
+            shape: [(found.time_constant.low, found.time_constant.high), term.shape[1]],
+            ..*term
+        };
+        let position = kinds.len() - 1;
+        let added = AddedTerm { term: position, score: 2.0 * found.gain, residual };
+        self.trace.added = self.trace.added.iter().copied().chain([added]).collect();
+        let others = fitted.terms()[..position].iter().copied();
+        self.trace.after_goodness = goodness(curve, &fitted);
+        let decimation = filter.map(|filter| filter.shape);
+        let with_filter = |term: FittedTerm| match (term.kind, decimation) {
+            (NoiseTerm::Filtered(_), Some(shape)) => FittedTerm { shape, ..term },
+            _ => term,
+        };
+        self.trace.after = Model::new(fitted.sample_period(), others.map(with_filter).chain([bounded]));
+        self.markov_by_spectrum = Some(found);
+    }
+
     /// The residual of the model at the shortest averaging time.
     fn first_residual(&self) -> Residual {
-        let model = &self.trace.after;
-        let residual = |point: &AllanPoint| {
-            let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
-            Residual { n: point.n, excess, sigmas: excess * (2.0 * model.edf(point)).sqrt() }
-        };
         let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
-        self.covariates.curve.points().first().map_or(nothing, residual)
+        self.covariates.curve.points().first().map_or(nothing, |point| residual(&self.trace.after, point))
     }
 
     /// Takes the terms of `held`, a model of the first half that held on the second, in place of those that were traced in the
@@ -288,6 +348,23 @@ impl ChannelFit {
         self.trace.after_goodness = fitted;
         self.trace.added.clone_from(&held.added);
     }
+}
+
+/// The residual of a model at a point of a curve.
+fn residual(model: &Model, point: &AllanPoint) -> Residual {
+    let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
+    Residual { n: point.n, excess, sigmas: excess * (2.0 * model.edf(point)).sqrt() }
+}
+
+/// Length of the impulse response of the longest filter in a model, s.
+pub(crate) fn filter_length_s(model: &Model) -> f64 {
+    let length = |kind: &NoiseTerm| match kind {
+        NoiseTerm::Filtered(filter) => {
+            f64::from(filter.stages) * f64::from(filter.taps) * model.sample_period() / filter.decimation
+        }
+        _ => 0.0,
+    };
+    model.terms().iter().map(|term| length(&term.kind)).fold(0.0, f64::max)
 }
 
 /// Deviance of a fit with what its added terms must take off at least.

@@ -10,8 +10,10 @@ use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, 
 use crate::preprocessing::{Exclusion, in_parallel};
 use crate::report::{ModelErrorReport, ModelReport, term_reports};
 use crate::series::Series;
-use crate::spectral_lines::fit_with_lines;
+use crate::spectra::cosine_spectrum::CosineSpectrum;
+use crate::spectral_lines::{MergedLine, fit_with_lines};
 use crate::traced_record::{TracedRecord, agree_on_filter};
+use crate::uniform_series::UniformSeries;
 use allan_core::{Curve, Model};
 use measurement::ChannelProfile;
 
@@ -28,6 +30,9 @@ pub(crate) struct FirstHalfFit {
     /// The baseline model of the first half as it was recorded, with its spikes and knocks.
     raw: Model,
     pub fit: ChannelFit,
+    slowest: Option<CosineSpectrum>,
+    /// Lines in the spectrum.
+    lines: Vec<MergedLine>,
     /// Curves of the channel's epochs; `None` of a record that is too short for them, and of a channel that is not traced.
     epoch_curves: Option<EpochCurves>,
     /// The same, with the part of the first half that `fit` is fitted to.
@@ -48,6 +53,9 @@ impl FirstHalf {
         let traced = fits.filter(|(channel, _)| record.traced.contains(channel));
         // The filter of the whole record is the one that is reported.
         let _of_first_half = agree_on_filter(record.measurement, &record.estimators, traced);
+        for FirstHalfFit { fit, slowest, lines, .. } in &mut channels {
+            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, lines));
+        }
         channels.iter_mut().for_each(FirstHalfFit::fit_to_recent);
         Self { channels, series }
     }
@@ -82,7 +90,7 @@ impl FirstHalfFit {
         let estimators = &record.estimators;
         let position = estimators.both.position(channel).unwrap_or_default();
         let fit = ChannelFit::fit_baseline(CovariateFit::estimate(&estimators.ruled[0], position, false, |_| None));
-        Self { raw: fit.trace.before.clone(), fit, epoch_curves: None, epochs: None }
+        Self { raw: fit.trace.before.clone(), fit, slowest: None, lines: Vec::new(), epoch_curves: None, epochs: None }
     }
 
     /// The baseline model and what it lacks, of the channel of `series[own]`; `halves` are the first halves of `series`.
@@ -113,9 +121,10 @@ impl FirstHalfFit {
         let middle = record.measurement.middle();
         let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&series[own]), middle);
         let rest = covariates.compensated_series(&halves[own], halves);
-        let (fit, _) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile);
+        let (fit, lines) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile);
         let raw = raw.unwrap_or_else(|| fit.trace.before.clone());
-        Self { raw, fit, epoch_curves, epochs: None }
+        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(&halves[own]));
+        Self { raw, fit, slowest: CosineSpectrum::new(&rest), lines, epoch_curves, epochs: None }
     }
 
     /// Fits the model to the later quarter of the first half where its noise changes.

@@ -2,18 +2,19 @@
 //! bounds, and with evidence that a person can check.
 
 use crate::OCTAVES;
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, filter_length_s};
 use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
-use crate::spectral_lines::{FEW_PERIODS, MergedLine};
+use crate::spectra::MarkovEstimate;
+use crate::spectral_lines::{FEW_PERIODS, FULL_WIDTH, MergedLine};
 use crate::uniform_series::UniformSeries;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
-use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm};
+use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 use allan_core::trace::AddedTerm;
 use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
@@ -27,6 +28,12 @@ const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Farthest that a line of the curve and the same line of the spectrum are apart, as a part of the frequency.
 const FREQUENCY_BY_OCTAVES: f64 = 0.2;
+/// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
+const WIDEST_BAND: f64 = 2.0;
+/// Largest excess kurtosis of a telegraph signal that the curve alone shows, in units of that of two equally frequent levels. A
+/// signal that is at one level for a part `p` of the time has `(1/(p·(1−p)) − 2)/2` times as much at averaging times below its
+/// time constant: 1.5 for 28 %. The samples themselves show less even ones.
+const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
 /// Variance of the rounding error, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -38,8 +45,8 @@ pub(crate) struct ChannelFindings<'a> {
     pub fit: &'a ChannelFit,
     /// The covariates and the channel's sensitivities to them.
     pub sensitivities: Vec<(ChannelProfile, Sensitivity)>,
-    /// Lines of the spectrum.
-    pub lines: &'a [MergedLine],
+    /// Lines of the spectrum; `None` if they were not sought.
+    pub lines: Option<&'a [MergedLine]>,
     /// Random telegraph noise in the samples.
     pub telegraph: Option<&'a Detection>,
     /// Drift that the channel has in common with others.
@@ -68,8 +75,12 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     let telegraph = findings.telegraph.filter(|found| !is_rounding(found));
     let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
     let duration_s = fit.covariates.curve.samples() as f64 * period_s;
-    let in_spectrum: Vec<Effect> =
-        lines.iter().map(|line| line_effect(line, model, unit)).filter(|effect| is_shown(effect, duration_s)).collect();
+    let in_spectrum: Vec<Effect> = lines
+        .unwrap_or_default()
+        .iter()
+        .map(|line| line_effect(line, model, unit))
+        .filter(|effect| is_shown(effect, duration_s))
+        .collect();
     for found in &fit.trace.added {
         let term = &model.terms()[found.term];
         match term.kind {
@@ -79,10 +90,16 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             _ if !is_dithered => {}
             NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s => {}
             NoiseTerm::Quantization if rounding_s > 0.0 => {}
-            // Reported from the spectrum, which resolves them better than the curve. A line whose frequency moves may be in the
-            // curve alone.
+            // Reported from the spectrum, which resolves them better than the curve.
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_)
                 if is_in_spectrum(&term.kind, &in_spectrum) || has_few_periods(&term.kind, duration_s) => {}
+            // In the curve alone: its frequency changes, or it is no line.
+            NoiseTerm::Sinusoid(Sinusoid { frequency }) | NoiseTerm::Resonance(Resonance { frequency, .. })
+                if lines.is_some() && !is_band(term, duration_s) =>
+            {
+                let what = format!("as by a line at {frequency:.4} Hz, where the spectrum has none");
+                effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
+            }
             // In the curve, random telegraph noise and a common-mode drift look like these.
             NoiseTerm::Markov(_) | NoiseTerm::RateRamp if telegraph.is_some() || common.is_some() => {}
             NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
@@ -91,9 +108,27 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Markov(Markov { time_constant })
                 if findings.rest.is_some_and(|rest| !is_reversible(rest, time_constant)) =>
             {
-                effects.push(decaying_effect(found, time_constant, &fit.covariates.curve));
+                let what = format!(
+                    "with the spectrum of a process that forgets within {} s, but its changes up and down differ: disturbances \
+                     that begin at once and decay",
+                    seconds(time_constant),
+                );
+                effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
+            }
+            NoiseTerm::Markov(_) if let Some(by_spectrum) = &fit.markov_by_spectrum => {
+                effects.push(markov_effect(term, by_spectrum, unit));
             }
             NoiseTerm::Markov(markov) => match telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov) {
+                Some(kurtosis) if kurtosis.ratio - 3.0 * kurtosis.error > LARGEST_KURTOSIS_RATIO => {
+                    let what = format!(
+                        "with the spectrum of a process that forgets within {} s, but an excess kurtosis {:.1} ± {:.1} times \
+                         that of a telegraph signal: rare disturbances",
+                        seconds(markov.time_constant),
+                        kurtosis.ratio,
+                        kurtosis.error,
+                    );
+                    effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
+                }
                 Some(kurtosis) if kurtosis.is_telegraph() => {
                     effects.push(telegraph_effect(term, found, &kurtosis, unit, period_s));
                 }
@@ -102,11 +137,19 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             _ => effects.push(term_effect(term, found, unit, period_s)),
         }
     }
+    keep_first_of(&mut effects, "unexplained");
     effects.extend(telegraph.map(|found| found.effect.clone()));
     effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
     effects.extend(in_spectrum);
     effects.retain(|effect| is_shown(effect, duration_s));
     effects
+}
+
+/// Leaves the first effect of this kind alone: of several terms that stand for one thing that has no name, the first was the
+/// clearest.
+fn keep_first_of(effects: &mut Vec<Effect>, kind: &str) {
+    let mut is_first = true;
+    effects.retain(|effect| effect.kind != kind || std::mem::take(&mut is_first));
 }
 
 /// Whether the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of
@@ -131,6 +174,12 @@ fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
     })
 }
 
+/// Whether a term is a resonance of whose bandwidth a record of this length bounds both sides.
+fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
+    let [_, (narrowest, widest)] = term.shape;
+    matches!(term.kind, NoiseTerm::Resonance(of) if narrowest > 1.0 / duration_s && widest < WIDEST_BAND * of.frequency)
+}
+
 /// Whether a line has fewer periods in the record than lines are searched for: its curve alone does not tell it from drift.
 fn has_few_periods(kind: &NoiseTerm, duration_s: f64) -> bool {
     line_frequency(kind).is_some_and(|frequency| frequency * duration_s < FEW_PERIODS)
@@ -143,17 +192,6 @@ fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
         NoiseTerm::Resonance(line) => Some(line.frequency),
         _ => None,
     }
-}
-
-/// Length of the impulse response of the longest filter in a model, s.
-fn filter_length_s(model: &Model) -> f64 {
-    let length = |kind: &NoiseTerm| match kind {
-        NoiseTerm::Filtered(filter) => {
-            f64::from(filter.stages) * f64::from(filter.taps) * model.sample_period() / filter.decimation
-        }
-        _ => 0.0,
-    };
-    model.terms().iter().map(|term| length(&term.kind)).fold(0.0, f64::max)
 }
 
 /// Whether a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
@@ -223,25 +261,35 @@ fn telegraph_effect(
     Effect { kind: "telegraph".to_owned(), parameters, evidence, finding: 0 }
 }
 
-/// A Markov term whose process is not the same when time runs backwards: neither a Gaussian process nor a telegraph signal.
-fn decaying_effect(found: &AddedTerm, time_constant: f64, curve: &Curve<OCTAVES>) -> Effect {
+/// A term that fits an octave of the curve and is contradicted by `what` the samples show.
+fn unexplained_octave(found: &AddedTerm, curve: &Curve<OCTAVES>, what: &str) -> Effect {
     let point = curve.points().iter().find(|point| point.n == found.residual.n);
     // Of the measured deviation at this averaging time; that of the model is taken as exact.
     let bound = |of: fn(&AllanPoint) -> f64| point.map_or(1.0, |point| (of(point) / point.avar).sqrt());
     let percent = |factor: f64| 100.0 * ((1.0 + found.residual.excess) * factor - 1.0);
     let (low, high) = (percent(bound(|point| point.low)), percent(bound(|point| point.high)));
-    let tau = point.map_or(time_constant, |point| point.tau);
+    let tau = found.residual.n as f64 * curve.sample_period();
     let evidence = format!(
-        "{:+.1} % at tau = {} s ({:.0} sigma) with the spectrum of a process that forgets within {} s, but its changes up and \
-         down differ: disturbances that begin at once and decay",
+        "{:+.1} % at tau = {} s ({:.0} sigma) {what}",
         100.0 * found.residual.excess,
         seconds(tau),
         found.residual.sigmas.abs(),
-        seconds(time_constant),
     );
     let parameters =
         [("tau", Parameter::new(tau, tau, tau, "s")), ("excess_percent", Parameter::new(percent(1.0), low, high, "%"))];
     Effect::new("unexplained", parameters, evidence)
+}
+
+/// A Markov term that the spectrum shows and the curve does not.
+fn markov_effect(term: &FittedTerm, by_spectrum: &MarkovEstimate, unit: &str) -> Effect {
+    let time_constant = by_spectrum.time_constant.value;
+    let evidence = format!(
+        "the spectrum is flat below {} Hz, where a random walk would rise: e^{:.0} times as likely; {}",
+        seconds(0.5 / (PI * time_constant)),
+        by_spectrum.gain,
+        meaning(&term.kind),
+    );
+    Effect { kind: term.kind.name().to_owned(), parameters: term_parameters(term, unit), evidence, finding: 0 }
 }
 
 /// A Markov term in the place of the white noise.
@@ -327,6 +375,9 @@ fn line_effect(line: &MergedLine, model: &Model, unit: &str) -> Effect {
     if line.shape_p_value < SIGNIFICANCE {
         return unexplained_band(line, model);
     }
+    if let Some(distance) = line.sidebands {
+        return modulated_line(line, distance);
+    }
     let (kind, root) = (line.kind(), 2f64.sqrt());
     let parameters = match kind {
         NoiseTerm::Resonance(_) => {
@@ -350,6 +401,24 @@ fn line_effect(line: &MergedLine, model: &Model, unit: &str) -> Effect {
         meaning(&kind),
     );
     Effect::new(kind.name(), parameters.into_iter().chain([frequency]), evidence)
+}
+
+/// A sinusoid between two equal ones `distance` Hz away.
+fn modulated_line(line: &MergedLine, distance: f64) -> Effect {
+    let frequency = normal_bounds(line.frequency, "Hz");
+    // The spread of the merged peaks is that of the sidebands: their part of the power is its square over that of the distance.
+    let spread = line.width.value / FULL_WIDTH;
+    let percent = 100.0 * (spread / distance).min(1.0);
+    let relative = NORMAL_975 * line.deviation.error / line.deviation.value;
+    let excess = Parameter::new(percent, percent * (1.0 - relative).max(0.0), percent * (1.0 + relative), "%");
+    let evidence = format!(
+        "a line at {:.4} Hz between two equal ones {distance:.4} Hz away, {:.0} sigma: its amplitude swells and fades every {:.0} s, \
+         which no sinusoid of one amplitude does",
+        line.frequency.value,
+        line.statistic.sqrt(),
+        1.0 / distance,
+    );
+    Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
 }
 
 /// A band of the spectrum that stands out of the noise and has not the form of a resonance.

@@ -237,7 +237,7 @@ impl FittedChannel {
                 resolution,
                 fit,
                 sensitivities: Vec::new(),
-                lines: &[],
+                lines: None,
                 telegraph: None,
                 common: None,
                 rest: None,

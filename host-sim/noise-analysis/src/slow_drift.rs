@@ -1,7 +1,8 @@
 //! Slow drift that several channels have in common.
 
 use crate::series::Series;
-use crate::spectra::common_mode::{CommonModeDrift, CrossSpectra};
+use crate::spectra::MarkovEstimate;
+use crate::spectra::common_mode::CrossSpectra;
 use crate::uniform_series::UniformSeries;
 use measurement::ChannelProfile;
 
@@ -14,7 +15,7 @@ pub(crate) struct ChannelsInCommon {
     pub channels: Vec<ChannelProfile>,
     /// Increase of the ln likelihood of the spectra.
     pub gain: f64,
-    pub drift: CommonModeDrift,
+    pub drift: MarkovEstimate,
 }
 
 /// The drift that `channels` of one quantity have in common; `samples` are those of each less its covariates.

@@ -6,6 +6,7 @@
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
 //!               ├► sine tapers ─► common_mode            drift that several channels share
+//!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
 //!               ├► Welch ─► white_noise                  N, independent of the Allan variance
 //!               │        ├► equation_5                   the Allan deviation, by equation (5) of the paper
 //!               │        └► SpectralShape                a smooth curve through the spectrum
@@ -14,9 +15,11 @@
 
 mod autocorrelation;
 pub(crate) mod common_mode;
+pub(crate) mod cosine_spectrum;
 mod equation_5;
 mod line_models;
 mod lines;
+mod markov_spectrum;
 mod periodogram;
 mod smooth_shape;
 mod welch;
@@ -26,6 +29,7 @@ pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
 pub use lines::{SpectralLine, find_lines};
 pub(crate) use lines::{find_lines_over, without_slow_sines};
+pub(crate) use markov_spectrum::MarkovEstimate;
 pub use smooth_shape::{SpectralBand, SpectralShape};
 pub use welch::Welch;
 pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};

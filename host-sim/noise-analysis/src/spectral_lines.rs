@@ -18,6 +18,14 @@ const MERGE_DISTANCE: f64 = 0.03;
 const MERGE_WIDTHS: f64 = 3.0;
 /// Peaks closer than so many resolutions are one line: a sinusoid and the side lobes of its taper.
 const MERGE_RESOLUTIONS: f64 = 8.0;
+/// Distance from a line beyond which a peak is none of the side lobes of its taper, in resolutions, and by how much two peaks at
+/// equal distances from a line may differ in their distances.
+const LOBE_RESOLUTIONS: f64 = 2.5;
+const SIDEBAND_TOLERANCE: f64 = 0.5;
+/// By which part, and by how many standard deviations, equal peaks differ at most: peaks a few resolutions from a line change
+/// with the part of it that was left.
+const SIDEBAND_RATIO: f64 = 0.25;
+const SIDEBAND_SIGMAS: f64 = 3.0;
 /// A peak at a lower frequency than so many of its widths is no line but a Markov process.
 const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
 /// Lower bound of the model's other noise, as a fraction of that of its Markov processes: in the nulls of a filter rounding noise remains.
@@ -30,6 +38,8 @@ const MIN_PHASE_CHANGES: f64 = 30.0;
 const MIN_OWN_DEVIATION: f64 = 0.5;
 /// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
 pub(crate) const FEW_PERIODS: f64 = 8.0;
+/// Full width at half maximum of a normal curve, in standard deviations.
+pub(crate) const FULL_WIDTH: f64 = 2.35;
 /// Power gain of a filter below which the spectrum holds leakage from other frequencies.
 const LEAKAGE_GAIN: f64 = 0.1;
 
@@ -48,6 +58,9 @@ pub(crate) struct MergedLine {
     pub p_value: f64,
     /// Probability that the strongest peak, were it a resonance, would deviate as far from the spectrum of one.
     pub shape_p_value: f64,
+    /// Distance of two equal peaks on either side of the strongest one that were merged with it, Hz: the amplitude of the line
+    /// changes to and fro.
+    pub sidebands: Option<f64>,
     duration_s: f64,
 }
 
@@ -140,6 +153,21 @@ fn is_leakage(model: &Model, frequency: f64) -> bool {
     model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min) < LEAKAGE_GAIN
 }
 
+/// The distance of the first two sinusoids beside the strongest of `peaks`, if they are at equal distances on either side, beyond
+/// the side lobes of the taper, and equally strong.
+fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<f64> {
+    let [strongest, one, other, ..] = peaks else { return None };
+    let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
+    let is_symmetric = (distance(one) + distance(other)).abs() < SIDEBAND_TOLERANCE / duration_s;
+    let is_beside = [one, other].iter().all(|peak| distance(peak).abs() > LOBE_RESOLUTIONS / duration_s);
+    let difference = (one.deviation.value - other.deviation.value).abs();
+    let error = one.deviation.error.hypot(other.deviation.error);
+    let mean = 0.5 * (one.deviation.value + other.deviation.value);
+    let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
+    let are_sinusoids = [strongest, one, other].iter().all(|peak| peak.width.is_none());
+    (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| 0.5 * (distance(one) - distance(other)).abs())
+}
+
 impl MergedLine {
     /// One line with the power of all `peaks`, at their mean frequency, as wide as they and their spread.
     fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
@@ -162,11 +190,11 @@ impl MergedLine {
                 value: total.sqrt(),
                 error: strongest.deviation.error * total.sqrt() / strongest.deviation.value,
             },
-            // A normal curve is 2.35 standard deviations wide at half its height.
-            width: MeasuredValue { value: own_width.hypot(2.35 * spread), error: width_error.hypot(spread) },
+            width: MeasuredValue { value: own_width.hypot(FULL_WIDTH * spread), error: width_error.hypot(spread) },
             statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
+            sidebands: sidebands(peaks, duration_s),
             duration_s,
         }
     }
@@ -198,5 +226,39 @@ impl MergedLine {
         } else {
             NoiseTerm::Resonance(Resonance { frequency, bandwidth })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::find;
+    use crate::series::Series;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    /// 400 s at 50 Hz: white noise of deviation 1 with a sinusoid of amplitude 1 at 7.3 Hz, which swells and fades by `depth` five times.
+    fn series(depth: f64) -> Series {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let slots = 0..20_000_u64;
+        let value = |slot: u64| {
+            let time_s = 0.02 * slot as f64;
+            let amplitude = 1.0 + depth * (TAU * 5.0 * time_s / 400.0).sin();
+            amplitude * (TAU * 7.3 * time_s).sin() + random.sample::<f64, _>(StandardNormal)
+        };
+        let values = slots.clone().map(value).collect();
+        Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.02, resolution: 1e-6, unit: "g" }
+    }
+
+    #[test]
+    fn a_line_that_swells_and_fades_has_sidebands() {
+        let of =
+            |depth: f64| find(&series(depth), None, 0.0).first().map(|line| (line.frequency.value, line.sidebands));
+        let (frequency, sidebands) = of(0.5).expect("100 times the noise at its frequency");
+        // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
+        assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");
+        assert!((sidebands.expect("two at a quarter of the amplitude") - 5.0 / 400.0).abs() < 0.0025, "{sidebands:?}");
+        assert_eq!(of(0.0).map(|(_, sidebands)| sidebands), Some(None));
     }
 }

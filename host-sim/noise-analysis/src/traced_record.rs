@@ -14,6 +14,7 @@ use crate::preprocessing::{Exclusion, Preprocessing, in_parallel};
 use crate::report::Stretch;
 use crate::series::Series;
 use crate::slow_drift::{ChannelsInCommon, common_mode, goes_as_far_as_ramp};
+use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
 use crate::unexplained;
 use crate::uniform_series::UniformSeries;
@@ -50,6 +51,7 @@ pub(crate) struct ChannelTrace {
     telegraph: Option<Detection>,
     /// The samples less the share of the covariates; of a traced channel only.
     rest: Option<UniformSeries>,
+    slowest: Option<CosineSpectrum>,
 }
 
 impl<'a> TracedRecord<'a> {
@@ -73,6 +75,9 @@ impl<'a> TracedRecord<'a> {
         });
         let traces = channels.iter_mut().map(|trace| (trace.channel, &mut trace.fit));
         let filter = agree_on_filter(measurement, &estimators, traces.filter(|(channel, _)| traced.contains(channel)));
+        for ChannelTrace { fit, slowest, lines, .. } in &mut channels {
+            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, lines));
+        }
         let motions = moved.into_iter().flatten().collect();
         Self { measurement, traced, noise_grids, preprocessing, estimators, series, channels, filter, coupled, motions }
     }
@@ -124,7 +129,15 @@ impl<'a> TracedRecord<'a> {
         let is_named = |effect: &Effect| effect.kind != NoiseTerm::RateRamp.name() || is_ramp(effect);
         effects.extend(named.into_iter().filter(is_named));
         let resolution = estimators.both.resolution_of(channel);
-        effects.extend(unexplained::by_curve(&trace.fit, &measurement.profile, resolution));
+        let by_curve = unexplained::by_curve(&trace.fit, &measurement.profile, resolution);
+        if let Some(unexplained) = &by_curve {
+            effects.retain(|effect| !unexplained::is_contradicted(effect, unexplained));
+        }
+        effects.extend(by_curve);
+        let own = self.series_of(channel);
+        let temperature = self.coupled.iter().position(|of| of.quantity == Quantity::Temperature);
+        let level = own.zip(temperature).and_then(|(own, at)| unexplained::level_by_temperature(own, &self.series[at]));
+        effects.extend(level);
         effects
     }
 }
@@ -135,7 +148,7 @@ impl ChannelTrace {
         let position = estimators.both.position(channel).unwrap_or_default();
         let covariates = CovariateFit::estimate(&estimators.both, position, false, |_| None);
         let fit = ChannelFit::fit_baseline(covariates);
-        Self { channel, fit, lines: Vec::new(), telegraph: None, rest: None }
+        Self { channel, fit, lines: Vec::new(), telegraph: None, rest: None, slowest: None }
     }
 
     /// The baseline model and what it lacks, of the channel of `series[own]`.
@@ -158,7 +171,8 @@ impl ChannelTrace {
         let is_reversible =
             |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
         let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
-        Self { channel, fit, lines, telegraph, rest: Some(rest) }
+        let slowest = CosineSpectrum::new(&rest);
+        Self { channel, fit, lines, telegraph, rest: Some(rest), slowest }
     }
 
     fn findings<'a>(
@@ -173,7 +187,7 @@ impl ChannelTrace {
             resolution: both.resolution_of(self.channel),
             fit: &self.fit,
             sensitivities: sensitivities.map(|(position, of)| (both.channels[position], *of)).collect(),
-            lines: &self.lines,
+            lines: Some(&self.lines),
             telegraph: self.telegraph.as_ref(),
             common,
             rest: self.rest.as_ref(),

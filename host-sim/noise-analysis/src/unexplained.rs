@@ -1,8 +1,10 @@
-//! What a model leaves beyond chance: the point of the curve that contradicts it most.
+//! What a model leaves beyond chance: the point of the curve that contradicts it most, and a level of the noise that changes with
+//! the temperature.
 
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
-use crate::distributions::upper_tail;
+use crate::distributions::{NORMAL_975, quantile, upper_tail};
 use crate::findings::{Effect, Parameter, SIGNIFICANCE};
+use crate::series::Series;
 use allan_core::{AllanPoint, Model};
 use measurement::SensorProfile;
 use statrs::function::gamma::{gamma_lr, gamma_ur};
@@ -15,6 +17,17 @@ const MIN_EXCESS: f64 = 0.01;
 const MANY: f64 = 1e4;
 /// Variance of a rounding error that is not dithered, at most, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
+
+/// Averaging time of the largest Allan deviation of a Markov process, in time constants (IEEE Std 952, annex C).
+const MARKOV_PEAK: f64 = 1.89;
+/// Blocks of a record whose levels are compared with the temperature, and the fewest pairs of neighbouring samples in one.
+const LEVEL_BLOCKS: usize = 64;
+const LEAST_PAIRS: u32 = 100;
+/// Least part of the changes of the level that the temperature explains, and least change of the deviation over the range of the
+/// temperature, %: a supply or a vibration that changes in the course of a record has a course like that of the temperature by
+/// chance.
+const LEAST_EXPLAINED: f64 = 0.5;
+const LEAST_CHANGE: f64 = 5.0;
 
 /// A point of a curve and what the model says of it.
 struct Residual<'a> {
@@ -60,6 +73,80 @@ pub(crate) fn by_curve(fit: &ChannelFit, profile: &SensorProfile, resolution: f6
     Some(Effect::new("unexplained", [("tau", tau), ("excess_percent", excess)], evidence))
 }
 
+/// Whether an effect that was read off the curve is contradicted by what the model with it leaves `unexplained` there: a Markov
+/// process whose largest Allan deviation, at 1.89 time constants, is within two octaves of it.
+pub(crate) fn is_contradicted(effect: &Effect, unexplained: &Effect) -> bool {
+    let value = |of: &Effect, name: &str| of.parameters.get(name).map(|parameter| parameter.value);
+    let (Some(time_constant), Some(tau)) = (value(effect, "time_constant"), value(unexplained, "tau")) else {
+        return false;
+    };
+    effect.kind == "markov" && (tau / (MARKOV_PEAK * time_constant)).log2().abs() <= 2.0
+}
+
+/// A level of the noise that changes with the temperature: no effect that has a name.
+///
+/// The level of a block is half the mean square of the differences of neighbouring samples. Its logarithm is regressed on the mean
+/// temperature of the block.
+pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Option<Effect> {
+    let (first, last) = (*series.slots.first()?, *series.slots.last()?);
+    let block_of = |slot: u64| ((slot - first) * LEVEL_BLOCKS as u64 / (last - first + 1)) as usize;
+    let mut levels = vec![(0.0, 0_u32); LEVEL_BLOCKS];
+    for (slots, values) in series.slots.windows(2).zip(series.values.windows(2)) {
+        if slots[1] == slots[0] + 1 {
+            let (sum, count) = &mut levels[block_of(slots[1])];
+            (*sum, *count) = (*sum + 0.5 * (values[1] - values[0]).powi(2), *count + 1);
+        }
+    }
+    let mut means = vec![(0.0, 0_u32); LEVEL_BLOCKS];
+    for (&slot, value) in temperature.slots.iter().zip(&temperature.values) {
+        if (first..=last).contains(&slot) {
+            let (sum, count) = &mut means[block_of(slot)];
+            (*sum, *count) = (*sum + value, *count + 1);
+        }
+    }
+    let points: Vec<(f64, f64)> = levels
+        .iter()
+        .zip(&means)
+        .filter(|((square, pairs), (_, count))| *square > 0.0 && *pairs >= LEAST_PAIRS && *count > 0)
+        .map(|((square, pairs), (sum, count))| (sum / f64::from(*count), (square / f64::from(*pairs)).ln()))
+        .collect();
+    let count = points.len() as f64;
+    if points.len() < LEVEL_BLOCKS / 2 {
+        return None;
+    }
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
+    let (middle, level) = (mean(&|point| point.0), mean(&|point| point.1));
+    let (xx, yy) = (mean(&|point| (point.0 - middle).powi(2)), mean(&|point| (point.1 - level).powi(2)));
+    let slope = mean(&|point| (point.0 - middle) * (point.1 - level)) / xx;
+    let explained = slope * slope * xx / yy;
+    let (coldest, warmest) = points
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| (low.min(point.0), high.max(point.0)));
+    // The deviation has half the logarithm of the variance.
+    let percent = |slope: f64| 100.0 * (0.5 * slope * (warmest - coldest)).exp_m1();
+    let error = ((yy / xx) * (1.0 - explained) / (count - 2.0)).sqrt();
+    let is_shown = explained > LEAST_EXPLAINED && slope.abs() > quantile(0.5 * SIGNIFICANCE) * error;
+    if !is_shown || percent(slope.abs()) < LEAST_CHANGE {
+        return None;
+    }
+    let (a, b) = (percent(slope - NORMAL_975 * error), percent(slope + NORMAL_975 * error));
+    let period_s = series.period_s;
+    let evidence = format!(
+        "the level of the noise changes by {:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes follow the \
+         measured temperature, and no effect that is known here changes it",
+        percent(slope),
+        100.0 * explained,
+    );
+    Some(Effect::new(
+        "unexplained",
+        [
+            ("tau", Parameter::new(period_s, period_s, period_s, "s")),
+            ("excess_percent", Parameter::new(percent(slope), a.min(b), a.max(b), "%")),
+        ],
+        evidence,
+    ))
+}
+
 /// The deviation of a point, less what a rounding error of this variance can add or take away.
 fn residual<'a>(point: &'a AllanPoint, model: &Model, rounding: f64) -> Option<Residual<'a>> {
     let modelled = model.avar(point.n);
@@ -90,7 +177,46 @@ fn two_sided(ratio: f64, edf: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::two_sided;
+    use super::{level_by_temperature, two_sided};
+    use crate::series::Series;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 64_000;
+
+    fn series(value: impl FnMut(usize) -> f64) -> Series {
+        let slots = 0..SAMPLES as u64;
+        let values = (0..SAMPLES).map(value).collect();
+        Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.01, resolution: 1e-6, unit: "deg/s" }
+    }
+
+    /// Three quarters of a period between 20 and 30 degC.
+    fn temperature_c(at: usize) -> f64 {
+        25.0 + 5.0 * (0.75 * TAU * at as f64 / SAMPLES as f64).sin()
+    }
+
+    #[test]
+    fn a_level_that_follows_the_temperature_is_found_and_others_are_not() {
+        let temperature = series(temperature_c);
+        let noise = |seed: u64, level: fn(usize) -> f64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            series(move |at| level(at) * random.sample::<f64, _>(StandardNormal))
+        };
+        // From 20 to 30 degC the deviation rises as exp(0.04·10): by 49 %. Of 64 blocks of 1,000 differences each, whose squares have
+        // the relative variance 3/1000, the slope over the range is known to 0.5·√(3/1000/64)/0.35, which is 1 % of 1.49.
+        let found =
+            level_by_temperature(&noise(1, |at| (0.04 * temperature_c(at)).exp()), &temperature).expect("follows");
+        let excess = found.parameters["excess_percent"].value;
+        assert!((excess - 100.0 * 0.4_f64.exp_m1()).abs() < 5.0, "{excess}");
+        // A constant level, and one that goes up and down twice in the meantime.
+        for seed in 2..12 {
+            assert!(level_by_temperature(&noise(seed, |_| 1.0), &temperature).is_none(), "{seed}");
+        }
+        let twice = |at: usize| 1.0 + 0.3 * (2.0 * TAU * at as f64 / SAMPLES as f64).sin();
+        assert!(level_by_temperature(&noise(12, twice), &temperature).is_none());
+    }
 
     /// Quantiles of χ² from tables (Abramowitz and Stegun, table 26.8): 0.5 % on either side.
     #[test]

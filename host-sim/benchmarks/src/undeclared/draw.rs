@@ -5,7 +5,7 @@
 
 use super::channel_under_test::{ChannelUnderTest, RecordLength};
 use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size};
-use super::effect::{EffectKind, draw_unit, scaled, size};
+use super::effect::{EffectKind, GYROS, draw_unit, scaled, size};
 use super::environment::log_uniform;
 use super::generator::TrueRecording;
 use super::outside::{OutsideEffect, OutsideKind};
@@ -30,6 +30,9 @@ const MOVED: f64 = 0.2;
 const LARGEST_QUANTUM: f64 = 1.0;
 /// Largest fraction of dropped or repeated samples.
 const LARGEST_FRACTION: f64 = 0.02;
+/// Largest sensitivities of a gyroscope to temperature, deg/s/degC, to the supply, deg/s/V, and to acceleration, deg/s/g: thirty
+/// times the data sheet's typical ones (0.01, 0.32 and 0.05). Larger ones are no property of the sensor.
+const LARGEST_SENSITIVITIES: [f64; 3] = [0.3, 9.6, 1.5];
 /// Largest relative error of the sample clock.
 const LARGEST_CLOCK_ERROR: f64 = 0.01;
 /// Number of draws after which a set of effects is accepted although an effect is too weak.
@@ -181,6 +184,13 @@ fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &Tr
         }
         InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => squared.min(LARGEST_FRACTION),
         InjectedEffect::SampleClock { .. } => squared.min(LARGEST_CLOCK_ERROR),
+        InjectedEffect::Temperature { channel, .. } if GYROS.contains(&channel) => {
+            (strength * limit).min(LARGEST_SENSITIVITIES[0])
+        }
+        InjectedEffect::Supply { channel, .. } if GYROS.contains(&channel) => {
+            (strength * limit).min(LARGEST_SENSITIVITIES[1])
+        }
+        InjectedEffect::Acceleration { .. } => (strength * limit).min(LARGEST_SENSITIVITIES[2]),
         _ => strength * limit,
     };
     scaled(unit, size)

@@ -5,7 +5,7 @@ use super::cause::{Cause, Shown};
 use crate::distributions::NORMAL_975;
 use crate::findings::{Effect, Parameter};
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_PI_4, SQRT_2};
+use std::f64::consts::{FRAC_PI_4, PI, SQRT_2};
 
 /// Quantile of the normal distribution for a two-sided level of 1 %: equal frequencies are farther apart once in a hundred.
 const NORMAL_995: f64 = 2.576;
@@ -49,6 +49,15 @@ impl Line {
             error: (frequency.high - frequency.low) / (2.0 * NORMAL_975),
             width: effect.parameters.get("bandwidth").map_or(0.0, |bandwidth| bandwidth.value),
         })
+    }
+
+    /// Standard deviation of the frequency in a record of `duration_s`, Hz, without the error of the sample rate, which lines of one
+    /// record share: `√3/(πT)` times the relative error of the amplitude (D. Rife and R. Boorstyn, "Single-tone parameter
+    /// estimation from discrete-time observations", IEEE Trans. Inf. Theory 20, 1974).
+    fn error_by_amplitude(&self, duration_s: f64) -> f64 {
+        let relative = |of: Parameter| (of.high - of.low) / (2.0 * NORMAL_975 * of.value.max(f64::MIN_POSITIVE));
+        let by_amplitude = self.amplitude().map_or(f64::INFINITY, |of| 3f64.sqrt() / (PI * duration_s) * relative(of));
+        by_amplitude.min(self.error)
     }
 
     /// Amplitude of a sinusoid of the line's power, as a parameter.
@@ -135,7 +144,8 @@ fn modulated_line(frequencies: &[Frequency], duration_s: f64) -> Option<[usize; 
     let by_chance = |triple: &[usize; 3]| {
         let [below, line, above] = lines(*triple).map(Frequency::best);
         let distance = above.frequency - below.frequency;
-        let errors = line.error.hypot(0.5 * below.error.hypot(above.error));
+        let error = |of: &Line| of.error_by_amplitude(duration_s);
+        let errors = error(line).hypot(0.5 * error(below).hypot(error(above)));
         let within = NORMAL_995 * errors + SHIFT_OF_NEIGHBOURS / duration_s;
         let is_in_the_middle = (0.5 * (below.frequency + above.frequency) - line.frequency).abs() < within;
         let is_slow = distance < line.frequency;
@@ -324,10 +334,16 @@ fn harmonic_cause(members: Vec<(Multiple, Frequency)>) -> Cause {
         }
     }
     let is_square = by_channel.values().any(|lines| is_square(lines));
+    let is_sawtooth = by_channel.values().any(|lines| is_sawtooth(lines));
     let shown = by_channel.into_iter().map(|(channel, mut lines)| {
         lines.sort_by(|a, b| a.1.frequency.total_cmp(&b.1.frequency));
         let parts = lines.iter().map(|(_, line)| line.effect.clone()).collect();
-        let effect = if is_square { square_wave(&lines) } else { None }.unwrap_or_else(|| periodic(&lines));
+        let named = match (is_square, is_sawtooth) {
+            (true, _) => square_wave(&lines),
+            (_, true) => sawtooth(&lines),
+            _ => None,
+        };
+        let effect = named.unwrap_or_else(|| periodic(&lines));
         Shown { channel, effect, parts }
     });
     Cause { shown: shown.collect() }
@@ -340,19 +356,52 @@ fn amplitude_of(lines: &[(Multiple, Line)], harmonic: u32) -> Option<Parameter> 
 /// Whether the lines of a channel have the amplitudes of a square wave: 1/k at the odd multiples k, the first and the third
 /// among them, and none at even ones that a wave with two unequal halves would have to show.
 fn is_square(lines: &[(Multiple, Line)]) -> bool {
+    amplitude_of(lines, 3).is_some() && fall_with_their_number(lines, |multiple| multiple % 2 == 1)
+}
+
+/// Whether the lines of a channel have the amplitudes of a signal that rises and jumps: 1/k at every multiple k, the first three
+/// among them.
+fn is_sawtooth(lines: &[(Multiple, Line)]) -> bool {
+    [2, 3].iter().all(|harmonic| amplitude_of(lines, *harmonic).is_some()) && fall_with_their_number(lines, |_| true)
+}
+
+/// Whether the lines of a channel have amplitudes of 1/k of the first at the multiples k that the signal has, and hardly any at
+/// the others.
+fn fall_with_their_number(lines: &[(Multiple, Line)], has: impl Fn(u32) -> bool) -> bool {
     let Some(first) = amplitude_of(lines, 1) else { return false };
     let error = |of: &Parameter| (of.high - of.low) / (2.0 * NORMAL_975);
     let has_size = |(multiple, line): &(Multiple, Line)| {
         let Multiple::Harmonic(multiple) = *multiple else { return true };
         let Some(amplitude) = line.amplitude() else { return false };
         let expected = first.value / f64::from(multiple);
-        if multiple.is_multiple_of(2) {
+        if !has(multiple) {
             return amplitude.value < SQUARE_TOLERANCE * expected;
         }
         let joint = error(&amplitude).hypot(error(&first) / f64::from(multiple));
         (amplitude.value - expected).abs() < SQUARE_TOLERANCE * expected + SQUARE_SIGMAS * joint
     };
-    amplitude_of(lines, 3).is_some() && lines.iter().all(has_size)
+    lines.iter().all(has_size)
+}
+
+/// A signal that rises evenly and jumps back: no effect that has a name.
+fn sawtooth(lines: &[(Multiple, Line)]) -> Option<Effect> {
+    let (_, line) = lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(1))?;
+    let first = line.amplitude()?;
+    let higher = lines.iter().filter(|(multiple, _)| *multiple != Multiple::Harmonic(1));
+    let amplitudes: Vec<Parameter> = higher.filter_map(|(_, line)| line.amplitude()).collect();
+    let lacking = |of: fn(&Parameter) -> f64| {
+        100.0 * amplitudes.iter().map(|amplitude| of(amplitude).powi(2)).sum::<f64>().sqrt() / first.value
+    };
+    let excess = Parameter::new(lacking(|of| of.value), lacking(|of| of.low), lacking(|of| of.high), "%");
+    let evidence = format!(
+        "{} of one signal, even and odd ones with amplitudes that fall with their number: it rises evenly and jumps back every \
+         {:.1} s, which no sinusoid and no square wave does; {}",
+        harmonics(lines),
+        1.0 / line.frequency,
+        line.effect.evidence,
+    );
+    let frequency = line.effect.parameters.get("frequency")?.clone();
+    Some(Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence))
 }
 
 /// The square wave whose lowest odd harmonic in a channel is among `lines`. A square wave of amplitude A, half the distance of

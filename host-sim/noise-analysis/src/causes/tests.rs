@@ -105,14 +105,24 @@ fn unrelated_lines_are_seldom_harmonics() {
 }
 
 #[test]
-fn a_sawtooth_is_one_line_with_its_harmonics() {
-    // A sawtooth has every harmonic, with amplitudes that fall as 1/k.
-    let effects: Vec<Effect> = (1..=3).map(|k| line(2.0 * f64::from(k), 0.1 / f64::from(k))).collect();
+fn a_distorted_sinusoid_is_one_line_with_its_harmonics() {
+    let effects = vec![line(2.0, 0.1), line(4.0, 0.02), line(6.0, 0.01)];
     let found = merged(&[("g", &effects)], DURATION_S);
     assert_eq!(found.len(), 1);
     let effect = &found[0].shown[0].effect;
     assert_eq!((effect.kind.as_str(), effect.parameters["harmonics"].value), ("sinusoid", 3.0));
     assert_eq!(effect.parameters["frequency"].value, 2.0);
+}
+
+#[test]
+fn a_sawtooth_is_no_sinusoid() {
+    // A sawtooth has every harmonic, with amplitudes that fall as 1/k: sqrt(1/4 + 1/9) of the fundamental in these two.
+    let effects: Vec<Effect> = (1..=3).map(|k| line(2.0 * f64::from(k), 0.1 / f64::from(k))).collect();
+    let found = merged(&[("g", &effects)], DURATION_S);
+    assert_eq!(found.len(), 1);
+    let effect = &found[0].shown[0].effect;
+    assert_eq!((effect.kind.as_str(), effect.parameters["frequency"].value), ("unexplained", 2.0));
+    assert!((effect.parameters["excess_percent"].value - 100.0 * (13.0_f64 / 36.0).sqrt()).abs() < 1e-9);
 }
 
 #[test]

@@ -40,7 +40,11 @@ pub(crate) fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]
     sizes.dedup();
     let mut found = None;
     for size in sizes.into_iter().rev() {
-        let Some((chain, gain)) = fit(&PartMeans::new(series, size)) else { continue };
+        let parts = PartMeans::new(series, size);
+        let Some((chain, gain)) = fit(&parts) else { continue };
+        if !stays_at_levels(&chain, &parts) {
+            return None;
+        }
         let part_s = size as f64 * series.sample_period();
         let resolved = chain.correlation_time() > RESOLVED;
         found = Some(detection(&chain, gain, part_s, unit));
@@ -118,12 +122,42 @@ fn fit(parts: &PartMeans) -> Option<(TwoStateChain, f64)> {
     let chain = TwoStateChain::fit(&parts.means)?;
     let around = robust_variance(chain.residuals(&parts.means));
     let jumps = chain.jumps >= FEWEST_JUMPS && chain.correlation_time() > LEAST_TIME;
-    let highest = WHITE_FACTOR * parts.white + SLOW_FRACTION * chain.distance().powi(2);
-    if !jumps || chain.occupancy().iter().any(|&occupancy| occupancy < LEAST_OCCUPANCY) || around > highest {
+    if !jumps
+        || chain.occupancy().iter().any(|&occupancy| occupancy < LEAST_OCCUPANCY)
+        || around > largest_variance(&chain, parts)
+    {
         return None;
     }
     let gain = chain.log_likelihood - gauss_markov_log_likelihood(&parts.means);
     (gain > LEAST_GAIN).then_some((chain.with_errors(&parts.means), gain))
+}
+
+/// The largest variance of a mean around its level.
+fn largest_variance(chain: &TwoStateChain, parts: &PartMeans) -> f64 {
+    WHITE_FACTOR * parts.white + SLOW_FRACTION * chain.distance().powi(2)
+}
+
+/// Whether the means stay where they are between two jumps: over all visits to a level, the mean of the first half of a visit, less
+/// its first part, and that of the second half, less its last one, differ by chance. Disturbances that decay begin above the level
+/// and end below it.
+fn stays_at_levels(chain: &TwoStateChain, parts: &PartMeans) -> bool {
+    let variance = largest_variance(chain, parts);
+    let is_up: Vec<bool> = parts.means.iter().map(|mean| chain.is_upper(*mean)).collect();
+    let (mut sums, mut first) = ([(0.0, 0.0); 2], 0);
+    for visit in is_up.chunk_by(|a, b| a == b) {
+        let inner = parts.means.get(first + 1..first + visit.len() - 1).unwrap_or_default();
+        first += visit.len();
+        let half = inner.len() / 2;
+        if half == 0 || inner.iter().any(|mean| !mean.is_finite()) {
+            continue;
+        }
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+        let fall = mean(&inner[..half]) - mean(&inner[inner.len() - half..]);
+        let weight = half as f64 / (2.0 * variance);
+        let (sum, information) = &mut sums[usize::from(visit[0])];
+        (*sum, *information) = (*sum + weight * fall, *information + weight);
+    }
+    sums.iter().all(|(sum, information)| sum.abs() <= quantile(0.25 * SIGNIFICANCE) * information.sqrt())
 }
 
 /// The telegraph noise of `chain`, for parts of `part_s` seconds, as it is reported.
@@ -228,7 +262,16 @@ mod tests {
             state = kept * state + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
             state
         });
-        for series in [step, wave, walk, markov, series(34, |_, _| 0.0)] {
+        // Disturbances of size 4 that begin at random, 25 s apart on average, and decay within 8 s.
+        let mut height = 0.0;
+        let decays = series(35, move |random, _| {
+            height *= (-PERIOD_S / 8.0).exp();
+            if random.random_bool(PERIOD_S / 25.0) {
+                height += 4.0;
+            }
+            height
+        });
+        for series in [step, wave, walk, markov, decays, series(34, |_, _| 0.0)] {
             assert_eq!(find(&series, "g", &[1.0, 4.0]), None);
         }
         assert_eq!(find(&UniformSeries::new(PERIOD_S, vec![1.0; 10]), "g", &[]), None);

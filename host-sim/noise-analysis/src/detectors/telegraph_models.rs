@@ -110,6 +110,11 @@ impl TwoStateChain {
         [self.leave[1] / both, self.leave[0] / both]
     }
 
+    /// Whether a number is nearer to the upper level.
+    pub(super) fn is_upper(&self, value: f64) -> bool {
+        value > 0.5 * (self.levels[0] + self.levels[1])
+    }
+
     /// Distance of each number from the nearer level.
     pub(super) fn residuals(&self, values: &[f64]) -> Vec<f64> {
         let nearer = |value: &f64| {

@@ -4,41 +4,28 @@
 //! spectrum as the noise of the mean. So they give the spectrum that the mean would have without the shared process,
 //! whatever the noise of the channels is.
 
+use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, SHARED, TERMS, most_likely, time_constants};
 use super::periodogram::{SineTapered, low_frequency_bands};
-use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density, walk_amplitude, whittle_objective};
-use crate::distributions::NORMAL_975;
-use crate::findings::BoundedEstimate;
+use super::smooth_shape::{SpectralBand, walk_amplitude};
 use crate::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
-/// White, flicker and random-walk noise, a Markov process of each channel's own, and the shared one.
-const TERMS: usize = 5;
-/// Time constants that are tried: the shortest in samples, the longest as a fraction of the record, and the factor from one
-/// to the next.
-const SHORTEST: f64 = 16.0;
-const LONGEST: f64 = 0.5;
-const FACTOR: f64 = 1.25;
-/// The test whether anything is shared tries only every third time constant.
-const COARSE: usize = 3;
-/// Highest frequency, as a fraction of the sample rate.
-const HIGHEST: f64 = 0.02;
-/// Least Fisher information on the logarithm of the variance; keeps its standard deviation at 10 or below.
-const LEAST_INFORMATION: f64 = 1e-2;
+/// Samples whose means are transformed: up to [`HIGHEST`] the mean over a block lowers a density by 2 % at most.
+const BLOCK: usize = 4;
+/// Highest frequency, as a fraction of the rate of the blocks.
+const HIGHEST: f64 = 0.08;
 /// Fewest bands for a fit of four densities and a time constant.
 const FEWEST_BANDS: usize = 16;
-
-/// A Markov process that channels share.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CommonModeDrift {
-    /// Standard deviation, in the unit of the channels.
-    pub deviation: BoundedEstimate,
-    /// Correlation time, s.
-    pub time_constant: BoundedEstimate,
-}
+/// Time constants that are tried: the shortest in blocks, the longest as a fraction of the record.
+const SHORTEST: f64 = 4.0;
+const LONGEST: f64 = 0.5;
+/// The test whether anything is shared tries only every third time constant.
+const COARSE: usize = 3;
 
 /// Fourier transforms of channels that may share a process, all of one length.
 pub(crate) struct CrossSpectra {
-    sample_period: f64,
+    /// Of a block, s.
+    period: f64,
     duration: f64,
     channels: Vec<SineTapered>,
 }
@@ -49,10 +36,10 @@ impl CrossSpectra {
     pub(crate) fn new(channels: &[UniformSeries]) -> Option<Self> {
         let first = channels.first()?;
         let transformed: Option<Vec<SineTapered>> =
-            channels.iter().map(|channel| SineTapered::new(&channel.detrended())).collect();
+            channels.iter().map(|channel| SineTapered::new(&channel.detrended().averaged(BLOCK))).collect();
         let channels = transformed?;
         channels.iter().all(|channel| channel.length == channels[0].length).then(|| Self {
-            sample_period: first.sample_period(),
+            period: BLOCK as f64 * first.sample_period(),
             duration: first.duration(),
             channels,
         })
@@ -79,18 +66,19 @@ impl CrossSpectra {
 
     /// The shared Markov process that makes the spectra of `members` likeliest; `None` if the samples are too few.
     #[must_use]
-    pub(crate) fn fit_markov(&self, members: &[usize]) -> Option<CommonModeDrift> {
+    pub(crate) fn fit_markov(&self, members: &[usize]) -> Option<MarkovEstimate> {
         let (_, bands) = self.likeliest_signs(members)?;
-        let fits: Vec<ProcessFit> =
-            self.time_constants().map(|time| ProcessFit::new(&bands, self.sample_period, time, &[SHARED])).collect();
-        CommonModeDrift::from_fits(&fits)
+        let without = self.fit(&bands, self.period, Processes { own: false, shared: false });
+        let shared = Processes { own: false, shared: true };
+        let fits: Vec<MarkovFit> = self.time_constants().map(|time| self.fit(&bands, time, shared)).collect();
+        most_likely(&fits, without.objective)
     }
 
     /// Bands of the mean, which contains the process, followed by those of the differences. The sign of a member is negative
     /// where its bit in `negative` is set.
     fn bands(&self, members: &[usize], negative: usize) -> Option<Vec<SpectralBand>> {
         let resolution = self.channels[0].resolution();
-        let ranges: Vec<_> = low_frequency_bands((HIGHEST / self.sample_period / resolution) as usize).collect();
+        let ranges: Vec<_> = low_frequency_bands((HIGHEST / self.period / resolution) as usize).collect();
         let signed: Vec<(&SineTapered, f64)> = members
             .iter()
             .enumerate()
@@ -119,107 +107,56 @@ impl CrossSpectra {
 
     /// Gain in ln likelihood of the bands by a shared process.
     fn gain(&self, bands: &[SpectralBand]) -> f64 {
-        let least = |terms: &[usize]| {
+        let least = |shared: bool| {
             let fits = self.time_constants().step_by(COARSE);
-            fits.map(|time| ProcessFit::new(bands, self.sample_period, time, terms).objective)
+            fits.map(|time| self.fit(bands, time, Processes { own: true, shared }).objective)
                 .fold(f64::INFINITY, f64::min)
         };
-        least(&[OWN]) - least(&[OWN, SHARED])
+        least(false) - least(true)
     }
 
     /// Time constants that are tried, s.
     fn time_constants(&self) -> impl Iterator<Item = f64> {
-        let longest = LONGEST * self.duration;
-        std::iter::successors(Some(SHORTEST * self.sample_period), |time| Some(time * FACTOR))
-            .take_while(move |&time| time < longest)
+        time_constants(SHORTEST * self.period, LONGEST * self.duration)
     }
-}
 
-impl CommonModeDrift {
-    fn from_fits(fits: &[ProcessFit]) -> Option<Self> {
-        let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective))?;
-        // Mean and standard deviation over all time constants, weighted by their likelihood: in a record of few correlation
-        // times, time constant and variance are uncertain together.
-        let weighted = |value: &dyn Fn(&ProcessFit) -> f64| {
-            let mean = |of: &dyn Fn(f64) -> f64| {
-                let (sum, total) = fits.iter().fold((0.0, 0.0), |(sum, total), fit| {
-                    let weight = (likeliest.objective - fit.objective).exp();
-                    (sum + weight * of(value(fit)), total + weight)
-                });
-                sum / total
-            };
-            let middle = mean(&|value| value);
-            (middle, mean(&|value| (value - middle).powi(2)).sqrt())
-        };
-        let (time, of_time) = weighted(&|fit| fit.time.ln());
-        let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.max(f64::MIN_POSITIVE).ln());
-        let (alone, _) = weighted(&|fit| 0.5 * fit.error);
-        Some(Self {
-            deviation: bounded(likeliest.variance.sqrt(), (deviation, of_deviation.hypot(alone))),
-            // Between two of the time constants that were tried all are equally likely: factor/√12.
-            time_constant: bounded(likeliest.time, (time, of_time.hypot(FACTOR.ln() / 12f64.sqrt()))),
-        })
-    }
-}
-
-/// `value` with bounds by mean and standard deviation of its logarithm.
-fn bounded(value: f64, (mean, deviation): (f64, f64)) -> BoundedEstimate {
-    let half = NORMAL_975 * deviation;
-    BoundedEstimate { value, low: (mean - half).exp().min(value), high: (mean + half).exp().max(value) }
-}
-
-/// The likeliest noise and processes for one time constant.
-struct ProcessFit {
-    time: f64,
-    variance: f64,
-    /// Relative standard deviation of the variance, all else being known.
-    error: f64,
-    objective: f64,
-}
-
-/// Indices of the terms that a fit includes or not.
-const OWN: usize = 3;
-const SHARED: usize = 4;
-
-impl ProcessFit {
-    /// Fits N, B, K and `terms` to the bands of the mean followed by those of the differences.
-    fn new(bands: &[SpectralBand], sample_period: f64, time: f64, terms: &[usize]) -> Self {
+    /// Fits N, B, K and processes with this time constant to the bands of the mean followed by those of the differences.
+    fn fit(&self, bands: &[SpectralBand], time: f64, processes: Processes) -> MarkovFit {
         let basis = |(at, band): (usize, &SpectralBand)| {
-            let [white, flicker, walk, process] = process_basis(band.frequency, sample_period, time);
-            let own = if terms.contains(&OWN) { process } else { 0.0 };
-            let shared = if terms.contains(&SHARED) && at < bands.len() / 2 { process } else { 0.0 };
+            let [white, flicker, walk, process] = shapes(band.frequency, self.period, time);
+            let own = if processes.own { process } else { 0.0 };
+            let shared = if processes.shared && at < bands.len() / 2 { process } else { 0.0 };
             [white, flicker, walk, own, shared]
         };
         let bases: Vec<[f64; TERMS]> = bands.iter().enumerate().map(basis).collect();
-        let mut densities = [0.0; TERMS];
-        fit_mixture(bands, &bases, &mut densities);
-        let totals: Vec<f64> = bases.iter().map(|basis| mixture_density(basis, &densities)).collect();
-        let variance = densities[TERMS - 1];
-        let fraction = |(basis, total): (&[f64; TERMS], &f64)| basis[TERMS - 1] * variance / total;
-        let fractions = bases.iter().zip(&totals).map(fraction);
-        let information: f64 = fractions.zip(bands).map(|(fraction, band)| band.ordinates * fraction * fraction).sum();
-        Self {
-            time,
-            variance,
-            error: information.max(LEAST_INFORMATION).sqrt().recip(),
-            objective: whittle_objective(bands, &totals),
-        }
+        MarkovFit::new(bands, &bases, time, if processes.shared { SHARED } else { OWN })
     }
+}
+
+/// Which Markov processes a fit has.
+#[derive(Clone, Copy)]
+struct Processes {
+    /// One in each channel.
+    own: bool,
+    /// One in the mean.
+    shared: bool,
 }
 
 /// One-sided densities: 1 of white noise, 1/f and a sampled random walk, which are 1 at 1 Hz, and of a Markov process of
 /// variance 1 with this time constant.
-fn process_basis(frequency: f64, sample_period: f64, time: f64) -> [f64; 4] {
-    let walk = walk_amplitude(frequency, sample_period);
-    let kept = (-sample_period / time).exp();
-    let turn = (2.0 * PI * frequency * sample_period).cos();
-    let markov = 2.0 * sample_period * (1.0 - kept * kept) / (1.0 - 2.0 * kept * turn + kept * kept);
+fn shapes(frequency: f64, period: f64, time: f64) -> [f64; 4] {
+    let walk = walk_amplitude(frequency, period);
+    let kept = (-period / time).exp();
+    let turn = (2.0 * PI * frequency * period).cos();
+    let markov = 2.0 * period * (1.0 - kept * kept) / (1.0 - 2.0 * kept * turn + kept * kept);
     [1.0, 1.0 / frequency, walk * walk, markov]
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::CrossSpectra;
+    use crate::findings::BoundedEstimate;
+    use crate::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

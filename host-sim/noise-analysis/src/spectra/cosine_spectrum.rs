@@ -1,0 +1,286 @@
+//! The slowest noise of a record, by the discrete cosine transform of means over 256 equal blocks.
+//!
+//! The even continuation of a record has no jump at its ends, so that little of a random walk leaks from one coefficient to
+//! another, and the transform needs no taper: it shows what a record does over its own length. A Fourier transform under a taper,
+//! or the longest octave of the Allan variance, does not, and that is where a Markov process, which comes back, differs from a
+//! random walk, which does not. The expected square of each coefficient follows from the covariance of the block means
+//! (N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23, 1974).
+
+use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
+use super::smooth_shape::SpectralBand;
+use crate::uniform_series::UniformSeries;
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// Blocks of a record.
+const BLOCKS: usize = 256;
+/// Least samples of a block: the covariances are those of continuous means.
+const LEAST_SAMPLES: usize = 8;
+/// Most blocks without samples.
+const MOST_EMPTY: usize = BLOCKS / 32;
+/// Time constants that are tried: the shortest and the longest, in blocks.
+const SHORTEST: f64 = 1.0;
+const LONGEST: f64 = BLOCKS as f64 / 6.0;
+/// Coefficients of a line that are left out on either side of it.
+const LINE_COEFFICIENTS: f64 = 8.0;
+/// Fewest bands, of 58, for a fit of four densities and a time constant.
+const FEWEST_BANDS: usize = 20;
+/// Least gain in ln likelihood by a Markov process. Of 6,000 simulated records of white noise and a random walk 12 gained more
+/// than 4 and 6 more than 5, so that one of six channels exceeds it by chance in 1 of 100 records.
+const LEAST_GAIN: f64 = 4.5;
+
+/// The slowest noise of one channel.
+#[derive(Debug, Clone)]
+pub(crate) struct CosineSpectrum {
+    /// Duration of a block, s.
+    block_s: f64,
+    /// Mean square of the coefficients of each band.
+    squares: Vec<f64>,
+}
+
+/// The orders of the coefficients in each band: a band is 1/12 of its order wide.
+fn bands() -> impl Iterator<Item = Range<usize>> {
+    let next = |from: usize| (from < BLOCKS).then(|| from..(from + (from / 12).max(1)).min(BLOCKS));
+    std::iter::successors(next(1), move |band| next(band.end))
+}
+
+impl CosineSpectrum {
+    /// Of `series`; `None` if it is too short, or if too many blocks have no samples.
+    pub(crate) fn new(series: &UniformSeries) -> Option<Self> {
+        let size = series.values().len() / BLOCKS;
+        if size < LEAST_SAMPLES {
+            return None;
+        }
+        let blocks = series.averaged(size);
+        let mean = blocks.mean();
+        let missing = blocks.values()[..BLOCKS].iter().filter(|value| !value.is_finite()).count();
+        if missing > MOST_EMPTY {
+            return None;
+        }
+        let mut latest = mean;
+        let mut filled = [0.0; BLOCKS];
+        for (filled, value) in filled.iter_mut().zip(blocks.values()) {
+            if value.is_finite() {
+                latest = *value;
+            }
+            *filled = latest - mean;
+        }
+        let square = |order: usize| {
+            let phase = PI * order as f64 / BLOCKS as f64;
+            let terms = filled.iter().enumerate().map(|(at, value)| value * (phase * (at as f64 + 0.5)).cos());
+            2.0 / BLOCKS as f64 * terms.sum::<f64>().powi(2)
+        };
+        let squares: Vec<f64> = bands().map(|band| mean_over(&band, square)).collect();
+        squares.iter().all(|square| *square > 0.0).then(|| Self { block_s: blocks.sample_period(), squares })
+    }
+
+    /// The Markov process beside white, flicker and random-walk noise; `None` if the record is as likely without one. `lines` are
+    /// the frequencies of lines, Hz, and `filter_s` the length of the sensor's filter, below which nothing is tried.
+    pub(crate) fn find_markov(&self, lines: &[f64], filter_s: f64) -> Option<MarkovEstimate> {
+        let is_line = |order: usize| {
+            // A faster line is folded down by the means over blocks.
+            let of_line = |frequency: f64| {
+                let folded = (2.0 * BLOCKS as f64 * self.block_s * frequency).rem_euclid(2.0 * BLOCKS as f64);
+                folded.min(2.0 * BLOCKS as f64 - folded)
+            };
+            lines.iter().any(|&frequency| (order as f64 - of_line(frequency)).abs() < LINE_COEFFICIENTS)
+        };
+        let (places, shown): (Vec<usize>, Vec<SpectralBand>) = bands()
+            .zip(&self.squares)
+            .enumerate()
+            .filter(|(_, (band, _))| !band.clone().any(is_line))
+            // One real number has half the degrees of freedom of an ordinate of a Fourier transform.
+            .map(|(place, (band, &density))| {
+                (place, SpectralBand { frequency: 0.0, density, ordinates: 0.5 * band.len() as f64 })
+            })
+            .unzip();
+        if shown.len() < FEWEST_BANDS {
+            return None;
+        }
+        let noise = noise_shapes();
+        let fit = |process: Option<&MarkovShape>| {
+            let basis = |&place: &usize| {
+                let [white, flicker, walk] = noise[place];
+                [white, flicker, walk, process.map_or(0.0, |process| process.expected[place]), 0.0]
+            };
+            let bases: Vec<[f64; TERMS]> = places.iter().map(basis).collect();
+            MarkovFit::new(&shown, &bases, process.map_or(0.0, |process| process.time * self.block_s), OWN)
+        };
+        let without = fit(None).objective;
+        let slow = markov_shapes().iter().filter(|shape| shape.time * self.block_s > filter_s);
+        let fits: Vec<MarkovFit> = slow.map(|shape| fit(Some(shape))).collect();
+        most_likely(&fits, without).filter(|found| found.gain > LEAST_GAIN)
+    }
+}
+
+/// The mean of a function of the order over a band.
+fn mean_over(band: &Range<usize>, of: impl Fn(usize) -> f64) -> f64 {
+    band.clone().map(of).sum::<f64>() / band.len() as f64
+}
+
+/// Expected mean squares in each band of white, flicker and random-walk noise, each up to a factor.
+fn noise_shapes() -> &'static [[f64; 3]] {
+    static SHAPES: OnceLock<Vec<[f64; 3]>> = OnceLock::new();
+    SHAPES.get_or_init(|| {
+        // The covariance of means over blocks of 1 whose second integral is `integral`.
+        let of_blocks = |integral: fn(f64) -> f64, lag: usize| {
+            let lag = lag as f64;
+            integral(lag + 1.0) - 2.0 * integral(lag) + integral(lag - 1.0)
+        };
+        // Minus half the mean square of a difference, without the constant, which is in no coefficient: ln of the lag of flicker
+        // noise, half the lag of a random walk with steps of variance 1 a block.
+        let flicker = |x: f64| if x == 0.0 { 0.0 } else { -0.5 * x * x * (x.abs().ln() - 1.5) };
+        let walk = |x: f64| -x.abs().powi(3) / 12.0;
+        let white = expected_squares(|lag| if lag == 0 { 1.0 } else { 0.0 });
+        let flicker = expected_squares(|lag| of_blocks(flicker, lag));
+        let walk = expected_squares(|lag| of_blocks(walk, lag));
+        white.into_iter().zip(flicker).zip(walk).map(|((white, flicker), walk)| [white, flicker, walk]).collect()
+    })
+}
+
+/// A Markov process of variance 1.
+struct MarkovShape {
+    /// Time constant, blocks.
+    time: f64,
+    /// Expected mean square in each band.
+    expected: Vec<f64>,
+}
+
+fn markov_shapes() -> &'static [MarkovShape] {
+    static SHAPES: OnceLock<Vec<MarkovShape>> = OnceLock::new();
+    SHAPES.get_or_init(|| {
+        let of_time = |time: f64| {
+            let kept = (-1.0 / time).exp();
+            // The mean of exp(−|t|/T) over two blocks.
+            let covariance = |lag: usize| match lag {
+                0 => 2.0 * time * (1.0 - time * (1.0 - kept)),
+                lag => time * time * (1.0 - kept).powi(2) * kept.powi(lag as i32 - 1),
+            };
+            MarkovShape { time, expected: expected_squares(covariance) }
+        };
+        time_constants(SHORTEST, LONGEST).map(of_time).collect()
+    })
+}
+
+/// Expected mean squares of the coefficients in each band, of blocks with this covariance at a lag.
+fn expected_squares(covariance: impl Fn(usize) -> f64) -> Vec<f64> {
+    let covariances: Vec<f64> = (0..BLOCKS).map(covariance).collect();
+    let of_order = |order: usize| {
+        let phase = PI * order as f64 / BLOCKS as f64;
+        // Σ of the products of two values of the cosine at this lag.
+        let products =
+            |lag: f64| 0.5 * ((BLOCKS as f64 - lag) * (phase * lag).cos() - (phase * lag).sin() / phase.sin());
+        let of_lag =
+            |(lag, covariance): (usize, &f64)| if lag == 0 { 1.0 } else { 2.0 } * covariance * products(lag as f64);
+        2.0 / BLOCKS as f64 * covariances.iter().enumerate().map(of_lag).sum::<f64>()
+    };
+    bands().map(|band| mean_over(&band, of_order)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BLOCKS, CosineSpectrum, bands, expected_squares, noise_shapes};
+    use crate::uniform_series::UniformSeries;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// White noise of deviation 1 at 10 Hz over 4,000 s, with a sum of steps of deviation `step`, a process of this deviation with a
+    /// time constant of 40 s, and a sine of amplitude 1 at 0.05 Hz.
+    fn series(seed: u64, step: f64, deviation: f64) -> UniformSeries {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let kept = (-0.1f64 / 40.0).exp();
+        let (mut walk, mut process) = (0.0, 0.0);
+        let value = |at: usize| {
+            let mut normal = || random.sample::<f64, _>(StandardNormal);
+            walk += step * normal();
+            process = kept * process + deviation * (1.0 - kept * kept).sqrt() * normal();
+            walk + process + normal() + (0.05 * std::f64::consts::TAU * at as f64 / 10.0).sin()
+        };
+        UniformSeries::new(0.1, (0..40_000).map(value).collect())
+    }
+
+    #[test]
+    fn tells_a_markov_process_from_a_random_walk() {
+        let find = |series: &UniformSeries| CosineSpectrum::new(series)?.find_markov(&[0.05], 0.0);
+        let (mut inside, runs) = (0, 8);
+        for seed in 0..runs {
+            let found = find(&series(seed, 0.0, 0.5)).expect("100 time constants");
+            // 100 time constants: the deviation is known to some 7 %, the time to some 15 %.
+            assert!((found.deviation.value / 0.5).ln().abs() < 0.4, "{seed}: {found:?}");
+            assert!((found.time_constant.value / 40.0).ln().abs() < 0.7, "{seed}: {found:?}");
+            inside += usize::from((found.time_constant.low..=found.time_constant.high).contains(&40.0));
+            inside += usize::from((found.deviation.low..=found.deviation.high).contains(&0.5));
+            assert_eq!(find(&series(seed, 0.01, 0.0)), None, "{seed}");
+            assert_eq!(find(&series(seed, 0.0, 0.0)), None, "{seed}");
+        }
+        // 95 % of 16 are expected; 11 or fewer have a probability of one in ten thousand.
+        assert!(inside >= 12, "{inside}");
+    }
+
+    #[test]
+    fn random_walks_are_no_markov_processes() {
+        let of_seed = |seed: u64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut walk = 0.0;
+            let values = (0..8 * BLOCKS).map(|_| {
+                walk += random.sample::<f64, _>(StandardNormal);
+                walk + random.sample::<f64, _>(StandardNormal)
+            });
+            CosineSpectrum::new(&UniformSeries::new(1.0, values.collect()))
+        };
+        let found = (0..400).filter(|&seed| of_seed(seed).expect("complete").find_markov(&[], 0.0).is_some()).count();
+        // 0.2 % of 400 are expected; more than 4 have a probability of one in a thousand.
+        assert!(found <= 4, "{found}");
+    }
+
+    #[test]
+    fn finds_most_processes_of_thirty_time_constants() {
+        // 8 samples a block: 30 time constants are 68 samples each.
+        let kept = (-30.0 / (8.0 * BLOCKS as f64)).exp();
+        let of_seed = |seed: u64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut process: f64 = random.sample(StandardNormal);
+            let values = (0..8 * BLOCKS).map(|_| {
+                process = kept * process + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+                process + 0.03 * random.sample::<f64, _>(StandardNormal)
+            });
+            CosineSpectrum::new(&UniformSeries::new(1.0, values.collect()))
+        };
+        let found = (0..100).filter(|&seed| of_seed(seed).expect("complete").find_markov(&[], 0.0).is_some()).count();
+        // Two thirds, of which docs/analysis.md tells, are 67 ± 5; 50 are 3.6 standard deviations less.
+        assert!(found >= 50, "{found}");
+    }
+
+    /// The mean square of the coefficients of 400 simulated random walks.
+    #[test]
+    fn coefficients_of_a_random_walk_have_the_expected_squares() {
+        let mut sums = vec![0.0; noise_shapes().len()];
+        let runs = 400;
+        for seed in 0..runs {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut walk = 0.0;
+            let values = (0..16 * BLOCKS).map(|_| {
+                walk += random.sample::<f64, _>(StandardNormal) / 4.0;
+                walk
+            });
+            let spectrum = CosineSpectrum::new(&UniformSeries::new(1.0, values.collect())).expect("complete");
+            sums.iter_mut().zip(&spectrum.squares).for_each(|(sum, square)| *sum += square / runs as f64);
+        }
+        // Steps of variance 1/16 at each of 16 samples: 1 per block. A square has twice the variance of its mean's square.
+        for (place, (band, sum)) in bands().zip(&sums).enumerate() {
+            let ratio = sum / noise_shapes()[place][2];
+            assert!(
+                (ratio - 1.0).abs() < 4.5 * (2.0 / (runs as usize * band.len()) as f64).sqrt(),
+                "{band:?}: {ratio}"
+            );
+        }
+    }
+
+    #[test]
+    fn white_noise_has_the_same_square_in_every_coefficient() {
+        let squares = expected_squares(|lag| if lag == 0 { 3.0 } else { 0.0 });
+        assert!(squares.iter().all(|square| (square - 3.0).abs() < 1e-9));
+    }
+}

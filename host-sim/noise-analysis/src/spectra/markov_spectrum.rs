@@ -1,0 +1,93 @@
+//! A Markov process in a spectrum: the likeliest time constant and variance beside white, flicker and random-walk noise, by
+//! Whittle's likelihood.
+
+use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density, whittle_objective};
+use crate::distributions::NORMAL_975;
+use crate::findings::BoundedEstimate;
+
+/// White, flicker and random-walk noise, a Markov process of each channel's own, and a shared one.
+pub(super) const TERMS: usize = 5;
+pub(super) const OWN: usize = 3;
+pub(super) const SHARED: usize = 4;
+/// Factor from one time constant that is tried to the next.
+const FACTOR: f64 = 1.25;
+/// Least Fisher information on the logarithm of the variance; keeps its standard deviation at 10 or below.
+const LEAST_INFORMATION: f64 = 1e-2;
+
+/// A Markov process by a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MarkovEstimate {
+    /// Standard deviation, in the unit of the channels.
+    pub deviation: BoundedEstimate,
+    /// Correlation time, s.
+    pub time_constant: BoundedEstimate,
+    /// Gain in ln likelihood over the same noise without it.
+    pub gain: f64,
+}
+
+/// Time constants that are tried, from the shortest to the longest, in their unit.
+pub(super) fn time_constants(shortest: f64, longest: f64) -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(shortest), |time| Some(time * FACTOR)).take_while(move |&time| time < longest)
+}
+
+/// The likeliest process of `fits` of several time constants, with bounds, and its gain over the objective `without` it.
+pub(super) fn most_likely(fits: &[MarkovFit], without: f64) -> Option<MarkovEstimate> {
+    let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective))?;
+    // Mean and standard deviation over all time constants, weighted by their likelihood: in a record of few correlation
+    // times, time constant and variance are uncertain together.
+    let weighted = |value: &dyn Fn(&MarkovFit) -> f64| {
+        let mean = |of: &dyn Fn(f64) -> f64| {
+            let (sum, total) = fits.iter().fold((0.0, 0.0), |(sum, total), fit| {
+                let weight = (likeliest.objective - fit.objective).exp();
+                (sum + weight * of(value(fit)), total + weight)
+            });
+            sum / total
+        };
+        let middle = mean(&|value| value);
+        (middle, mean(&|value| (value - middle).powi(2)).sqrt())
+    };
+    let (time, of_time) = weighted(&|fit| fit.time.ln());
+    let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.max(f64::MIN_POSITIVE).ln());
+    let (alone, _) = weighted(&|fit| 0.5 * fit.error);
+    Some(MarkovEstimate {
+        deviation: bounded(likeliest.variance.sqrt(), (deviation, of_deviation.hypot(alone))),
+        // Between two of the time constants that were tried all are equally likely: factor/√12.
+        time_constant: bounded(likeliest.time, (time, of_time.hypot(FACTOR.ln() / 12f64.sqrt()))),
+        gain: without - likeliest.objective,
+    })
+}
+
+/// `value` with bounds by mean and standard deviation of its logarithm.
+fn bounded(value: f64, (mean, deviation): (f64, f64)) -> BoundedEstimate {
+    let half = NORMAL_975 * deviation;
+    BoundedEstimate { value, low: (mean - half).exp().min(value), high: (mean + half).exp().max(value) }
+}
+
+/// The likeliest noise and processes for one time constant.
+pub(super) struct MarkovFit {
+    pub time: f64,
+    variance: f64,
+    /// Relative standard deviation of the variance, all else being known.
+    error: f64,
+    pub objective: f64,
+}
+
+impl MarkovFit {
+    /// Fits the densities of the terms to the bands in which they have the values `bases`; `process` is the index of the Markov
+    /// process with the time constant `time`.
+    pub(super) fn new(bands: &[SpectralBand], bases: &[[f64; TERMS]], time: f64, process: usize) -> Self {
+        let mut densities = [0.0; TERMS];
+        fit_mixture(bands, bases, &mut densities);
+        let totals: Vec<f64> = bases.iter().map(|basis| mixture_density(basis, &densities)).collect();
+        let variance = densities[process];
+        let fraction = |(basis, total): (&[f64; TERMS], &f64)| basis[process] * variance / total;
+        let fractions = bases.iter().zip(&totals).map(fraction);
+        let information: f64 = fractions.zip(bands).map(|(fraction, band)| band.ordinates * fraction * fraction).sum();
+        Self {
+            time,
+            variance,
+            error: information.max(LEAST_INFORMATION).sqrt().recip(),
+            objective: whittle_objective(bands, &totals),
+        }
+    }
+}
