@@ -21,21 +21,10 @@ use adis16405_driver::GyroRange;
 use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock};
 use std::path::Path;
 
+pub use crate::time_base_error::StreamError;
+
 /// Rows of a recording that is held in memory.
 const MOST_HELD: u64 = 1 << 17;
-/// Rows of a block.
-pub(crate) const BLOCK: usize = 1 << 14;
-
-/// Why a recording cannot be read in blocks.
-#[derive(Debug, thiserror::Error)]
-pub enum StreamError {
-    /// The file is damaged, or its columns cannot be chosen.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// It has no time base.
-    #[error(transparent)]
-    TimeBase(#[from] TimeBaseError),
-}
 
 /// An open recording.
 pub struct SampleStream {

@@ -14,6 +14,9 @@ use crate::stamp_quality::StampQuality;
 use crate::time_base_error::{MIN_SAMPLES, TimeBaseError};
 use std::collections::BTreeMap;
 
+/// Rows of a block.
+pub(crate) const BLOCK: usize = 1 << 14;
+
 /// What tells the sample periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Source {

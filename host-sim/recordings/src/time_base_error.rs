@@ -1,5 +1,6 @@
 //! Why a recording has no time base.
 
+use crate::input_error::InputError;
 use std::collections::BTreeMap;
 
 /// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
@@ -50,6 +51,17 @@ pub enum TimeBaseError {
         /// Samples that were left out, by cause.
         dropped: BTreeMap<&'static str, u64>,
     },
+}
+
+/// Why a recording cannot be read in blocks.
+#[derive(Debug, thiserror::Error)]
+pub enum StreamError {
+    /// The file is damaged, or its columns cannot be chosen.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// It has no time base.
+    #[error(transparent)]
+    TimeBase(#[from] TimeBaseError),
 }
 
 /// The causes for which samples were left out, as the end of a sentence.
