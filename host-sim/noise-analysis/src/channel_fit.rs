@@ -347,6 +347,7 @@ impl ChannelFit {
         self.trace.after = with_resolved_bounds(curve, &model, common.map(|common| common.decimation));
         self.trace.after_goodness = fitted;
         self.trace.added.clone_from(&held.added);
+        self.markov_by_spectrum = None;
     }
 }
 
