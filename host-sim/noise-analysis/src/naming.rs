@@ -97,6 +97,10 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Sinusoid(Sinusoid { frequency }) | NoiseTerm::Resonance(Resonance { frequency, .. })
                 if lines.is_some() && !is_band(term, duration_s) =>
             {
+                // Above a line of the spectrum, one of the harmonics of that beyond those that the spectrum lists.
+                if has_line_below(&in_spectrum, frequency) {
+                    continue;
+                }
                 let what = format!("as by a line at {frequency:.4} Hz, where the spectrum has none");
                 effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
             }
@@ -178,6 +182,15 @@ fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
 fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
     let [_, (narrowest, widest)] = term.shape;
     matches!(term.kind, NoiseTerm::Resonance(of) if narrowest > 1.0 / duration_s && widest < WIDEST_BAND * of.frequency)
+}
+
+/// Whether one of `lines`, the effects by the spectrum, is at a lower frequency than a line of the curve, which is known to some
+/// tenths.
+fn has_line_below(lines: &[Effect], frequency: f64) -> bool {
+    let below = |line: &Effect| {
+        line.parameters.get("frequency").is_some_and(|of| of.value < (1.0 + FREQUENCY_BY_OCTAVES) * frequency)
+    };
+    lines.iter().any(below)
 }
 
 /// Whether a line has fewer periods in the record than lines are searched for: its curve alone does not tell it from drift.
