@@ -8,7 +8,6 @@ use crate::octave_covariance::with_bounds_behind_a_filter;
 use crate::part_filter::{PartFilter, is_white};
 use crate::spectra::MarkovEstimate;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
-use crate::spectral_lines::MergedLine;
 use allan_core::fit::{Goodness, fit_shapes_except, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter};
@@ -265,8 +264,9 @@ impl ChannelFit {
 
     /// Adds the Markov process that the lowest frequencies of the spectrum show, where the model of the curve has none: the curve
     /// tells it from a random walk by its longest octaves alone. Its time constant is that of the spectrum, the coefficients of
-    /// all terms are fitted again; a process to which the curve gives no variance is left out. `lines` are those of the spectrum.
-    pub(crate) fn add_markov_of_spectrum(&mut self, spectrum: &CosineSpectrum, lines: &[MergedLine]) {
+    /// all terms are fitted again; a process to which the curve gives no variance is left out. `lines` are the frequencies of
+    /// those of the spectrum, Hz.
+    pub(crate) fn add_markov_of_spectrum(&mut self, spectrum: &CosineSpectrum, lines: impl Iterator<Item = f64>) {
         let curve = &self.covariates.curve;
         let model = &self.trace.after;
         let has_room = model.terms().len() < MAX_TERMS && self.trace.added.len() < MAX_ADDED;
@@ -278,8 +278,7 @@ impl ChannelFit {
             NoiseTerm::Resonance(line) => Some(line.frequency),
             _ => None,
         };
-        let lines: Vec<f64> =
-            model.terms().iter().filter_map(line).chain(lines.iter().map(|line| line.frequency.value)).collect();
+        let lines: Vec<f64> = model.terms().iter().filter_map(line).chain(lines).collect();
         let filter = model.terms().iter().find(|term| matches!(term.kind, NoiseTerm::Filtered(_)));
         let Some(found) = spectrum.find_markov(&lines, FILTER_LENGTHS * filter_length_s(model)) else { return };
         let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();

@@ -55,7 +55,8 @@ impl FirstHalf {
         // The filter of the whole record is the one that is reported.
         let _of_first_half = agree_on_filter(record.measurement, &record.estimators, traced);
         for FirstHalfFit { fit, slowest, lines, .. } in &mut channels {
-            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, lines));
+            let frequencies = || lines.iter().map(|line| line.frequency.value);
+            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
         channels.iter_mut().for_each(FirstHalfFit::fit_to_recent);
         Self { channels, series }

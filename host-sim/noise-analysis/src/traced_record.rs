@@ -77,7 +77,8 @@ impl<'a> TracedRecord<'a> {
         let traces = channels.iter_mut().map(|trace| (trace.channel, &mut trace.fit));
         let filter = agree_on_filter(measurement, &estimators, traces.filter(|(channel, _)| traced.contains(channel)));
         for ChannelTrace { fit, slowest, lines, .. } in &mut channels {
-            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, lines));
+            let frequencies = || lines.iter().map(|line| line.frequency.value);
+            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
         let motions = moved.into_iter().flatten().collect();
         Self { measurement, traced, noise_grids, preprocessing, estimators, series, channels, filter, coupled, motions }
