@@ -2,16 +2,13 @@
 
 use crate::output::{self, note, progress_bar};
 use anyhow::{Context, Result, bail};
-use noise_analysis::parallel::{on_one_thread, threads};
+use noise_analysis::parallel::{in_parallel, on_one_thread};
 use noise_analysis::report::Report;
 use recordings::Printable;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-use std::thread;
 
 /// Endings that the name of a report does not keep.
 const ENDINGS: [&str; 2] = [".gz", ".csv"];
@@ -33,27 +30,15 @@ pub(crate) fn write_reports(
         output::check_file(report, &inputs).with_context(|| report.display().to_string())?;
     }
     let bar = progress_bar(files.len() as u64, "{wide_bar} {pos}/{len} {eta}");
-    let next = AtomicUsize::new(0);
-    let failures: Mutex<BTreeMap<usize, String>> = Mutex::default();
-    let work = || {
-        while let Some((at, file)) = Some(next.fetch_add(1, Relaxed)).and_then(|at| Some((at, files.get(at)?))) {
-            let written = on_one_thread(|| output::write_json(&analyze(file)?, &reports[at]));
-            if let Err(error) = written
-                && let Ok(mut failures) = failures.lock()
-            {
-                failures.insert(at, named(file, &error));
-            }
-            bar.inc(1);
-        }
-    };
-    thread::scope(|scope| {
-        for _ in 0..threads().min(files.len()) {
-            scope.spawn(work);
-        }
+    let work: Vec<(&Path, &PathBuf)> = files.iter().copied().zip(&reports).collect();
+    let written = in_parallel(&work, |(file, report)| {
+        let written = on_one_thread(|| output::write_json(&analyze(file)?, report));
+        bar.inc(1);
+        written.map_err(|error| named(file, &error))
     });
     bar.finish_and_clear();
-    let failures = failures.into_inner().unwrap_or_default();
-    failures.values().for_each(|failure| note(format_args!("no report: {failure}")));
+    let failures: Vec<String> = written.into_iter().filter_map(Result::err).collect();
+    failures.iter().for_each(|failure| note(format_args!("no report: {failure}")));
     let written = files.len() - failures.len();
     if !is_quiet {
         output::print(|out| {

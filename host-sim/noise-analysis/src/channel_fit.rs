@@ -273,12 +273,8 @@ impl ChannelFit {
         if !has_room || self.correlation_times().next().is_some() {
             return;
         }
-        let line = |term: &FittedTerm| match term.kind {
-            NoiseTerm::Sinusoid(line) => Some(line.frequency),
-            NoiseTerm::Resonance(line) => Some(line.frequency),
-            _ => None,
-        };
-        let lines: Vec<f64> = model.terms().iter().filter_map(line).chain(lines).collect();
+        let of_model = model.terms().iter().filter_map(|term| line_frequency(&term.kind));
+        let lines: Vec<f64> = of_model.chain(lines).collect();
         let filter = model.terms().iter().find(|term| matches!(term.kind, NoiseTerm::Filtered(_)));
         let Some(found) = spectrum.find_markov(&lines, FILTER_LENGTHS * filter_length_s(model)) else { return };
         let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
@@ -354,6 +350,15 @@ impl ChannelFit {
 fn residual(model: &Model, point: &AllanPoint) -> Residual {
     let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
     Residual { n: point.n, excess, sigmas: excess * (2.0 * model.edf(point)).sqrt() }
+}
+
+/// Frequency of a term that is a line, Hz.
+pub(crate) fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
+    match kind {
+        NoiseTerm::Sinusoid(line) => Some(line.frequency),
+        NoiseTerm::Resonance(line) => Some(line.frequency),
+        _ => None,
+    }
 }
 
 /// Length of the impulse response of the longest filter in a model, s.

@@ -2,7 +2,7 @@
 //! bounds, and with evidence that a person can check.
 
 use crate::OCTAVES;
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, filter_length_s};
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, filter_length_s, line_frequency};
 use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
@@ -196,15 +196,6 @@ fn has_line_below(lines: &[Effect], frequency: f64) -> bool {
 /// Whether a line has fewer periods in the record than lines are searched for: its curve alone does not tell it from drift.
 fn has_few_periods(kind: &NoiseTerm, duration_s: f64) -> bool {
     line_frequency(kind).is_some_and(|frequency| frequency * duration_s < FEW_PERIODS)
-}
-
-/// Frequency of a term that is a line, Hz.
-fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
-    match kind {
-        NoiseTerm::Sinusoid(line) => Some(line.frequency),
-        NoiseTerm::Resonance(line) => Some(line.frequency),
-        _ => None,
-    }
 }
 
 /// Whether a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white

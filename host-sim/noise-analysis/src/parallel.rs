@@ -30,7 +30,7 @@ pub fn threads() -> usize {
 }
 
 /// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.
-pub(crate) fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let cores = threads();
     if cores == 1 {
         return items.iter().map(task).collect();
