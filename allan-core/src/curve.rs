@@ -366,6 +366,23 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.retain(keep);
     }
 
+    /// This curve at averaging factors below `from`, and at longer ones that of the means of each `samples` samples in a row,
+    /// which are `means`.
+    ///
+    /// Second differences of such means are those of the samples at `samples` times the averaging factor, so that a long
+    /// record need not be kept to be looked at again: its means are enough. An empty curve leaves the points of the means
+    /// alone. Points for which there is no room are left out, the longest averaging times first.
+    #[must_use]
+    pub fn continued_by_means(mut self, means: &Self, samples: u64, from: u64) -> Self {
+        self.points.retain(|point| point.n < from);
+        let points = means.points.iter().map(|point| AllanPoint { n: point.n.saturating_mul(samples), ..*point });
+        let free = OCTAVES - self.points.len();
+        self.points.extend(points.filter(|point| point.n >= from).take(free));
+        self.sample_period = means.sample_period / samples as f64;
+        self.samples = means.samples.saturating_mul(samples);
+        self
+    }
+
     /// The same curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {

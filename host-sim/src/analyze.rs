@@ -3,16 +3,17 @@
 use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
 use crate::output::{self, note};
 use crate::progress::{self, Progress};
-use crate::{many, quick};
+use crate::{many, streaming};
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
-use noise_analysis::analysis::analyze;
+use noise_analysis::analysis::{analyze, analyze_long};
+use noise_analysis::long_record::MOST_PERIODS;
 use noise_analysis::report::Report;
 use noise_analysis::several::{self, NoiseAgreement, NoiseInflation};
 use recordings::any_sensor::{ReadOptions, SensorRecording};
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::recording::Recording;
-use recordings::sample_stream::{SampleStream, StreamError};
+use recordings::sample_stream::{KeptInMemory, SampleStream, StreamError};
 use recordings::time_base::{StampQuality, time_base};
 use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
 use serde::Serialize;
@@ -22,6 +23,8 @@ use std::path::{Path, PathBuf};
 
 /// Name of the sensor whose register counts need no profile.
 const ADIS16405: &str = "adis16405";
+/// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
+const QUICK_ROWS: u64 = 1 << 17;
 /// Name of a sensor without a data sheet.
 const GENERIC: &str = "generic";
 
@@ -31,10 +34,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
     let inputs: Vec<&Path> = files.iter().copied().chain(against.as_deref()).collect();
     if let Some(folder) = reports {
-        let analyze = |file: &Path| {
-            let recording = of_file(recording, file);
-            if *quick { quick_report(&recording, &ReadMonitor::default()) } else { whole_report(&recording) }
-        };
+        let analyze = |file: &Path| report(&of_file(recording, file), *quick, &ReadMonitor::default(), &mut |_| {});
         return many::write_reports(&files, folder, output.quiet, analyze);
     }
     output::check(output, &inputs)?;
@@ -85,45 +85,49 @@ fn of_file(recording: &RecordingArguments, file: &Path) -> RecordingArguments {
 fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Report> {
     let mut progress = Progress::reading(&recording.input.file)?;
     let monitor = progress.monitor().clone();
-    let interrupted = |samples: u64| {
-        note(format_args!(
-            "interrupted: this is the report of the first {samples} samples, which were read until then"
-        ));
-    };
-    if is_quick {
-        let mut stream = open_stream(recording, &monitor)?;
-        let estimators = quick::estimate(&mut stream)?;
+    let mut end_reading = |stream: &SampleStream| {
         if progress.end_reading() {
-            interrupted(stream.description().samples);
+            note(format_args!(
+                "interrupted: this is the report of the first {} samples, which were read until then",
+                stream.description().samples
+            ));
         }
         note_all(stream.notes());
+    };
+    report(recording, is_quick, &monitor, &mut end_reading)
+}
+
+/// The report of a recording; `end_reading` is called when it was read, before it is analysed.
+fn report(
+    recording: &RecordingArguments,
+    is_quick: bool,
+    monitor: &ReadMonitor,
+    end_reading: &mut dyn FnMut(&SampleStream),
+) -> Result<Report> {
+    if is_quick {
+        let mut stream = open_stream(recording, monitor, KeptInMemory { rows: QUICK_ROWS, irregular: false })?;
+        let estimators = streaming::curves(&mut stream)?;
+        end_reading(&stream);
         let bar = progress::analysing(Some(stream.description().channels.len()));
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
         return Ok(report);
     }
-    let read = read_with(recording, &monitor);
-    let is_interrupted = progress.end_reading();
-    let (measurement, notes) = read?;
-    if is_interrupted {
-        interrupted(measurement.len() as u64);
+    let mut stream = open_stream(recording, monitor, KeptInMemory { rows: MOST_PERIODS, irregular: true })?;
+    if stream.description().periods <= MOST_PERIODS {
+        end_reading(&stream);
+        let bar = progress::analysing(None);
+        let report = analyze(stream.beginning());
+        bar.finish_and_clear();
+        return Ok(report);
     }
-    note_all(&notes);
+    let long = streaming::long_record(&mut stream)?;
+    end_reading(&stream);
+    drop(stream);
     let bar = progress::analysing(None);
-    let report = analyze(&measurement);
+    let report = analyze_long(&long);
     bar.finish_and_clear();
     Ok(report)
-}
-
-/// The whole report of a recording.
-fn whole_report(recording: &RecordingArguments) -> Result<Report> {
-    Ok(analyze(&read_with(recording, &ReadMonitor::default())?.0))
-}
-
-/// The report of the curves of a recording alone.
-fn quick_report(recording: &RecordingArguments, monitor: &ReadMonitor) -> Result<Report> {
-    let mut stream = open_stream(recording, monitor)?;
-    Ok(quick::estimate(&mut stream)?.report(&|| {}))
 }
 
 fn note_all(notes: &[String]) {
@@ -131,11 +135,11 @@ fn note_all(notes: &[String]) {
 }
 
 /// Opens a recording of any format to read it in blocks.
-fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor) -> Result<SampleStream> {
+fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<SampleStream> {
     let name = || recording.input.file.display().to_string();
     let opened = match open(&recording.input, monitor)? {
-        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate),
-        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, options, recording.rate),
+        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate, kept),
+        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, options, recording.rate, kept),
         Opened::Replayed(replayed) => {
             let (measurement, notes) = on_time_base(&replayed, recording.rate).with_context(name)?;
             note_all(&notes);

@@ -12,10 +12,10 @@ mod many;
 mod output;
 mod paper;
 mod progress;
-mod quick;
 mod record;
 mod recording_file;
 mod simulate;
+mod streaming;
 mod undeclared;
 
 use anyhow::{Context, Result};

@@ -15,6 +15,7 @@ use crate::assessment::{AssessedModels, Assessment};
 use crate::causes;
 use crate::figure_data;
 use crate::first_half::{FirstHalf, FirstHalfFit};
+use crate::long_record::{LongRecord, ShorterTimes};
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::in_parallel;
 use crate::part_report;
@@ -26,43 +27,149 @@ use crate::spectra::allan_deviations_by_spectrum;
 use crate::traced_record::{ChannelTrace, TracedRecord};
 use crate::uniform_series::UniformSeries;
 use allan_core::{AllanPoint, Curve};
-use measurement::{ChannelProfile, Measurement};
+use measurement::{ChannelProfile, Measurement, RecordingDescription};
 use std::collections::BTreeMap;
 
 /// Analyses every channel of a measurement. Effects are traced in the inertial channels only; the others get the baseline
 /// model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
-    let mut record = TracedRecord::new(measurement);
-    let first_half = FirstHalf::fit(&record);
-    keep_terms_that_held(&mut record, &first_half);
-    let effects = record.effects();
-    // What the first half shows by itself, to compare with what the whole record shows.
-    let effects_of_half = if effects.iter().all(Vec::is_empty) {
-        vec![Vec::new(); effects.len()]
-    } else {
-        TracedRecord::new(&measurement.before(measurement.middle())).effects()
-    };
-    let mut channels = channel_reports(&record, &first_half);
-    let duration_s = measurement.periods() as f64 * measurement.period_s();
-    let findings = causes::find(&mut channels, &effects, &effects_of_half, &measurement.profile, duration_s);
-    let part = part_report::report(measurement, &record.filter);
-    // The samples are transformed once more for the figures: what is not needed then is released.
-    drop((record, first_half));
-    let mut report = Report {
-        schema: SCHEMA,
-        quick: false,
-        sample_rate_hz: measurement.sample_rate_hz,
-        samples: measurement.len() as u64,
-        dropped: by_cause(&measurement.dropped),
-        flagged: by_cause(&measurement.flagged),
-        part,
-        findings,
-        common_mode: common_mode_regression(measurement, &channels),
-        channels,
-    };
-    figure_data::set(&mut report, measurement);
-    report
+    let description = RecordingDescription::from(measurement);
+    Recorded { description: &description, measurement, first: measurement, long: None }.report()
+}
+
+/// Analyses a recording of which not all samples are kept.
+#[must_use]
+pub fn analyze_long(record: &LongRecord) -> Report {
+    let LongRecord { description, first, means, .. } = record;
+    Recorded { description, measurement: means, first, long: Some(record) }.report()
+}
+
+/// What a report is made of.
+struct Recorded<'a> {
+    description: &'a RecordingDescription,
+    /// The samples, or those of a long record in means.
+    measurement: &'a Measurement,
+    /// The samples, or the first of them.
+    first: &'a Measurement,
+    long: Option<&'a LongRecord>,
+}
+
+impl Recorded<'_> {
+    fn report(&self) -> Report {
+        let &Self { description, measurement, first, long } = self;
+        let shorter = long.map(|long| &long.shorter);
+        let mut record = TracedRecord::new(measurement, shorter);
+        let first_half = FirstHalf::fit(&record);
+        keep_terms_that_held(&mut record, &first_half);
+        let mut effects = record.effects();
+        // What the first half shows by itself, to compare with what the whole record shows.
+        let effects_of_half = if effects.iter().all(Vec::is_empty) {
+            vec![Vec::new(); effects.len()]
+        } else {
+            let shorter = shorter.map(ShorterTimes::of_first_half);
+            TracedRecord::new(&measurement.before(measurement.middle()), shorter.as_ref()).effects()
+        };
+        // What the first samples show has nothing to be compared with.
+        for (effects, of_samples) in effects.iter_mut().zip(long.iter().flat_map(|long| &long.effects)) {
+            effects.splice(0..0, of_samples.iter().cloned());
+        }
+        let mut channels = self.channel_reports(&record, &first_half);
+        let duration_s = description.periods as f64 * description.period_s();
+        let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
+        let part = part_report::report(first, &record.filter);
+        // The samples are transformed once more for the figures: what is not needed then is released.
+        drop((record, first_half));
+        let mut report = Report {
+            schema: SCHEMA,
+            quick: false,
+            sample_rate_hz: description.sample_rate_hz,
+            samples: description.samples,
+            dropped: by_cause(&description.dropped),
+            flagged: by_cause(&description.flagged),
+            part,
+            findings,
+            common_mode: common_mode_regression(measurement, &channels),
+            channels,
+        };
+        figure_data::set(&mut report, measurement, long.map(|long| &long.first));
+        report
+    }
+
+    /// The report of every channel, in the order of the channels, without its effects.
+    fn channel_reports(&self, record: &TracedRecord, first_half: &FirstHalf) -> Vec<ChannelReport> {
+        let TracedRecord { estimators, traced, .. } = record;
+        let models: Vec<(&ChannelTrace, &FirstHalfFit)> = record.channels.iter().zip(&first_half.channels).collect();
+        let assessments = in_parallel(&models, |(trace, half)| Assessed::new(record, trace, half));
+        let nonstationarities = first_half.nonstationarities(record);
+        let at_rest = record.at_rest();
+        let avar_of = |of: ChannelProfile, n: u64| {
+            let position = record.channels.iter().position(|trace| trace.channel == of)?;
+            estimators.measured[position].points().iter().find(|point| point.n == n).map(|point| point.avar)
+        };
+        let report = |((trace, half), measured): (&(&ChannelTrace, &FirstHalfFit), &Curve<OCTAVES>),
+                      assessed: Assessed| {
+            let channel = trace.channel;
+            let whole = measured.clone().with_confidence(|point| half.fit.trace.before.variance_fractions(point.n));
+            let after = half.after(record, channel, &whole, avar_of);
+            // The model with the added terms, fitted to the whole record, with the errors of `after`.
+            let position = estimators.both.position(channel).unwrap_or_default();
+            let refitted = ModelReport {
+                terms: term_reports(&trace.fit.trace.after, channel.unit),
+                adev: trace.fit.deviations(&estimators.both, position, &whole, avar_of),
+                ..after.clone()
+            };
+            let nonstationarity = traced.iter().position(|of| *of == channel);
+            let points = whole.points().iter();
+            ChannelReport {
+                name: channel.name.to_owned(),
+                unit: channel.unit.to_owned(),
+                samples: self.description.samples,
+                missing: self.missing_samples(record, channel),
+                curve: points.map(|point| curve_point(point, whole.samples(), &assessed.by_spectrum)).collect(),
+                read_off: SlopeMethodReport::from_curve(&whole, channel.unit),
+                before: half.before(record, channel, &whole),
+                first_half_curve: half.curve_error(record, channel),
+                after,
+                refitted,
+                nonstationarity: nonstationarity.and_then(|position| nonstationarities.get(position)?.clone()),
+                at_rest: at_rest.clone(),
+                effects: Vec::new(),
+                assessment: assessed.assessment,
+                figure_data: FigureData::default(),
+            }
+        };
+        let channels = models.iter().zip(&estimators.measured).zip(assessments);
+        channels.map(|(models, assessed)| report(models, assessed)).collect()
+    }
+
+    /// Samples of a channel that are missing in its model.
+    fn missing_samples(&self, record: &TracedRecord, channel: ChannelProfile) -> MissingSamples {
+        let TracedRecord { measurement, preprocessing, estimators, .. } = record;
+        let dropped = &self.description.dropped;
+        let of_all = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
+        let position = measurement.channels.iter().position(|of| of.profile == channel).unwrap_or_default();
+        let own: Vec<(&str, u64)> = match self.long {
+            // Of means, a knock has all of their samples.
+            Some(long) => {
+                let samples = |(cause, means)| (cause, means * long.shorter.samples_per_mean);
+                let of_means = preprocessing.refused(channel).map(samples);
+                long.refused[position].iter().map(|(&cause, &count)| (cause, count)).chain(of_means).collect()
+            }
+            None => {
+                let refused = measurement.channels.get(position).into_iter().flat_map(|channel| &channel.refused);
+                let refused = refused.map(|(&cause, positions)| (cause, positions.len() as u64));
+                refused.chain(preprocessing.refused(channel)).collect()
+            }
+        };
+        let mut refused: BTreeMap<String, u64> = BTreeMap::new();
+        for (cause, count) in of_all.chain(own).filter(|(_, count)| *count > 0) {
+            *refused.entry(cause.to_owned()).or_insert(0) += count;
+        }
+        let lost = dropped.get("gap").copied().unwrap_or(0);
+        let replaced = estimators.both.position(channel).map_or(0, |position| estimators.both.replaced(position));
+        MissingSamples { lost, refused, replaced }
+    }
 }
 
 fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
@@ -92,52 +199,6 @@ fn keep_terms_that_held(record: &mut TracedRecord, first_half: &FirstHalf) {
     }
 }
 
-/// The report of every channel, in the order of the channels, without its effects.
-fn channel_reports(record: &TracedRecord, first_half: &FirstHalf) -> Vec<ChannelReport> {
-    let TracedRecord { measurement, estimators, traced, .. } = record;
-    let models: Vec<(&ChannelTrace, &FirstHalfFit)> = record.channels.iter().zip(&first_half.channels).collect();
-    let assessments = in_parallel(&models, |(trace, half)| Assessed::new(record, trace, half));
-    let nonstationarities = first_half.nonstationarities(record);
-    let at_rest = record.at_rest();
-    let avar_of = |of: ChannelProfile, n: u64| {
-        let position = record.channels.iter().position(|trace| trace.channel == of)?;
-        estimators.measured[position].points().iter().find(|point| point.n == n).map(|point| point.avar)
-    };
-    let report = |((trace, half), measured): (&(&ChannelTrace, &FirstHalfFit), &Curve<OCTAVES>), assessed: Assessed| {
-        let channel = trace.channel;
-        let whole = measured.clone().with_confidence(|point| half.fit.trace.before.variance_fractions(point.n));
-        let after = half.after(record, channel, &whole, avar_of);
-        // The model with the added terms, fitted to the whole record, with the errors of `after`.
-        let position = estimators.both.position(channel).unwrap_or_default();
-        let refitted = ModelReport {
-            terms: term_reports(&trace.fit.trace.after, channel.unit),
-            adev: trace.fit.deviations(&estimators.both, position, &whole, avar_of),
-            ..after.clone()
-        };
-        let nonstationarity = traced.iter().position(|of| *of == channel);
-        let points = whole.points().iter();
-        ChannelReport {
-            name: channel.name.to_owned(),
-            unit: channel.unit.to_owned(),
-            samples: measurement.len() as u64,
-            missing: missing_samples(record, channel),
-            curve: points.map(|point| curve_point(point, whole.samples(), &assessed.by_spectrum)).collect(),
-            read_off: SlopeMethodReport::from_curve(&whole, channel.unit),
-            before: half.before(record, channel, &whole),
-            first_half_curve: half.curve_error(record, channel),
-            after,
-            refitted,
-            nonstationarity: nonstationarity.and_then(|position| nonstationarities.get(position)?.clone()),
-            at_rest: at_rest.clone(),
-            effects: Vec::new(),
-            assessment: assessed.assessment,
-            figure_data: FigureData::default(),
-        }
-    };
-    let channels = models.iter().zip(&estimators.measured).zip(assessments);
-    channels.map(|(models, assessed)| report(models, assessed)).collect()
-}
-
 /// What the samples of a channel say beside its fits.
 struct Assessed {
     assessment: Assessment,
@@ -159,7 +220,10 @@ impl Assessed {
         };
         // By the spectrum of the samples as they were recorded, as the measured curve is.
         let factors: Vec<u64> = (0..OCTAVES).map(|octave| 1 << octave).collect();
-        let by_spectrum = allan_deviations_by_spectrum(&UniformSeries::from_series(&recorded), &factors);
+        let mut by_spectrum = allan_deviations_by_spectrum(&UniformSeries::from_series(&recorded), &factors);
+        // Means tell nothing of the averaging times that are shorter than they are.
+        let shorter = record.shorter.map_or(0, |shorter| shorter.samples_per_mean.ilog2() as usize);
+        by_spectrum.splice(0..0, vec![None; shorter]);
         Self { assessment: Assessment::new(own, models), by_spectrum }
     }
 }
@@ -167,20 +231,4 @@ impl Assessed {
 fn curve_point(point: &AllanPoint, samples: u64, by_spectrum: &[Option<f64>]) -> CurvePoint {
     let adev_by_spectrum = by_spectrum.get(point.n.ilog2() as usize).copied().flatten();
     CurvePoint { adev_by_spectrum, ..CurvePoint::new(point, samples) }
-}
-
-/// Samples of a channel that are missing in its model.
-fn missing_samples(record: &TracedRecord, channel: ChannelProfile) -> MissingSamples {
-    let TracedRecord { measurement, preprocessing, estimators, .. } = record;
-    let lost = measurement.dropped.get("gap").copied().unwrap_or(0);
-    let of_all =
-        measurement.dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
-    let own = measurement.channel(&channel).into_iter().flat_map(|channel| &channel.refused);
-    let own = own.map(|(&cause, positions)| (cause, positions.len() as u64));
-    let mut refused: BTreeMap<String, u64> = BTreeMap::new();
-    for (cause, count) in of_all.chain(own).chain(preprocessing.refused(channel)).filter(|(_, count)| *count > 0) {
-        *refused.entry(cause.to_owned()).or_insert(0) += count;
-    }
-    let replaced = estimators.both.position(channel).map_or(0, |position| estimators.both.replaced(position));
-    MissingSamples { lost, refused, replaced }
 }

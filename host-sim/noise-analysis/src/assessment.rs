@@ -15,6 +15,7 @@ use crate::spectra::correlation_time;
 use crate::uniform_series::UniformSeries;
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
+use allan_core::term::MovingAverageFilter;
 use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
@@ -103,17 +104,18 @@ impl Assessment {
         let whole = UniformSeries::from_series(series);
         let halfway = whole.values().len() / 2;
         let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
-        let markov_time_by_autocorrelation =
-            correlation_time(&whole, refitted).map(|time| Parameter::new(time.value, time.low, time.high, "s"));
+        let markov_time_by_autocorrelation = correlation_time(&whole, &sampled_every(refitted, whole.sample_period()))
+            .map(|time| Parameter::new(time.value, time.low, time.high, "s"));
         if !is_known(refitted) {
             return Self::unknown(!series.values.is_empty());
         }
-        let by_spectrum = spectral_white_noise::estimate(&whole, refitted, series.resolution, series.unit);
+        let of_series = |model: &Model| sampled_every(model, whole.sample_period());
+        let by_spectrum = spectral_white_noise::estimate(&whole, &of_series(refitted), series.resolution, series.unit);
         Self {
             coefficients: coefficients(refitted, series.unit),
             coefficients_note: None,
-            drift: drift(uncompensated, series.unit, &unseen),
-            innovations: filter_innovations(of_first_half, &unseen),
+            drift: drift(&of_series(uncompensated), series.unit, &unseen),
+            innovations: filter_innovations(&of_series(of_first_half), &unseen),
             angle_random_walk_by_spectrum: by_spectrum.angle_random_walk,
             angle_random_walk_by_spectrum_note: by_spectrum.note,
             markov_time_by_autocorrelation,
@@ -145,6 +147,19 @@ impl Assessment {
         };
         Self { coefficients_note: Some(note.to_owned()), ..Self::default() }
     }
+}
+
+/// A model of samples every `period` s of the same noise, of which the samples may be means: only a filter counts samples.
+fn sampled_every(model: &Model, period: f64) -> Model {
+    let ratio = period / model.sample_period();
+    let term = |term: &FittedTerm| match term.kind {
+        NoiseTerm::Filtered(filter) => {
+            let decimation = filter.decimation * ratio;
+            FittedTerm { kind: NoiseTerm::Filtered(MovingAverageFilter { decimation, ..filter }), ..*term }
+        }
+        _ => *term,
+    };
+    Model::new(period, model.terms().iter().map(term))
 }
 
 /// Whether the record says anything of a term: an upper bound of 0 belongs to a channel that never changes.

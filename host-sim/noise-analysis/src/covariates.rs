@@ -37,8 +37,8 @@ impl RegressionData {
     fn new(part: &RecordPart, channel: usize, known: Option<&Self>) -> Self {
         let positions: Vec<usize> = regressors(part.channels[channel], part).collect();
         let covariate = |(index, &position): (usize, &usize)| match known {
-            Some(known) => known.covariates[index].continued(&part.curve(position), 1),
-            None => Covariate::new(&part.curve(position), part.resolution(position), 1),
+            Some(known) => known.covariates[index].continued(&part.curve(position), part.coupled_from()),
+            None => Covariate::new(&part.curve(position), part.resolution(position), part.coupled_from()),
         };
         let pairs = positions.iter().enumerate().flat_map(|(i, &a)| positions[..i].iter().map(move |&b| (a, b)));
         Self {

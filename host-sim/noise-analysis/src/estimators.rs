@@ -4,11 +4,12 @@
 //! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
 //! channels are taken where both have a sample.
 
+use crate::long_record::{ShorterTimes, ShorterTimesOfChannel};
 use crate::parallel::in_parallel;
 use crate::preprocessing::{Exclusion, Preprocessing};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
-use allan_core::{Cascade, Coupling, Curve};
+use allan_core::{Cascade, Coupling, Covariance, Curve};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use nalgebra::DMatrix;
 
@@ -102,6 +103,17 @@ pub(crate) struct RecordPart {
     /// Smallest distance of two values by channel, in its unit: one count, or several.
     resolutions: Vec<f64>,
     period_s: f64,
+    shorter: Option<ShorterCurves>,
+}
+
+/// The curves at averaging times that are too short for the estimators, which have the means of samples.
+#[derive(Clone)]
+struct ShorterCurves {
+    samples_per_mean: u64,
+    /// Averaging factor from which on the estimators are used, samples.
+    until: u64,
+    /// By channel, with the samples that were replaced.
+    curves: Vec<(Curve<OCTAVES>, u64)>,
 }
 
 /// The curves of the recording as measured, and the estimators of its halves.
@@ -117,9 +129,11 @@ pub(crate) struct RecordEstimators {
 }
 
 impl RecordEstimators {
-    /// Estimates from `measurement`. The channels of each part are `coupled`, then all others that were recorded.
+    /// Estimates from `measurement`, or where that has means from them and from the `shorter` averaging times. The channels of
+    /// each part are `coupled`, then all others that were recorded.
     pub(crate) fn estimate(
         measurement: &Measurement,
+        shorter: Option<&ShorterTimes>,
         coupled: &[ChannelProfile],
         preprocessing: &Preprocessing,
     ) -> Self {
@@ -137,7 +151,18 @@ impl RecordEstimators {
         };
         let (raw, ruled, [first, second]) = (of(Exclusion::None), of(ruled), of(both));
         let both = RecordPart { estimators: first.estimators.clone().followed_by(&second.estimators), ..first };
-        Self { measured: measured(measurement), raw, ruled, both }
+        let Some(shorter) = shorter else { return Self { measured: measured(measurement), raw, ruled, both } };
+        let halves = |parts: [RecordPart; 2], exclusion: Exclusion| {
+            let [first, second] = parts;
+            [(0, first), (1, second)]
+                .map(|(half, part)| part.with_shorter(shorter, exclusion, |of| of.half(half, exclusion)))
+        };
+        Self {
+            measured: shorter.channels.iter().map(|channel| channel.measured.clone()).collect(),
+            raw: halves(raw, Exclusion::None),
+            ruled: halves(ruled, Exclusion::ByFirstHalf),
+            both: both.with_shorter(shorter, Exclusion::ByWhole, |of| of.both(Exclusion::ByWhole)),
+        }
     }
 }
 
@@ -173,7 +198,7 @@ fn halves(
         channels.iter().map(|channel| f64::from(preprocessing.counts_per_step(*channel)) * channel.lsb).collect();
     let estimators = CoupledEstimators::new(channels.len(), coupled.len());
     let period_s = measurement.period_s();
-    let part = RecordPart { channels: channels.clone(), estimators, resolutions, period_s };
+    let part = RecordPart { channels: channels.clone(), estimators, resolutions, period_s, shorter: None };
     let mut halves = [part.clone(), part];
     let recorded: Vec<RecordedSamples> = channels
         .iter()
@@ -227,7 +252,34 @@ impl RecordPart {
     /// Of one channel, whose estimator has counts of [`STEPS_PER_COUNT`] steps.
     pub(crate) fn of_channel(channel: ChannelProfile, cascade: Cascade<OCTAVES, OVERLAP>, period_s: f64) -> Self {
         let estimators = CoupledEstimators { cascades: vec![cascade], missing: vec![0], couplings: Vec::new() };
-        Self { channels: vec![channel], estimators, resolutions: vec![channel.lsb], period_s }
+        Self { channels: vec![channel], estimators, resolutions: vec![channel.lsb], period_s, shorter: None }
+    }
+
+    /// The part with the curves of `shorter` at averaging times that are too short for its own samples, which are means.
+    fn with_shorter(
+        self,
+        shorter: &ShorterTimes,
+        exclusion: Exclusion,
+        curve: impl Fn(&ShorterTimesOfChannel) -> Curve<OCTAVES>,
+    ) -> Self {
+        let of = |channel: &ChannelProfile| {
+            let of = shorter.of(*channel)?;
+            Some((of.resolution, (curve(of), of.replaced(exclusion))))
+        };
+        let (resolutions, curves) =
+            self.channels.iter().map(|channel| of(channel).unwrap_or((channel.lsb, (Curve::empty(), 0)))).unzip();
+        let shorter = ShorterCurves { samples_per_mean: shorter.samples_per_mean, until: shorter.until(), curves };
+        Self { resolutions, shorter: Some(shorter), ..self }
+    }
+
+    /// Seconds between samples.
+    pub(crate) fn sample_period(&self) -> f64 {
+        self.shorter.as_ref().map_or(self.period_s, |shorter| self.period_s / shorter.samples_per_mean as f64)
+    }
+
+    /// Least averaging factor at which the covariances of channels are known, samples.
+    pub(crate) fn coupled_from(&self) -> u64 {
+        self.shorter.as_ref().map_or(1, |shorter| shorter.until)
     }
 
     /// Position of a channel.
@@ -237,11 +289,20 @@ impl RecordPart {
 
     /// Allan variances of the channel at a position, in its unit squared.
     pub(crate) fn curve(&self, channel: usize) -> Curve<OCTAVES> {
-        self.estimators.cascade(channel).curve(self.period_s).scaled(self.step_size(channel))
+        let own = self.estimators.cascade(channel).curve(self.period_s).scaled(self.step_size(channel));
+        match &self.shorter {
+            None => own,
+            Some(shorter) => {
+                shorter.curves[channel].0.clone().continued_by_means(&own, shorter.samples_per_mean, shorter.until)
+            }
+        }
     }
 
     /// Samples of the channel at a position that were replaced because they are missing.
     pub(crate) fn replaced(&self, channel: usize) -> u64 {
+        if let Some(shorter) = &self.shorter {
+            return shorter.curves[channel].1;
+        }
         let cascade = self.estimators.cascade(channel);
         let sums = (0..OCTAVES).filter_map(|octave| cascade.octave_sums(octave));
         sums.map(|sums| u64::from(sums.interpolation.replaced())).sum()
@@ -262,6 +323,10 @@ impl RecordPart {
         let (high, low) = (a.max(b), a.min(b));
         let mut points = self.estimators.couplings[high * (high - 1) / 2 + low].points();
         points.iter_mut().for_each(|point| point.covariance *= self.step_size(a) * self.step_size(b));
+        if let Some(shorter) = &self.shorter {
+            let in_samples = |point: &Covariance| Covariance { n: point.n * shorter.samples_per_mean, ..*point };
+            return points.iter().map(in_samples).filter(|point| point.n >= shorter.until).collect();
+        }
         points
     }
 

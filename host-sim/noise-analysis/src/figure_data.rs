@@ -32,18 +32,26 @@ const FINE_FROM: f64 = 3.0;
 /// Significant digits: more than a figure resolves.
 const DIGITS: usize = 6;
 
-/// Sets the figure data of every channel of `report`, the report of `measurement`.
-pub(crate) fn set(report: &mut Report, measurement: &Measurement) {
-    let period_s = measurement.period_s();
+/// Sets the figure data of every channel of `report`, the report of `measurement`; where that has the means of a long record, its
+/// `first` samples show the higher frequencies.
+pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<&Measurement>) {
+    let period_s = report.sample_rate_hz.recip();
     let stages = if report.part.filter.as_deref() == Some("moving_average") { 1 } else { 2 };
     let recorded: Vec<(ChannelProfile, &ChannelReport)> = measurement.profiles().zip(&report.channels).collect();
     let mut data = in_parallel(&recorded, |(profile, channel)| {
         let series = Series::from_measurement(measurement, profile);
         FigureData {
             data_sheet: data_sheet(&profile.data_sheet),
-            spectrum: spectrum(&UniformSeries::from_series(&series), |frequency| {
-                model_density(&channel.refitted.terms, stages, frequency, period_s)
-            }),
+            spectrum: {
+                let model = |frequency: f64| model_density(&channel.refitted.terms, stages, frequency, period_s);
+                let own = spectrum(&UniformSeries::from_series(&series), model);
+                let faster = first.and_then(|first| {
+                    let channel = first.channels.iter().find(|channel| channel.profile.name == profile.name)?;
+                    let series = Series::from_measurement(first, &channel.profile);
+                    spectrum(&UniformSeries::from_series(&series), model)
+                });
+                with_faster(own, faster, measurement.sample_rate_hz)
+            },
             bias_over_time: bias_over_time(&series),
         }
     });
@@ -127,6 +135,22 @@ fn spectrum(series: &UniformSeries, model: impl Fn(f64) -> f64) -> Option<Spectr
         low: column(&|point| bound(point, 0.975)),
         high: column(&|point| bound(point, 0.025)),
         model: column(&|point| model(point.frequency)),
+    })
+}
+
+/// The spectrum of means at the rate `rate_hz`, and above four tenths of that rate, where means have lost a quarter of a sinusoid, that
+/// of samples.
+fn with_faster(means: Option<SpectrumReport>, faster: Option<SpectrumReport>, rate_hz: f64) -> Option<SpectrumReport> {
+    let (Some(means), Some(faster)) = (&means, &faster) else { return means.or(faster) };
+    let highest = means.frequency_hz.partition_point(|frequency| *frequency < 0.4 * rate_hz);
+    let lowest = faster.frequency_hz.partition_point(|frequency| *frequency < 0.4 * rate_hz);
+    let column = |of: &dyn Fn(&SpectrumReport) -> &Vec<f64>| [&of(means)[..highest], &of(faster)[lowest..]].concat();
+    Some(SpectrumReport {
+        frequency_hz: column(&|of| &of.frequency_hz),
+        density: column(&|of| &of.density),
+        low: column(&|of| &of.low),
+        high: column(&|of| &of.high),
+        model: column(&|of| &of.model),
     })
 }
 

@@ -13,7 +13,7 @@ use crate::report::{ModelErrorReport, ModelReport, term_reports};
 use crate::series::Series;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
-use crate::traced_record::{TracedRecord, agree_on_filter};
+use crate::traced_record::{TracedRecord, agree_on_filter, faster_lines};
 use crate::uniform_series::UniformSeries;
 use allan_core::{Curve, Model};
 use measurement::ChannelProfile;
@@ -114,7 +114,8 @@ impl FirstHalfFit {
             bias_changes.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)
         };
         let has_ramp = preprocessing.has_ramp(channel);
-        let raw = preprocessing.excludes_any(Exclusion::ByFirstHalf).then(|| {
+        let has_rules = estimators.both.channels.iter().any(|of| record.has_rules(*of));
+        let raw = has_rules.then(|| {
             let raw = CovariateFit::estimate(&estimators.raw[0], own, has_ramp, sensitivity);
             ChannelFit::fit_baseline(raw).trace.before
         });
@@ -122,8 +123,13 @@ impl FirstHalfFit {
         let followed = covariates.compensated_series(&series[own], series);
         let middle = record.measurement.middle();
         let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&series[own]), middle);
+        let epoch_curves = match record.shorter {
+            Some(shorter) => epoch_curves.map(|curves| curves.in_samples(shorter, channel)),
+            None => epoch_curves,
+        };
         let rest = covariates.compensated_series(&halves[own], halves);
-        let (fit, lines) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile);
+        let faster = faster_lines(record.shorter, channel);
+        let (fit, lines) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile, faster);
         let raw = raw.unwrap_or_else(|| fit.trace.before.clone());
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(&halves[own]));
         Self { raw, fit, slowest: CosineSpectrum::new(&rest), lines, epoch_curves, epochs: None }
@@ -163,7 +169,7 @@ impl FirstHalfFit {
             adev: whole.points().iter().map(|point| self.raw.avar(point.n).sqrt()).collect(),
             fitted: error(&estimators.raw[0]),
             unseen: error(&estimators.raw[1]),
-            unseen_excluding: has_rules(record, channel).then(|| error(&estimators.ruled[1])),
+            unseen_excluding: record.has_rules(channel).then(|| error(&estimators.ruled[1])),
         }
     }
 
@@ -185,12 +191,7 @@ impl FirstHalfFit {
             adev: self.fit.deviations(&estimators.both, position, whole, avar_of),
             fitted: ModelErrorReport::new(model, self.fit.fitted_curve()),
             unseen: unseen(&estimators.raw[1]),
-            unseen_excluding: has_rules(record, channel).then(|| unseen(&estimators.ruled[1])),
+            unseen_excluding: record.has_rules(channel).then(|| unseen(&estimators.ruled[1])),
         }
     }
-}
-
-/// Whether rules of the first half exclude samples of a channel.
-fn has_rules(record: &TracedRecord, channel: ChannelProfile) -> bool {
-    record.preprocessing.excludes(channel, Exclusion::ByFirstHalf)
 }

@@ -52,3 +52,18 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync)
     results.sort_unstable_by_key(|(at, _)| *at);
     results.into_iter().map(|(_, result)| result).collect()
 }
+
+/// Runs `task` for each of `changed` with the one of `others` at the same position, on as many threads as there are cores.
+pub(crate) fn for_each_pair<T: Send, U: Sync>(changed: &mut [T], others: &[U], task: impl Fn(&mut T, &U) + Sync) {
+    let threads = threads().min(changed.len()).max(1);
+    let each = changed.len().div_ceil(threads).max(1);
+    let work = |(changed, others): (&mut [T], &[U])| {
+        changed.iter_mut().zip(others).for_each(|(changed, other)| task(changed, other));
+    };
+    let parts = changed.chunks_mut(each).zip(others.chunks(each));
+    if threads == 1 {
+        parts.for_each(work);
+    } else {
+        std::thread::scope(|scope| parts.for_each(|part| drop(scope.spawn(move || work(part)))));
+    }
+}

@@ -78,17 +78,27 @@ struct ChannelFindings {
 
 impl Preprocessing {
     /// Looks for knocks, spikes, steps, ramps, sensitivities and a coarse resolution in the channels `traced`, and for lost or
-    /// repeated samples and a wrong sample rate in the whole recording.
-    pub(crate) fn detect(measurement: &Measurement, traced: &[ChannelProfile], noise_grids: &NoiseGrids) -> Self {
+    /// repeated samples and a wrong sample rate in the whole recording. Where that has `means` of samples, what shows in samples
+    /// alone is not looked for.
+    pub(crate) fn detect(
+        measurement: &Measurement,
+        means: bool,
+        traced: &[ChannelProfile],
+        noise_grids: &NoiseGrids,
+    ) -> Self {
         let mut preprocessing = Self::default();
-        for finding in sampling_faults::detect(measurement) {
+        let faults = if means { Vec::new() } else { sampling_faults::detect(measurement) };
+        for finding in faults {
             preprocessing.repeated.extend(excluded(&finding.correction));
             preprocessing.common_effects.push(finding.effect);
         }
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
         let measured = |channel: ChannelProfile| Series::from_measurement(measurement, &channel);
-        let steps = in_parallel(&recorded, |&channel| effective_lsb::counts_per_step(&measured(channel)));
-        preprocessing.counts_per_step = recorded.iter().copied().zip(steps).filter(|(_, counts)| *counts > 1).collect();
+        if !means {
+            let steps = in_parallel(&recorded, |&channel| effective_lsb::counts_per_step(&measured(channel)));
+            let steps = recorded.iter().copied().zip(steps);
+            preprocessing.counts_per_step = steps.filter(|(_, counts)| *counts > 1).collect();
+        }
         let series_of =
             |channel: ChannelProfile| measured(channel).with_counts_per_step(preprocessing.counts_per_step(channel));
         let series: Vec<Series> = in_parallel(traced, |&channel| series_of(channel));
@@ -104,11 +114,19 @@ impl Preprocessing {
         let numbered: Vec<usize> = (0..traced.len()).collect();
         let found = in_parallel(&numbered, |&at| {
             let quiet = knocks.removed_from(&series[at], at);
-            let saturation = output_range::find_saturation(&series[at], traced[at].range);
-            // What is cut off is no noise around which a sample could be a spike.
-            let spikes = if saturation.is_none() { spikes::find(&quiet) } else { None };
             let dithered = measurement.profile.dithered_avar_counts2;
-            let range = saturation.or_else(|| output_range::find_noise_below_count(&series[at], dithered));
+            let [lsb, saturation, below_count] = if means {
+                [None, None, None]
+            } else {
+                [
+                    effective_lsb::find(&measured(traced[at])),
+                    output_range::find_saturation(&series[at], traced[at].range),
+                    output_range::find_noise_below_count(&series[at], dithered),
+                ]
+            };
+            // What is cut off is no noise around which a sample could be a spike.
+            let spikes = if saturation.is_none() && !means { spikes::find(&quiet) } else { None };
+            let range = saturation.or(below_count);
             let mut exclusion = ChannelExclusion {
                 spikes: spikes.as_ref().map(|finding| excluded(&finding.correction)).unwrap_or_default(),
                 knocks: slots_within(&series[at], &knocks.by_whole[at]),
@@ -134,7 +152,7 @@ impl Preprocessing {
                 bias::find(&own, &others, &accelerations(traced, &all, traced[at]), noise_grids).responses
             };
             ChannelFindings {
-                lsb: effective_lsb::find(&measured(traced[at])),
+                lsb,
                 range,
                 knocks: knocks.detections(&series[at], at, traced),
                 responses_of_first_half,

@@ -10,7 +10,7 @@ use crate::causes;
 use crate::channel_fit::ChannelFit;
 use crate::contradiction::Contradiction;
 use crate::covariates::CovariateFit;
-use crate::estimators::{RecordPart, STEPS_PER_COUNT};
+use crate::estimators::RecordPart;
 use crate::figure_data;
 use crate::findings::Effect;
 use crate::naming::{ChannelFindings, name_effects};
@@ -19,12 +19,12 @@ use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
     SlopeMethodReport, term_reports,
 };
+use crate::streamed_curves::StreamedCurves;
 use crate::unexplained;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve, Model};
-use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
+use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock};
 use std::collections::BTreeMap;
-use std::thread;
 
 /// Why there is neither clock nor filter.
 const PART_NOTE: &str = "clock and filter of the part are not estimated in a quick report";
@@ -32,39 +32,7 @@ const PART_NOTE: &str = "clock and filter of the part are not estimated in a qui
 /// The estimators of a recording whose samples come in blocks.
 pub struct CurveEstimators {
     description: RecordingDescription,
-    channels: Vec<ChannelEstimators>,
-    /// Sample period of the last sample.
-    last: Option<u64>,
-}
-
-/// The estimators of one channel.
-struct ChannelEstimators {
-    whole: GappedEstimator,
-    /// In steps of a count, as those of the whole analysis.
-    halves: [GappedEstimator; 2],
-    /// Samples that are refused in this channel alone, by cause.
-    refused: BTreeMap<&'static str, u64>,
-}
-
-/// An estimator and the samples that are missing since its last one.
-#[derive(Default)]
-struct GappedEstimator {
-    cascade: Cascade<OCTAVES, OVERLAP>,
-    missing: u32,
-}
-
-impl GappedEstimator {
-    /// Takes samples that follow each other.
-    fn push(&mut self, counts: &[i32]) {
-        if self.missing > 0 && !counts.is_empty() {
-            self.cascade.gap(std::mem::take(&mut self.missing));
-        }
-        self.cascade.push_slice(counts);
-    }
-
-    fn miss(&mut self, samples: u64) {
-        self.missing = self.missing.saturating_add(u32::try_from(samples).unwrap_or(u32::MAX));
-    }
+    channels: Vec<StreamedCurves>,
 }
 
 /// The report of a recording in memory.
@@ -79,36 +47,22 @@ impl CurveEstimators {
     /// Of the recording of this description, without samples.
     #[must_use]
     pub fn new(description: RecordingDescription) -> Self {
-        let channel = |_: &ChannelProfile| ChannelEstimators {
-            whole: GappedEstimator::default(),
-            halves: [GappedEstimator::default(), GappedEstimator::default()],
-            refused: BTreeMap::new(),
-        };
-        Self { channels: description.channels.iter().map(channel).collect(), description, last: None }
+        let channel = |_: &ChannelProfile| StreamedCurves::new(&[description.middle()]);
+        Self { channels: description.channels.iter().map(channel).collect(), description }
     }
 
     /// Takes the next samples, the channels on as many threads as there are cores.
     pub fn push(&mut self, block: &SampleBlock) {
-        let (last, middle) = (self.last, self.description.middle());
-        let threads = parallel::threads().min(self.channels.len()).max(1);
-        let each = self.channels.len().div_ceil(threads).max(1);
-        let parts = self.channels.chunks_mut(each).zip(block.channels.chunks(each));
-        let work = |(estimators, channels): (&mut [ChannelEstimators], &[MeasuredChannel])| {
-            estimators.iter_mut().zip(channels).for_each(|(of, channel)| of.push(&block.slots, channel, last, middle));
-        };
-        if threads == 1 {
-            parts.for_each(work);
-        } else {
-            thread::scope(|scope| parts.for_each(|part| drop(scope.spawn(move || work(part)))));
-        }
-        self.last = block.slots.last().copied().or(last);
+        parallel::for_each_pair(&mut self.channels, &block.channels, |curves, channel| {
+            curves.push(&block.slots, channel);
+        });
     }
 
     /// The report; `done` is called for each channel that is fitted.
     #[must_use]
     pub fn report(&self, done: &(dyn Fn() + Sync)) -> Report {
         let Self { description, channels, .. } = self;
-        let all: Vec<(&ChannelProfile, &ChannelEstimators)> = description.channels.iter().zip(channels).collect();
+        let all: Vec<(&ChannelProfile, &StreamedCurves)> = description.channels.iter().zip(channels).collect();
         let fitted = in_parallel(&all, |(profile, estimators)| {
             let fitted = FittedChannel::fit(description, **profile, estimators);
             done();
@@ -142,49 +96,6 @@ impl CurveEstimators {
     }
 }
 
-impl ChannelEstimators {
-    /// Takes the next samples of the channel; `last` is the sample period before them, `middle` the first of the second half.
-    fn push(&mut self, slots: &[u64], channel: &MeasuredChannel, last: Option<u64>, middle: u64) {
-        let mut refused: Vec<usize> = channel.refused.values().flatten().copied().collect();
-        refused.sort_unstable();
-        for (&cause, positions) in &channel.refused {
-            *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
-        }
-        let steps: Vec<i32> = channel.counts.iter().map(|count| count.saturating_mul(STEPS_PER_COUNT as i32)).collect();
-        let second = slots.partition_point(|&slot| slot < middle);
-        let mut refused = refused.into_iter().peekable();
-        let mut before = last;
-        let mut first = 0;
-        while first < slots.len() {
-            // The samples from `first` on that follow each other in one half and are used; the one behind them may be refused.
-            let end_of_half = if first < second { second } else { slots.len() };
-            let refused_at = refused.peek().copied().unwrap_or(usize::MAX).min(end_of_half);
-            let follows = |&at: &usize| slots[at] - slots[at - 1] == 1;
-            let end = (first + 1..refused_at).take_while(follows).last().map_or(first, |last| last) + 1;
-            let (slot, is_second) = (slots[first], first >= second);
-            let missing = before.map_or(0, |before| slot - before - 1);
-            let half = &mut self.halves[usize::from(is_second)];
-            if missing > 0 {
-                self.whole.miss(missing);
-                // Of a gap over the middle, each half has the samples on its side.
-                half.miss(if is_second { missing.min(slot - middle) } else { missing });
-            }
-            if refused.next_if_eq(&first).is_some() {
-                while refused.next_if_eq(&first).is_some() {}
-                self.whole.miss(1);
-                half.miss(1);
-                before = Some(slot);
-                first += 1;
-                continue;
-            }
-            self.whole.push(&channel.counts[first..end]);
-            half.push(&steps[first..end]);
-            before = Some(slots[end - 1]);
-            first = end;
-        }
-    }
-}
-
 /// A channel with its models.
 struct FittedChannel {
     profile: ChannelProfile,
@@ -199,13 +110,16 @@ struct FittedChannel {
 }
 
 impl FittedChannel {
-    fn fit(description: &RecordingDescription, profile: ChannelProfile, estimators: &ChannelEstimators) -> Self {
+    fn fit(description: &RecordingDescription, profile: ChannelProfile, estimators: &StreamedCurves) -> Self {
         let period_s = description.period_s();
-        let ChannelEstimators { whole, halves: [first, second], .. } = estimators;
-        let mut both = first.cascade.clone();
-        both.merge(&second.cascade);
         let part = |cascade: Cascade<OCTAVES, OVERLAP>| RecordPart::of_channel(profile, cascade, period_s);
-        let [first, second, both] = [first.cascade.clone(), second.cascade.clone(), both].map(part);
+        let both = estimators.parts().cloned().reduce(|mut both, second| {
+            both.merge(&second);
+            both
+        });
+        let mut halves = estimators.parts().cloned().map(part);
+        let [first, second] = std::array::from_fn(|_| halves.next().unwrap_or_else(|| part(Cascade::new())));
+        let both = part(both.unwrap_or_default());
         let filters = &description.profile.filters;
         let fit = |part: &RecordPart| {
             let curve = CovariateFit::estimate(part, 0, false, |_| None);
@@ -220,7 +134,7 @@ impl FittedChannel {
         if profile.quantity.is_inertial() && Contradiction::find(&half.trace.after, &second.curve(0)).is_none() {
             fit.take_terms_that_held(&half.trace, None);
         }
-        let whole = whole.cascade.curve(period_s).scaled(profile.lsb);
+        let whole = estimators.whole().curve(period_s).scaled(profile.lsb);
         Self { profile, whole, first, second, both, half, fit }
     }
 
@@ -248,7 +162,7 @@ impl FittedChannel {
         (of(&self.fit), of(&self.half))
     }
 
-    fn report(&self, description: &RecordingDescription, estimators: &ChannelEstimators) -> ChannelReport {
+    fn report(&self, description: &RecordingDescription, estimators: &StreamedCurves) -> ChannelReport {
         let unit = self.profile.unit;
         let (before, after) = (&self.half.trace.before, &self.half.trace.after);
         let [first, second] = [&self.first, &self.second].map(|part| part.curve(0));
@@ -295,7 +209,7 @@ impl FittedChannel {
 fn missing_samples(
     description: &RecordingDescription,
     both: &RecordPart,
-    estimators: &ChannelEstimators,
+    estimators: &StreamedCurves,
 ) -> MissingSamples {
     let mut refused: BTreeMap<String, u64> = BTreeMap::new();
     let of_all = description.dropped.iter().filter(|(cause, _)| **cause != "gap");

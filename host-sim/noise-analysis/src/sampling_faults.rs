@@ -3,6 +3,7 @@
 use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
 use crate::findings::{Correction, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use measurement::{Measurement, SensorProfile};
+use std::collections::BTreeMap;
 
 /// How many times more often than in independent channels equal neighbours may occur by chance.
 const DEPENDENCE: f64 = 3.0;
@@ -18,22 +19,25 @@ const MIN_SAMPLES: usize = 100 * SEGMENTS;
 /// Lost samples, repeated samples and a wrong sample rate, as far as they are found, in this order.
 #[must_use]
 pub(crate) fn detect(measurement: &Measurement) -> Vec<Detection> {
-    [lost_samples(measurement), repeated_samples(measurement), sample_clock(measurement)]
+    [lost_samples_of(measurement), repeated_samples(measurement), sample_clock(measurement)]
         .into_iter()
         .flatten()
         .collect()
 }
 
-/// Samples that never arrived: the sample indices or time stamps have room for them. A single one is reported, because
-/// only a loss leaves such room.
+pub(crate) fn lost_samples_of(measurement: &Measurement) -> Option<Detection> {
+    lost_samples(measurement.len() as u64, &measurement.dropped, measurement.gaps())
+}
+
+/// Samples that never arrived, beside the `used` ones: the sample indices or time stamps have room for them. A single one is
+/// reported, because only a loss leaves such room.
 #[must_use]
-pub(crate) fn lost_samples(measurement: &Measurement) -> Option<Detection> {
-    let (gaps, used) = (measurement.gaps(), measurement.len());
-    let missing = measurement.dropped.get("gap").copied().unwrap_or(0);
+pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gaps: usize) -> Option<Detection> {
+    let missing = dropped.get("gap").copied().unwrap_or(0);
     if missing == 0 {
         return None;
     }
-    let all = (used as u64 + measurement.dropped.values().sum::<u64>()) as f64;
+    let all = (used + dropped.values().sum::<u64>()) as f64;
     let missing = missing as f64;
     // The events that are counted are the gaps, each of several samples.
     let per_gap = missing / (gaps.max(1) as f64);

@@ -11,6 +11,7 @@ use crate::uniform_series::UniformSeries;
 use allan_core::Model;
 use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
 use measurement::SensorProfile;
+use std::f64::consts::PI;
 
 /// Peaks closer than this part of their frequency are one line if either has a width.
 const MERGE_DISTANCE: f64 = 0.03;
@@ -67,32 +68,62 @@ pub(crate) struct MergedLine {
 /// Finds the lines of `series` and traces what the baseline model lacks with them.
 ///
 /// `rest` is the series less its covariates, if the channel depends on any; lines that come from a covariate are left out.
+/// Of a series that has means of samples, `faster` are the lines that it does not show, and that are known beforehand; what they
+/// look like in the series is left out.
 pub(crate) fn fit_with_lines(
     covariates: CovariateFit,
     series: &Series,
     rest: Option<&Series>,
     profile: &SensorProfile,
+    faster: Option<&[MergedLine]>,
 ) -> (ChannelFit, Vec<MergedLine>) {
     let rate_error = profile.sample_rate_error;
-    let mut lines = find(series, None, rate_error);
+    let find = |series: &Series, known: Option<&Model>| {
+        let mut lines = find(series, known, rate_error);
+        if let Some(faster) = faster {
+            lines.retain(|line| !faster.iter().any(|faster| is_alias(line, faster, series.period_s)));
+            lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s));
+        }
+        lines
+    };
+    let faster = || faster.into_iter().flatten();
+    let mut lines = find(series, None);
     if let Some(rest) = rest {
-        let left = find(rest, None, rate_error);
+        let left = find(rest, None);
         let is_own = |line: &MergedLine, left: &MergedLine| {
             line.is_same(left) && left.deviation.value > MIN_OWN_DEVIATION * line.deviation.value
         };
         lines.retain(|line| left.iter().any(|left| is_own(line, left)));
     }
+    lines.extend(faster());
     let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
     let filters = profile.filters_read_at(1.0 / covariates.curve.sample_period());
     let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &filters);
     if fit.correlation_times().next().is_some() && lines.iter().any(MergedLine::is_broad) {
         // A broad line may be a part of a Markov process, which the background of the first search has no form for.
         lines.retain(|line| !line.is_broad());
-        lines.extend(find(series, Some(&fit.trace.after), rate_error).into_iter().filter(MergedLine::is_broad));
+        lines.extend(find(series, Some(&fit.trace.after)).into_iter().filter(MergedLine::is_broad));
+        lines.extend(faster().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
     lines.retain(|line| line.is_sinusoid() || !is_leakage(&fit.trace.after, line.frequency.value));
     (fit, lines)
+}
+
+/// The deviation of a line of means over `width` s, before they were taken: a mean has `sin(πfw)/(πfw)` of a sinusoid.
+fn before_averaging(line: &MergedLine, width: f64) -> MeasuredValue {
+    let phase = PI * line.frequency.value * width;
+    let gain = phase.sin() / phase;
+    MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
+}
+
+/// Whether `line` of a series is what the faster line `of` looks like at its sample period, s.
+fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
+    let turns = of.frequency.value * period_s;
+    let alias = (turns - turns.round()).abs() / period_s;
+    let reach =
+        MERGE_WIDTHS * (of.width.value + of.frequency.error + line.width.value) + MERGE_RESOLUTIONS / line.duration_s;
+    (line.frequency.value - alias).abs() < reach
 }
 
 /// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum

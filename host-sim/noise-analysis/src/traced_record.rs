@@ -7,6 +7,7 @@ use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::random_telegraph;
 use crate::estimators::RecordEstimators;
 use crate::findings::{Detection, Effect};
+use crate::long_record::ShorterTimes;
 use crate::motion::{self, PlatformMotion};
 use crate::naming::{ChannelFindings, name_effects};
 use crate::parallel::in_parallel;
@@ -24,7 +25,10 @@ use measurement::{ChannelProfile, Measurement, Quantity};
 
 /// A recording with what was found in all of it.
 pub(crate) struct TracedRecord<'a> {
+    /// The samples, or those of a long record in means.
     pub measurement: &'a Measurement,
+    /// Where `measurement` has means, the averaging times that are too short for them.
+    pub shorter: Option<&'a ShorterTimes>,
     /// The channels in which effects are traced: the inertial ones.
     pub traced: Vec<ChannelProfile>,
     /// Covariances of the block means of each channel's noise, computed once.
@@ -47,7 +51,7 @@ pub(crate) struct ChannelTrace {
     pub channel: ChannelProfile,
     pub fit: ChannelFit,
     /// Lines in the spectrum.
-    lines: Vec<MergedLine>,
+    pub lines: Vec<MergedLine>,
     /// Random telegraph noise.
     telegraph: Option<Detection>,
     /// The samples less the share of the covariates; of a traced channel only.
@@ -56,22 +60,23 @@ pub(crate) struct ChannelTrace {
 }
 
 impl<'a> TracedRecord<'a> {
-    pub(crate) fn new(measurement: &'a Measurement) -> Self {
+    /// What `measurement` shows; where that has means, with the averaging times that are too short for them.
+    pub(crate) fn new(measurement: &'a Measurement, shorter: Option<&'a ShorterTimes>) -> Self {
         let of = |quantities: [Quantity; 2]| {
             quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
         };
         let traced = of([Quantity::AngularRate, Quantity::SpecificForce]);
         let coupled = [traced.clone(), of([Quantity::Temperature, Quantity::SupplyVoltage])].concat();
         let noise_grids = NoiseGrids::default();
-        let preprocessing = Preprocessing::detect(measurement, &traced, &noise_grids);
-        let estimators = RecordEstimators::estimate(measurement, &coupled, &preprocessing);
+        let preprocessing = Preprocessing::detect(measurement, shorter.is_some(), &traced, &noise_grids);
+        let estimators = RecordEstimators::estimate(measurement, shorter, &coupled, &preprocessing);
         let moved = in_parallel(&traced, |channel| {
             motion::find(&Series::from_measurement(measurement, channel), channel).map(|motion| (*channel, motion))
         });
         let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
         let mut channels = in_parallel(&recorded, |&channel| match traced.iter().position(|of| *of == channel) {
-            Some(own) => ChannelTrace::trace(measurement, &preprocessing, &estimators, &series, own),
+            Some(own) => ChannelTrace::trace(measurement, shorter, &preprocessing, &estimators, &series, own),
             None => ChannelTrace::baseline(&estimators, channel),
         });
         let traces = channels.iter_mut().map(|trace| (trace.channel, &mut trace.fit));
@@ -81,12 +86,30 @@ impl<'a> TracedRecord<'a> {
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
         let motions = moved.into_iter().flatten().collect();
-        Self { measurement, traced, noise_grids, preprocessing, estimators, series, channels, filter, coupled, motions }
+        Self {
+            measurement,
+            shorter,
+            traced,
+            noise_grids,
+            preprocessing,
+            estimators,
+            series,
+            channels,
+            filter,
+            coupled,
+            motions,
+        }
     }
 
     /// The series of the same channels as [`series`](Self::series), without the samples of `exclusion`.
     pub(crate) fn series_without(&self, exclusion: Exclusion) -> Vec<Series> {
         in_parallel(&self.coupled, |&channel| self.preprocessing.series(self.measurement, channel, exclusion))
+    }
+
+    /// Whether the rules of the first half leave out samples of a channel.
+    pub(crate) fn has_rules(&self, channel: ChannelProfile) -> bool {
+        let is_screened = self.shorter.and_then(|shorter| shorter.of(channel)).is_some_and(|of| of.is_screened);
+        is_screened || self.preprocessing.excludes(channel, Exclusion::ByFirstHalf)
     }
 
     /// The series of one channel, if it is among them.
@@ -156,6 +179,7 @@ impl ChannelTrace {
     /// The baseline model and what it lacks, of the channel of `series[own]`.
     fn trace(
         measurement: &Measurement,
+        shorter: Option<&ShorterTimes>,
         preprocessing: &Preprocessing,
         estimators: &RecordEstimators,
         series: &[Series],
@@ -167,7 +191,8 @@ impl ChannelTrace {
         });
         let own = &series[own];
         let rest = covariates.compensated_series(own, series);
-        let (fit, lines) = fit_with_lines(covariates, own, rest.as_ref(), &measurement.profile);
+        let (fit, lines) =
+            fit_with_lines(covariates, own, rest.as_ref(), &measurement.profile, faster_lines(shorter, channel));
         let correlation_times: Vec<f64> = fit.correlation_times().collect();
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         let is_reversible =
@@ -197,6 +222,11 @@ impl ChannelTrace {
     }
 }
 
+/// The lines of a channel that are too fast for its series, where that has means.
+pub(crate) fn faster_lines(shorter: Option<&ShorterTimes>, channel: ChannelProfile) -> Option<&[MergedLine]> {
+    shorter.map(|shorter| shorter.of(channel).map_or(&[][..], |of| &of.lines))
+}
+
 /// Gives `fits` of channels in one part of a recording the filter that the part of the sensor has once, as they show it
 /// together.
 pub(crate) fn agree_on_filter<'f>(
@@ -205,7 +235,7 @@ pub(crate) fn agree_on_filter<'f>(
     fits: impl Iterator<Item = (ChannelProfile, &'f mut ChannelFit)>,
 ) -> Result<PartFilter, Unidentified> {
     let profile = &measurement.profile;
-    let decimation = profile.internal_rate_hz / measurement.sample_rate_hz;
+    let decimation = profile.internal_rate_hz * estimators.both.sample_period();
     let mut fits: Vec<(ChannelProfile, &mut ChannelFit)> = fits.collect();
     let channels: Vec<FilteredChannel> = fits
         .iter()

@@ -1,10 +1,11 @@
 //! A recording that is read in blocks, in memory that does not grow with its length.
 //!
 //! Tables of register counts, tables in any units and arrays of NumPy are read twice: once for the sample rate, the length, and the
-//! size of a count, and once for the samples. Their first 2¹⁷ rows are read before that, to tell the clock of the time stamps; a
-//! recording that has no more rows, or another format, is held in memory and is the same as that of the other readers.
+//! size of a count, and once for the samples. Their first rows are read before that, as many as the caller says, to tell the clock of
+//! the time stamps; a recording that has no more rows, or another format, is held in memory and is the same as that of the other
+//! readers.
 
-use crate::any_sensor::ReadOptions;
+use crate::any_sensor::{ReadOptions, SensorRecording};
 use crate::count_stream::{self, CountStream};
 use crate::file_format::{FileFormat, InputFile};
 use crate::input_error::{InputError, Reason};
@@ -12,6 +13,7 @@ use crate::quantizer::Quantizer;
 use crate::read_monitor::ReadMonitor;
 use crate::sample_slots::SampleSlots;
 use crate::sensor_measurement::quantizer_note;
+use crate::sensor_table::SensorTable;
 use crate::stamp_quality::StampQuality;
 use crate::stream_clock::StreamClock;
 use crate::time_base::time_base;
@@ -23,19 +25,37 @@ use std::path::Path;
 
 pub use crate::time_base_error::StreamError;
 
-/// Rows of a recording that is held in memory.
-const MOST_HELD: u64 = 1 << 17;
+/// Sample periods at the start of a recording that are kept of one that is not held in memory.
+const BEGINNING: u64 = 1 << 17;
+
+/// Which recordings are kept in memory, instead of being read in blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KeptInMemory {
+    /// Those of at most so many rows.
+    pub rows: u64,
+    /// Those whose time stamps are too irregular to be understood without all of them. Where they are not kept, they are an error.
+    pub irregular: bool,
+}
+
+impl KeptInMemory {
+    /// Whether a recording that has more rows is kept because of its time stamps.
+    fn has_to_be_kept(self, has_index: bool, stamps: Option<&StampQuality>) -> bool {
+        self.irregular && matches!(StreamClock::new(has_index, stamps), Err(TimeBaseError::Irregular(_)))
+    }
+}
 
 /// An open recording.
 pub struct SampleStream {
     content: Content,
+    /// The samples at the start, or all of a recording that is held in memory.
+    beginning: Measurement,
     description: RecordingDescription,
     notes: Vec<String>,
     monitor: ReadMonitor,
 }
 
 enum Content {
-    Held(Box<Measurement>),
+    Held,
     Counts(Box<Source<GyroRange>>),
     Values(Box<Values>),
 }
@@ -87,7 +107,8 @@ impl SampleStream {
     pub fn held(measurement: Measurement, monitor: &ReadMonitor) -> Self {
         Self {
             description: RecordingDescription::from(&measurement),
-            content: Content::Held(Box::new(measurement)),
+            content: Content::Held,
+            beginning: measurement,
             notes: Vec::new(),
             monitor: monitor.clone(),
         }
@@ -97,12 +118,22 @@ impl SampleStream {
     ///
     /// # Errors
     /// The file is damaged, or has no time base: see [`TimeBaseError`].
-    pub fn counts(input: InputFile, range: GyroRange, stated_hz: Option<f64>) -> Result<Self, StreamError> {
+    pub fn counts(
+        input: InputFile,
+        range: GyroRange,
+        stated_hz: Option<f64>,
+        kept: KeptInMemory,
+    ) -> Result<Self, StreamError> {
         let rename = |error: InputError| StreamError::Input(input.rename(error));
         let monitor = &input.monitor().clone();
-        let (recording, is_all) = count_stream::head(input.path(), range, monitor, MOST_HELD).map_err(rename)?;
+        let head = |most: u64| count_stream::head(input.path(), range, monitor, most).map_err(rename);
+        let (mut recording, mut is_all) = head(kept.rows)?;
         let first = recording.samples.first().map(|sample| sample.time_stamp).unwrap_or_default();
-        let base = time_base(&recording, stated_hz)?;
+        let mut base = time_base(&recording, stated_hz)?;
+        if !is_all && kept.has_to_be_kept(first.index.is_some(), base.stamps.as_ref()) {
+            (recording, is_all) = head(u64::MAX)?;
+            base = time_base(&recording, stated_hz)?;
+        }
         if is_all {
             let notes = base.stamps.iter().flat_map(StampQuality::notes).collect();
             return Ok(Self { notes, ..Self::held(base.measurement, monitor) });
@@ -116,19 +147,25 @@ impl SampleStream {
             most: u64::MAX,
         };
         let mut description = RecordingDescription::from(&base.measurement);
+        let beginning = base.measurement.before(BEGINNING);
         drop((recording, base.measurement));
         let content = Content::Counts(Box::new(source));
         description.samples = 0;
-        let mut stream = Self { content, description, notes: Vec::new(), monitor: monitor.clone() };
+        let mut stream = Self { content, beginning, description, notes: Vec::new(), monitor: monitor.clone() };
         stream.survey()?;
         Ok(stream)
     }
 
-    /// Opens a recording of any sensor.
+    /// Opens a recording of any sensor; one that is neither a table nor an array is kept in memory.
     ///
     /// # Errors
     /// As [`counts`](Self::counts), and where the columns cannot be chosen.
-    pub fn any_sensor(input: InputFile, options: ReadOptions, stated_hz: Option<f64>) -> Result<Self, StreamError> {
+    pub fn any_sensor(
+        input: InputFile,
+        options: ReadOptions,
+        stated_hz: Option<f64>,
+        kept: KeptInMemory,
+    ) -> Result<Self, StreamError> {
         let monitor = &input.monitor().clone();
         let is_streamed = matches!(input.format(), FileFormat::CountTable | FileFormat::TextTable | FileFormat::Npy);
         if !is_streamed {
@@ -136,16 +173,25 @@ impl SampleStream {
             notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
             return Ok(Self { notes, ..Self::held(base.measurement, monitor) });
         }
-        let head = value_stream::head(input.path(), input.format(), &options, monitor, MOST_HELD);
-        let ValueHead { table, time_unit_s, is_all } = head.map_err(|error| input.rename(error))?;
+        let head = |most: u64| {
+            let head = value_stream::head(input.path(), input.format(), &options, monitor, most);
+            head.map_err(|error| input.rename(error))
+        };
+        let slots_of = |table: &SensorTable| {
+            let rows = table.columns.first().map_or(0, |column| column.values.len());
+            SampleSlots::new(rows, table.times_s.as_deref(), table.indices.as_deref(), stated_hz)
+        };
+        let ValueHead { mut table, time_unit_s, mut is_all } = head(kept.rows)?;
+        if !is_all && kept.has_to_be_kept(table.indices.is_some(), slots_of(&table)?.stamps.as_ref()) {
+            ValueHead { table, is_all, .. } = head(u64::MAX)?;
+        }
         if is_all {
-            let recording = crate::any_sensor::SensorRecording::new(table, &options.sensor);
+            let recording = SensorRecording::new(table, &options.sensor);
             let (base, mut notes) = recording.time_base(stated_hz)?;
             notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
             return Ok(Self { notes, ..Self::held(base.measurement, monitor) });
         }
-        let rows = table.columns.first().map_or(0, |column| column.values.len());
-        let slots = SampleSlots::new(rows, table.times_s.as_deref(), table.indices.as_deref(), stated_hz)?;
+        let slots = slots_of(&table)?;
         let description = RecordingDescription {
             profile: options.sensor.clone(),
             sample_rate_hz: slots.sample_rate_hz,
@@ -163,12 +209,21 @@ impl SampleStream {
             has_index: table.indices.is_some(),
             most: u64::MAX,
         };
-        drop(table);
+        let (base, _) = SensorRecording::new(table, &source.options.sensor).time_base(stated_hz)?;
+        let beginning = base.measurement.before(BEGINNING);
+        drop(base);
         let values = Values { source, time_unit_s, columns: Vec::new(), note: None };
         let content = Content::Values(Box::new(values));
-        let mut stream = Self { content, description, notes: Vec::new(), monitor: monitor.clone() };
+        let mut stream = Self { content, beginning, description, notes: Vec::new(), monitor: monitor.clone() };
         stream.survey()?;
         Ok(stream)
+    }
+
+    /// The samples at the start of the recording with their time stamps: all of one that is held in memory, else those of the first 2¹⁷
+    /// sample periods, of which the size of a count may be that of these samples alone.
+    #[must_use]
+    pub fn beginning(&self) -> &Measurement {
+        &self.beginning
     }
 
     /// What is known of the recording before its samples are used.
@@ -187,7 +242,7 @@ impl SampleStream {
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         match &self.content {
-            Content::Held(_) => None,
+            Content::Held => None,
             Content::Counts(source) => Some(source.input.path()),
             Content::Values(values) => Some(values.source.input.path()),
         }
@@ -206,8 +261,8 @@ impl SampleStream {
 
     fn read_pass(&mut self, mut take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
         let stopped_at = match &mut self.content {
-            Content::Held(measurement) => {
-                take_held(measurement, take);
+            Content::Held => {
+                take_held(&self.beginning, take);
                 None
             }
             Content::Counts(source) => {
@@ -239,7 +294,7 @@ impl SampleStream {
         };
         let Some(rows) = stopped_at else { return Ok(true) };
         match &mut self.content {
-            Content::Held(_) => {}
+            Content::Held => {}
             Content::Counts(source) => source.most = rows,
             Content::Values(values) => values.source.most = rows,
         }
@@ -262,9 +317,9 @@ impl SampleStream {
     }
 
     fn survey_pass(&mut self) -> Result<(), StreamError> {
-        let Self { content, description, notes, monitor } = self;
+        let Self { content, description, notes, monitor, .. } = self;
         match content {
-            Content::Held(_) => {}
+            Content::Held => {}
             Content::Counts(source) => {
                 let mut pass = open_counts(source, monitor)?;
                 while pass.next(&description.profile)?.is_some() {}

@@ -50,7 +50,7 @@ impl Case {
             [spikes::find(&series), step, ramp]
         });
         let common = [
-            sampling_faults::lost_samples(&self.measurement),
+            sampling_faults::lost_samples_of(&self.measurement),
             sampling_faults::repeated_samples(&self.measurement),
             sampling_faults::sample_clock(&self.measurement),
         ];
@@ -228,7 +228,7 @@ fn values_of_twelve_bits_have_an_lsb_of_four_counts() {
 #[test]
 fn lost_and_repeated_samples_are_counted() {
     let lossy = Case::hiding(vec![InjectedEffect::DroppedSamples { fraction: 2e-3 }], 200.0, 8);
-    let detection = sampling_faults::lost_samples(&lossy.measurement).unwrap();
+    let detection = sampling_faults::lost_samples_of(&lossy.measurement).unwrap();
     assert_covers(&detection, "fraction", 2e-3);
     assert_eq!(sampling_faults::repeated_samples(&lossy.measurement), None);
 
@@ -239,7 +239,7 @@ fn lost_and_repeated_samples_are_counted() {
     let stale = Case::hiding(vec![InjectedEffect::RepeatedSamples { fraction: 2e-3 }], 200.0, 9);
     let detection = sampling_faults::repeated_samples(&stale.measurement).unwrap();
     assert_covers(&detection, "fraction", 2e-3);
-    assert_eq!(sampling_faults::lost_samples(&stale.measurement), None);
+    assert_eq!(sampling_faults::lost_samples_of(&stale.measurement), None);
     let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
     let values = stale.series(GYRO).values;
     assert!(positions.iter().all(|&slot| values[slot as usize] == values[slot as usize - 1]));

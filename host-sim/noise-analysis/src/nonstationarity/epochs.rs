@@ -1,8 +1,11 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
+use crate::long_record::ShorterTimes;
+use crate::preprocessing::Exclusion;
 use crate::series::Series;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
+use measurement::ChannelProfile;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
@@ -65,6 +68,29 @@ impl EpochCurves {
         };
         let mut parts = curves.quarters.iter().chain(&curves.fitted_epochs).chain(&curves.unseen_epochs);
         parts.all(|part| part.points().iter().any(|point| point.avar > 0.0)).then_some(curves)
+    }
+
+    /// The same curves of a channel by averaging factors in samples, where the series has means; the quarters and the second half
+    /// with the `shorter` averaging times.
+    #[must_use]
+    pub(crate) fn in_samples(self, shorter: &ShorterTimes, channel: ChannelProfile) -> Self {
+        let [of_earlier, of_later] = &self.quarters;
+        let (quarters, unseen) = match shorter.of(channel) {
+            Some(of) => {
+                let [earlier, later] = of.quarters(Exclusion::ByFirstHalf);
+                let unseen = shorter.continued(of.half(1, Exclusion::ByFirstHalf), &self.unseen);
+                ([shorter.continued(earlier, of_earlier), shorter.continued(later, of_later)], unseen)
+            }
+            None => ([shorter.in_samples(of_earlier), shorter.in_samples(of_later)], shorter.in_samples(&self.unseen)),
+        };
+        let epochs = |curves: &[Curve<OCTAVES>]| curves.iter().map(|curve| shorter.in_samples(curve)).collect();
+        Self {
+            quarters,
+            unseen,
+            fitted_epochs: epochs(&self.fitted_epochs),
+            unseen_epochs: epochs(&self.unseen_epochs),
+            ..self
+        }
     }
 
     /// Epochs of the later quarter of the first half.

@@ -1,0 +1,146 @@
+//! Recordings that are condensed because they are too long to be kept: what is found in them is what was put in, and the curves are
+//! those of the same samples in memory.
+
+use measurement::adis16405::profile;
+use measurement::{MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
+use noise_analysis::analysis::{analyze, analyze_long};
+use noise_analysis::long_record::LongRecordReader;
+use noise_analysis::report::{ChannelReport, Parameter, Report, Validation};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+const RATE_HZ: f64 = 204.8;
+/// 49 min: means of two samples.
+const PERIODS: u64 = 600_000;
+/// White noise of 10 counts of 0.05 °/s at 204.8 Hz, °/√s.
+const N: f64 = 0.034_94;
+/// Slower than the means show, and faster: Hz.
+const SLOW_LINE_HZ: f64 = 0.371;
+const FAST_LINE_HZ: f64 = 77.3;
+/// °/s/°C.
+const SENSITIVITY: f64 = 0.02;
+const SPIKES: u64 = 30;
+
+/// Three gyros and the temperature: a slow line and spikes in x, a fast line in y, a bias that follows the temperature in z. A part in
+/// 500 of the samples is lost, and 4,000 in a row.
+fn recorded() -> Measurement {
+    let profile = profile(0.05);
+    let mut random = ChaCha8Rng::seed_from_u64(31);
+    let channel = |name: &str| profile.channel(name).expect("a channel of the part");
+    let mut channels =
+        ["gyro_x", "gyro_y", "gyro_z", "temp"].map(|name| MeasuredChannel::new(channel(name), Vec::new()));
+    let mut slots = Vec::new();
+    for slot in 0..PERIODS {
+        let time = slot as f64 / RATE_HZ;
+        let mut white = || 10.0 * random.sample::<f64, _>(StandardNormal);
+        let temperature = 10.0 * (TAU * time / 1500.0).sin() + 3.0 * (TAU * time / 611.0).cos();
+        let counts = [
+            white() + 0.4 * (TAU * SLOW_LINE_HZ * time).sin(),
+            white() + 2.0 * (TAU * FAST_LINE_HZ * time).sin(),
+            white() + SENSITIVITY * temperature / 0.05,
+            temperature / 0.14 + 0.1 * white(),
+        ];
+        let is_spike = slot % (PERIODS / SPIKES) == 777;
+        if random.random_bool(0.002) || (400_000..404_000).contains(&slot) {
+            continue;
+        }
+        slots.push(slot);
+        for (channel, count) in channels.iter_mut().zip(counts) {
+            channel.counts.push(count.round() as i32);
+        }
+        if is_spike {
+            *channels[0].counts.last_mut().expect("the sample") += 200;
+        }
+    }
+    let missing = PERIODS - slots.len() as u64;
+    Measurement {
+        profile,
+        sample_rate_hz: RATE_HZ,
+        stated_rate_hz: Some(RATE_HZ),
+        slots,
+        times_s: None,
+        channels: channels.into(),
+        dropped: BTreeMap::from([("gap", missing)]),
+        flagged: BTreeMap::new(),
+    }
+}
+
+/// Spikes of gyro x that were not lost.
+fn spikes(measurement: &Measurement) -> u64 {
+    measurement.channels[0].counts.iter().filter(|count| **count > 100).count() as u64
+}
+
+/// The report of a measurement that is read in blocks of `rows`.
+fn condensed(measurement: &Measurement, rows: usize) -> Report {
+    let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
+    for from in (0..measurement.len()).step_by(rows) {
+        let range = from..(from + rows).min(measurement.len());
+        let part = |of: &MeasuredChannel| MeasuredChannel::new(of.profile, of.counts[range.clone()].to_vec());
+        let channels = measurement.channels.iter().map(part).collect();
+        reader.push(&SampleBlock { slots: measurement.slots[range.clone()].to_vec(), channels });
+    }
+    analyze_long(&reader.finish())
+}
+
+fn channel<'a>(report: &'a Report, name: &str) -> &'a ChannelReport {
+    report.channels.iter().find(|channel| channel.name == name).expect("a recorded channel")
+}
+
+fn parameter<'a>(report: &'a Report, name: &str, kind: &str, parameter: &str) -> &'a Parameter {
+    let effects = &channel(report, name).effects;
+    let effect = effects.iter().find(|effect| effect.kind == kind).unwrap_or_else(|| panic!("{name}: no {kind}"));
+    &effect.parameters[parameter]
+}
+
+#[test]
+fn a_condensed_recording_has_the_curves_and_the_findings_of_its_samples() {
+    let measurement = recorded();
+    let (whole, long) = (analyze(&measurement), condensed(&measurement, 5_000));
+    assert_eq!((whole.samples, &whole.dropped), (long.samples, &long.dropped));
+    for (of_whole, of_long) in whole.channels.iter().zip(&long.channels) {
+        let name = &of_whole.name;
+        let curve = |of: &ChannelReport| of.curve.iter().map(|point| (point.n, point.adev)).collect::<Vec<_>>();
+        assert_eq!(curve(of_whole), curve(of_long), "{name}");
+        assert_eq!(of_whole.missing.lost, of_long.missing.lost);
+        // The models are fitted to the same curves up to 16 samples, and to those of means behind them.
+        let n = |of: &ChannelReport| of.refitted.terms.iter().find(|term| term.kind == "angle_random_walk").cloned();
+        let (Some(a), Some(b)) = (n(of_whole), n(of_long)) else { panic!("{name} has no white noise") };
+        let (a, b) = (&a.parameters["value"], &b.parameters["value"]);
+        assert!((a.value - b.value).abs() < 0.25 * (a.high - a.low), "{name}: {a:?} {b:?}");
+        if name != "temp" {
+            assert!((b.low..=b.high).contains(&N), "{name}: {b:?}");
+        }
+    }
+    // A periodogram knows the frequency of a line to a part of one over the length, 0.34 mHz, or of the first 2¹⁷ samples, 1.6 mHz; the
+    // clock to 10⁻⁴.
+    for report in [&whole, &long] {
+        let slow = parameter(report, "gyro_x", "sinusoid", "frequency");
+        assert!((slow.value - SLOW_LINE_HZ).abs() < 0.34e-3, "{slow:?}");
+        let fast = parameter(report, "gyro_y", "sinusoid", "frequency");
+        assert!((fast.value - FAST_LINE_HZ).abs() < 1.6e-3 + 1e-4 * FAST_LINE_HZ, "{fast:?}");
+        let sensitivity = parameter(report, "gyro_z", "temperature", "sensitivity");
+        assert!((sensitivity.low..=sensitivity.high).contains(&SENSITIVITY), "{sensitivity:?}");
+        let size = parameter(report, "gyro_x", "spikes", "size");
+        assert!((size.low..=size.high).contains(&10.0), "{size:?}");
+        assert_eq!(channel(report, "gyro_x").missing.refused["spikes"], spikes(&measurement));
+        let kinds: Vec<&str> = report.findings.iter().map(|finding| finding.kind.as_str()).collect();
+        let mut sorted = kinds.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, ["dropped_samples", "sinusoid", "sinusoid", "spikes", "temperature"], "{kinds:?}");
+    }
+    // The first samples alone show the spikes: nothing says whether the second half has them too.
+    let spikes = long.findings.iter().find(|finding| finding.kind == "spikes").expect("spikes");
+    assert_eq!(spikes.validated, Validation::Untestable);
+}
+
+#[test]
+fn the_size_of_the_blocks_does_not_matter() {
+    let mut measurement = recorded();
+    measurement.channels.truncate(1);
+    let [large, small] = [1 << 16, 777].map(|rows| format!("{:?}", condensed(&measurement, rows)));
+    // Each is a megabyte of text.
+    assert!(large == small);
+}
