@@ -23,6 +23,7 @@ use clap::{CommandFactory, Parser};
 use cli::{Cli, Command, MonitorArguments, ReplayArguments};
 use host_sim::{monitor, uf2};
 use live::{DeviceSource, GrowingRecording};
+use mimalloc::MiMalloc;
 use recordings::Printable;
 use recordings::serial::{self, SerialLink};
 use std::fs;
@@ -30,6 +31,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
 
 /// Folder of the page if none is named.
 const DEFAULT_PAGE: &str = "report";

@@ -176,7 +176,7 @@ impl CovariateFit {
 /// Subtracts `sensitivity` times the deviation of `covariate` from its mean; both have the same samples.
 fn subtract(series: &mut Series, sensitivity: f64, covariate: &Series) {
     let mean = covariate.values.iter().sum::<f64>() / covariate.values.len() as f64;
-    for (value, covariate) in series.values.iter_mut().zip(&covariate.values) {
+    for (value, covariate) in series.values_mut().iter_mut().zip(covariate.values.iter()) {
         *value -= sensitivity * (covariate - mean);
     }
 }

@@ -223,7 +223,7 @@ fn bias_over_time(series: &Series) -> Option<BiasOverTime> {
     let periods = series.span.end - series.span.start;
     let length = periods.div_ceil(BLOCKS as u64).max(1);
     let mut sums: BTreeMap<u64, (f64, u64)> = BTreeMap::new();
-    for (slot, value) in series.slots.iter().zip(&series.values) {
+    for (slot, value) in series.slots.iter().zip(series.values.iter()) {
         let (sum, count) = sums.entry((slot - series.span.start) / length).or_default();
         *sum += value;
         *count += 1;
@@ -389,7 +389,7 @@ mod tests {
         let slots: Vec<u64> = (0..100_000).filter(|slot| !(20_000..30_000).contains(slot)).collect();
         let series = Series {
             values: slots.iter().map(|&slot| 5.0 + slot as f64 * PERIOD_S).collect(),
-            slots,
+            slots: slots.into(),
             span: 0..100_000,
             period_s: PERIOD_S,
             resolution: 0.0,

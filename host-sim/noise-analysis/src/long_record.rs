@@ -491,10 +491,9 @@ fn part(block: &SampleBlock, positions: std::ops::Range<usize>) -> SampleBlock {
 /// The samples of a channel in a block.
 fn series(block: &SampleBlock, profile: &ChannelProfile, at: usize) -> Series {
     let channel = &block.channels[at];
-    let is_used = |position: &usize| !channel.is_refused(*position);
-    let used = (0..channel.counts.len()).filter(is_used);
-    let (slots, values) =
-        used.map(|position| (block.slots[position], f64::from(channel.counts[position]) * profile.lsb)).unzip();
+    let used = || (0..channel.counts.len()).filter(|position| !channel.is_refused(*position));
+    let slots = used().map(|position| block.slots[position]).collect();
+    let values = used().map(|position| f64::from(channel.counts[position]) * profile.lsb).collect();
     let span = block.slots.first().copied().unwrap_or(0)..block.slots.last().map_or(0, |last| last + 1);
     Series { slots, values, span, period_s: 1.0, resolution: profile.lsb, unit: profile.unit }
 }

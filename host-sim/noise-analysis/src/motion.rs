@@ -31,7 +31,7 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
     let limit = BIAS_ERRORS * channel.initial_bias_error?;
     let width = (BLOCK_S / series.period_s).round().max(1.0) as u64;
     let mut sums: Vec<(f64, u64)> = Vec::new();
-    for (&slot, value) in series.slots.iter().zip(&series.values) {
+    for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
         let number = (slot / width) as usize;
         if sums.len() <= number {
             sums.resize(number + 1, (0.0, 0));

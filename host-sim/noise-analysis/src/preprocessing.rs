@@ -20,6 +20,7 @@ use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
+use std::sync::Arc;
 
 /// Which of the samples that the detectors found are left out. Samples that were read twice always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +45,8 @@ struct ChannelExclusion {
 /// Effects in the samples, and the corrections that remove them.
 #[derive(Default)]
 pub(crate) struct Preprocessing {
+    /// Sample periods of all samples.
+    slots: Arc<[u64]>,
     /// Effects that concern every channel: sample loss, repeated samples, the sample clock.
     common_effects: Vec<Effect>,
     channel_effects: Vec<(ChannelProfile, Effect)>,
@@ -86,14 +89,16 @@ impl Preprocessing {
         traced: &[ChannelProfile],
         noise_grids: &NoiseGrids,
     ) -> Self {
-        let mut preprocessing = Self::default();
+        let mut preprocessing = Self { slots: measurement.slots.as_slice().into(), ..Self::default() };
         let faults = if means { Vec::new() } else { sampling_faults::detect(measurement) };
         for finding in faults {
             preprocessing.repeated.extend(excluded(&finding.correction));
             preprocessing.common_effects.push(finding.effect);
         }
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
-        let measured = |channel: ChannelProfile| Series::from_measurement(measurement, &channel);
+        let slots = Arc::clone(&preprocessing.slots);
+        let measured =
+            |channel: ChannelProfile| Series::with_shared_slots(measurement, &channel, || Arc::clone(&slots));
         if !means {
             let steps = in_parallel(&recorded, |&channel| effective_lsb::counts_per_step(&measured(channel)));
             let steps = recorded.iter().copied().zip(steps);
@@ -207,6 +212,12 @@ impl Preprocessing {
         self.exclusions.iter().any(|(_, own)| !own.slots(exclusion).is_empty())
     }
 
+    /// Whether the series of a channel is the same for two exclusions.
+    pub(crate) fn leaves_the_same(&self, channel: ChannelProfile, one: Exclusion, other: Exclusion) -> bool {
+        let has_responses = self.responses.iter().any(|(of, _)| *of == channel);
+        !has_responses && self.excluded(channel, one) == self.excluded(channel, other)
+    }
+
     /// Sample periods that a channel does not use, in ascending order.
     pub(crate) fn excluded(&self, channel: ChannelProfile, exclusion: Exclusion) -> Vec<u64> {
         let own = self.exclusion(channel).map(|own| own.slots(exclusion)).unwrap_or_default();
@@ -252,15 +263,20 @@ impl Preprocessing {
         self.responses(channel, Exclusion::ByWhole).iter().any(|of| of.effect.kind != "vibration_rectification")
     }
 
+    /// A channel's series as measured.
+    pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelProfile) -> Series {
+        Series::with_shared_slots(measurement, &channel, || Arc::clone(&self.slots))
+    }
+
     /// A channel's series after preprocessing.
     pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelProfile, exclusion: Exclusion) -> Series {
-        let mut series =
-            Series::from_measurement(measurement, &channel).with_counts_per_step(self.counts_per_step(channel));
+        let mut series = self.measured(measurement, channel).with_counts_per_step(self.counts_per_step(channel));
         for &(_, from, size) in self.offsets.iter().filter(|(of, ..)| *of == channel) {
             series = series.lowered_from(from, size);
         }
         for response in self.responses(channel, exclusion) {
-            series.values.iter_mut().zip(&series.slots).for_each(|(value, slot)| *value -= response.bias(*slot));
+            let values = Arc::make_mut(&mut series.values);
+            values.iter_mut().zip(series.slots.iter()).for_each(|(value, slot)| *value -= response.bias(*slot));
         }
         series.without(&self.excluded(channel, exclusion))
     }

@@ -3,14 +3,15 @@
 use crate::findings::Correction;
 use measurement::{ChannelProfile, Measurement};
 use std::ops::Range;
+use std::sync::Arc;
 
-/// The samples of one channel, each with the sample period in which it was taken.
+/// The samples of one channel, each with the sample period in which it was taken. A copy shares them until it is changed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Sample period of each sample, counted from the first; strictly increasing. A step of more than 1 is a gap.
-    pub slots: Vec<u64>,
+    pub slots: Arc<[u64]>,
     /// One value for each slot, in [`unit`](Self::unit).
-    pub values: Vec<f64>,
+    pub values: Arc<[f64]>,
     /// Sample periods of the record, or of the part of it, that the series is from: those of `slots` and of samples that are
     /// missing. Series of channels that were recorded together have the same span.
     pub span: Range<u64>,
@@ -26,14 +27,31 @@ impl Series {
     /// The samples of `channel` that were not refused; an empty series if it was not recorded.
     #[must_use]
     pub fn from_measurement(measurement: &Measurement, channel: &ChannelProfile) -> Self {
+        Self::with_shared_slots(measurement, channel, || measurement.slots.as_slice().into())
+    }
+
+    /// The same; `slots` gives the sample periods of all samples, which the series shares if none of the channel was refused.
+    pub(crate) fn with_shared_slots(
+        measurement: &Measurement,
+        channel: &ChannelProfile,
+        slots: impl FnOnce() -> Arc<[u64]>,
+    ) -> Self {
         let recorded = measurement.channel(channel);
         let counts = recorded.map(|channel| channel.counts.as_slice()).unwrap_or_default();
         let mut refused: Vec<usize> =
             recorded.iter().flat_map(|channel| channel.refused.values().flatten().copied()).collect();
         refused.sort_unstable();
-        let used = (0..counts.len()).filter(|position| refused.binary_search(position).is_err());
-        let (slots, values) =
-            used.map(|position| (measurement.slots[position], f64::from(counts[position]) * channel.lsb)).unzip();
+        let value = |count: &i32| f64::from(*count) * channel.lsb;
+        let (slots, values) = if counts.is_empty() {
+            ([].into(), [].into())
+        } else if refused.is_empty() {
+            (slots(), counts.iter().map(value).collect())
+        } else {
+            let used: Vec<usize> =
+                (0..counts.len()).filter(|position| refused.binary_search(position).is_err()).collect();
+            let slots = used.iter().map(|&position| measurement.slots[position]).collect();
+            (slots, used.iter().map(|&position| value(&counts[position])).collect())
+        };
         Self {
             slots,
             values,
@@ -50,6 +68,11 @@ impl Series {
         Self { resolution: self.resolution * f64::from(counts), ..self }
     }
 
+    /// The values, to change them; a copy no longer shares them.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        Arc::make_mut(&mut self.values)
+    }
+
     /// Time from the start of the record to the last sample, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
@@ -61,8 +84,8 @@ impl Series {
     pub fn before(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);
         Self {
-            slots: self.slots[..count].to_vec(),
-            values: self.values[..count].to_vec(),
+            slots: self.slots[..count].into(),
+            values: self.values[..count].into(),
             span: self.span.start..slot.min(self.span.end),
             ..*self
         }
@@ -73,8 +96,8 @@ impl Series {
     pub fn from(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);
         Self {
-            slots: self.slots[count..].to_vec(),
-            values: self.values[count..].to_vec(),
+            slots: self.slots[count..].into(),
+            values: self.values[count..].into(),
             span: slot.max(self.span.start)..self.span.end,
             ..*self
         }
@@ -83,8 +106,11 @@ impl Series {
     /// The samples of the sample periods for which `is_kept` holds, which is asked for each in ascending order.
     #[must_use]
     pub fn filtered(mut self, mut is_kept: impl FnMut(u64) -> bool) -> Self {
-        let kept = self.slots.iter().zip(&self.values).filter(|(slot, _)| is_kept(**slot));
-        (self.slots, self.values) = kept.map(|(&slot, &value)| (slot, value)).unzip();
+        let kept: Vec<usize> = (0..self.slots.len()).filter(|&position| is_kept(self.slots[position])).collect();
+        if kept.len() < self.slots.len() {
+            self.slots = kept.iter().map(|&position| self.slots[position]).collect();
+            self.values = kept.iter().map(|&position| self.values[position]).collect();
+        }
         self
     }
 
@@ -113,7 +139,7 @@ impl Series {
     #[must_use]
     pub fn lowered_from(mut self, slot: u64, offset: f64) -> Self {
         let from = self.slots.partition_point(|&of| of < slot);
-        self.values[from..].iter_mut().for_each(|value| *value -= offset);
+        self.values_mut()[from..].iter_mut().for_each(|value| *value -= offset);
         self
     }
 

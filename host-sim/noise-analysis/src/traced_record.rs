@@ -71,7 +71,7 @@ impl<'a> TracedRecord<'a> {
         let preprocessing = Preprocessing::detect(measurement, shorter.is_some(), &traced, &noise_grids);
         let estimators = RecordEstimators::estimate(measurement, shorter, &coupled, &preprocessing);
         let moved = in_parallel(&traced, |channel| {
-            motion::find(&Series::from_measurement(measurement, channel), channel).map(|motion| (*channel, motion))
+            motion::find(&preprocessing.measured(measurement, *channel), channel).map(|motion| (*channel, motion))
         });
         let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
@@ -103,7 +103,11 @@ impl<'a> TracedRecord<'a> {
 
     /// The series of the same channels as [`series`](Self::series), without the samples of `exclusion`.
     pub(crate) fn series_without(&self, exclusion: Exclusion) -> Vec<Series> {
-        in_parallel(&self.coupled, |&channel| self.preprocessing.series(self.measurement, channel, exclusion))
+        let coupled: Vec<(&ChannelProfile, &Series)> = self.coupled.iter().zip(&self.series).collect();
+        in_parallel(&coupled, |&(&channel, whole)| {
+            let is_same = self.preprocessing.leaves_the_same(channel, exclusion, Exclusion::ByWhole);
+            if is_same { whole.clone() } else { self.preprocessing.series(self.measurement, channel, exclusion) }
+        })
     }
 
     /// Whether the rules of the first half leave out samples of a channel.

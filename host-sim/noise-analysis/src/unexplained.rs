@@ -98,7 +98,7 @@ pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Opt
         }
     }
     let mut means = vec![(0.0, 0_u32); LEVEL_BLOCKS];
-    for (&slot, value) in temperature.slots.iter().zip(&temperature.values) {
+    for (&slot, value) in temperature.slots.iter().zip(temperature.values.iter()) {
         if (first..=last).contains(&slot) {
             let (sum, count) = &mut means[block_of(slot)];
             (*sum, *count) = (*sum + value, *count + 1);

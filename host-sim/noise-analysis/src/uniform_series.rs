@@ -298,7 +298,7 @@ mod tests {
         let series = |slots: Vec<u64>| Series {
             values: (1..=slots.len()).map(|value| value as f64).collect(),
             span: slots.first().copied().unwrap_or(0)..slots.last().map_or(0, |last| last + 1),
-            slots,
+            slots: slots.into(),
             period_s: 0.1,
             resolution: 1.0,
             unit: "g",

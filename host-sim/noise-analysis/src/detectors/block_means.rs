@@ -39,7 +39,7 @@ impl BlockMeans {
             return None;
         }
         let (mut sums, mut counts) = (vec![0.0; BLOCKS], vec![0u64; BLOCKS]);
-        for (&slot, value) in series.slots.iter().zip(&series.values) {
+        for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
             // The few samples after the last whole block are left out.
             if let Some(sum) = sums.get_mut((slot / width) as usize) {
                 *sum += value;

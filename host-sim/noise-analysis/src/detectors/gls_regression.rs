@@ -214,7 +214,7 @@ mod tests {
         };
         let values: Vec<f64> = (0..128 * 32).map(|_| next()).collect();
         let slots = 0..values.len() as u64;
-        Series { slots: slots.clone().collect(), span: slots, values, period_s: 1.0, resolution: 0.0, unit: "g" }
+        Series { slots: slots.clone().collect(), span: slots, values: values.into(), period_s: 1.0, resolution: 0.0, unit: "g" }
     }
 
     /// For any fraction of random walk in the noise.
@@ -245,7 +245,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(2);
         let mut series = series(&mut random, 0.0);
         let count = series.values.len() as f64;
-        for (at, value) in series.values.iter_mut().enumerate() {
+        for (at, value) in series.values_mut().iter_mut().enumerate() {
             *value += 0.5 * at as f64 / count + if at >= 2_048 { 1.0 } else { 0.0 };
         }
         let blocks = BlockMeans::from_series(&series).unwrap();

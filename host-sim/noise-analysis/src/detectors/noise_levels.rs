@@ -65,7 +65,7 @@ impl SquaredDifferences {
         let shift = n.trailing_zeros();
         let count = (series.span.end.saturating_sub(start) >> shift) as usize;
         let (mut sums, mut filled) = (vec![0.0; count], vec![0_u32; count]);
-        for (&slot, &value) in series.slots.iter().zip(&series.values) {
+        for (&slot, &value) in series.slots.iter().zip(series.values.iter()) {
             let at = ((slot - start) >> shift) as usize;
             if at < count {
                 sums[at] += value;

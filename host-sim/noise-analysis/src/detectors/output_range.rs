@@ -25,7 +25,7 @@ const NOISE_OCTAVES: usize = 7;
 #[must_use]
 pub(crate) fn find_saturation(series: &Series, range: Option<f64>) -> Option<Detection> {
     let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
-    for value in &series.values {
+    for value in series.values.iter() {
         *counts.entry((value / series.resolution).round() as i64).or_insert(0) += 1;
     }
     let ends = [counts.first_key_value()?, counts.last_key_value()?].map(|(level, count)| (*level, *count));
@@ -66,7 +66,7 @@ pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64
     }
     let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
     let mut next = series.slots.first().copied().unwrap_or(0);
-    for (&slot, value) in series.slots.iter().zip(&series.values) {
+    for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
         if slot > next {
             estimator.gap(u32::try_from(slot - next).unwrap_or(u32::MAX));
         }

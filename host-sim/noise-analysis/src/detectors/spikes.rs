@@ -10,6 +10,7 @@ use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialIn
 use crate::series::Series;
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Fewest neighbours that must be there on either side.
 const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
@@ -133,10 +134,8 @@ impl Interpolation {
         let errors = interpolation.errors(series, &series.values);
         let rough = clipped_deviation(&errors);
         let mut clean = series.values.clone();
-        for (value, error) in clean.iter_mut().zip(&errors) {
-            if error.abs() > CLIP * rough {
-                *value -= error;
-            }
+        for (position, error) in errors.iter().enumerate().filter(|(_, error)| error.abs() > CLIP * rough) {
+            Arc::make_mut(&mut clean)[position] -= error;
         }
         let covariance = covariance(series, &clean, mean);
         interpolation.weights = weights(&covariance)?;
@@ -221,7 +220,7 @@ impl Interpolation {
                 jumps += 1;
                 continue;
             }
-            values[position] -= error;
+            Arc::make_mut(&mut values)[position] -= error;
             spikes.push(Spike { position, error });
         }
         (spikes, jumps)

@@ -114,7 +114,7 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
     let mut series = case.series(GYRO);
     assert_eq!(spikes::find(&series), None);
     // Two averages of 8 leave 0.29 of the white noise: 1.7 σ of the samples, but much more than the interpolation error.
-    series.values[20_000] += 0.5 * white();
+    series.values_mut()[20_000] += 0.5 * white();
     let detection = spikes::find(&series).unwrap();
     assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
 }
@@ -158,7 +158,8 @@ fn a_ramp_is_measured_and_is_no_step() {
     assert!((detection.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
     let per_slot = detection.effect.parameters["slope"].value * series.period_s;
     let mut levelled = series;
-    for (value, &slot) in levelled.values.iter_mut().zip(&levelled.slots) {
+    let slots = levelled.slots.clone();
+    for (value, &slot) in levelled.values_mut().iter_mut().zip(slots.iter()) {
         *value -= per_slot * slot as f64;
     }
     assert_eq!(bias_changes(&levelled).ramp, None);

@@ -33,7 +33,7 @@ impl TemperatureCourse {
         let first = *series.values.first().filter(|_| series.unit == "degC")?;
         let count = usize::try_from(series.slots.last()? / width + 1).ok()?;
         let mut sums = vec![(0.0, 0u32); count];
-        for (&slot, value) in series.slots.iter().zip(&series.values) {
+        for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
             let (sum, count) = &mut sums[(slot / width) as usize];
             (*sum, *count) = (*sum + value, *count + 1);
         }

@@ -83,7 +83,7 @@ fn variances(series: &Series, width: u64) -> Option<Vec<f64>> {
     // Sums of the values and of their squares about a value near all of them, and their number.
     let origin = *series.values.first()?;
     let mut sums = vec![(0.0, 0.0, 0.0); count];
-    for (&slot, value) in series.slots.iter().zip(&series.values) {
+    for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
         let (sum, squares, count) = &mut sums[(slot / width) as usize];
         let value = value - origin;
         (*sum, *squares, *count) = (*sum + value, *squares + value * value, *count + 1.0);

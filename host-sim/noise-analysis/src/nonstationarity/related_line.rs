@@ -117,8 +117,8 @@ fn centroid(series: &Series, slots: Range<u64>, near: f64) -> Option<f64> {
     let range = position(slots.start)..position(slots.end);
     let stretch = Series {
         span: slots,
-        slots: series.slots[range.clone()].to_vec(),
-        values: series.values[range].to_vec(),
+        slots: series.slots[range.clone()].into(),
+        values: series.values[range].into(),
         ..*series
     };
     let welch = Welch::estimate(&UniformSeries::from_series(&stretch), length)?;
