@@ -137,17 +137,18 @@ impl RecordEstimators {
         coupled: &[ChannelProfile],
         preprocessing: &Preprocessing,
     ) -> Self {
-        let halves = |exclusion: Exclusion| halves(measurement, coupled, preprocessing, exclusion);
         let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
         // Nothing is estimated twice.
         let mut distinct = vec![Exclusion::None];
         let is_distinct =
             |of: Exclusion| preprocessing.excludes_any(of) || (of == both && preprocessing.has_responses());
         distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
-        let parts = in_parallel(&distinct, |&exclusion| halves(exclusion));
-        let of = |exclusion: Exclusion| match distinct.iter().position(|of| *of == exclusion) {
-            Some(position) => parts[position].clone(),
-            None => parts[0].clone(),
+        let work: Vec<(Exclusion, Half)> =
+            distinct.iter().flat_map(|&of| [Half::First, Half::Second].map(|half| (of, half))).collect();
+        let parts = in_parallel(&work, |&(exclusion, of)| half(measurement, coupled, preprocessing, exclusion, of));
+        let of = |exclusion: Exclusion| {
+            let position = distinct.iter().position(|of| *of == exclusion).unwrap_or(0);
+            [parts[2 * position].clone(), parts[2 * position + 1].clone()]
         };
         let (raw, ruled, [first, second]) = (of(Exclusion::None), of(ruled), of(both));
         let both = RecordPart { estimators: first.estimators.clone().followed_by(&second.estimators), ..first };
@@ -185,54 +186,66 @@ fn measured(measurement: &Measurement) -> Vec<Curve<OCTAVES>> {
     in_parallel(&measurement.channels, curve)
 }
 
-/// The estimators of the halves of a recording, by time, without the samples of `exclusion`.
-fn halves(
+/// The estimators of a half of a recording, by time, without the samples of `exclusion`.
+fn half(
     measurement: &Measurement,
     coupled: &[ChannelProfile],
     preprocessing: &Preprocessing,
     exclusion: Exclusion,
-) -> [RecordPart; 2] {
+    half: Half,
+) -> RecordPart {
     let others = measurement.profiles().filter(|channel| !coupled.contains(channel));
     let channels: Vec<ChannelProfile> = coupled.iter().copied().chain(others).collect();
     let resolutions =
         channels.iter().map(|channel| f64::from(preprocessing.counts_per_step(*channel)) * channel.lsb).collect();
-    let estimators = CoupledEstimators::new(channels.len(), coupled.len());
-    let period_s = measurement.period_s();
-    let part = RecordPart { channels: channels.clone(), estimators, resolutions, period_s, shorter: None };
-    let mut halves = [part.clone(), part];
+    let mut estimators = CoupledEstimators::new(channels.len(), coupled.len());
     let recorded: Vec<RecordedSamples> = channels
         .iter()
         .filter_map(|channel| {
             let of = measurement.channel(channel)?;
             let excluded = preprocessing.excluded(*channel, exclusion);
-            Some(RecordedSamples { channel: of, is_excluded: positions(measurement, of, &excluded) })
+            let is_corrected = preprocessing.corrects(*channel, exclusion);
+            Some(RecordedSamples { channel: of, is_excluded: positions(measurement, of, &excluded), is_corrected })
         })
         .collect();
     let middle = measurement.middle();
-    for position in 0..measurement.len() {
+    let second = measurement.slots.partition_point(|&slot| slot < middle);
+    let (positions, begins_at) = match half {
+        Half::First => (0..second, 0),
+        Half::Second => (second..measurement.len(), middle),
+    };
+    for position in positions {
         let slot = measurement.slots[position];
-        let missing = measurement.missing_before(position);
-        if slot < middle {
-            halves[0].estimators.gap(missing);
-        } else {
-            // Of a gap over the middle, each half has the samples on its side.
-            halves[1].estimators.gap(missing.min(u32::try_from(slot - middle).unwrap_or(u32::MAX)));
-        }
-        halves[usize::from(slot >= middle)].estimators.push(recorded.iter().map(|of| {
+        // Of a gap over the middle, each half has the samples on its side.
+        let own = u32::try_from(slot - begins_at).unwrap_or(u32::MAX);
+        estimators.gap(measurement.missing_before(position).min(own));
+        estimators.push(recorded.iter().map(|of| {
             (!of.is_excluded[position]).then(|| {
                 let steps = f64::from(of.channel.counts[position]) * STEPS_PER_COUNT;
+                if !of.is_corrected {
+                    return steps as i32;
+                }
                 let profile = of.channel.profile;
                 (steps - STEPS_PER_COUNT * preprocessing.offset(profile, exclusion, slot) / profile.lsb).round() as i32
             })
         }));
     }
-    halves
+    RecordPart { channels, estimators, resolutions, period_s: measurement.period_s(), shorter: None }
+}
+
+/// A half of a recording, by time.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Half {
+    First,
+    Second,
 }
 
 /// A channel's samples, and whether each is left out.
 struct RecordedSamples<'a> {
     channel: &'a MeasuredChannel,
     is_excluded: Vec<bool>,
+    /// Whether an offset is subtracted from any of them.
+    is_corrected: bool,
 }
 
 /// For each sample of a channel whether it was refused or its sample period is one of `excluded`.

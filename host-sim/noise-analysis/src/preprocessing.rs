@@ -240,6 +240,11 @@ impl Preprocessing {
         self.exclusions.iter().find(|(of, _)| *of == channel).map(|(_, own)| own)
     }
 
+    /// Whether anything is subtracted from samples of a channel.
+    pub(crate) fn corrects(&self, channel: ChannelProfile, exclusion: Exclusion) -> bool {
+        self.offsets.iter().any(|(of, ..)| *of == channel) || !self.responses(channel, exclusion).is_empty()
+    }
+
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
     pub(crate) fn offset(&self, channel: ChannelProfile, exclusion: Exclusion, slot: u64) -> f64 {
         let steps = self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from);

@@ -214,7 +214,14 @@ mod tests {
         };
         let values: Vec<f64> = (0..128 * 32).map(|_| next()).collect();
         let slots = 0..values.len() as u64;
-        Series { slots: slots.clone().collect(), span: slots, values: values.into(), period_s: 1.0, resolution: 0.0, unit: "g" }
+        Series {
+            slots: slots.clone().collect(),
+            span: slots,
+            values: values.into(),
+            period_s: 1.0,
+            resolution: 0.0,
+            unit: "g",
+        }
     }
 
     /// For any fraction of random walk in the noise.

@@ -4,11 +4,13 @@
 //! estimated in the first half at one octave and applied to the second half at all octaves.
 
 use crate::estimators::CoupledEstimators;
+use crate::parallel::in_parallel;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::PowerLaw;
 use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use std::ops::Range;
 
 /// Degrees of freedom that an octave needs for each weight that is estimated from it.
 const DEGREES_OF_FREEDOM_PER_WEIGHT: f64 = 10.0;
@@ -105,16 +107,21 @@ impl CommonModeRegression {
 /// Estimators of the first quarter, the second quarter, and the second half.
 fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelProfile]) -> [CoupledEstimators; 3] {
     let recorded: Vec<&MeasuredChannel> = channels.iter().filter_map(|channel| measurement.channel(channel)).collect();
-    let mut parts = [(); 3].map(|()| CoupledEstimators::new(channels.len(), channels.len()));
-    for position in 0..measurement.len() {
-        let part = &mut parts[(4 * position / measurement.len()).min(2)];
-        let missing = measurement.missing_before(position);
-        if missing > 0 {
-            part.gap(missing);
+    let quarter = |number: usize| (number * measurement.len()).div_ceil(4);
+    let part = |positions: &Range<usize>| {
+        let mut part = CoupledEstimators::new(channels.len(), channels.len());
+        for position in positions.clone() {
+            part.gap(measurement.missing_before(position));
+            part.push(recorded.iter().map(|of| (!of.is_refused(position)).then(|| of.counts[position])));
         }
-        part.push(recorded.iter().map(|of| (!of.is_refused(position)).then(|| of.counts[position])));
-    }
-    parts
+        part
+    };
+    // The longest one first, beside which the others are computed.
+    let parts = [quarter(2)..measurement.len(), 0..quarter(1), quarter(1)..quarter(2)];
+    let mut parts = in_parallel(&parts, part).into_iter();
+    let [second_half, first, second] =
+        std::array::from_fn(|_| parts.next().unwrap_or_else(|| CoupledEstimators::new(0, 0)));
+    [first, second, second_half]
 }
 
 /// The weight of every channel in the prediction of channel `of`, 0 of itself; `None` where the covariances of the others

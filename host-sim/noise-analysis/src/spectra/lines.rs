@@ -7,7 +7,7 @@
 
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
-use super::smooth_shape::{Background, LocalLevel, median};
+use super::smooth_shape::{Background, LocalLevel, WINDOW, median};
 use crate::findings::MeasuredValue;
 use crate::uniform_series::UniformSeries;
 use statrs::function::beta::beta_reg;
@@ -352,7 +352,7 @@ impl<'a> WhitenedSpectrum<'a> {
             if bin >= until {
                 // The level is computed at every few ordinates: it changes little over a fraction of its window.
                 level = self.background.level(&self.whitened, bin).value;
-                until = bin + (bin / 16).clamp(1, 32);
+                until = bin + (bin / 16).clamp(1, WINDOW / 8);
             }
             let [left, here, right] = [self.padded[at - 1], self.padded[at], self.padded[at + 1]];
             let is_peak = here >= left && here > right && here > 4.0 * level;

@@ -195,7 +195,7 @@ const LOWEST: usize = 3;
 /// Number of equal bands over the linear part of the spectrum; narrow enough to resolve the nulls of a filter.
 const BANDS: usize = 512;
 /// Ordinates on either side of a local median, at most.
-const WINDOW: usize = 512;
+pub(super) const WINDOW: usize = 512;
 /// Variance of the median of exponential variables over that of their mean: 1/ln²2.
 const MEDIAN_LOSS: f64 = 2.08;
 /// Floor of the background, as a fraction of the density of the median band: below it the spectrum is what the taper leaks.
