@@ -105,13 +105,17 @@ pub(crate) fn estimate(
     let Some(best) = tried.iter().min_by(|a, b| a.total().total_cmp(&b.total())) else {
         return Err(Unidentified::NotCorrelated);
     };
-    let scatters: Vec<f64> = joint.iter().map(|channel| channel.scatter(best.filter)).collect();
     // By chance one of the hypotheses, each with an amplitude and a decimation, falls as much in one of 1/SIGNIFICANCE records.
+    let required = chi_squared_quantile(1.0 - SIGNIFICANCE / tried.len() as f64, 2.0);
+    // A scatter is at least 1, and is not needed where the deviances themselves fall by too little.
+    if unfiltered.iter().sum::<f64>() - best.total() <= required {
+        return Err(Unidentified::NotCorrelated);
+    }
+    let scatters: Vec<f64> = joint.iter().map(|channel| channel.scatter(best.filter)).collect();
     let falls = |of: &Hypothesis| -> Vec<f64> {
         let standardised = unfiltered.iter().zip(&of.deviances).zip(&scatters);
         standardised.map(|((before, after), scatter)| (before - after) / scatter).collect()
     };
-    let required = chi_squared_quantile(1.0 - SIGNIFICANCE / tried.len() as f64, 2.0);
     let shown: Vec<bool> = falls(best).iter().map(|fall| *fall > required).collect();
     let showing = shown.iter().filter(|shown| **shown).count();
     if falls(best).iter().sum::<f64>() <= required {
