@@ -15,7 +15,7 @@ use crate::assessment::{AssessedModels, Assessment};
 use crate::causes;
 use crate::figure_data;
 use crate::first_half::{FirstHalf, FirstHalfFit};
-use crate::long_record::{LongRecord, ShorterTimes};
+use crate::long_record::LongRecord;
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::in_parallel;
 use crate::part_report;
@@ -24,7 +24,7 @@ use crate::report::{
 };
 use crate::series::Series;
 use crate::spectra::allan_deviations_by_spectrum;
-use crate::traced_record::{ChannelTrace, TracedRecord};
+use crate::traced_record::{ChannelTrace, Condensed, TracedRecord};
 use crate::uniform_series::UniformSeries;
 use allan_core::{AllanPoint, Curve};
 use measurement::{ChannelProfile, Measurement, RecordingDescription};
@@ -58,8 +58,8 @@ struct Recorded<'a> {
 impl Recorded<'_> {
     fn report(&self) -> Report {
         let &Self { description, measurement, first, long } = self;
-        let shorter = long.map(|long| &long.shorter);
-        let mut record = TracedRecord::new(measurement, shorter);
+        let condensed = long.map(LongRecord::condensed);
+        let mut record = TracedRecord::new(measurement, condensed);
         let first_half = FirstHalf::fit(&record);
         keep_terms_that_held(&mut record, &first_half);
         let mut effects = record.effects();
@@ -67,8 +67,10 @@ impl Recorded<'_> {
         let effects_of_half = if effects.iter().all(Vec::is_empty) {
             vec![Vec::new(); effects.len()]
         } else {
-            let shorter = shorter.map(ShorterTimes::of_first_half);
-            TracedRecord::new(&measurement.before(measurement.middle()), shorter.as_ref()).effects()
+            let half = measurement.before(measurement.middle());
+            let shorter = condensed.map(|condensed| condensed.shorter.of_first_half());
+            let of_half = condensed.zip(shorter.as_ref()).map(|(of, shorter)| Condensed { shorter, ..of });
+            TracedRecord::new(&half, of_half).effects()
         };
         // What the first samples show has nothing to be compared with.
         for (effects, of_samples) in effects.iter_mut().zip(long.iter().flat_map(|long| &long.effects)) {
@@ -222,7 +224,7 @@ impl Assessed {
         let factors: Vec<u64> = (0..OCTAVES).map(|octave| 1 << octave).collect();
         let mut by_spectrum = allan_deviations_by_spectrum(&UniformSeries::from_series(&recorded), &factors);
         // Means tell nothing of the averaging times that are shorter than they are.
-        let shorter = record.shorter.map_or(0, |shorter| shorter.samples_per_mean.ilog2() as usize);
+        let shorter = record.condensed.map_or(0, |condensed| condensed.shorter.samples_per_mean.ilog2() as usize);
         by_spectrum.splice(0..0, vec![None; shorter]);
         Self { assessment: Assessment::new(own, models), by_spectrum }
     }

@@ -4,18 +4,15 @@
 //! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
 //! channels are taken where both have a sample.
 
-use crate::long_record::{ShorterTimes, ShorterTimesOfChannel};
 use crate::parallel::in_parallel;
 use crate::preprocessing::{Exclusion, Preprocessing};
+use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
+use crate::streamed_curves::STEPS_PER_COUNT;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
 use allan_core::{Cascade, Coupling, Covariance, Curve};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use nalgebra::DMatrix;
-
-/// The estimators take integers: a count is divided into so many steps, because a bias step that preprocessing subtracts is
-/// not a whole number of counts.
-pub(crate) const STEPS_PER_COUNT: f64 = 16.0;
 
 /// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
 #[derive(Clone)]

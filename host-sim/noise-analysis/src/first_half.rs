@@ -13,7 +13,7 @@ use crate::report::{ModelErrorReport, ModelReport, term_reports};
 use crate::series::Series;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
-use crate::traced_record::{TracedRecord, agree_on_filter, faster_lines};
+use crate::traced_record::{TracedRecord, agree_on_filter};
 use crate::uniform_series::UniformSeries;
 use allan_core::{Curve, Model};
 use measurement::ChannelProfile;
@@ -123,12 +123,12 @@ impl FirstHalfFit {
         let followed = covariates.compensated_series(&series[own], series);
         let middle = record.measurement.middle();
         let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&series[own]), middle);
-        let epoch_curves = match record.shorter {
-            Some(shorter) => epoch_curves.map(|curves| curves.in_samples(shorter, channel)),
+        let epoch_curves = match record.condensed {
+            Some(condensed) => epoch_curves.map(|curves| curves.in_samples(condensed.shorter, channel)),
             None => epoch_curves,
         };
         let rest = covariates.compensated_series(&halves[own], halves);
-        let faster = faster_lines(record.shorter, channel);
+        let faster = record.condensed.map(|condensed| condensed.faster_lines(record.measurement, channel));
         let (fit, lines) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile, faster);
         let raw = raw.unwrap_or_else(|| fit.trace.before.clone());
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(&halves[own]));

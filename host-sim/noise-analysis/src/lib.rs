@@ -14,6 +14,9 @@
 //! Once the filter is agreed on, `nonstationarity` tells whether the noise changes while the record is made, which decides what
 //! the models of the first half are fitted to.
 //!
+//! [`long_record`] condenses a recording that is too long to be kept: its means take the way of samples, and `shorter_times` has the
+//! curves at the averaging times that are too short for them.
+//!
 //! [`quick`] makes the report of the curves alone, from samples that are read in blocks.
 //!
 //! [`analysis::analyze`] is the pipeline to a [`report::Report`]. `spectra` and `detectors` depend neither on the model nor on
@@ -48,6 +51,7 @@ pub mod report;
 mod sampling_faults;
 pub mod series;
 pub mod several;
+mod shorter_times;
 #[cfg(test)]
 #[path = "../tests/support/simulated_part.rs"]
 mod simulated_part;

@@ -11,18 +11,16 @@
 //! one. Memory does not depend on the length of the recording.
 
 use crate::detectors::spikes::SpikeRule;
-use crate::estimators::STEPS_PER_COUNT;
 use crate::findings::{Detection, Effect};
 use crate::interpolation::REACH;
 use crate::parallel::{self, in_parallel};
 use crate::preprocessing::Exclusion;
 use crate::sampling_faults;
 use crate::series::Series;
+use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::spectral_lines::MergedLine;
-use crate::streamed_curves::StreamedCurves;
-use crate::traced_record::TracedRecord;
-use crate::{OCTAVES, OVERLAP};
-use allan_core::{Cascade, Curve};
+use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
+use crate::traced_record::{Condensed, TracedRecord};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
 use std::collections::BTreeMap;
 
@@ -33,9 +31,6 @@ const MOST_MEANS: u64 = 1 << 19;
 /// Sample periods at the start of the recording whose samples are analysed: a line of a faster rate than that of the means has as
 /// many periods there that its frequency is known to a millionth of the rate.
 const FIRST_PERIODS: u64 = 1 << 17;
-/// The curve of the means is used from this averaging factor on, in means: from there on it has as many differences as that of the
-/// samples ([`OVERLAP`] in an averaging time).
-const LEAST_FACTOR: u64 = OVERLAP as u64;
 /// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
 /// deviation of the mean of their roundings, `1/√(12·256)` of a count.
 const MEAN_STEPS_LOG2: u32 = 8;
@@ -87,38 +82,19 @@ pub struct LongRecord {
     /// Means of [`ShorterTimes::samples_per_mean`] samples each.
     pub(crate) means: Measurement,
     pub(crate) shorter: ShorterTimes,
+    /// Of each channel, the lines that the means do not show.
+    pub(crate) faster_lines: Vec<Vec<MergedLine>>,
     /// Of each channel, what only the samples themselves show.
     pub(crate) effects: Vec<Vec<Effect>>,
     /// Of each channel, the samples that are refused in it alone, by cause.
     pub(crate) refused: Vec<BTreeMap<&'static str, u64>>,
 }
 
-/// The averaging times that are too short for the means of a long recording.
-pub(crate) struct ShorterTimes {
-    pub samples_per_mean: u64,
-    /// In the order of the channels of the measurement.
-    pub channels: Vec<ShorterTimesOfChannel>,
-}
-
-/// The same of one channel.
-#[derive(Clone)]
-pub(crate) struct ShorterTimesOfChannel {
-    /// Of the means.
-    profile: ChannelProfile,
-    /// Smallest distance of two values, in the channel's unit.
-    pub resolution: f64,
-    /// Lines of a frequency that the means do not show.
-    pub lines: Vec<MergedLine>,
-    /// The whole curve as recorded.
-    pub measured: Curve<OCTAVES>,
-    /// With all samples, and without those that the screen leaves out: by half of the record, the parts that it is made of.
-    recorded: [Vec<Cascade<OCTAVES, OVERLAP>>; 2],
-    screened: [Vec<Cascade<OCTAVES, OVERLAP>>; 2],
-    /// Whether the screen leaves out a sample.
-    pub is_screened: bool,
-    period_s: f64,
-    /// Size of a count, in the channel's unit.
-    lsb: f64,
+impl LongRecord {
+    /// What the analysis of the means needs beside them.
+    pub(crate) fn condensed(&self) -> Condensed<'_> {
+        Condensed { shorter: &self.shorter, faster_lines: &self.faster_lines }
+    }
 }
 
 impl LongRecordReader {
@@ -210,6 +186,7 @@ impl LongRecordReader {
         let refused = |of: &LongChannel| of.screened.as_ref().unwrap_or(&of.recorded).refused.clone();
         let (effects, refused) = (fast.iter().map(with_lost).collect(), channels.iter().map(refused).collect());
         let means = measurement_of_means(&description, samples_per_mean, &channels);
+        let faster_lines = fast.iter().map(|of| of.lines.clone()).collect();
         let period_s = description.period_s();
         let all = channels.into_iter().zip(fast).zip(description.channels.iter().zip(&means.channels));
         let shorter =
@@ -222,7 +199,6 @@ impl LongRecordReader {
                 ShorterTimesOfChannel {
                     profile: mean.profile,
                     resolution: fast.resolution,
-                    lines: fast.lines,
                     measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
                     recorded: halves(&channel.recorded),
                     screened: halves(channel.screened.as_ref().unwrap_or(&channel.recorded)),
@@ -232,7 +208,7 @@ impl LongRecordReader {
                 }
             };
         let shorter = ShorterTimes { samples_per_mean, channels: all.map(shorter).collect() };
-        LongRecord { description, first, means, shorter, effects, refused }
+        LongRecord { description, first, means, shorter, faster_lines, effects, refused }
     }
 }
 
@@ -263,76 +239,6 @@ fn measurement_of_means(
         channels: description.channels.iter().zip(channels).map(channel).collect(),
         dropped: BTreeMap::new(),
         flagged: BTreeMap::new(),
-    }
-}
-
-impl ShorterTimes {
-    /// Those of the first half of the record.
-    pub(crate) fn of_first_half(&self) -> Self {
-        let half = |of: &ShorterTimesOfChannel| {
-            let halves = |[first, _]: &[Vec<Cascade<OCTAVES, OVERLAP>>; 2]| {
-                let (earlier, later) = first.split_at(first.len() / 2);
-                [earlier.to_vec(), later.to_vec()]
-            };
-            ShorterTimesOfChannel { recorded: halves(&of.recorded), screened: halves(&of.screened), ..of.clone() }
-        };
-        Self { samples_per_mean: self.samples_per_mean, channels: self.channels.iter().map(half).collect() }
-    }
-
-    /// Averaging factor from which on the curve is that of the means, samples.
-    pub(crate) fn until(&self) -> u64 {
-        LEAST_FACTOR * self.samples_per_mean
-    }
-
-    /// A channel of the measurement of the means.
-    pub(crate) fn of(&self, channel: ChannelProfile) -> Option<&ShorterTimesOfChannel> {
-        self.channels.iter().find(|of| of.profile == channel)
-    }
-
-    /// The curve of `means`, with that of the samples at averaging times that are too short for it.
-    pub(crate) fn continued(&self, shorter: Curve<OCTAVES>, means: &Curve<OCTAVES>) -> Curve<OCTAVES> {
-        shorter.continued_by_means(means, self.samples_per_mean, self.until())
-    }
-
-    /// The curve of `means` alone, by averaging factors in samples.
-    pub(crate) fn in_samples(&self, means: &Curve<OCTAVES>) -> Curve<OCTAVES> {
-        Curve::empty().continued_by_means(means, self.samples_per_mean, 0)
-    }
-}
-
-impl ShorterTimesOfChannel {
-    /// The curve of a half as recorded, or without spikes and repeated samples; 0 is the first half.
-    pub(crate) fn half(&self, half: usize, exclusion: Exclusion) -> Curve<OCTAVES> {
-        self.curve(&self.parts(exclusion)[half])
-    }
-
-    /// The curve of both halves.
-    pub(crate) fn both(&self, exclusion: Exclusion) -> Curve<OCTAVES> {
-        self.curve(&self.parts(exclusion).concat())
-    }
-
-    /// The curves of the quarters of the first half.
-    pub(crate) fn quarters(&self, exclusion: Exclusion) -> [Curve<OCTAVES>; 2] {
-        let [first, _] = self.parts(exclusion);
-        let (earlier, later) = first.split_at(first.len() / 2);
-        [self.curve(earlier), self.curve(later)]
-    }
-
-    /// Samples that were replaced because they are missing.
-    pub(crate) fn replaced(&self, exclusion: Exclusion) -> u64 {
-        self.parts(exclusion).iter().flatten().map(Cascade::replaced).sum()
-    }
-
-    fn parts(&self, exclusion: Exclusion) -> &[Vec<Cascade<OCTAVES, OVERLAP>>; 2] {
-        if exclusion == Exclusion::None { &self.recorded } else { &self.screened }
-    }
-
-    fn curve(&self, parts: &[Cascade<OCTAVES, OVERLAP>]) -> Curve<OCTAVES> {
-        let joined = parts.iter().cloned().reduce(|mut joined, later| {
-            joined.merge(&later);
-            joined
-        });
-        joined.unwrap_or_default().curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
     }
 }
 

@@ -1,11 +1,14 @@
 //! Curves of a channel whose samples come in blocks and are not kept: of the whole record, and of parts that follow each other in
 //! time.
 
-use crate::estimators::STEPS_PER_COUNT;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::Cascade;
 use measurement::MeasuredChannel;
 use std::collections::BTreeMap;
+
+/// The estimators take integers: a count is divided into so many steps, because a bias step that preprocessing subtracts is
+/// not a whole number of counts.
+pub(crate) const STEPS_PER_COUNT: f64 = 16.0;
 
 /// The estimators of one channel.
 #[derive(Clone)]

@@ -7,7 +7,6 @@ use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::random_telegraph;
 use crate::estimators::RecordEstimators;
 use crate::findings::{Detection, Effect};
-use crate::long_record::ShorterTimes;
 use crate::motion::{self, PlatformMotion};
 use crate::naming::{ChannelFindings, name_effects};
 use crate::parallel::in_parallel;
@@ -15,6 +14,7 @@ use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::preprocessing::{Exclusion, Preprocessing};
 use crate::report::Stretch;
 use crate::series::Series;
+use crate::shorter_times::ShorterTimes;
 use crate::slow_drift::{ChannelsInCommon, common_mode, goes_as_far_as_ramp};
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
@@ -27,8 +27,8 @@ use measurement::{ChannelProfile, Measurement, Quantity};
 pub(crate) struct TracedRecord<'a> {
     /// The samples, or those of a long record in means.
     pub measurement: &'a Measurement,
-    /// Where `measurement` has means, the averaging times that are too short for them.
-    pub shorter: Option<&'a ShorterTimes>,
+    /// Where `measurement` has means, what is known beside them.
+    pub condensed: Option<Condensed<'a>>,
     /// The channels in which effects are traced: the inertial ones.
     pub traced: Vec<ChannelProfile>,
     /// Covariances of the block means of each channel's noise, computed once.
@@ -46,6 +46,15 @@ pub(crate) struct TracedRecord<'a> {
     motions: Vec<(ChannelProfile, PlatformMotion)>,
 }
 
+/// What is known of a long recording beside the means of its samples.
+#[derive(Clone, Copy)]
+pub(crate) struct Condensed<'a> {
+    /// The averaging times that are too short for the means.
+    pub shorter: &'a ShorterTimes,
+    /// Of each channel of the measurement, the lines that the means do not show.
+    pub faster_lines: &'a [Vec<MergedLine>],
+}
+
 /// The noise of one channel in all of a recording.
 pub(crate) struct ChannelTrace {
     pub channel: ChannelProfile,
@@ -59,9 +68,18 @@ pub(crate) struct ChannelTrace {
     slowest: Option<CosineSpectrum>,
 }
 
+impl<'a> Condensed<'a> {
+    /// The lines of a channel that the means of `measurement` do not show.
+    pub(crate) fn faster_lines(&self, measurement: &Measurement, channel: ChannelProfile) -> &'a [MergedLine] {
+        let position = measurement.profiles().position(|of| of == channel);
+        position.and_then(|position| self.faster_lines.get(position)).map_or(&[], Vec::as_slice)
+    }
+}
+
 impl<'a> TracedRecord<'a> {
-    /// What `measurement` shows; where that has means, with the averaging times that are too short for them.
-    pub(crate) fn new(measurement: &'a Measurement, shorter: Option<&'a ShorterTimes>) -> Self {
+    /// What `measurement` shows; where that has means, with what is known beside them.
+    pub(crate) fn new(measurement: &'a Measurement, condensed: Option<Condensed<'a>>) -> Self {
+        let shorter = condensed.map(|condensed| condensed.shorter);
         let of = |quantities: [Quantity; 2]| {
             quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
         };
@@ -76,7 +94,7 @@ impl<'a> TracedRecord<'a> {
         let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
         let mut channels = in_parallel(&recorded, |&channel| match traced.iter().position(|of| *of == channel) {
-            Some(own) => ChannelTrace::trace(measurement, shorter, &preprocessing, &estimators, &series, own),
+            Some(own) => ChannelTrace::trace(measurement, condensed, &preprocessing, &estimators, &series, own),
             None => ChannelTrace::baseline(&estimators, channel),
         });
         let traces = channels.iter_mut().map(|trace| (trace.channel, &mut trace.fit));
@@ -88,7 +106,7 @@ impl<'a> TracedRecord<'a> {
         let motions = moved.into_iter().flatten().collect();
         Self {
             measurement,
-            shorter,
+            condensed,
             traced,
             noise_grids,
             preprocessing,
@@ -112,7 +130,8 @@ impl<'a> TracedRecord<'a> {
 
     /// Whether the rules of the first half leave out samples of a channel.
     pub(crate) fn has_rules(&self, channel: ChannelProfile) -> bool {
-        let is_screened = self.shorter.and_then(|shorter| shorter.of(channel)).is_some_and(|of| of.is_screened);
+        let shorter = self.condensed.and_then(|condensed| condensed.shorter.of(channel));
+        let is_screened = shorter.is_some_and(|of| of.is_screened);
         is_screened || self.preprocessing.excludes(channel, Exclusion::ByFirstHalf)
     }
 
@@ -183,7 +202,7 @@ impl ChannelTrace {
     /// The baseline model and what it lacks, of the channel of `series[own]`.
     fn trace(
         measurement: &Measurement,
-        shorter: Option<&ShorterTimes>,
+        condensed: Option<Condensed>,
         preprocessing: &Preprocessing,
         estimators: &RecordEstimators,
         series: &[Series],
@@ -195,8 +214,13 @@ impl ChannelTrace {
         });
         let own = &series[own];
         let rest = covariates.compensated_series(own, series);
-        let (fit, lines) =
-            fit_with_lines(covariates, own, rest.as_ref(), &measurement.profile, faster_lines(shorter, channel));
+        let (fit, lines) = fit_with_lines(
+            covariates,
+            own,
+            rest.as_ref(),
+            &measurement.profile,
+            condensed.map(|condensed| condensed.faster_lines(measurement, channel)),
+        );
         let correlation_times: Vec<f64> = fit.correlation_times().collect();
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         let is_reversible =
@@ -224,11 +248,6 @@ impl ChannelTrace {
             rest: self.rest.as_ref(),
         }
     }
-}
-
-/// The lines of a channel that are too fast for its series, where that has means.
-pub(crate) fn faster_lines(shorter: Option<&ShorterTimes>, channel: ChannelProfile) -> Option<&[MergedLine]> {
-    shorter.map(|shorter| shorter.of(channel).map_or(&[][..], |of| &of.lines))
 }
 
 /// Gives `fits` of channels in one part of a recording the filter that the part of the sensor has once, as they show it

@@ -1,8 +1,8 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
-use crate::long_record::ShorterTimes;
 use crate::preprocessing::Exclusion;
 use crate::series::Series;
+use crate::shorter_times::ShorterTimes;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
 use measurement::ChannelProfile;
