@@ -2,9 +2,10 @@
 //! curves at averaging times that are too short for the means, and the first samples.
 //!
 //! ```text
-//! blocks of samples ─► Screen (spikes, repeated samples) ─► means ─► all that is slow: drift, steps, temperature, lines
-//!        └─────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
-//! first samples ─► TracedRecord ─► all that is fast: spikes, faster lines, resolution, sample clock
+//! first samples ─► TracedRecord ─► what is fast: faster lines, resolution, saturation, sample clock
+//!        └─► rules ─┐
+//! blocks of samples ─► SampleScreen (spikes, repeated samples) ─► means ─► what is slow: drift, steps, temperature, lines
+//!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
 //! ```
 //!
 //! The second differences of means are those of the samples at longer averaging times, so that the two curves of a channel are
@@ -12,11 +13,10 @@
 
 use crate::detectors::spikes::SpikeRule;
 use crate::findings::{Detection, Effect};
-use crate::interpolation::REACH;
 use crate::parallel::{self, in_parallel};
 use crate::preprocessing::Exclusion;
+use crate::sample_screen::SampleScreen;
 use crate::sampling_faults;
-use crate::series::Series;
 use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::spectral_lines::MergedLine;
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
@@ -43,14 +43,14 @@ const MEANS_PER_PERIOD: f64 = 2.5;
 /// A block mean at this place has no sample.
 const MISSING: i32 = i32::MIN;
 /// Effects that only the samples themselves show, and that are looked for in the first of them.
-const FAST_KINDS: [&str; 5] = ["spikes", "saturated", "noise_below_count", "repeated_samples", "sample_clock"];
+const FAST_KINDS: [&str; 4] = ["saturated", "noise_below_count", "repeated_samples", "sample_clock"];
 
 /// Reads a long recording block by block.
 pub struct LongRecordReader {
     description: RecordingDescription,
     first: Measurement,
     samples_per_mean: u64,
-    screen: Screen,
+    screen: SampleScreen,
     channels: Vec<LongChannel>,
     fast: Vec<FastFindings>,
     last: Option<u64>,
@@ -69,8 +69,8 @@ struct FastFindings {
 /// What is kept of one channel.
 struct LongChannel {
     recorded: StreamedCurves,
-    /// Without what the screen leaves out; `None` if that is nothing.
-    screened: Option<StreamedCurves>,
+    /// Without what the screen leaves out.
+    screened: StreamedCurves,
     means: Means,
 }
 
@@ -121,23 +121,22 @@ impl LongRecordReader {
         };
         let fast: Vec<FastFindings> = description.channels.iter().map(of).collect();
         let shows = |of: &FastFindings, kind: &str| of.effects.iter().any(|effect| effect.kind == kind);
-        let rules = in_parallel(&description.channels, |profile| {
-            let at = record.channels.iter().position(|trace| trace.channel.name == profile.name)?;
-            let channel = record.channels[at].channel;
-            let has_spikes = shows(fast.iter().zip(&description.channels).find(|(_, of)| *of == profile)?.0, "spikes");
-            let series = record.preprocessing.series(&first, channel, Exclusion::None);
-            SpikeRule::fit(&series).filter(|_| has_spikes)
+        let inertial: Vec<(&ChannelProfile, &FastFindings)> = description.channels.iter().zip(&fast).collect();
+        let rules = in_parallel(&inertial, |(profile, fast)| {
+            // What is cut off is no noise around which a sample could be a spike.
+            let channel = record.traced.iter().find(|of| of.name == profile.name && !shows(fast, "saturated"))?;
+            let series = record.preprocessing.series(&first, *channel, Exclusion::None);
+            SpikeRule::fit_for(&series, description.samples)
         });
         let leaves_out_repeated = fast.iter().any(|of| shows(of, "repeated_samples"));
         drop(record);
-        let screen = Screen { rules, leaves_out_repeated, ..Screen::default() };
-        let is_screened = screen.leaves_out_any();
+        let screen = SampleScreen::new(&description.channels, rules, leaves_out_repeated);
         let channel = |profile: &ChannelProfile| {
             let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
             let largest = at_first.iter().flat_map(|channel| &channel.counts).map(|count| count.unsigned_abs()).max();
             LongChannel {
                 recorded: StreamedCurves::new(&boundaries),
-                screened: is_screened.then(|| StreamedCurves::new(&boundaries)),
+                screened: StreamedCurves::new(&boundaries),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
             }
         };
@@ -155,36 +154,25 @@ impl LongRecordReader {
         self.last = block.slots.last().copied().or(self.last);
         parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
             of.recorded.push(&block.slots, channel);
-            if of.screened.is_none() {
-                of.means.push(&block.slots, channel);
-            }
         });
-        if self.screen.leaves_out_any() {
-            let settled = self.screen.push(block, &self.description.channels);
-            self.push_screened(&settled);
-        }
-    }
-
-    fn push_screened(&mut self, block: &SampleBlock) {
-        parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
-            of.screened.iter_mut().for_each(|screened| screened.push(&block.slots, channel));
-            of.means.push(&block.slots, channel);
-        });
+        let channels = &mut self.channels;
+        self.screen.push(block, |screened| push_screened(channels, screened));
     }
 
     /// The recording, all of which was read.
     #[must_use]
     pub fn finish(mut self) -> LongRecord {
-        if self.screen.leaves_out_any() {
-            let rest = self.screen.finish(&self.description.channels);
-            self.push_screened(&rest);
-        }
-        let Self { description, first, samples_per_mean, channels, fast, gaps, .. } = self;
+        push_screened(&mut self.channels, &self.screen.finish());
+        let Self { description, first, samples_per_mean, screen, channels, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let lost = lost.map(|Detection { effect, .. }| effect);
-        let with_lost = |of: &FastFindings| lost.iter().chain(&of.effects).cloned().collect();
-        let refused = |of: &LongChannel| of.screened.as_ref().unwrap_or(&of.recorded).refused.clone();
-        let (effects, refused) = (fast.iter().map(with_lost).collect(), channels.iter().map(refused).collect());
+        let hours = description.periods as f64 * description.period_s() / 3600.0;
+        let effects = |(of, spikes): (&FastFindings, Option<Detection>)| {
+            let spikes = spikes.map(|Detection { effect, .. }| effect);
+            lost.iter().chain(&of.effects).cloned().chain(spikes).collect::<Vec<Effect>>()
+        };
+        let effects = fast.iter().zip(screen.spikes(hours)).map(effects).collect();
+        let refused = channels.iter().map(|of| of.screened.refused.clone()).collect();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
         let faster_lines = fast.iter().map(|of| of.lines.clone()).collect();
         let period_s = description.period_s();
@@ -201,8 +189,8 @@ impl LongRecordReader {
                     resolution: fast.resolution,
                     measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
                     recorded: halves(&channel.recorded),
-                    screened: halves(channel.screened.as_ref().unwrap_or(&channel.recorded)),
-                    is_screened: channel.screened.is_some_and(|screened| screened.refused != channel.recorded.refused),
+                    screened: halves(&channel.screened),
+                    is_screened: channel.screened.refused != channel.recorded.refused,
                     period_s,
                     lsb: profile.lsb,
                 }
@@ -210,6 +198,13 @@ impl LongRecordReader {
         let shorter = ShorterTimes { samples_per_mean, channels: all.map(shorter).collect() };
         LongRecord { description, first, means, shorter, faster_lines, effects, refused }
     }
+}
+
+fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
+    parallel::for_each_pair(channels, &block.channels, |of, channel| {
+        of.screened.push(&block.slots, channel);
+        of.means.push(&block.slots, channel);
+    });
 }
 
 fn measurement_of_means(
@@ -294,112 +289,7 @@ impl Means {
     }
 }
 
-/// Marks spikes and repeated samples by the rules of the first samples.
-#[derive(Default)]
-struct Screen {
-    /// Of the channels that have spikes.
-    rules: Vec<Option<SpikeRule>>,
-    leaves_out_repeated: bool,
-    /// Samples that were not passed on, behind a few that were.
-    held: SampleBlock,
-    /// How many of these were.
-    settled: usize,
-}
-
-impl Screen {
-    fn leaves_out_any(&self) -> bool {
-        self.leaves_out_repeated || self.rules.iter().any(Option::is_some)
-    }
-
-    /// Takes a block, and returns the samples whose neighbours on both sides are known.
-    fn push(&mut self, block: &SampleBlock, channels: &[ChannelProfile]) -> SampleBlock {
-        if self.held.channels.is_empty() {
-            let empty = |profile: &ChannelProfile| MeasuredChannel::new(*profile, Vec::new());
-            self.held.channels = channels.iter().map(empty).collect();
-        }
-        let offset = self.held.slots.len();
-        self.held.slots.extend(&block.slots);
-        for (held, channel) in self.held.channels.iter_mut().zip(&block.channels) {
-            held.counts.extend(&channel.counts);
-            for (&cause, positions) in &channel.refused {
-                held.refused.entry(cause).or_default().extend(positions.iter().map(|position| position + offset));
-            }
-        }
-        let end = self.held.slots.len().saturating_sub(REACH).max(self.settled);
-        let passed = self.marked(channels, end);
-        let kept = end.saturating_sub(REACH);
-        self.held = part(&self.held, kept..self.held.slots.len());
-        self.settled = end - kept;
-        passed
-    }
-
-    /// The samples that are left at the end.
-    fn finish(&mut self, channels: &[ChannelProfile]) -> SampleBlock {
-        self.marked(channels, self.held.slots.len())
-    }
-
-    /// The samples up to `end` that were not passed on, with those refused that are spikes or repeated.
-    fn marked(&self, channels: &[ChannelProfile], end: usize) -> SampleBlock {
-        let mut marked = part(&self.held, self.settled..end);
-        let numbered: Vec<usize> = (0..channels.len()).collect();
-        let spikes = in_parallel(&numbered, |&at| {
-            let Some(Some(rule)) = self.rules.get(at) else { return Vec::new() };
-            let slots = rule.slots(&series(&self.held, &channels[at], at));
-            let position = |slot: &u64| marked.slots.binary_search(slot).ok();
-            slots.iter().filter_map(position).collect::<Vec<usize>>()
-        });
-        let repeated: Vec<usize> = if self.leaves_out_repeated {
-            let is_repeated = |at: &usize| {
-                let at = at + self.settled;
-                at > 0 && self.held.channels.iter().all(|channel| channel.counts[at] == channel.counts[at - 1])
-            };
-            (0..marked.slots.len()).filter(is_repeated).collect()
-        } else {
-            Vec::new()
-        };
-        for (channel, spikes) in marked.channels.iter_mut().zip(spikes) {
-            for (cause, positions) in [("spikes", spikes), ("repeated", repeated.clone())] {
-                if !positions.is_empty() {
-                    channel.refused.insert(cause, positions);
-                }
-            }
-        }
-        marked
-    }
-}
-
 /// Whether only the samples themselves show an effect; a resolution of several counts is a `quantization` with a `step`.
 fn is_fast(effect: &Effect) -> bool {
     FAST_KINDS.contains(&effect.kind.as_str()) || effect.parameters.contains_key("step")
-}
-
-/// Some samples of a block.
-fn part(block: &SampleBlock, positions: std::ops::Range<usize>) -> SampleBlock {
-    let channel = |channel: &MeasuredChannel| MeasuredChannel {
-        profile: channel.profile,
-        counts: channel.counts[positions.clone()].to_vec(),
-        refused: channel
-            .refused
-            .iter()
-            .map(|(&cause, of)| {
-                let within = of.iter().filter(|position| positions.contains(position));
-                (cause, within.map(|position| position - positions.start).collect::<Vec<usize>>())
-            })
-            .filter(|(_, of)| !of.is_empty())
-            .collect(),
-    };
-    SampleBlock {
-        slots: block.slots[positions.clone()].to_vec(),
-        channels: block.channels.iter().map(channel).collect(),
-    }
-}
-
-/// The samples of a channel in a block.
-fn series(block: &SampleBlock, profile: &ChannelProfile, at: usize) -> Series {
-    let channel = &block.channels[at];
-    let used = || (0..channel.counts.len()).filter(|position| !channel.is_refused(*position));
-    let slots = used().map(|position| block.slots[position]).collect();
-    let values = used().map(|position| f64::from(channel.counts[position]) * profile.lsb).collect();
-    let span = block.slots.first().copied().unwrap_or(0)..block.slots.last().map_or(0, |last| last + 1);
-    Series { slots, values, span, period_s: 1.0, resolution: profile.lsb, unit: profile.unit }
 }

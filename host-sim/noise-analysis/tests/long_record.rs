@@ -131,7 +131,7 @@ fn a_condensed_recording_has_the_curves_and_the_findings_of_its_samples() {
         sorted.sort_unstable();
         assert_eq!(sorted, ["dropped_samples", "sinusoid", "sinusoid", "spikes", "temperature"], "{kinds:?}");
     }
-    // The first samples alone show the spikes: nothing says whether the second half has them too.
+    // All samples were searched at once: nothing says whether the second half has as many.
     let spikes = long.findings.iter().find(|finding| finding.kind == "spikes").expect("spikes");
     assert_eq!(spikes.validated, Validation::Untestable);
 }

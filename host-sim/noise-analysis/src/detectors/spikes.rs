@@ -10,6 +10,7 @@ use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialIn
 use crate::series::Series;
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Fewest neighbours that must be there on either side.
@@ -32,82 +33,124 @@ pub(crate) struct SpikeRule {
     threshold: f64,
 }
 
+/// What a rule finds in samples of its channel.
+#[derive(Default)]
+pub(crate) struct FoundSpikes {
+    /// Sample periods, in ascending order within what was looked at.
+    pub slots: Vec<u64>,
+    /// Interpolation errors, in the channel's unit, without their sign.
+    sizes: Vec<f64>,
+    /// Candidates that are jumps of the bias.
+    jumps: usize,
+}
+
+impl FoundSpikes {
+    /// Those in the sample periods `slots`.
+    pub(crate) fn within(self, slots: Range<u64>) -> Self {
+        let kept = self.slots.into_iter().zip(self.sizes).filter(|(slot, _)| slots.contains(slot));
+        let (slots, sizes) = kept.unzip();
+        Self { slots, sizes, jumps: self.jumps }
+    }
+
+    /// Adds those of later samples.
+    pub(crate) fn extend(&mut self, later: Self) {
+        self.slots.extend(later.slots);
+        self.sizes.extend(later.sizes);
+        self.jumps += later.jumps;
+    }
+
+    /// Whether there are spikes, and more of them than jumps of the bias.
+    fn are_spikes(&self) -> bool {
+        self.slots.len() > self.jumps
+    }
+}
+
 impl SpikeRule {
     /// The rule of a channel; `None` if it has fewer than 600 samples or never changes.
     pub(crate) fn fit(series: &Series) -> Option<Self> {
+        Self::fit_for(series, series.values.len() as u64)
+    }
+
+    /// The same for a channel of `samples` samples in all, some of which are those of `series`.
+    pub(crate) fn fit_for(series: &Series, samples: u64) -> Option<Self> {
         if series.values.len() < 100 * REACH {
             return None;
         }
         let interpolation = Interpolation::fit(series)?;
-        let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / series.values.len() as f64);
+        let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / samples as f64);
         Some(Self { interpolation, threshold })
     }
 
     /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
     /// as frequent.
     pub(crate) fn slots(&self, series: &Series) -> Vec<u64> {
-        slots(series, &self.spikes(series))
+        let found = self.find_around(series, self.interpolation.mean);
+        if found.are_spikes() { found.slots } else { Vec::new() }
     }
 
-    /// The spikes, the largest first.
-    fn spikes(&self, series: &Series) -> Vec<Spike> {
+    /// What there is in a part of the same channel, whose bias may be another one.
+    pub(crate) fn find(&self, series: &Series) -> FoundSpikes {
+        self.find_around(series, series.values.iter().sum::<f64>() / series.values.len().max(1) as f64)
+    }
+
+    fn find_around(&self, series: &Series, mean: f64) -> FoundSpikes {
         if series.values.len() <= 2 * REACH {
-            return Vec::new();
+            return FoundSpikes::default();
         }
-        let (spikes, jumps) = self.interpolation.spikes(series, self.threshold);
-        if spikes.len() > jumps { spikes } else { Vec::new() }
+        let interpolation = Interpolation { mean, ..self.interpolation };
+        let (mut spikes, jumps) = interpolation.spikes(series, self.threshold);
+        spikes.sort_by_key(|spike| spike.position);
+        FoundSpikes {
+            slots: spikes.iter().map(|spike| series.slots[spike.position]).collect(),
+            sizes: spikes.iter().map(|spike| spike.error.abs()).collect(),
+            jumps,
+        }
     }
-}
 
-/// Sample periods of spikes, in ascending order.
-fn slots(series: &Series, spikes: &[Spike]) -> Vec<u64> {
-    let mut slots: Vec<u64> = spikes.iter().map(|spike| series.slots[spike.position]).collect();
-    slots.sort_unstable();
-    slots
+    /// The spikes of a channel in `unit` that was looked at for `hours`, as they are reported; `None` if there are none, or if jumps
+    /// of the bias are at least as frequent.
+    pub(crate) fn detection(&self, found: &FoundSpikes, hours: f64, unit: &'static str) -> Option<Detection> {
+        if !found.are_spikes() {
+            return None;
+        }
+        let Self { interpolation, threshold } = self;
+        let sizes = &found.sizes;
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        let size = SpikeSize::estimate(sizes, *threshold, interpolation.deviation);
+        let count = sizes.len() as f64;
+        let (fewest, most) = poisson_bounds(count);
+        let rate = |count: f64, detected: f64| count / detected / hours;
+        let z = largest / interpolation.deviation;
+        let evidence = format!(
+            "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {z:.1} σ; \
+             an electrical disturbance or a damaged word",
+            sizes.len(),
+            threshold / interpolation.deviation,
+        );
+        let parameters = [
+            (
+                "rate",
+                Parameter::new(
+                    rate(count, size.detected),
+                    rate(fewest, size.detected_most),
+                    rate(most, size.detected_least),
+                    "1/h",
+                ),
+            ),
+            ("size", Parameter::new(size.value, size.low, size.high, unit)),
+        ];
+        Some(Detection {
+            effect: Effect::new("spikes", parameters, evidence),
+            correction: Some(Correction::Exclude(found.slots.clone())),
+        })
+    }
 }
 
 /// Looks for spikes in one channel. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let rule = SpikeRule::fit(series)?;
-    let spikes = rule.spikes(series);
-    if spikes.is_empty() {
-        return None;
-    }
-    let SpikeRule { interpolation, threshold } = rule;
-    let sizes: Vec<f64> = spikes.iter().map(|spike| spike.error.abs()).collect();
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let hours = series.duration_s() / 3600.0;
-    let size = SpikeSize::estimate(&sizes, threshold, interpolation.deviation);
-    let count = sizes.len() as f64;
-    let (fewest, most) = poisson_bounds(count);
-    let rate = |count: f64, detected: f64| count / detected / hours;
-    let z = largest / interpolation.deviation;
-    let evidence = format!(
-        "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {z:.1} σ; \
-         an electrical disturbance or a damaged word",
-        sizes.len(),
-        threshold / interpolation.deviation,
-    );
-    Some(Detection {
-        effect: Effect::new(
-            "spikes",
-            [
-                (
-                    "rate",
-                    Parameter::new(
-                        rate(count, size.detected),
-                        rate(fewest, size.detected_most),
-                        rate(most, size.detected_least),
-                        "1/h",
-                    ),
-                ),
-                ("size", Parameter::new(size.value, size.low, size.high, series.unit)),
-            ],
-            evidence,
-        ),
-        correction: Some(Correction::Exclude(slots(series, &spikes))),
-    })
+    rule.detection(&rule.find(series), series.duration_s() / 3600.0, series.unit)
 }
 
 /// The best linear interpolation of a sample from its neighbours.
