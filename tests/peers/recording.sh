@@ -5,7 +5,7 @@
 #     tests/peers/recording.sh [--quick-only] [ROWS…]   (a million rows by default, of six channels)
 #
 # allantools gives the curves alone, `analyze --quick` curves, models, errors and what the trace of the curves finds, `analyze`
-# everything that a report has. With --quick-only neither the script nor the whole analysis runs: for tables that they do not hold.
+# everything that a report has. With --quick-only neither the script, which does not hold every table, nor the whole analysis runs.
 # A table of a hundred million rows takes 1.6 GB. Installs the script's packages into target/peers.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
