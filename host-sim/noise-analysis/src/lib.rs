@@ -55,6 +55,7 @@ pub mod spectra;
 mod spectral_lines;
 mod traced_record;
 mod unexplained;
+mod unexplained_signals;
 pub mod uniform_series;
 pub mod units;
 
