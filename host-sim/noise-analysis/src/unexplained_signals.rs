@@ -11,6 +11,9 @@ use crate::uniform_series::UniformSeries;
 /// Shortest time constant of a process, in periods of a periodic signal, that may be the signal's: its jumps and slopes have the
 /// spectrum of one with its time scale.
 const LEAST_OF_PERIOD: f64 = 0.02;
+/// Time constants of a process, in periods of a line, that may be the line's: the Allan deviation of the process is largest at 1.89 time
+/// constants, that of the line at 0.37 periods, and octaves tell either to a factor of 4.
+const OF_TRACK_PERIOD: [f64; 2] = [0.05, 0.8];
 /// Half the width of a resonance that may be a track, over the range of the track.
 const LEAST_OF_TRACK: f64 = 0.5;
 
@@ -29,16 +32,18 @@ impl UnexplainedSignals {
         if let Some(periodic) = &periodic {
             lines.retain(|line| !periodic.has(line.frequency.value, resolution));
         }
-        // A resonance that covers the track is what wanders there.
+        let is_stronger = |line: &MergedLine, track: &FrequencyTrack| 0.5 * line.statistic > track.energy();
+        // A stronger resonance that covers the track is what wanders there.
         let is_told = |track: &FrequencyTrack| {
             let [first, last] = track.frequencies;
             lines.iter().any(|line| {
-                line.width.value > LEAST_OF_TRACK * (last - first).abs() && track.passes(line.frequency.value)
+                let covers = line.width.value > LEAST_OF_TRACK * (last - first).abs();
+                covers && track.passes(line.frequency.value) && is_stronger(line, track)
             })
         };
         let track = FrequencyTrack::find(series).filter(|track| !is_told(track));
         if let Some(track) = &track {
-            lines.retain(|line| !track.passes(line.frequency.value) || 0.5 * line.statistic > track.energy());
+            lines.retain(|line| !track.passes(line.frequency.value) || is_stronger(line, track));
         }
         Self { periodic, track }
     }
@@ -50,13 +55,17 @@ impl UnexplainedSignals {
 
     /// Whether what an effect of the channel tells is a part of one of the signals.
     pub(crate) fn has(&self, effect: &Effect) -> bool {
-        let Some(periodic) = &self.periodic else { return false };
         match effect.kind.as_str() {
-            "markov" | "telegraph" => {
-                let time_constant = effect.parameters.get("time_constant");
-                time_constant.is_some_and(|time| time.value > LEAST_OF_PERIOD * periodic.period_s())
-            }
-            "rate_ramp" => true,
+            "markov" | "telegraph" => effect.parameters.get("time_constant").is_some_and(|time| {
+                let is_periodic = |periodic: &PeriodicSignal| time.value > LEAST_OF_PERIOD * periodic.period_s();
+                let is_track = |track: &FrequencyTrack| {
+                    let [least, most] = OF_TRACK_PERIOD;
+                    let [first, last] = track.frequencies;
+                    (least / first.max(last)..=most / first.min(last)).contains(&time.value)
+                };
+                self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track)
+            }),
+            "rate_ramp" => self.periodic.is_some(),
             _ => false,
         }
     }

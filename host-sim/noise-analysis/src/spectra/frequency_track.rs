@@ -21,8 +21,8 @@ const PADDING: usize = 2;
 const LOWEST: usize = 4;
 /// Fewest ordinates by which the frequency runs over the record: a line that keeps its frequency is in the mean over time.
 const FEWEST_ORDINATES: usize = 8;
-/// Largest ordinate over the noise that is counted: a short disturbance is no track.
-const LARGEST: f64 = 8.0;
+/// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
+const LARGEST: f64 = 32.0;
 
 /// A line whose frequency runs.
 #[derive(Debug, Clone, Copy, PartialEq)]

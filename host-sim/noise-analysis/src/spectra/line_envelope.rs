@@ -23,7 +23,7 @@ const OF_FREQUENCY: usize = 8;
 const PADDING: usize = 2;
 /// Probability that the envelope of one sinusoid in noise has such an ordinate anywhere. It is tried for each of the few lines of a
 /// record, not at each frequency.
-const FALSE_ALARM: f64 = 1e-3;
+const FALSE_ALARM: f64 = 0.01;
 /// Largest part that the change of the phase has of that of the amplitude, or the reverse, in power, where another line is as far away as
 /// they are fast: one line alone on one side of another is half a change of either.
 const LARGEST_OTHER: f64 = 0.25;
@@ -105,14 +105,14 @@ mod tests {
 
     const SAMPLES: usize = 20_000;
 
-    /// The change of a sine of amplitude 0.2 at 7.3 Hz in white noise of deviation 1 at 50 Hz, whose amplitude and phase change by these
+    /// The change of a sine of amplitude 0.3 at 7.3 Hz in white noise of deviation 1 at 50 Hz, whose amplitude and phase change by these
     /// parts 5.3 times in the record.
     fn found(seed: u64, amplitude: f64, phase: f64) -> Option<Modulation> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let value = |at: usize| {
             let change = (TAU * 5.3 * at as f64 / SAMPLES as f64).sin();
             let angle = TAU * 7.3 * 0.02 * at as f64 + phase * change;
-            0.2 * (1.0 + amplitude * change) * angle.sin() + random.sample::<f64, _>(StandardNormal)
+            0.3 * (1.0 + amplitude * change) * angle.sin() + random.sample::<f64, _>(StandardNormal)
         };
         let series = UniformSeries::new(0.02, (0..SAMPLES).map(value).collect());
         let sine = Sine::fit_near(&series, 7.3, 0.5 / series.duration());
@@ -123,11 +123,11 @@ mod tests {
     fn changes_of_amplitude_and_of_phase_are_told_apart() {
         for seed in 0..4 {
             for (amplitude, phase) in [(0.5, 0.0), (0.0, 0.5)] {
-                // Expected ratio 0.04·20,000/4·0.25/2 = 25: the depth is known to 14 %, and half an ordinate off the frequency, it
-                // loses another 10 %.
-                let found = found(seed, amplitude, phase).expect("25 times the noise");
+                // Expected ratio 0.09·20,000/8·0.25 = 56, of which the taper and the distance to the ordinate leave 47: the depth is known
+                // to 10 %, and 10 % too low.
+                let found = found(seed, amplitude, phase).expect("47 times the noise");
                 assert!((found.frequency * 400.0 - 5.3).abs() < 0.6, "{found:?}");
-                assert!((found.depth.value / 0.5 - 1.0).abs() < 0.6, "{found:?}");
+                assert!((found.depth.value / 0.5 - 1.0).abs() < 0.5, "{found:?}");
                 assert_eq!(found.of_phase, phase > 0.0, "{found:?}");
             }
         }
@@ -154,7 +154,7 @@ mod tests {
     #[test]
     fn steady_sines_have_none() {
         let false_alarms = (100..400).filter(|&seed| found(seed, 0.0, 0.0).is_some()).count();
-        // 0.3 of 300 are expected; three or more have a probability of 0.4 %.
-        assert!(false_alarms <= 2, "{false_alarms}");
+        // 3 of 300 are expected at most; ten or more have a probability of 0.1 %.
+        assert!(false_alarms <= 9, "{false_alarms}");
     }
 }

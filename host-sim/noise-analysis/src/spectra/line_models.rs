@@ -269,6 +269,12 @@ impl Lorentz {
         })
     }
 
+    /// Whether centre, height or width differ from those of an estimate of the same line by more than half their standard deviations.
+    pub(super) fn differs_from(&self, other: &Self) -> bool {
+        let changes = [(self.height / other.height).ln(), self.centre - other.centre, (self.width / other.width).ln()];
+        changes.iter().zip(self.errors).any(|(change, error)| change.abs() > 0.5 * error)
+    }
+
     /// Factor on the ordinate at `position` that removes the line and leaves the level.
     pub(super) fn deflation(&self, position: f64) -> f64 {
         1.0 / (1.0 + self.height * bell(position, self.centre, self.width))

@@ -34,6 +34,8 @@ const LEAST_EXCESS: f64 = 0.1;
 const NEIGHBOURS: usize = 16;
 /// Largest number of resonances that are refitted when one is added: each refit fits the background of the whole spectrum.
 const REFITTED: usize = 2;
+/// Most rounds of refits.
+const REFITS: usize = 6;
 /// A line within this many widths of a resonance, and with less than this fraction of its statistic, is a residue of it.
 const SKIRTS: f64 = 20.0;
 const RESIDUE: f64 = 0.02;
@@ -218,13 +220,21 @@ fn independent_part(series: &UniformSeries) -> f64 {
     present / (1.0 + (variance - scatter).max(0.0) / (mean * mean))
 }
 
-/// Refits each resonance over the background without any of them: a strong one biases the first estimate of it.
+/// Refits each resonance over the background without any of them, until that moves it by less than its errors: a strong one biases the
+/// first estimates of it, and those the background.
 fn refit(rest: &Transformed, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
-    for index in 0..resonances.len() {
-        let Some(spectrum) = WhitenedSpectrum::new(rest, known, resonances, Some(index)) else { return };
-        let Resonance { line, lorentz } = resonances[index];
-        if let Some(better) = spectrum.resonance(lorentz.centre, [lorentz.width]) {
-            resonances[index] = Resonance { line: spectrum.resonance_line(&better, line.p_value), lorentz: better };
+    for _ in 0..REFITS {
+        let mut moved = false;
+        for index in 0..resonances.len() {
+            let Some(spectrum) = WhitenedSpectrum::new(rest, known, resonances, Some(index)) else { return };
+            let Resonance { line, lorentz } = resonances[index];
+            if let Some(better) = spectrum.resonance(lorentz.centre, [lorentz.width]) {
+                moved |= better.differs_from(&lorentz);
+                resonances[index] = Resonance { line: spectrum.resonance_line(&better, line.p_value), lorentz: better };
+            }
+        }
+        if !moved {
+            return;
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::findings::{Parameter, SIGNIFICANCE};
 use crate::uniform_series::UniformSeries;
 use realfft::RealFftPlanner;
 use statrs::function::beta::beta_reg;
+use statrs::function::gamma::gamma_ur;
 
 /// Blocks of the record, at least: twice the highest harmonic is half their rate.
 const BLOCKS: usize = 1024;
@@ -35,9 +36,10 @@ const LEAST_CORNER: f64 = 2.0;
 const CORNERS: usize = 7;
 /// White noise, a random walk and the Markov processes.
 const TERMS: usize = 2 + CORNERS;
-/// Least part that the even harmonics have in the sum, and the odd ones: a square wave has no even ones, a sinusoid of twice the frequency
-/// no odd ones.
-const LEAST_SHARE: f64 = 0.1;
+/// Largest probability by chance of the sum of the even harmonics, which a square wave lacks, and of that of the odd ones, which the harmonics of
+/// twice the frequency lack.
+const EVEN_BY_CHANCE: f64 = 1e-3;
+const ODD_BY_CHANCE: f64 = 0.05;
 /// Largest part of one harmonic in the sum: a line of another cause at a multiple would be all of it.
 const LARGEST_SHARE: f64 = 0.8;
 /// Least power of the fundamental over the noise: the sum of its harmonics alone could be that of a multiple of it.
@@ -94,7 +96,13 @@ impl PeriodicSignal {
         let (noise, between) = rest.noise(Some(fundamental)).map(|noise| (noise, rest.between(fundamental)))?;
         let ratios: Vec<f64> = (2..=HARMONICS).map(|number| rest.ratio(&noise, number, fundamental)).collect();
         let sum: f64 = ratios.iter().sum();
-        let share = |first: usize| ratios.iter().skip(first).step_by(2).sum::<f64>() / sum;
+        let by_chance = |first: usize| {
+            let (count, sum) =
+                ratios.iter().skip(first).step_by(2).fold((0.0, 0.0), |(n, sum), of| (n + 1.0, sum + of));
+            gamma_ur(count, sum)
+        };
+        // The first of them is the second harmonic.
+        let has_both = by_chance(0) < EVEN_BY_CHANCE && by_chance(1) < ODD_BY_CHANCE;
         let largest = ratios.iter().copied().fold(0.0, f64::max) / sum;
         let excess = |spectrum: &PaddedSpectrum, number: usize| {
             spectrum.density(number as f64 * fundamental) - noise.density(number as f64 * fundamental)
@@ -103,7 +111,7 @@ impl PeriodicSignal {
         let powers: Vec<f64> = (2..=HARMONICS).map(|number| excess(&rest, number)).collect();
         let is_fundamental =
             first > (LEAST_FUNDAMENTAL - 1.0) * noise.density(fundamental) && powers.iter().all(|power| *power < first);
-        if !is_fundamental || share(0) < LEAST_SHARE || share(1) < LEAST_SHARE || largest > LARGEST_SHARE {
+        if !is_fundamental || !has_both || largest > LARGEST_SHARE {
             return None;
         }
         // Sums of exponential variables, of which those between the harmonics have given the level.
@@ -270,9 +278,10 @@ mod tests {
     #[test]
     fn a_sawtooth_is_found_among_few_periods() {
         for (seed, periods) in [(1, 5.3), (2, 9.0), (3, 17.7)] {
-            // Amplitudes 0.2/(πk): ordinates of 16·1024/4·0.04/π²/k² = 17/k²·4 over the noise, of which those from the second on have 0.6.
-            let found = PeriodicSignal::find(&series(seed, 0.002, |turn| 0.4 * ((periods * turn).fract() - 0.5)))
-                .expect("sum of 40");
+            // Amplitudes 0.6/(πk): ordinates of 16·1024/4·0.36/(πk)², 149/k², over the white noise, of which the second to the eighth have 79
+            // together; the walk is as large as the white noise at 5 periods per record.
+            let found = PeriodicSignal::find(&series(seed, 0.002, |turn| 0.6 * ((periods * turn).fract() - 0.5)))
+                .expect("some ten times the noise");
             let duration_s = 0.1 * 16.0 * BLOCKS as f64;
             // Known to less than a tenth of the resolution.
             assert!((found.frequency.value * duration_s - periods).abs() < 0.2, "{periods}: {found:?}");
