@@ -139,7 +139,7 @@ impl<'a> TracedRecord<'a> {
             effects.retain(|effect| !unexplained::is_contradicted(effect, unexplained));
         }
         effects.extend(by_curve);
-        effects.retain(|effect| !trace.signals.has(effect));
+        effects.retain(|effect| !trace.signals.has(effect, &trace.lines));
         effects.extend(trace.signals.effects());
         let own = self.series_of(channel);
         let temperature = self.coupled.iter().position(|of| of.quantity == Quantity::Temperature);

@@ -53,8 +53,9 @@ impl UnexplainedSignals {
         Self { periodic: None, track: None }
     }
 
-    /// Whether what an effect of the channel tells is a part of one of the signals.
-    pub(crate) fn has(&self, effect: &Effect) -> bool {
+    /// Whether what an effect of the channel tells is a part of one of the signals. `lines` are the other lines of the spectrum; those
+    /// of the curve are known to an octave.
+    pub(crate) fn has(&self, effect: &Effect, lines: &[MergedLine]) -> bool {
         match effect.kind.as_str() {
             "markov" | "telegraph" => effect.parameters.get("time_constant").is_some_and(|time| {
                 let is_periodic = |periodic: &PeriodicSignal| time.value > LEAST_OF_PERIOD * periodic.period_s();
@@ -64,6 +65,14 @@ impl UnexplainedSignals {
                     (least / first.max(last)..=most / first.min(last)).contains(&time.value)
                 };
                 self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track)
+            }),
+            "sinusoid" | "resonance" => effect.parameters.get("frequency").is_some_and(|frequency| {
+                let is_in_spectrum = lines.iter().any(|line| line.frequency.value == frequency.value);
+                let is_periodic = |periodic: &PeriodicSignal| periodic.reaches(frequency.value);
+                let is_track = |track: &FrequencyTrack| track.passes(frequency.value);
+                let is_part =
+                    self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track);
+                is_part && !is_in_spectrum
             }),
             "rate_ramp" => self.periodic.is_some(),
             _ => false,
@@ -109,4 +118,61 @@ fn track_effect(track: &FrequencyTrack) -> Effect {
         track.p_value,
     );
     Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::UnexplainedSignals;
+    use crate::findings::{Effect, Parameter};
+    use crate::uniform_series::UniformSeries;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 40_000;
+    const RATE_HZ: f64 = 100.0;
+
+    /// White noise of deviation 1 over 400 s with a signal of the time.
+    fn signals(signal: impl Fn(f64) -> f64) -> UnexplainedSignals {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let value = |at: usize| signal(at as f64 / RATE_HZ) + random.sample::<f64, _>(StandardNormal);
+        let series = UniformSeries::new(1.0 / RATE_HZ, (0..SAMPLES).map(value).collect());
+        UnexplainedSignals::find(&series, &mut Vec::new())
+    }
+
+    fn effect(kind: &str, name: &'static str, value: f64) -> Effect {
+        Effect::new(kind, [(name, Parameter::new(value, value, value, ""))], String::new())
+    }
+
+    #[test]
+    fn names_in_the_place_of_a_slow_signal_are_taken_back() {
+        // Harmonics of 40,000/4·(0.3/(πk))², 91/k², over the noise.
+        let of_40_s = signals(|time_s| 0.3 * (time_s / 40.0).fract());
+        let found: Vec<Effect> = of_40_s.effects().collect();
+        let [effect_of_40_s] = &found[..] else { panic!("{found:?}") };
+        assert_eq!(effect_of_40_s.kind, "unexplained");
+        // The resolution is 2.5 mHz, of which the frequency is known to a tenth.
+        assert!((effect_of_40_s.parameters["frequency"].value - 0.025).abs() < 0.000_25, "{found:?}");
+        assert!(of_40_s.has(&effect("markov", "time_constant", 9.0), &[]));
+        assert!(of_40_s.has(&effect("resonance", "frequency", 0.05), &[]));
+        assert!(!of_40_s.has(&effect("markov", "time_constant", 0.05), &[]));
+        assert!(!of_40_s.has(&effect("resonance", "frequency", 2.0), &[]));
+    }
+
+    #[test]
+    fn names_in_the_place_of_a_running_frequency_are_taken_back() {
+        // 0.15²·40,000/4 = 225 over the noise.
+        let running = signals(|time_s| 0.15 * (TAU * (4.0 + 0.005 * time_s) * time_s).sin());
+        let found: Vec<Effect> = running.effects().collect();
+        let [track] = &found[..] else { panic!("{found:?}") };
+        // From 4 to 8 Hz, within the ordinates of 64 segments of 6.25 s.
+        let frequency = &track.parameters["frequency"];
+        assert!((frequency.low - 4.0).abs() < 0.2 && (frequency.high - 8.0).abs() < 0.2, "{track:?}");
+        assert!(running.has(&effect("resonance", "frequency", 6.0), &[]));
+        assert!(running.has(&effect("markov", "time_constant", 0.05), &[]));
+        assert!(!running.has(&effect("markov", "time_constant", 5.0), &[]));
+        assert!(!running.has(&effect("resonance", "frequency", 12.0), &[]));
+        assert_eq!(signals(|_| 0.0).effects().count(), 0);
+    }
 }

@@ -141,6 +141,11 @@ impl PeriodicSignal {
         (frequency - multiple * self.frequency.value).abs() < within
     }
 
+    /// Whether a frequency, Hz, is between the fundamental, or half an octave below it, and the highest harmonic that was examined.
+    pub(crate) fn reaches(&self, frequency: f64) -> bool {
+        (std::f64::consts::FRAC_1_SQRT_2..=HARMONICS as f64).contains(&(frequency / self.frequency.value))
+    }
+
     /// Harmonics that were examined.
     pub(crate) fn harmonics(&self) -> f64 {
         HARMONICS as f64
