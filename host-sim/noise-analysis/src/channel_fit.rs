@@ -106,6 +106,15 @@ impl ChannelFit {
         })
     }
 
+    /// Frequencies of the model's resonances, Hz, with what each takes off the deviance.
+    pub(crate) fn bands(&self) -> Vec<(f64, f64)> {
+        let resonance = |found: &AddedTerm| match self.trace.after.terms()[found.term].kind {
+            NoiseTerm::Resonance(resonance) => Some((resonance.frequency, found.score)),
+            _ => None,
+        };
+        self.trace.added.iter().filter_map(resonance).collect()
+    }
+
     /// Whether the noise of the first `octaves` is large enough against the channel's `resolution` (in its unit) that
     /// rounding adds white noise and nothing else.
     pub(crate) fn is_dithered(&self, profile: &SensorProfile, resolution: f64, octaves: usize) -> bool {

@@ -187,7 +187,7 @@ impl ChannelTrace {
             |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
         let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
         let slowest = CosineSpectrum::new(&rest);
-        let signals = UnexplainedSignals::find(&rest, &mut lines);
+        let signals = UnexplainedSignals::find(&rest, &mut lines, &fit.bands());
         Self { channel, fit, lines, telegraph, rest: Some(rest), slowest, signals }
     }
 

@@ -14,8 +14,6 @@ const LEAST_OF_PERIOD: f64 = 0.02;
 /// Time constants of a process, in periods of a line, that may be the line's: the Allan deviation of the process is largest at 1.89 time
 /// constants, that of the line at 0.37 periods, and octaves tell either to a factor of 4.
 const OF_TRACK_PERIOD: [f64; 2] = [0.05, 0.8];
-/// Half the width of a resonance that may be a track, over the range of the track.
-const LEAST_OF_TRACK: f64 = 0.5;
 
 /// The signals of one channel.
 pub(crate) struct UnexplainedSignals {
@@ -25,25 +23,24 @@ pub(crate) struct UnexplainedSignals {
 
 impl UnexplainedSignals {
     /// Those of `series`, a channel's samples less its covariates. `lines` are those of its spectrum; those that are a part of one
-    /// of the signals are removed from them.
-    pub(crate) fn find(series: &UniformSeries, lines: &mut Vec<MergedLine>) -> Self {
+    /// of the signals are removed from them. `bands_of_curve` are the frequencies of the resonances of the curve, Hz, with what they
+    /// take off its deviance.
+    pub(crate) fn find(series: &UniformSeries, lines: &mut Vec<MergedLine>, bands_of_curve: &[(f64, f64)]) -> Self {
         let periodic = PeriodicSignal::find(series);
         let resolution = 1.0 / series.duration();
         if let Some(periodic) = &periodic {
             lines.retain(|line| !periodic.has(line.frequency.value, resolution));
         }
-        let is_stronger = |line: &MergedLine, track: &FrequencyTrack| 0.5 * line.statistic > track.energy();
-        // A stronger resonance that covers the track is what wanders there.
+        // A stronger band in its range is a frequency that wanders, of which a straight track holds a part.
         let is_told = |track: &FrequencyTrack| {
-            let [first, last] = track.frequencies;
-            lines.iter().any(|line| {
-                let covers = line.width.value > LEAST_OF_TRACK * (last - first).abs();
-                covers && track.passes(line.frequency.value) && is_stronger(line, track)
-            })
+            let of_lines = lines.iter().filter(|line| line.width.value > 0.0);
+            let of_lines = of_lines.map(|line| (line.frequency.value, line.statistic));
+            let mut bands = of_lines.chain(bands_of_curve.iter().copied());
+            bands.any(|(frequency, statistic)| track.passes(frequency) && 0.5 * statistic > track.energy())
         };
         let track = FrequencyTrack::find(series).filter(|track| !is_told(track));
         if let Some(track) = &track {
-            lines.retain(|line| !track.passes(line.frequency.value) || is_stronger(line, track));
+            lines.retain(|line| !track.passes(line.frequency.value) || 0.5 * line.statistic > track.energy());
         }
         Self { periodic, track }
     }
@@ -138,7 +135,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let value = |at: usize| signal(at as f64 / RATE_HZ) + random.sample::<f64, _>(StandardNormal);
         let series = UniformSeries::new(1.0 / RATE_HZ, (0..SAMPLES).map(value).collect());
-        UnexplainedSignals::find(&series, &mut Vec::new())
+        UnexplainedSignals::find(&series, &mut Vec::new(), &[])
     }
 
     fn effect(kind: &str, name: &'static str, value: f64) -> Effect {
