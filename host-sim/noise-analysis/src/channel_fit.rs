@@ -8,7 +8,7 @@ use crate::octave_covariance::with_bounds_behind_a_filter;
 use crate::part_filter::{PartFilter, is_white};
 use crate::spectra::MarkovEstimate;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
-use allan_core::fit::{Goodness, fit_shapes_except, goodness};
+use allan_core::fit::{Goodness, fit, fit_shapes_except, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter};
 use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Residual, Trace, trace};
@@ -104,6 +104,15 @@ impl ChannelFit {
             NoiseTerm::Markov(Markov { time_constant }) => Some(time_constant),
             _ => None,
         })
+    }
+
+    /// Frequencies of the model's resonances, Hz, with what each takes off the deviance.
+    pub(crate) fn bands(&self) -> Vec<(f64, f64)> {
+        let resonance = |found: &AddedTerm| match self.trace.after.terms()[found.term].kind {
+            NoiseTerm::Resonance(resonance) => Some((resonance.frequency, found.score)),
+            _ => None,
+        };
+        self.trace.added.iter().filter_map(resonance).collect()
     }
 
     /// Whether the noise of the first `octaves` is large enough against the channel's `resolution` (in its unit) that
@@ -264,7 +273,7 @@ impl ChannelFit {
 
     /// Adds the Markov process that the lowest frequencies of the spectrum show, where the model of the curve has none: the curve
     /// tells it from a random walk by its longest octaves alone. Its time constant is that of the spectrum, the coefficients of
-    /// all terms are fitted again; a process to which the curve gives no variance is left out. `lines` are the frequencies of
+    /// all terms are fitted again with their shapes as they are; a process to which the curve gives no variance is left out. `lines` are the frequencies of
     /// those of the spectrum, Hz.
     pub(crate) fn add_markov_of_spectrum(&mut self, spectrum: &CosineSpectrum, lines: impl Iterator<Item = f64>) {
         let curve = &self.covariates.curve;
@@ -280,7 +289,7 @@ impl ChannelFit {
         let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
         let markov = NoiseTerm::Markov(Markov { time_constant: found.time_constant.value });
         let kinds = [kinds.as_slice(), &[markov]].concat();
-        let fitted = fit_shapes_except(curve, &kinds, &kinds);
+        let fitted = fit(curve, &kinds);
         let octave = curve.points().iter().min_by(|a, b| {
             let distance = |point: &AllanPoint| (point.tau / found.time_constant.value).ln().abs();
             distance(a).total_cmp(&distance(b))

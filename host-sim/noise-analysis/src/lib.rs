@@ -62,6 +62,7 @@ mod spectral_lines;
 mod streamed_curves;
 mod traced_record;
 mod unexplained;
+mod unexplained_signals;
 pub mod uniform_series;
 pub mod units;
 

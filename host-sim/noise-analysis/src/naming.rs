@@ -7,8 +7,8 @@ use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
-use crate::spectra::MarkovEstimate;
-use crate::spectral_lines::{FEW_PERIODS, FULL_WIDTH, MergedLine};
+use crate::spectra::{MarkovEstimate, Modulation};
+use crate::spectral_lines::{FEW_PERIODS, MergedLine};
 use crate::uniform_series::UniformSeries;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
@@ -379,8 +379,8 @@ fn line_effect(line: &MergedLine, model: &Model, unit: &str) -> Effect {
     if line.shape_p_value < SIGNIFICANCE {
         return unexplained_band(line, model);
     }
-    if let Some(distance) = line.sidebands {
-        return modulated_line(line, distance);
+    if let Some(modulation) = &line.modulation {
+        return modulated_line(line, modulation);
     }
     let (kind, root) = (line.kind(), 2f64.sqrt());
     let parameters = match kind {
@@ -407,20 +407,30 @@ fn line_effect(line: &MergedLine, model: &Model, unit: &str) -> Effect {
     Effect::new(kind.name(), parameters.into_iter().chain([frequency]), evidence)
 }
 
-/// A sinusoid between two equal ones `distance` Hz away.
-fn modulated_line(line: &MergedLine, distance: f64) -> Effect {
+/// A line whose amplitude or phase changes.
+fn modulated_line(line: &MergedLine, modulation: &Modulation) -> Effect {
     let frequency = normal_bounds(line.frequency, "Hz");
-    // The spread of the merged peaks is that of the sidebands: their part of the power is its square over that of the distance.
-    let spread = line.width.value / FULL_WIDTH;
-    let percent = 100.0 * (spread / distance).min(1.0);
-    let relative = NORMAL_975 * line.deviation.error / line.deviation.value;
-    let excess = Parameter::new(percent, percent * (1.0 - relative).max(0.0), percent * (1.0 + relative), "%");
+    // The part of the deviation that is in the sidebands: the amplitude of either is half the depth of that of the line.
+    let percent = |depth: f64| 100.0 * depth / (2.0 + depth * depth).sqrt();
+    let MeasuredValue { value, error } = modulation.depth;
+    let excess = Parameter::new(
+        percent(value),
+        percent((value - NORMAL_975 * error).max(0.0)),
+        percent(value + NORMAL_975 * error),
+        "%",
+    );
+    let (changes, depth) = if modulation.of_phase {
+        ("its phase goes to and fro", format!("{value:.2} rad"))
+    } else {
+        ("its amplitude swells and fades", format!("{:.0} %", 100.0 * value))
+    };
     let evidence = format!(
-        "a line at {:.4} Hz between two equal ones {distance:.4} Hz away, {:.0} sigma: its amplitude swells and fades every {:.0} s, \
-         which no sinusoid of one amplitude does",
+        "a line at {:.4} Hz, {:.0} sigma, whose sidebands are {:.4} Hz away: {changes} by {depth} every {:.0} s, which no sinusoid \
+         does",
         line.frequency.value,
         line.statistic.sqrt(),
-        1.0 / distance,
+        modulation.frequency,
+        1.0 / modulation.frequency,
     );
     Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
 }
@@ -441,11 +451,12 @@ fn unexplained_band(line: &MergedLine, model: &Model) -> Effect {
         line.statistic.sqrt(),
         line.shape_p_value,
     );
-    let parameters = [
-        ("frequency", Parameter::new(centre, (centre - half).max(0.0), centre + half, "Hz")),
-        ("excess_percent", Parameter::new(excess(1.0), excess((1.0 - relative).max(0.0)), excess(1.0 + relative), "%")),
-    ];
-    Effect::new("unexplained", parameters, evidence)
+    let frequency = Parameter::new(centre, (centre - half).max(0.0), centre + half, "Hz");
+    let percent = Parameter::new(excess(1.0), excess((1.0 - relative).max(0.0)), excess(1.0 + relative), "%");
+    // An interval wider than the share says nothing of it.
+    let is_known = percent.high - percent.low <= percent.value;
+    let share = is_known.then_some(("excess_percent", percent));
+    Effect::new("unexplained", [("frequency", frequency)].into_iter().chain(share), evidence)
 }
 
 /// Drift that `channel` has in common with others.

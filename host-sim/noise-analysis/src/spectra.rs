@@ -6,6 +6,8 @@
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
 //!               ├► sine tapers ─► common_mode            drift that several channels share
+//!               ├► periodic_signal                       a slow signal that repeats and is no sinusoid
+//!               ├► frequency_track                       a line whose frequency runs
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
 //!               ├► Welch ─► white_noise                  N, independent of the Allan variance
 //!               │        ├► equation_5                   the Allan deviation, by equation (5) of the paper
@@ -17,9 +19,12 @@ mod autocorrelation;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
 mod equation_5;
+pub(crate) mod frequency_track;
+mod line_envelope;
 mod line_models;
 mod lines;
 mod markov_spectrum;
+pub(crate) mod periodic_signal;
 mod periodogram;
 mod smooth_shape;
 mod welch;
@@ -27,6 +32,7 @@ mod white_noise;
 
 pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
+pub use line_envelope::Modulation;
 pub use lines::{SpectralLine, find_lines};
 pub(crate) use lines::{find_lines_over, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;

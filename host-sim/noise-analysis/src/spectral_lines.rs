@@ -40,7 +40,7 @@ const MIN_OWN_DEVIATION: f64 = 0.5;
 /// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
 pub(crate) const FEW_PERIODS: f64 = 8.0;
 /// Full width at half maximum of a normal curve, in standard deviations.
-pub(crate) const FULL_WIDTH: f64 = 2.35;
+const FULL_WIDTH: f64 = 2.35;
 /// Power gain of a filter below which the spectrum holds leakage from other frequencies.
 const LEAKAGE_GAIN: f64 = 0.1;
 
@@ -59,9 +59,8 @@ pub(crate) struct MergedLine {
     pub p_value: f64,
     /// Probability that the strongest peak, were it a resonance, would deviate as far from the spectrum of one.
     pub shape_p_value: f64,
-    /// Distance of two equal peaks on either side of the strongest one that were merged with it, Hz: the amplitude of the line
-    /// changes to and fro.
-    pub sidebands: Option<f64>,
+    /// How the amplitude or the phase of the strongest peak changes to and fro.
+    pub modulation: Option<spectra::Modulation>,
     duration_s: f64,
 }
 
@@ -184,9 +183,9 @@ fn is_leakage(model: &Model, frequency: f64) -> bool {
     model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min) < LEAKAGE_GAIN
 }
 
-/// The distance of the first two sinusoids beside the strongest of `peaks`, if they are at equal distances on either side, beyond
-/// the side lobes of the taper, and equally strong.
-fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<f64> {
+/// The change of the amplitude of the strongest of `peaks`, if the first two sinusoids beside it are at equal distances on either
+/// side, beyond the side lobes of the taper, and equally strong.
+fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<spectra::Modulation> {
     let [strongest, one, other, ..] = peaks else { return None };
     let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
     let is_symmetric = (distance(one) + distance(other)).abs() < SIDEBAND_TOLERANCE / duration_s;
@@ -196,7 +195,13 @@ fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<f64> {
     let mean = 0.5 * (one.deviation.value + other.deviation.value);
     let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
     let are_sinusoids = [strongest, one, other].iter().all(|peak| peak.width.is_none());
-    (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| 0.5 * (distance(one) - distance(other)).abs())
+    // Each sideband has half the depth of the amplitude of the line.
+    let over_line = 2.0 / strongest.deviation.value;
+    (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| spectra::Modulation {
+        frequency: 0.5 * (distance(one) - distance(other)).abs(),
+        depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
+        of_phase: false,
+    })
 }
 
 impl MergedLine {
@@ -225,7 +230,7 @@ impl MergedLine {
             statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
-            sidebands: sidebands(peaks, duration_s),
+            modulation: sidebands(peaks, duration_s).or(strongest.modulation),
             duration_s,
         }
     }
@@ -285,11 +290,14 @@ mod tests {
     #[test]
     fn a_line_that_swells_and_fades_has_sidebands() {
         let of =
-            |depth: f64| find(&series(depth), None, 0.0).first().map(|line| (line.frequency.value, line.sidebands));
-        let (frequency, sidebands) = of(0.5).expect("100 times the noise at its frequency");
+            |depth: f64| find(&series(depth), None, 0.0).first().map(|line| (line.frequency.value, line.modulation));
+        let (frequency, modulation) = of(0.5).expect("100 times the noise at its frequency");
         // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
         assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");
-        assert!((sidebands.expect("two at a quarter of the amplitude") - 5.0 / 400.0).abs() < 0.0025, "{sidebands:?}");
-        assert_eq!(of(0.0).map(|(_, sidebands)| sidebands), Some(None));
+        let modulation = modulation.expect("two sidebands of a quarter of the amplitude");
+        assert!((modulation.frequency - 5.0 / 400.0).abs() < 0.0025, "{modulation:?}");
+        // The amplitude of each sideband is known to a fiftieth of that of the line.
+        assert!((modulation.depth.value - 0.5).abs() < 0.1, "{modulation:?}");
+        assert_eq!(of(0.0).map(|(_, modulation)| modulation), Some(None));
     }
 }

@@ -19,6 +19,7 @@ use crate::slow_drift::{ChannelsInCommon, common_mode, goes_as_far_as_ramp};
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
 use crate::unexplained;
+use crate::unexplained_signals::UnexplainedSignals;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
@@ -66,6 +67,8 @@ pub(crate) struct ChannelTrace {
     /// The samples less the share of the covariates; of a traced channel only.
     rest: Option<UniformSeries>,
     slowest: Option<CosineSpectrum>,
+    /// Signals that have no name.
+    signals: UnexplainedSignals,
 }
 
 impl<'a> Condensed<'a> {
@@ -182,6 +185,8 @@ impl<'a> TracedRecord<'a> {
             effects.retain(|effect| !unexplained::is_contradicted(effect, unexplained));
         }
         effects.extend(by_curve);
+        effects.retain(|effect| !trace.signals.has(effect, &trace.lines));
+        effects.extend(trace.signals.effects());
         let own = self.series_of(channel);
         let temperature = self.coupled.iter().position(|of| of.quantity == Quantity::Temperature);
         let level = own.zip(temperature).and_then(|(own, at)| unexplained::level_by_temperature(own, &self.series[at]));
@@ -196,7 +201,15 @@ impl ChannelTrace {
         let position = estimators.both.position(channel).unwrap_or_default();
         let covariates = CovariateFit::estimate(&estimators.both, position, false, |_| None);
         let fit = ChannelFit::fit_baseline(covariates);
-        Self { channel, fit, lines: Vec::new(), telegraph: None, rest: None, slowest: None }
+        Self {
+            channel,
+            fit,
+            lines: Vec::new(),
+            telegraph: None,
+            rest: None,
+            slowest: None,
+            signals: UnexplainedSignals::none(),
+        }
     }
 
     /// The baseline model and what it lacks, of the channel of `series[own]`.
@@ -214,20 +227,16 @@ impl ChannelTrace {
         });
         let own = &series[own];
         let rest = covariates.compensated_series(own, series);
-        let (fit, lines) = fit_with_lines(
-            covariates,
-            own,
-            rest.as_ref(),
-            &measurement.profile,
-            condensed.map(|condensed| condensed.faster_lines(measurement, channel)),
-        );
+        let faster = condensed.map(|condensed| condensed.faster_lines(measurement, channel));
+        let (fit, mut lines) = fit_with_lines(covariates, own, rest.as_ref(), &measurement.profile, faster);
         let correlation_times: Vec<f64> = fit.correlation_times().collect();
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         let is_reversible =
             |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
         let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
         let slowest = CosineSpectrum::new(&rest);
-        Self { channel, fit, lines, telegraph, rest: Some(rest), slowest }
+        let signals = UnexplainedSignals::find(&rest, &mut lines, &fit.bands());
+        Self { channel, fit, lines, telegraph, rest: Some(rest), slowest, signals }
     }
 
     fn findings<'a>(

@@ -49,9 +49,19 @@ impl Sine {
         self.cosine.hypot(self.sine)
     }
 
+    /// φ of `amplitude·cos(2πft − φ)`, rad.
+    pub(super) fn phase(&self) -> f64 {
+        self.sine.atan2(self.cosine)
+    }
+
     /// The ordinate of a periodogram at the sinusoid's own frequency, unit²/Hz.
     pub(super) fn density(&self, series: &UniformSeries) -> f64 {
         2.0 * self.power * series.sample_period()
+    }
+
+    /// The same sinusoid with the opposite sign.
+    pub(super) fn negative(self) -> Self {
+        Self { cosine: -self.cosine, sine: -self.sine, ..self }
     }
 
     /// The series without the sinusoid.
@@ -139,7 +149,7 @@ impl PhaseSums {
 }
 
 /// Calls `visit` with position, value, cosine and sine of every sample.
-fn for_each_phase(series: &UniformSeries, frequency: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
+pub(super) fn for_each_phase(series: &UniformSeries, frequency: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
     let turn = frequency * series.sample_period();
     let (step_sine, step_cosine) = (TAU * turn).sin_cos();
     for (block, values) in series.values().chunks(STEPS).enumerate() {
@@ -257,6 +267,12 @@ impl Lorentz {
             statistic: 2.0 * (likelihood - level_alone),
             shape_p_value: shape_p_value(&groups, &parameters),
         })
+    }
+
+    /// Whether centre, height or width differ from those of an estimate of the same line by more than half their standard deviations.
+    pub(super) fn differs_from(&self, other: &Self) -> bool {
+        let changes = [(self.height / other.height).ln(), self.centre - other.centre, (self.width / other.width).ln()];
+        changes.iter().zip(self.errors).any(|(change, error)| change.abs() > 0.5 * error)
     }
 
     /// Factor on the ordinate at `position` that removes the line and leaves the level.

@@ -5,6 +5,7 @@
 //! peaks", MNRAS 385, 2008) and for the uncertainty of the background. A resonance is sought in averages over 4, 16, 64 …
 //! ordinates. A peak is taken for the model with the larger likelihood.
 
+use super::line_envelope::{MOST_PERIODS, Modulation};
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, LocalLevel, WINDOW, median};
@@ -33,6 +34,8 @@ const LEAST_EXCESS: f64 = 0.1;
 const NEIGHBOURS: usize = 16;
 /// Largest number of resonances that are refitted when one is added: each refit fits the background of the whole spectrum.
 const REFITTED: usize = 2;
+/// Most rounds of refits.
+const REFITS: usize = 6;
 /// A line within this many widths of a resonance, and with less than this fraction of its statistic, is a residue of it.
 const SKIRTS: f64 = 20.0;
 const RESIDUE: f64 = 0.02;
@@ -67,6 +70,8 @@ pub struct SpectralLine {
     pub p_value: f64,
     /// Probability that a line with the spectrum of a resonance deviates as far from it; 1 of a sinusoid.
     pub shape_p_value: f64,
+    /// How the amplitude or the phase of a line without a width changes over the record; `None` where it may be constant.
+    pub modulation: Option<Modulation>,
 }
 
 impl SpectralLine {
@@ -92,17 +97,19 @@ pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
 #[must_use]
 pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
     let known: &dyn Fn(f64) -> f64 = &known;
-    let (rest, mut sines) = without_slow_sines(series.clone().averaged_until_dithered());
+    let (rest, slow) = without_slow_sines(series.clone().averaged_until_dithered());
+    let mut sines: Vec<FoundSine> = Vec::new();
     let mut rest = Transformed::new(rest.detrended());
     let mut resonances: Vec<Resonance> = Vec::new();
-    while sines.len() + resonances.len() < MOST
+    while slow.len() + sines.len() + resonances.len() < MOST
         && let Some(transformed) = &rest
         && let Some(spectrum) = WhitenedSpectrum::new(transformed, known, &resonances, None)
     {
         match spectrum.most_significant(&transformed.series) {
             Some(Candidate::Sine(line, sine)) => {
+                let density = 2.0 * sine.density(&transformed.series) / line.statistic;
+                sines.push(FoundSine { line, sine, density });
                 rest = Transformed::new(sine.subtracted_from(&transformed.series));
-                sines.push(line);
             }
             Some(Candidate::Resonance(resonance)) => {
                 resonances.push(resonance);
@@ -113,8 +120,12 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
             None => break,
         }
     }
+    if let Some(rest) = &rest {
+        find_modulations(&mut sines, &rest.series, &resonances);
+    }
+    let sines = sines.into_iter().map(|found| found.line);
     let mut found: Vec<SpectralLine> =
-        sines.into_iter().chain(resonances.iter().map(|resonance| resonance.line)).collect();
+        slow.into_iter().chain(sines).chain(resonances.iter().map(|resonance| resonance.line)).collect();
     found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let all = found.clone();
     found.retain(|line| !all.iter().any(|strong| is_residue(line, strong)));
@@ -183,6 +194,7 @@ fn sine_line(sine: &Sine, duration: f64, ratio: f64, p_value: f64) -> SpectralLi
         statistic: 2.0 * ratio,
         p_value,
         shape_p_value: 1.0,
+        modulation: None,
     }
 }
 
@@ -208,13 +220,21 @@ fn independent_part(series: &UniformSeries) -> f64 {
     present / (1.0 + (variance - scatter).max(0.0) / (mean * mean))
 }
 
-/// Refits each resonance over the background without any of them: a strong one biases the first estimate of it.
+/// Refits each resonance over the background without any of them, until that moves it by less than its errors: a strong one biases the
+/// first estimates of it, and those the background.
 fn refit(rest: &Transformed, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
-    for index in 0..resonances.len() {
-        let Some(spectrum) = WhitenedSpectrum::new(rest, known, resonances, Some(index)) else { return };
-        let Resonance { line, lorentz } = resonances[index];
-        if let Some(better) = spectrum.resonance(lorentz.centre, [lorentz.width]) {
-            resonances[index] = Resonance { line: spectrum.resonance_line(&better, line.p_value), lorentz: better };
+    for _ in 0..REFITS {
+        let mut moved = false;
+        for index in 0..resonances.len() {
+            let Some(spectrum) = WhitenedSpectrum::new(rest, known, resonances, Some(index)) else { return };
+            let Resonance { line, lorentz } = resonances[index];
+            if let Some(better) = spectrum.resonance(lorentz.centre, [lorentz.width]) {
+                moved |= better.differs_from(&lorentz);
+                resonances[index] = Resonance { line: spectrum.resonance_line(&better, line.p_value), lorentz: better };
+            }
+        }
+        if !moved {
+            return;
         }
     }
 }
@@ -231,6 +251,54 @@ fn is_residue(line: &SpectralLine, strong: &SpectralLine) -> bool {
 enum Candidate {
     Sine(SpectralLine, Sine),
     Resonance(Resonance),
+}
+
+/// A sinusoid that was removed from the record.
+struct FoundSine {
+    line: SpectralLine,
+    sine: Sine,
+    /// Of the noise around it, unit²/Hz.
+    density: f64,
+}
+
+/// Sets how each of the sinusoids changes over the record of which `rest` is left, and removes those that are sidebands of another.
+fn find_modulations(sines: &mut Vec<FoundSine>, rest: &UniformSeries, resonances: &[Resonance]) {
+    let duration = rest.duration();
+    let mut at = 0;
+    while let Some(found) = sines.get(at) {
+        let frequency = found.sine.frequency;
+        let distance = |other: &FoundSine| other.sine.frequency - frequency;
+        let is_near =
+            |other: &&FoundSine| (1.0..=MOST_PERIODS as f64 + 1.0).contains(&(distance(other).abs() * duration));
+        let near: Vec<&FoundSine> = sines.iter().filter(is_near).filter(|other| other.is_weaker_than(found)).collect();
+        let with_near = near.iter().fold(rest.clone(), |rest, other| other.sine.negative().subtracted_from(&rest));
+        let distances: Vec<f64> = near.iter().map(|other| distance(other)).collect();
+        // On the skirts of a resonance the noise is not white.
+        let is_skirt = |resonance: &Resonance| {
+            let line = &resonance.line;
+            let distance = (line.frequency.value - frequency).abs();
+            line.width.is_some_and(|width| distance < SKIRTS * width.value)
+        };
+        let is_examined = !resonances.iter().any(is_skirt);
+        let modulation = Modulation::find(&found.sine, &with_near, found.density, &distances).filter(|_| is_examined);
+        sines[at].line.modulation = modulation;
+        if let Some(modulation) = modulation {
+            let power = sines[at].line.deviation.value;
+            let is_sideband = |other: &FoundSine| {
+                other.line.deviation.value < power && modulation.is_sideband(other.sine.frequency - frequency, duration)
+            };
+            let before = sines[..at].iter().filter(|other| is_sideband(other)).count();
+            sines.retain(|other| !is_sideband(other));
+            at -= before;
+        }
+        at += 1;
+    }
+}
+
+impl FoundSine {
+    fn is_weaker_than(&self, other: &Self) -> bool {
+        self.line.deviation.value < other.line.deviation.value
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -422,6 +490,7 @@ impl<'a> WhitenedSpectrum<'a> {
             statistic: lorentz.statistic,
             p_value,
             shape_p_value: lorentz.shape_p_value,
+            modulation: None,
         }
     }
 }

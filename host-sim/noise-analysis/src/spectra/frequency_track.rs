@@ -1,0 +1,225 @@
+//! A line whose frequency runs evenly from one end of the record to the other.
+//!
+//! In the spectrum of the whole record its power is spread over all the frequencies that it passes. In the spectra of short segments it is
+//! in one or two ordinates of each, which lie on a straight line over time. The ordinates of all such lines are summed, for
+//! every first frequency and every slope (J. Taylor, "A sensitive method for detecting dispersed radio emission", Astron.
+//! Astrophys. Suppl. 15, 1974: each sum is one of two sums over half as many segments). Of the lengths of segments, that is the
+//! best in which the frequency runs by half of the segment's resolution.
+
+use crate::findings::SIGNIFICANCE;
+use crate::uniform_series::UniformSeries;
+use realfft::RealFftPlanner;
+use statrs::function::gamma::gamma_ur;
+
+/// Numbers of segments that are tried.
+const SEGMENTS: [usize; 4] = [32, 64, 128, 256];
+/// Fewest samples of a segment.
+const FEWEST_SAMPLES: usize = 256;
+/// Ordinates to a resolution of a segment: between two of them a line loses at most 0.9 dB.
+const PADDING: usize = 2;
+/// Lowest frequency, in resolutions of a segment: below, drift leaks.
+const LOWEST: usize = 4;
+/// Fewest ordinates by which the frequency runs over the record: a line that keeps its frequency is in the mean over time.
+const FEWEST_ORDINATES: usize = 8;
+/// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
+const LARGEST: f64 = 32.0;
+
+/// A line whose frequency runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FrequencyTrack {
+    /// At the beginning and at the end of the record, Hz.
+    pub frequencies: [f64; 2],
+    /// Half an ordinate of a segment, Hz: by how much they may be off.
+    pub error: f64,
+    /// Mean of the ordinates on the track over the noise, less 1, and its standard deviation.
+    pub excess: f64,
+    pub excess_error: f64,
+    /// Number of segments.
+    segments: f64,
+    /// Probability of such a mean anywhere by chance.
+    pub p_value: f64,
+}
+
+impl FrequencyTrack {
+    /// The clearest track in a record; `None` if chance explains it.
+    pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
+        let series = series.clone().averaged_until_dithered().detrended();
+        let found = SEGMENTS.into_iter().filter_map(|segments| Self::in_segments(&series, segments));
+        let best = found.min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
+        let p_value = best.p_value * SEGMENTS.len() as f64;
+        (p_value < SIGNIFICANCE).then_some(Self { p_value, ..best })
+    }
+
+    fn in_segments(series: &UniformSeries, segments: usize) -> Option<Self> {
+        let spectrogram = Spectrogram::new(series, segments)?;
+        let rising = spectrogram.rows.clone();
+        let falling = spectrogram.rows.iter().rev().cloned().collect();
+        let [rising, falling] = [rising, falling].map(strongest_line);
+        let (is_rising, line) = if rising.sum > falling.sum { (true, rising) } else { (false, falling) };
+        let columns = spectrogram.rows[0].len();
+        // Rising and falling, from every ordinate by every number of them.
+        let trials = (2 * columns * segments) as f64;
+        let count = segments as f64;
+        let low = spectrogram.frequency(line.first);
+        let high = spectrogram.frequency(line.first + line.drift);
+        Some(Self {
+            frequencies: if is_rising { [low, high] } else { [high, low] },
+            error: 0.5 * spectrogram.spacing,
+            excess: f64::from(line.sum) / count - 1.0,
+            excess_error: 1.0 / count.sqrt(),
+            segments: count,
+            p_value: (trials * gamma_ur(count, f64::from(line.sum))).min(1.0),
+        })
+    }
+
+    /// What a sinusoid of the same energy would be over the noise in the spectrum of the whole record, at least: some is lost between
+    /// the ordinates.
+    pub(crate) fn energy(&self) -> f64 {
+        self.excess * self.segments
+    }
+
+    /// Whether a frequency, Hz, is one that the track passes.
+    pub(crate) fn passes(&self, frequency: f64) -> bool {
+        let [first, last] = self.frequencies;
+        (first.min(last) - self.error..=first.max(last) + self.error).contains(&frequency)
+    }
+}
+
+/// Spectra of equal segments over their mean at each frequency and in each segment.
+struct Spectrogram {
+    /// Of each segment, from the lowest frequency on.
+    rows: Vec<Vec<f32>>,
+    /// Hz between ordinates.
+    spacing: f64,
+}
+
+impl Spectrogram {
+    fn new(series: &UniformSeries, segments: usize) -> Option<Self> {
+        let size = series.values().len() / segments;
+        if size < FEWEST_SAMPLES {
+            return None;
+        }
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(PADDING * size);
+        let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
+        let mut rows: Vec<Vec<f32>> = Vec::with_capacity(segments);
+        for values in series.values().chunks_exact(size).take(segments) {
+            input.fill(0.0);
+            for (slot, value) in input.iter_mut().zip(values) {
+                *slot = if value.is_finite() { *value } else { 0.0 };
+            }
+            // An error means buffers of the wrong length; these are the planner's own.
+            transform.process(&mut input, &mut output).ok()?;
+            rows.push(output[PADDING * LOWEST..output.len() - 1].iter().map(|bin| bin.norm_sqr() as f32).collect());
+        }
+        let columns = rows.first()?.len();
+        let mut by_column = vec![0.0_f32; columns];
+        for row in &rows {
+            by_column.iter_mut().zip(row).for_each(|(sum, power)| *sum += power / segments as f32);
+        }
+        for row in &mut rows {
+            let mut level = 0.0;
+            for (power, mean) in row.iter_mut().zip(&by_column) {
+                *power = if *mean > 0.0 { *power / mean } else { 0.0 };
+                level += *power / columns as f32;
+            }
+            let scale = if level > 0.0 { level.recip() } else { 0.0 };
+            row.iter_mut().for_each(|power| *power = (*power * scale).min(LARGEST as f32));
+        }
+        Some(Self { rows, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
+    }
+
+    /// Of an ordinate, Hz.
+    fn frequency(&self, column: usize) -> f64 {
+        (PADDING * LOWEST + column) as f64 * self.spacing
+    }
+}
+
+/// A straight line through rows of ordinates.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    first: usize,
+    /// Ordinates from the first row to the last.
+    drift: usize,
+    sum: f32,
+}
+
+/// The line with the largest sum over all rows, whose number is a power of two, of those that rise by at least
+/// [`FEWEST_ORDINATES`] and by at most one ordinate a row.
+fn strongest_line(rows: Vec<Vec<f32>>) -> Line {
+    let columns = rows[0].len();
+    // Of each group of rows the sums by the drift over it.
+    let mut groups: Vec<Vec<Vec<f32>>> = rows.into_iter().map(|row| vec![row]).collect();
+    while groups.len() > 1 {
+        groups = groups
+            .chunks_exact(2)
+            .map(|pair| {
+                let drifts = 2 * pair[0].len();
+                let line = |drift: usize| {
+                    let (half, shift) = (drift / 2, drift.div_ceil(2));
+                    let (first, second) = (&pair[0][half], &pair[1][half]);
+                    // A line that leaves the spectrum has no sum.
+                    let mut sums = vec![0.0; columns];
+                    for (sum, (a, b)) in sums.iter_mut().zip(first.iter().zip(&second[shift.min(columns)..])) {
+                        *sum = if *a > 0.0 && *b > 0.0 { a + b } else { 0.0 };
+                    }
+                    sums
+                };
+                (0..drifts).map(line).collect()
+            })
+            .collect();
+    }
+    let mut best = Line { first: 0, drift: 0, sum: 0.0 };
+    for (drift, sums) in groups.iter().flatten().enumerate().skip(FEWEST_ORDINATES) {
+        for (first, &sum) in sums.iter().enumerate() {
+            if sum > best.sum {
+                best = Line { first, drift, sum };
+            }
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 1 << 17;
+    const RATE_HZ: f64 = 200.0;
+
+    /// White noise of deviation 1 with a sinusoid of this amplitude from one frequency to another, and a steady one.
+    fn series(seed: u64, amplitude: f64, [first, last]: [f64; 2]) -> UniformSeries {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let duration_s = SAMPLES as f64 / RATE_HZ;
+        let value = |at: usize| {
+            let time_s = at as f64 / RATE_HZ;
+            let turns = (first + 0.5 * (last - first) * time_s / duration_s) * time_s;
+            amplitude * (TAU * turns).sin() + (TAU * 31.0 * time_s).sin() + random.sample::<f64, _>(StandardNormal)
+        };
+        UniformSeries::new(1.0 / RATE_HZ, (0..SAMPLES).map(value).collect())
+    }
+
+    #[test]
+    fn a_frequency_that_runs_up_or_down_is_found() {
+        for (seed, frequencies) in [(1, [5.0, 15.0]), (2, [50.0, 20.0]), (3, [3.0, 6.0])] {
+            // 0.07²·SAMPLES/4 = 160 over 128 segments at most: an excess of 1, less than half of which is lost between the ordinates, is
+            // five and more standard deviations.
+            let found = FrequencyTrack::find(&series(seed, 0.07, frequencies)).expect("clear");
+            for (found_hz, expected) in found.frequencies.into_iter().zip(frequencies) {
+                // Two ordinates of the longest spectra that resolve it, of 128 segments: 0.2 Hz.
+                assert!((found_hz - expected).abs() < 0.5, "{found:?}");
+            }
+            assert!(found.passes(0.5 * (frequencies[0] + frequencies[1])) && !found.passes(90.0));
+        }
+    }
+
+    #[test]
+    fn steady_lines_and_noise_are_none() {
+        for seed in 10..30 {
+            assert_eq!(FrequencyTrack::find(&series(seed, 0.0, [1.0, 1.0])), None, "{seed}");
+        }
+    }
+}

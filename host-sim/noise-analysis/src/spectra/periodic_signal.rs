@@ -1,0 +1,318 @@
+//! A slow periodic signal that is no sinusoid, by the sum of the harmonics of one frequency.
+//!
+//! A thermostat or a pump that comes on every minute has a few periods in a record, and harmonics each of which is too weak for
+//! a line of its own, or is one of a few that look like unrelated sinusoids. Together they stand out of the ordinates between them
+//! (the harmonic sum of pulsar searches: J. Taylor and G. Huguenin, "Two new pulsating radio sources", Nature 221, 1969). The noise is a
+//! sum of white and random-walk noise and of Markov processes, fitted to the ordinates between the harmonics.
+
+use super::line_models::Sine;
+use super::periodogram::taper;
+use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use crate::distributions::NORMAL_975;
+use crate::findings::{Parameter, SIGNIFICANCE};
+use crate::uniform_series::UniformSeries;
+use realfft::RealFftPlanner;
+use statrs::function::beta::beta_reg;
+use statrs::function::gamma::gamma_ur;
+
+/// Blocks of the record, at least: twice the highest harmonic is half their rate.
+const BLOCKS: usize = 1024;
+/// Harmonics in the sum, the fundamental among them.
+const HARMONICS: usize = 8;
+/// Lowest and highest fundamental, in periods per record. Between the harmonics of a lower one there is no ordinate that none of
+/// them reaches; a higher one has harmonics that are lines by themselves.
+const FEWEST_PERIODS: usize = 4;
+const MOST_PERIODS: usize = 32;
+/// Ordinates to a resolution: the eighth harmonic of a frequency is at most a quarter of a resolution off its ordinate.
+const PADDING: usize = 16;
+/// Steps of the fundamental to a resolution.
+const STEPS: usize = 16;
+/// Distance from a harmonic beyond which an ordinate shows the noise, in resolutions: the first null of the taper's lobe.
+const LOBE: f64 = 1.2;
+/// Frequencies that are examined, those with the largest sums over the noise that is fitted to all ordinates.
+const EXAMINED: usize = 8;
+/// Corners of the Markov processes of the noise, in periods per record, from the least on, each twice the one before.
+const LEAST_CORNER: f64 = 2.0;
+const CORNERS: usize = 7;
+/// White noise, a random walk and the Markov processes.
+const TERMS: usize = 2 + CORNERS;
+/// Largest probability by chance of the sum of the even harmonics, which a square wave lacks, and of that of the odd ones, which the harmonics of
+/// twice the frequency lack.
+const EVEN_BY_CHANCE: f64 = 1e-3;
+const ODD_BY_CHANCE: f64 = 0.05;
+/// Largest part of one harmonic in the sum: a line of another cause at a multiple would be all of it.
+const LARGEST_SHARE: f64 = 0.8;
+/// Least power of the fundamental over the noise: the sum of its harmonics alone could be that of a multiple of it.
+const LEAST_FUNDAMENTAL: f64 = 4.0;
+
+/// A periodic signal with harmonics.
+#[derive(Debug, Clone)]
+pub(crate) struct PeriodicSignal {
+    /// Of the fundamental, Hz.
+    pub frequency: Parameter,
+    /// Deviation of the harmonics over that of the fundamental, %.
+    pub harmonics_percent: Parameter,
+    /// Sum of the ordinates of the harmonics without the fundamental, over the noise.
+    pub sum: f64,
+    /// Probability of such a sum at any frequency by chance.
+    pub p_value: f64,
+}
+
+impl PeriodicSignal {
+    /// The clearest one in a record; `None` if chance explains it.
+    pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
+        let size = series.values().len() / BLOCKS;
+        if size == 0 {
+            return None;
+        }
+        let blocks = series.averaged(size).detrended();
+        let spectrum = PaddedSpectrum::new(&blocks)?;
+        let noise = spectrum.noise(None)?;
+        let candidates = STEPS * FEWEST_PERIODS..=STEPS * MOST_PERIODS;
+        let mut sums: Vec<(f64, f64)> = candidates
+            .clone()
+            .map(|step| {
+                let fundamental = step as f64 / STEPS as f64;
+                let ratios: Vec<f64> =
+                    (1..=HARMONICS).map(|number| spectrum.ratio(&noise, number, fundamental)).collect();
+                (ratios.iter().sum::<f64>() - ratios.iter().copied().fold(0.0, f64::max), fundamental)
+            })
+            .collect();
+        sums.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Frequencies within half a resolution of the highest harmonic are one.
+        let trials = candidates.count() as f64 * HARMONICS as f64 / STEPS as f64;
+        let examined = sums
+            .iter()
+            .take(EXAMINED)
+            .filter_map(|(_, fundamental)| Self::examine(&blocks, &spectrum, *fundamental, trials));
+        examined.min_by(|a, b| a.p_value.total_cmp(&b.p_value)).filter(|found| found.p_value < SIGNIFICANCE)
+    }
+
+    /// Examines one fundamental, in resolutions: the harmonics are those of the record without it, into which it would leak.
+    fn examine(blocks: &UniformSeries, spectrum: &PaddedSpectrum, fundamental: f64, trials: f64) -> Option<Self> {
+        let resolution = 1.0 / blocks.duration();
+        let sine = Sine::fit_near(blocks, fundamental * resolution, resolution / PADDING as f64);
+        let rest = PaddedSpectrum::new(&sine.subtracted_from(blocks).detrended())?;
+        let (noise, between) = rest.noise(Some(fundamental)).map(|noise| (noise, rest.between(fundamental)))?;
+        let ratios: Vec<f64> = (2..=HARMONICS).map(|number| rest.ratio(&noise, number, fundamental)).collect();
+        let sum: f64 = ratios.iter().sum();
+        let by_chance = |first: usize| {
+            let (count, sum) =
+                ratios.iter().skip(first).step_by(2).fold((0.0, 0.0), |(n, sum), of| (n + 1.0, sum + of));
+            gamma_ur(count, sum)
+        };
+        // The first of them is the second harmonic.
+        let has_both = by_chance(0) < EVEN_BY_CHANCE && by_chance(1) < ODD_BY_CHANCE;
+        let largest = ratios.iter().copied().fold(0.0, f64::max) / sum;
+        let excess = |spectrum: &PaddedSpectrum, number: usize| {
+            spectrum.density(number as f64 * fundamental) - noise.density(number as f64 * fundamental)
+        };
+        let first = excess(spectrum, 1);
+        let powers: Vec<f64> = (2..=HARMONICS).map(|number| excess(&rest, number)).collect();
+        let is_fundamental =
+            first > (LEAST_FUNDAMENTAL - 1.0) * noise.density(fundamental) && powers.iter().all(|power| *power < first);
+        if !is_fundamental || !has_both || largest > LARGEST_SHARE {
+            return None;
+        }
+        // Sums of exponential variables, of which those between the harmonics have given the level.
+        let (above, below) = (ratios.len() as f64, between as f64);
+        let p_value = (trials * beta_reg(below, above, below / (below + sum))).min(1.0);
+        let percent = 100.0 * (powers.iter().sum::<f64>().max(0.0) / first).sqrt();
+        let relative = NORMAL_975 / (2.0 * sum).sqrt();
+        // Cramér-Rao bound of the fundamental alone.
+        let error = NORMAL_975 * 1.5f64.sqrt() * resolution
+            / (std::f64::consts::PI * (first / noise.density(fundamental)).sqrt());
+        Some(Self {
+            frequency: Parameter::new(sine.frequency, sine.frequency - error, sine.frequency + error, "Hz"),
+            harmonics_percent: Parameter::new(
+                percent,
+                percent * (1.0 - relative).max(0.0),
+                percent * (1.0 + relative),
+                "%",
+            ),
+            sum,
+            p_value,
+        })
+    }
+
+    /// Whether a frequency, Hz, is a multiple of the signal's within `within` Hz.
+    pub(crate) fn has(&self, frequency: f64, within: f64) -> bool {
+        let multiple = (frequency / self.frequency.value).round().max(1.0);
+        (frequency - multiple * self.frequency.value).abs() < within
+    }
+
+    /// Whether a frequency, Hz, is between the fundamental, or half an octave below it, and the highest harmonic that was examined.
+    pub(crate) fn reaches(&self, frequency: f64) -> bool {
+        (std::f64::consts::FRAC_1_SQRT_2..=HARMONICS as f64).contains(&(frequency / self.frequency.value))
+    }
+
+    /// Harmonics that were examined.
+    pub(crate) fn harmonics(&self) -> f64 {
+        HARMONICS as f64
+    }
+
+    /// Its period, s.
+    pub(crate) fn period_s(&self) -> f64 {
+        1.0 / self.frequency.value
+    }
+}
+
+/// A periodogram with [`PADDING`] ordinates to a resolution.
+struct PaddedSpectrum {
+    power: Vec<f64>,
+}
+
+/// A smooth density, by its terms.
+struct SmoothNoise {
+    densities: [f64; TERMS],
+}
+
+/// Values of the terms of the noise at an order in periods per record.
+fn basis(order: f64) -> [f64; TERMS] {
+    std::array::from_fn(|term| match term {
+        0 => 1.0,
+        1 => 1.0 / (order * order),
+        term => {
+            let corner = LEAST_CORNER * (1_u32 << (term - 2)) as f64;
+            1.0 / (1.0 + (order / corner).powi(2))
+        }
+    })
+}
+
+impl SmoothNoise {
+    fn density(&self, order: f64) -> f64 {
+        mixture_density(&basis(order), &self.densities)
+    }
+}
+
+impl PaddedSpectrum {
+    fn new(blocks: &UniformSeries) -> Option<Self> {
+        let values = blocks.values();
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(PADDING * values.len());
+        let mut input = transform.make_input_vec();
+        let mut squares = 0.0;
+        for (at, (slot, value)) in input.iter_mut().zip(values).enumerate() {
+            if value.is_finite() {
+                let weight = taper(at, values.len());
+                *slot = weight * value;
+                squares += weight * weight;
+            }
+        }
+        let mut output = transform.make_output_vec();
+        // An error means buffers of the wrong length; these are the planner's own.
+        transform.process(&mut input, &mut output).ok()?;
+        (squares > 0.0).then(|| Self { power: output.iter().map(|bin| bin.norm_sqr() / squares).collect() })
+    }
+
+    /// The ordinate nearest to an order in periods per record.
+    fn density(&self, order: f64) -> f64 {
+        self.power.get((order * PADDING as f64).round() as usize).copied().unwrap_or(0.0)
+    }
+
+    /// The ordinate of a harmonic over the noise.
+    fn ratio(&self, noise: &SmoothNoise, number: usize, fundamental: f64) -> f64 {
+        let order = number as f64 * fundamental;
+        self.density(order) / noise.density(order)
+    }
+
+    /// Orders of the independent ordinates up to twice the highest harmonic, without those that harmonics of `fundamental` reach.
+    fn orders(&self, fundamental: Option<f64>) -> impl Iterator<Item = usize> {
+        let last = (2 * HARMONICS * MOST_PERIODS).min((self.power.len() - 1) / PADDING);
+        (1..last).filter(move |&order| {
+            fundamental.is_none_or(|fundamental| {
+                let order = order as f64;
+                (order - (order / fundamental).round() * fundamental).abs() > LOBE
+            })
+        })
+    }
+
+    /// The noise by the ordinates that the harmonics of `fundamental` do not reach, or by all of them.
+    fn noise(&self, fundamental: Option<f64>) -> Option<SmoothNoise> {
+        let mut bands: Vec<(usize, f64, f64, f64)> = Vec::new();
+        for order in self.orders(fundamental) {
+            let density = self.density(order as f64);
+            match bands.last_mut() {
+                // A band is an eighth of its frequency wide.
+                Some((first, orders, sum, count)) if order < *first + *first / 8 + 1 => {
+                    (*orders, *sum, *count) = (*orders + order as f64, *sum + density, *count + 1.0);
+                }
+                _ => bands.push((order, order as f64, density, 1.0)),
+            }
+        }
+        let bands: Vec<SpectralBand> = bands
+            .into_iter()
+            .map(|(_, orders, sum, count)| SpectralBand {
+                frequency: orders / count,
+                density: sum / count,
+                ordinates: count,
+            })
+            .collect();
+        let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| basis(band.frequency)).collect();
+        let mut densities = [0.0; TERMS];
+        fit_mixture(&bands, &bases, &mut densities);
+        (bands.len() >= TERMS && densities.iter().sum::<f64>() > 0.0).then_some(SmoothNoise { densities })
+    }
+
+    /// Number of ordinates between the harmonics of `fundamental`, up to twice the highest.
+    fn between(&self, fundamental: f64) -> usize {
+        let highest = 2.0 * HARMONICS as f64 * fundamental;
+        self.orders(Some(fundamental)).filter(|&order| (order as f64) < highest).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    /// 16 samples a block: white noise of deviation 1, a random walk with steps of deviation `step`, and a signal of the phase in turns.
+    fn series(seed: u64, step: f64, signal: impl Fn(f64) -> f64) -> UniformSeries {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let samples = 16 * BLOCKS;
+        let mut walk = 0.0;
+        let value = |at: usize| {
+            walk += step * random.sample::<f64, _>(StandardNormal);
+            walk + random.sample::<f64, _>(StandardNormal) + signal(at as f64 / samples as f64)
+        };
+        UniformSeries::new(0.1, (0..samples).map(value).collect())
+    }
+
+    #[test]
+    fn a_sawtooth_is_found_among_few_periods() {
+        for (seed, periods) in [(1, 5.3), (2, 9.0), (3, 17.7)] {
+            // Amplitudes 0.6/(πk): ordinates of 16·1024/4·0.36/(πk)², 149/k², over the white noise, of which the second to the eighth have 79
+            // together; the walk is as large as the white noise at 5 periods per record.
+            let found = PeriodicSignal::find(&series(seed, 0.002, |turn| 0.6 * ((periods * turn).fract() - 0.5)))
+                .expect("some ten times the noise");
+            let duration_s = 0.1 * 16.0 * BLOCKS as f64;
+            // Known to less than a tenth of the resolution.
+            assert!((found.frequency.value * duration_s - periods).abs() < 0.2, "{periods}: {found:?}");
+            assert!(found.has(3.0 * periods / duration_s, 1.0 / duration_s));
+        }
+    }
+
+    #[test]
+    fn sinusoids_square_waves_and_noise_are_none() {
+        let square = |turn: f64| 0.2 * (TAU * 7.3 * turn).sin().signum();
+        let sinusoid = |turn: f64| (TAU * 6.4 * turn).sin();
+        let two = |turn: f64| 0.3 * (TAU * 9.4 * turn).sin() + 0.3 * (TAU * 28.2 * turn).sin();
+        let found = |seed: u64| {
+            let of =
+                |step: f64, signal: &dyn Fn(f64) -> f64| PeriodicSignal::find(&series(seed, step, signal)).is_some();
+            [
+                of(0.01, &square),
+                of(0.01, &sinusoid),
+                of(0.0, &two),
+                of(0.01, &|_| 0.0),
+                of(0.0, &|_| 0.0),
+                of(0.1, &|_| 0.0),
+            ]
+        };
+        for seed in 10..40 {
+            assert_eq!(found(seed), [false; 6], "{seed}");
+        }
+    }
+}

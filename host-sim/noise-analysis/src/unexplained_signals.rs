@@ -1,0 +1,175 @@
+//! Signals in the samples of a channel that no effect of a name has: a slow periodic one that is no sinusoid, and a line whose
+//! frequency runs. What was named in their place is taken back.
+
+use crate::distributions::NORMAL_975;
+use crate::findings::{Effect, Parameter};
+use crate::spectra::frequency_track::FrequencyTrack;
+use crate::spectra::periodic_signal::PeriodicSignal;
+use crate::spectral_lines::MergedLine;
+use crate::uniform_series::UniformSeries;
+
+/// Shortest time constant of a process, in periods of a periodic signal, that may be the signal's: its jumps and slopes have the
+/// spectrum of one with its time scale.
+const LEAST_OF_PERIOD: f64 = 0.02;
+/// Time constants of a process, in periods of a line, that may be the line's: the Allan deviation of the process is largest at 1.89 time
+/// constants, that of the line at 0.37 periods, and octaves tell either to a factor of 4.
+const OF_TRACK_PERIOD: [f64; 2] = [0.05, 0.8];
+
+/// The signals of one channel.
+pub(crate) struct UnexplainedSignals {
+    periodic: Option<PeriodicSignal>,
+    track: Option<FrequencyTrack>,
+}
+
+impl UnexplainedSignals {
+    /// Those of `series`, a channel's samples less its covariates. `lines` are those of its spectrum; those that are a part of one
+    /// of the signals are removed from them. `bands_of_curve` are the frequencies of the resonances of the curve, Hz, with what they
+    /// take off its deviance.
+    pub(crate) fn find(series: &UniformSeries, lines: &mut Vec<MergedLine>, bands_of_curve: &[(f64, f64)]) -> Self {
+        let periodic = PeriodicSignal::find(series);
+        let resolution = 1.0 / series.duration();
+        if let Some(periodic) = &periodic {
+            lines.retain(|line| !periodic.has(line.frequency.value, resolution));
+        }
+        // A stronger band in its range is a frequency that wanders, of which a straight track holds a part.
+        let is_told = |track: &FrequencyTrack| {
+            let of_lines = lines.iter().filter(|line| line.width.value > 0.0);
+            let of_lines = of_lines.map(|line| (line.frequency.value, line.statistic));
+            let mut bands = of_lines.chain(bands_of_curve.iter().copied());
+            bands.any(|(frequency, statistic)| track.passes(frequency) && 0.5 * statistic > track.energy())
+        };
+        let track = FrequencyTrack::find(series).filter(|track| !is_told(track));
+        if let Some(track) = &track {
+            lines.retain(|line| !track.passes(line.frequency.value) || 0.5 * line.statistic > track.energy());
+        }
+        Self { periodic, track }
+    }
+
+    /// None, of a channel that is not traced.
+    pub(crate) fn none() -> Self {
+        Self { periodic: None, track: None }
+    }
+
+    /// Whether what an effect of the channel tells is a part of one of the signals. `lines` are the other lines of the spectrum; those
+    /// of the curve are known to an octave.
+    pub(crate) fn has(&self, effect: &Effect, lines: &[MergedLine]) -> bool {
+        match effect.kind.as_str() {
+            "markov" | "telegraph" => effect.parameters.get("time_constant").is_some_and(|time| {
+                let is_periodic = |periodic: &PeriodicSignal| time.value > LEAST_OF_PERIOD * periodic.period_s();
+                let is_track = |track: &FrequencyTrack| {
+                    let [least, most] = OF_TRACK_PERIOD;
+                    let [first, last] = track.frequencies;
+                    (least / first.max(last)..=most / first.min(last)).contains(&time.value)
+                };
+                self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track)
+            }),
+            "sinusoid" | "resonance" => effect.parameters.get("frequency").is_some_and(|frequency| {
+                let is_in_spectrum = lines.iter().any(|line| line.frequency.value == frequency.value);
+                let is_periodic = |periodic: &PeriodicSignal| periodic.reaches(frequency.value);
+                let is_track = |track: &FrequencyTrack| track.passes(frequency.value);
+                let is_part =
+                    self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track);
+                is_part && !is_in_spectrum
+            }),
+            "rate_ramp" => self.periodic.is_some(),
+            _ => false,
+        }
+    }
+
+    /// As they are reported.
+    pub(crate) fn effects(&self) -> impl Iterator<Item = Effect> {
+        self.periodic.as_ref().map(periodic_effect).into_iter().chain(self.track.as_ref().map(track_effect))
+    }
+}
+
+fn periodic_effect(periodic: &PeriodicSignal) -> Effect {
+    let evidence = format!(
+        "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, {:.0} times the noise, by \
+         chance at any period {:.0e}",
+        periodic.period_s(),
+        periodic.harmonics_percent.value,
+        periodic.sum,
+        periodic.p_value,
+    );
+    let count = periodic.harmonics();
+    let parameters = [
+        ("frequency", periodic.frequency.clone()),
+        ("excess_percent", periodic.harmonics_percent.clone()),
+        ("harmonics", Parameter::new(count, count, count, "")),
+    ];
+    Effect::new("unexplained", parameters, evidence)
+}
+
+fn track_effect(track: &FrequencyTrack) -> Effect {
+    let [first, last] = track.frequencies;
+    let middle = 0.5 * (first + last);
+    let frequency = Parameter::new(middle, first.min(last) - track.error, first.max(last) + track.error, "Hz");
+    // Of the Allan deviation of what a filter around the line would pass.
+    let percent = |excess: f64| 100.0 * ((1.0 + excess.max(0.0)).sqrt() - 1.0);
+    let half = NORMAL_975 * track.excess_error;
+    let excess = Parameter::new(percent(track.excess), percent(track.excess - half), percent(track.excess + half), "%");
+    let evidence = format!(
+        "a line whose frequency runs from {first:.2} to {last:.2} Hz over the record, {:+.0} % of the noise of short spectra, by chance \
+         anywhere {:.0e}: a speed that changes",
+        100.0 * track.excess,
+        track.p_value,
+    );
+    Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::UnexplainedSignals;
+    use crate::findings::{Effect, Parameter};
+    use crate::uniform_series::UniformSeries;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 40_000;
+    const RATE_HZ: f64 = 100.0;
+
+    /// White noise of deviation 1 over 400 s with a signal of the time.
+    fn signals(signal: impl Fn(f64) -> f64) -> UnexplainedSignals {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let value = |at: usize| signal(at as f64 / RATE_HZ) + random.sample::<f64, _>(StandardNormal);
+        let series = UniformSeries::new(1.0 / RATE_HZ, (0..SAMPLES).map(value).collect());
+        UnexplainedSignals::find(&series, &mut Vec::new(), &[])
+    }
+
+    fn effect(kind: &str, name: &'static str, value: f64) -> Effect {
+        Effect::new(kind, [(name, Parameter::new(value, value, value, ""))], String::new())
+    }
+
+    #[test]
+    fn names_in_the_place_of_a_slow_signal_are_taken_back() {
+        // Harmonics of 40,000/4·(0.3/(πk))², 91/k², over the noise.
+        let of_40_s = signals(|time_s| 0.3 * (time_s / 40.0).fract());
+        let found: Vec<Effect> = of_40_s.effects().collect();
+        let [effect_of_40_s] = &found[..] else { panic!("{found:?}") };
+        assert_eq!(effect_of_40_s.kind, "unexplained");
+        // The resolution is 2.5 mHz, of which the frequency is known to a tenth.
+        assert!((effect_of_40_s.parameters["frequency"].value - 0.025).abs() < 0.000_25, "{found:?}");
+        assert!(of_40_s.has(&effect("markov", "time_constant", 9.0), &[]));
+        assert!(of_40_s.has(&effect("resonance", "frequency", 0.05), &[]));
+        assert!(!of_40_s.has(&effect("markov", "time_constant", 0.05), &[]));
+        assert!(!of_40_s.has(&effect("resonance", "frequency", 2.0), &[]));
+    }
+
+    #[test]
+    fn names_in_the_place_of_a_running_frequency_are_taken_back() {
+        // 0.15²·40,000/4 = 225 over the noise.
+        let running = signals(|time_s| 0.15 * (TAU * (4.0 + 0.005 * time_s) * time_s).sin());
+        let found: Vec<Effect> = running.effects().collect();
+        let [track] = &found[..] else { panic!("{found:?}") };
+        // From 4 to 8 Hz, within the ordinates of 64 segments of 6.25 s.
+        let frequency = &track.parameters["frequency"];
+        assert!((frequency.low - 4.0).abs() < 0.2 && (frequency.high - 8.0).abs() < 0.2, "{track:?}");
+        assert!(running.has(&effect("resonance", "frequency", 6.0), &[]));
+        assert!(running.has(&effect("markov", "time_constant", 0.05), &[]));
+        assert!(!running.has(&effect("markov", "time_constant", 5.0), &[]));
+        assert!(!running.has(&effect("resonance", "frequency", 12.0), &[]));
+        assert_eq!(signals(|_| 0.0).effects().count(), 0);
+    }
+}
