@@ -36,7 +36,7 @@ use crate::parallel;
 
 /// Offset of the sealed seeds from the open ones. The method has been changed after those at 2⁴⁰, at 2⁴¹ and at 2⁴² were run, and
 /// those at 2⁴⁰ and 2⁴¹ were recordings of the virtual sensor; so these are no longer used.
-const SEALED: u64 = 1 << 43;
+const SEALED: u64 = 1 << 44;
 /// Number of seeds that are reserved for each group of recordings.
 pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
