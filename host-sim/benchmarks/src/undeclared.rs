@@ -34,7 +34,7 @@ pub use table::{Proportion, STRONG, ScoreTable};
 
 use crate::parallel;
 
-/// Offset of the sealed seeds from the open ones. The method has been changed after those at 2⁴⁰, at 2⁴¹ and at 2⁴² were run, and
+/// Offset of the sealed seeds from the open ones. The method has been changed after those at 2⁴⁰, 2⁴¹, 2⁴² and 2⁴³ were run, and
 /// those at 2⁴⁰ and 2⁴¹ were recordings of the virtual sensor; so these are no longer used.
 const SEALED: u64 = 1 << 44;
 /// Number of seeds that are reserved for each group of recordings.
