@@ -7,7 +7,7 @@ use crate::{many, streaming};
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
 use noise_analysis::analysis::{analyze, analyze_long};
-use noise_analysis::long_record::MOST_PERIODS;
+use noise_analysis::long_record::MOST_SAMPLES;
 use noise_analysis::report::Report;
 use noise_analysis::several::{self, NoiseAgreement, NoiseInflation};
 use recordings::any_sensor::{ReadOptions, SensorRecording};
@@ -113,8 +113,8 @@ fn report(
         bar.finish_and_clear();
         return Ok(report);
     }
-    let mut stream = open_stream(recording, monitor, KeptInMemory { rows: MOST_PERIODS, irregular: true })?;
-    if stream.description().periods <= MOST_PERIODS {
+    let mut stream = open_stream(recording, monitor, KeptInMemory { rows: MOST_SAMPLES, irregular: true })?;
+    if stream.is_in_memory() && stream.description().samples <= MOST_SAMPLES {
         end_reading(&stream);
         let bar = progress::analysing(None);
         let report = analyze(stream.beginning());

@@ -1,6 +1,8 @@
-//! Tail probabilities, quantiles and bounds of the normal and of the Poisson distribution.
+//! Tail probabilities, quantiles and bounds of the normal, the Poisson and the exponential distribution.
 
 use statrs::distribution::{Continuous, ContinuousCDF, DiscreteCDF, Normal, Poisson};
+use statrs::function::beta::checked_beta_reg;
+use statrs::function::gamma::checked_gamma_ur;
 
 pub use allan_core::confidence::NORMAL_975;
 
@@ -19,6 +21,18 @@ pub fn quantile(probability: f64) -> f64 {
     -Normal::standard().inverse_cdf(probability)
 }
 
+/// Probability that the sum of `count` exponential variables of mean 1 exceeds `sum`; 1 where that is no positive number.
+pub(crate) fn exponential_sum_tail(count: f64, sum: f64) -> f64 {
+    checked_gamma_ur(count, sum).ok().filter(|tail| !tail.is_nan()).unwrap_or(1.0)
+}
+
+/// Probability that the mean of `above` exponential variables exceeds `ratio` times the mean of `below` others; 1 where one of these is
+/// no positive number.
+pub(crate) fn mean_ratio_tail(ratio: f64, above: f64, below: f64) -> f64 {
+    let tail = checked_beta_reg(below, above, below / (below + above * ratio));
+    tail.ok().filter(|tail| !tail.is_nan()).unwrap_or(1.0)
+}
+
 /// Probability that a Poisson number of the given mean is `count` or more.
 pub fn poisson_tail(count: u64, mean: f64) -> f64 {
     match (count, Poisson::new(mean)) {
@@ -35,4 +49,23 @@ pub(crate) fn poisson_bounds(count: f64) -> (f64, f64) {
     let bound = |count: f64, z: f64| count * (1.0 - 1.0 / (9.0 * count) + z / (3.0 * count.sqrt())).powi(3);
     let low = if count > 0.0 { bound(count, -NORMAL_975).max(0.0) } else { 0.0 };
     (low, bound(count + 1.0, NORMAL_975))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{exponential_sum_tail, mean_ratio_tail};
+
+    #[test]
+    fn tails_of_exponential_variables() {
+        // One of them exceeds 2 with e⁻²; of two, the first is twice the second with 1/3.
+        assert!((exponential_sum_tail(1.0, 2.0) - (-2.0f64).exp()).abs() < 1e-12);
+        assert!((mean_ratio_tail(2.0, 1.0, 1.0) - 1.0 / 3.0).abs() < 1e-12);
+        // A channel that never changes has sums and means of 0, or none.
+        for sum in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(exponential_sum_tail(3.0, sum), 1.0);
+        }
+        for (ratio, above, below) in [(f64::NAN, 1.0, 1.0), (2.0, 0.0, 1.0), (2.0, 1.0, 0.0)] {
+            assert_eq!(mean_ratio_tail(ratio, above, below), 1.0);
+        }
+    }
 }

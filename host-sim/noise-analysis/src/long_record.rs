@@ -24,8 +24,8 @@ use crate::traced_record::{Condensed, TracedRecord};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
 use std::collections::BTreeMap;
 
-/// Sample periods of the longest recording that is analysed whole.
-pub const MOST_PERIODS: u64 = 1 << 20;
+/// Samples of the longest recording that is analysed without being condensed.
+pub const MOST_SAMPLES: u64 = 1 << 20;
 /// Means of a longer recording, at most.
 const MOST_MEANS: u64 = 1 << 19;
 /// Sample periods at the start of the recording whose samples are analysed: a line of a faster rate than that of the means has as

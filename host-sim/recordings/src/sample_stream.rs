@@ -238,6 +238,12 @@ impl SampleStream {
         &self.notes
     }
 
+    /// Whether the recording is held in memory: its [beginning](Self::beginning) is all of it.
+    #[must_use]
+    pub fn is_in_memory(&self) -> bool {
+        matches!(self.content, Content::Held)
+    }
+
     /// The file that is read in blocks; `None` of a recording that is in memory.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {

@@ -115,6 +115,26 @@ fn curves_and_baseline_models_without_time_stamps_are_those_of_the_whole_analysi
     assert_eq!(arguments(&plain), arguments(&zipped));
 }
 
+/// The whole analysis condenses a recording of more than 2²⁰ samples, whose curves are still those of all of them.
+#[test]
+fn curves_of_a_long_recording_are_those_of_the_whole_analysis() {
+    let dir = tempdir().expect("a folder");
+    let mut random = ChaCha8Rng::seed_from_u64(22);
+    let mut table = "sample,gyro_x_counts\n".to_owned();
+    let rows = (0..1_070_000).filter(|row| row % 401 != 7 && !(700_000..703_000).contains(row));
+    for row in rows {
+        writeln!(table, "{row},{}", (8.0 * noise(&mut random)).round()).expect("memory");
+    }
+    let file = write(&dir, "long.csv", table.as_bytes());
+    let reports = both(&dir, &file, &["--rate", "100"]);
+    assert_same_curves(&reports, 0.0);
+    let [whole, _] = &reports;
+    assert_eq!(whole["samples"], table.lines().count() - 1);
+    let findings = whole["findings"].as_array().expect("findings");
+    assert!(findings.iter().all(|finding| finding["kind"] == "dropped_samples"), "{findings:?}");
+    assert!(whole["channels"][0]["spectrum"].is_object());
+}
+
 #[test]
 fn curves_with_gaps_are_those_of_the_whole_analysis() {
     let dir = tempdir().expect("a folder");

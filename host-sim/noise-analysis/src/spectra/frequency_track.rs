@@ -6,10 +6,10 @@
 //! Astrophys. Suppl. 15, 1974: each sum is one of two sums over half as many segments). Of the lengths of segments, that is the
 //! best in which the frequency runs by half of the segment's resolution.
 
+use crate::distributions::exponential_sum_tail;
 use crate::findings::SIGNIFICANCE;
 use crate::uniform_series::UniformSeries;
 use realfft::RealFftPlanner;
-use statrs::function::gamma::gamma_ur;
 
 /// Numbers of segments that are tried.
 const SEGMENTS: [usize; 4] = [32, 64, 128, 256];
@@ -68,7 +68,7 @@ impl FrequencyTrack {
             excess: f64::from(line.sum) / count - 1.0,
             excess_error: 1.0 / count.sqrt(),
             segments: count,
-            p_value: (trials * gamma_ur(count, f64::from(line.sum))).min(1.0),
+            p_value: (trials * exponential_sum_tail(count, f64::from(line.sum))).min(1.0),
         })
     }
 

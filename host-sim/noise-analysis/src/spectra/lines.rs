@@ -9,9 +9,9 @@ use super::line_envelope::{MOST_PERIODS, Modulation};
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, LocalLevel, WINDOW, median};
+use crate::distributions::mean_ratio_tail;
 use crate::findings::MeasuredValue;
 use crate::uniform_series::UniformSeries;
-use statrs::function::beta::beta_reg;
 use std::f64::consts::PI;
 
 /// Probability that a record without lines yields one sinusoid or more, and the same again for a resonance.
@@ -504,9 +504,4 @@ fn neighbourhood(averages: &[f64], at: usize, size: usize) -> LocalLevel {
     // 2/π of them.
     let value = median(&mut window) / (1.0 - 1.0 / (3.0 * size as f64));
     LocalLevel { value, ordinates: (window.len() * size) as f64 * 2.0 / PI }
-}
-
-/// Probability that the mean of `above` exponential variables exceeds `ratio` times the mean of `below` others.
-fn mean_ratio_tail(ratio: f64, above: f64, below: f64) -> f64 {
-    beta_reg(below, above, below / (below + above * ratio))
 }

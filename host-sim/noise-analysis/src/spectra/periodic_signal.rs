@@ -8,12 +8,10 @@
 use super::line_models::Sine;
 use super::periodogram::taper;
 use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
-use crate::distributions::NORMAL_975;
+use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
 use crate::findings::{Parameter, SIGNIFICANCE};
 use crate::uniform_series::UniformSeries;
 use realfft::RealFftPlanner;
-use statrs::function::beta::beta_reg;
-use statrs::function::gamma::gamma_ur;
 
 /// Blocks of the record, at least: twice the highest harmonic is half their rate.
 const BLOCKS: usize = 1024;
@@ -99,7 +97,7 @@ impl PeriodicSignal {
         let by_chance = |first: usize| {
             let (count, sum) =
                 ratios.iter().skip(first).step_by(2).fold((0.0, 0.0), |(n, sum), of| (n + 1.0, sum + of));
-            gamma_ur(count, sum)
+            exponential_sum_tail(count, sum)
         };
         // The first of them is the second harmonic.
         let has_both = by_chance(0) < EVEN_BY_CHANCE && by_chance(1) < ODD_BY_CHANCE;
@@ -116,7 +114,7 @@ impl PeriodicSignal {
         }
         // Sums of exponential variables, of which those between the harmonics have given the level.
         let (above, below) = (ratios.len() as f64, between as f64);
-        let p_value = (trials * beta_reg(below, above, below / (below + sum))).min(1.0);
+        let p_value = (trials * mean_ratio_tail(sum / above, above, below)).min(1.0);
         let percent = 100.0 * (powers.iter().sum::<f64>().max(0.0) / first).sqrt();
         let relative = NORMAL_975 / (2.0 * sum).sqrt();
         // Cramér-Rao bound of the fundamental alone.
