@@ -59,6 +59,8 @@ pub(crate) struct PeriodicSignal {
 impl PeriodicSignal {
     /// The clearest one in a record; `None` if chance explains it.
     pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
+        // Of a channel that never changes nothing is left.
+        let series = series.clone().averaged_until_dithered();
         let size = series.values().len() / BLOCKS;
         if size == 0 {
             return None;
