@@ -56,6 +56,15 @@ impl MeasuredChannel {
         Self { profile, counts, refused: BTreeMap::new() }
     }
 
+    /// Positions of the samples that were refused for any cause, in ascending order.
+    #[must_use]
+    pub fn refused_positions(&self) -> Vec<usize> {
+        let mut positions: Vec<usize> = self.refused.values().flatten().copied().collect();
+        positions.sort_unstable();
+        positions.dedup();
+        positions
+    }
+
     /// Whether the sample at `position` was refused for any cause.
     #[must_use]
     pub fn is_refused(&self, position: usize) -> bool {

@@ -20,7 +20,8 @@ use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::in_parallel;
 use crate::part_report;
 use crate::report::{
-    ChannelReport, CurvePoint, FigureData, MissingSamples, ModelReport, Report, SCHEMA, SlopeMethodReport, term_reports,
+    ChannelReport, CurvePoint, FigureData, MissingSamples, ModelReport, Report, SCHEMA, SlopeMethodReport, by_cause,
+    term_reports,
 };
 use crate::series::Series;
 use crate::spectra::allan_deviations_by_spectrum;
@@ -172,10 +173,6 @@ impl Recorded<'_> {
         let replaced = estimators.both.position(channel).map_or(0, |position| estimators.both.replaced(position));
         MissingSamples { lost, refused, replaced }
     }
-}
-
-fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
-    counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
 }
 
 /// The drift that the channels whose noise was followed have in common.

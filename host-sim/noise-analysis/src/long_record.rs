@@ -146,12 +146,10 @@ impl LongRecordReader {
 
     /// Takes the next samples, the channels on as many threads as there are cores.
     pub fn push(&mut self, block: &SampleBlock) {
-        let before = self.last.into_iter().chain(block.slots.iter().copied());
-        self.gaps += before
-            .zip(&block.slots[usize::from(self.last.is_none()).min(block.slots.len())..])
-            .filter(|(a, b)| **b - a > 1)
-            .count();
-        self.last = block.slots.last().copied().or(self.last);
+        for &slot in &block.slots {
+            self.gaps += usize::from(self.last.is_some_and(|last| slot > last + 1));
+            self.last = Some(slot);
+        }
         parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
             of.recorded.push(&block.slots, channel);
         });
@@ -259,12 +257,9 @@ impl Means {
     }
 
     fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
-        let mut refused: Vec<usize> = channel.refused.values().flatten().copied().collect();
-        refused.sort_unstable();
-        let mut refused = refused.into_iter().peekable();
+        let mut refused = channel.refused_positions().into_iter().peekable();
         for (position, (&slot, &count)) in slots.iter().zip(&channel.counts).enumerate() {
             if refused.next_if_eq(&position).is_some() {
-                while refused.next_if_eq(&position).is_some() {}
                 continue;
             }
             self.end_before(slot / self.samples_per_mean);

@@ -17,9 +17,9 @@ use crate::naming::{ChannelFindings, name_effects};
 use crate::parallel::{self, in_parallel};
 use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
-    SlopeMethodReport, term_reports,
+    SlopeMethodReport, by_cause, term_reports,
 };
-use crate::streamed_curves::StreamedCurves;
+use crate::streamed_curves::{StreamedCurves, joined};
 use crate::unexplained;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve, Model};
@@ -74,16 +74,13 @@ impl CurveEstimators {
             fitted.iter().zip(channels).map(|(fitted, of)| fitted.report(description, of)).collect();
         let duration_s = description.periods as f64 * description.period_s();
         let findings = causes::find(&mut channels, &effects, &of_half, &description.profile, duration_s);
-        let owned = |counts: &BTreeMap<&'static str, u64>| {
-            counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
-        };
         Report {
             schema: SCHEMA,
             quick: true,
             sample_rate_hz: description.sample_rate_hz,
             samples: description.samples,
-            dropped: owned(&description.dropped),
-            flagged: owned(&description.flagged),
+            dropped: by_cause(&description.dropped),
+            flagged: by_cause(&description.flagged),
             part: PartReport {
                 name: description.profile.name.to_owned(),
                 note: Some(PART_NOTE.to_owned()),
@@ -113,13 +110,9 @@ impl FittedChannel {
     fn fit(description: &RecordingDescription, profile: ChannelProfile, estimators: &StreamedCurves) -> Self {
         let period_s = description.period_s();
         let part = |cascade: Cascade<OCTAVES, OVERLAP>| RecordPart::of_channel(profile, cascade, period_s);
-        let both = estimators.parts().cloned().reduce(|mut both, second| {
-            both.merge(&second);
-            both
-        });
         let mut halves = estimators.parts().cloned().map(part);
         let [first, second] = std::array::from_fn(|_| halves.next().unwrap_or_else(|| part(Cascade::new())));
-        let both = part(both.unwrap_or_default());
+        let both = part(joined(estimators.parts()));
         let filters = &description.profile.filters;
         let fit = |part: &RecordPart| {
             let curve = CovariateFit::estimate(part, 0, false, |_| None);

@@ -44,6 +44,11 @@ pub struct Report {
     pub channels: Vec<ChannelReport>,
 }
 
+/// Numbers of samples by cause, as a report has them.
+pub(crate) fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String, u64> {
+    counts.iter().map(|(&cause, &count)| (cause.to_owned(), count)).collect()
+}
+
 /// What a sensor has once for all its channels: the clock of its converter and the low-pass filter before its output.
 ///
 /// What the record does not identify is absent, and `note` says why.

@@ -127,7 +127,8 @@ fn append(block: &mut SampleBlock, later: SampleBlock) {
 /// The samples of a channel in a block.
 fn series(block: &SampleBlock, at: usize) -> Series {
     let MeasuredChannel { profile, counts, .. } = &block.channels[at];
-    let used = || (0..counts.len()).filter(|position| !block.channels[at].is_refused(*position));
+    let refused = block.channels[at].refused_positions();
+    let used = || (0..counts.len()).filter(|position| refused.binary_search(position).is_err());
     let span = block.slots.first().copied().unwrap_or(0)..block.slots.last().map_or(0, |last| last + 1);
     Series {
         slots: used().map(|position| block.slots[position]).collect(),

@@ -1,7 +1,7 @@
 //! The samples of one channel on the recording's time base.
 
 use crate::findings::Correction;
-use measurement::{ChannelProfile, Measurement};
+use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -38,9 +38,7 @@ impl Series {
     ) -> Self {
         let recorded = measurement.channel(channel);
         let counts = recorded.map(|channel| channel.counts.as_slice()).unwrap_or_default();
-        let mut refused: Vec<usize> =
-            recorded.iter().flat_map(|channel| channel.refused.values().flatten().copied()).collect();
-        refused.sort_unstable();
+        let refused = recorded.map(MeasuredChannel::refused_positions).unwrap_or_default();
         let value = |count: &i32| f64::from(*count) * channel.lsb;
         let (slots, values) = if counts.is_empty() {
             ([].into(), [].into())

@@ -1,7 +1,7 @@
 //! The averaging times that are too short for the means that are kept of a long recording.
 
 use crate::preprocessing::Exclusion;
-use crate::streamed_curves::STEPS_PER_COUNT;
+use crate::streamed_curves::{STEPS_PER_COUNT, joined};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
 use measurement::ChannelProfile;
@@ -101,10 +101,6 @@ impl ShorterTimesOfChannel {
     }
 
     fn curve(&self, parts: &[Cascade<OCTAVES, OVERLAP>]) -> Curve<OCTAVES> {
-        let joined = parts.iter().cloned().reduce(|mut joined, later| {
-            joined.merge(&later);
-            joined
-        });
-        joined.unwrap_or_default().curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
+        joined(parts).curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
     }
 }

@@ -45,6 +45,14 @@ impl GappedEstimator {
     }
 }
 
+/// The estimator of parts that follow each other, with a gap between them.
+pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = &'a Cascade<OCTAVES, OVERLAP>>) -> Cascade<OCTAVES, OVERLAP> {
+    let mut parts = parts.into_iter();
+    let mut joined = parts.next().cloned().unwrap_or_default();
+    parts.for_each(|later| joined.merge(later));
+    joined
+}
+
 impl StreamedCurves {
     /// Without samples; `boundaries` are the first sample periods of each part but the first, in ascending order.
     pub(crate) fn new(boundaries: &[u64]) -> Self {
@@ -69,13 +77,11 @@ impl StreamedCurves {
 
     /// Takes the next samples of the channel, which were taken in the sample periods `slots`.
     pub(crate) fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
-        let mut refused: Vec<usize> = channel.refused.values().flatten().copied().collect();
-        refused.sort_unstable();
         for (&cause, positions) in &channel.refused {
             *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
         }
         let steps: Vec<i32> = channel.counts.iter().map(|count| count.saturating_mul(STEPS_PER_COUNT as i32)).collect();
-        let mut refused = refused.into_iter().peekable();
+        let mut refused = channel.refused_positions().into_iter().peekable();
         let mut first = 0;
         while first < slots.len() {
             let slot = slots[first];
@@ -95,7 +101,6 @@ impl StreamedCurves {
                 of_part.miss(missing.min(slot - part_from));
             }
             if refused.next_if_eq(&first).is_some() {
-                while refused.next_if_eq(&first).is_some() {}
                 self.whole.miss(1);
                 of_part.miss(1);
                 self.last = Some(slot);

@@ -21,7 +21,6 @@ use crate::time_base_error::TimeBaseError;
 use crate::value_stream::{self, ColumnSample, ValueColumn, ValueHead, ValueStream};
 use adis16405_driver::GyroRange;
 use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock};
-use std::path::Path;
 
 pub use crate::time_base_error::StreamError;
 
@@ -242,16 +241,6 @@ impl SampleStream {
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         matches!(self.content, Content::Held)
-    }
-
-    /// The file that is read in blocks; `None` of a recording that is in memory.
-    #[must_use]
-    pub fn file(&self) -> Option<&Path> {
-        match &self.content {
-            Content::Held => None,
-            Content::Counts(source) => Some(source.input.path()),
-            Content::Values(values) => Some(values.source.input.path()),
-        }
     }
 
     /// Reads the recording once and calls `take` with each block of its samples.
