@@ -1,10 +1,11 @@
-//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁹ of them, the
+//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁷ of them, the
 //! curves at averaging times that are too short for the means, and the first samples.
 //!
 //! ```text
-//! first samples ─► TracedRecord ─► what is fast: faster lines, resolution, saturation, sample clock
+//! first samples ─► TracedRecord ─► what is fast: resolution, saturation, sample clock
 //!        └─► rules ─┐
 //! blocks of samples ─► SampleScreen (spikes, repeated samples) ─► means ─► what is slow: drift, steps, temperature, lines
+//!        │                           ├─► StackedSpectrum ─► faster lines
 //!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
 //! ```
 //!
@@ -18,19 +19,19 @@ use crate::preprocessing::Exclusion;
 use crate::sample_screen::SampleScreen;
 use crate::sampling_faults;
 use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
-use crate::spectral_lines::MergedLine;
+use crate::spectra::stacked_spectrum::StackedSpectrum;
+use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
 use crate::traced_record::{Condensed, TracedRecord};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
 use std::collections::BTreeMap;
 
 /// Samples of the longest recording that is analysed without being condensed.
-pub const MOST_SAMPLES: u64 = 1 << 20;
+pub const MOST_SAMPLES: u64 = 1 << 18;
 /// Means of a longer recording, at most.
-const MOST_MEANS: u64 = 1 << 19;
-/// Sample periods at the start of the recording whose samples are analysed: a line of a faster rate than that of the means has as
-/// many periods there that its frequency is known to a millionth of the rate.
-const FIRST_PERIODS: u64 = 1 << 17;
+const MOST_MEANS: u64 = 1 << 17;
+/// Sample periods at the start of the recording whose samples are analysed, and of each of the stretches whose spectra are averaged.
+const FIRST_PERIODS: u64 = 1 << 16;
 /// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
 /// deviation of the mean of their roundings, `1/√(12·256)` of a count.
 const MEAN_STEPS_LOG2: u32 = 8;
@@ -60,8 +61,6 @@ pub struct LongRecordReader {
 /// What the samples of a channel at the start of the recording show.
 struct FastFindings {
     effects: Vec<Effect>,
-    /// Lines of a frequency that the means do not show.
-    lines: Vec<MergedLine>,
     /// Smallest distance of two values, in the channel's unit.
     resolution: f64,
 }
@@ -72,6 +71,30 @@ struct LongChannel {
     /// Without what the screen leaves out.
     screened: StreamedCurves,
     means: Means,
+    /// Of the inertial channels.
+    spectrum: Option<StackedSpectrum>,
+}
+
+impl LongChannel {
+    fn push_to_spectrum(&mut self, slots: &[u64], channel: &MeasuredChannel) {
+        let Some(spectrum) = &mut self.spectrum else { return };
+        let mut refused = channel.refused_positions().into_iter().peekable();
+        for (position, (&slot, &count)) in slots.iter().zip(&channel.counts).enumerate() {
+            if refused.next_if_eq(&position).is_none() {
+                spectrum.push(slot, f64::from(count) * channel.profile.lsb);
+            }
+        }
+    }
+
+    /// The lines that are too fast for the means.
+    fn faster_lines(&self, description: &RecordingDescription, samples_per_mean: u64) -> Vec<MergedLine> {
+        let Some(spectrum) = &self.spectrum else { return Vec::new() };
+        let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
+        let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
+        let [resolved_s, duration_s] = [FIRST_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
+        let lines = spectral_lines::merged(spectrum.lines(), resolved_s, duration_s, rate_error);
+        lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect()
+    }
 }
 
 /// A long recording, condensed.
@@ -106,16 +129,13 @@ impl LongRecordReader {
         let means = description.periods / samples_per_mean;
         let boundaries = [means / 2 / 2 * samples_per_mean, means / 2 * samples_per_mean];
         let record = TracedRecord::new(&first, None);
-        let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
         let effects = record.effects();
         let of = |profile: &ChannelProfile| {
             let at = record.channels.iter().position(|trace| trace.channel.name == profile.name);
             let effects = at.map(|at| effects[at].clone()).unwrap_or_default();
-            let lines = at.map(|at| record.channels[at].lines.clone()).unwrap_or_default();
             let counts = at.map_or(1, |at| record.preprocessing.counts_per_step(record.channels[at].channel));
             FastFindings {
                 effects: effects.into_iter().filter(is_fast).collect(),
-                lines: lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect(),
                 resolution: profile.lsb * f64::from(counts),
             }
         };
@@ -131,16 +151,19 @@ impl LongRecordReader {
         let leaves_out_repeated = fast.iter().any(|of| shows(of, "repeated_samples"));
         drop(record);
         let screen = SampleScreen::new(&description.channels, rules, leaves_out_repeated);
-        let channel = |profile: &ChannelProfile| {
+        let stacked =
+            |fast: &FastFindings| StackedSpectrum::new(description.period_s(), FIRST_PERIODS as usize, fast.resolution);
+        let channel = |(profile, fast): (&ChannelProfile, &FastFindings)| {
             let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
             let largest = at_first.iter().flat_map(|channel| &channel.counts).map(|count| count.unsigned_abs()).max();
             LongChannel {
                 recorded: StreamedCurves::new(&boundaries),
                 screened: StreamedCurves::new(&boundaries),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
+                spectrum: profile.quantity.is_inertial().then(|| stacked(fast)),
             }
         };
-        let channels = description.channels.iter().map(channel).collect();
+        let channels = description.channels.iter().zip(&fast).map(channel).collect();
         Self { description, first, samples_per_mean, screen, channels, fast, last: None, gaps: 0 }
     }
 
@@ -172,7 +195,7 @@ impl LongRecordReader {
         let effects = fast.iter().zip(screen.spikes(hours)).map(effects).collect();
         let refused = channels.iter().map(|of| of.screened.refused.clone()).collect();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
-        let faster_lines = fast.iter().map(|of| of.lines.clone()).collect();
+        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
         let period_s = description.period_s();
         let all = channels.into_iter().zip(fast).zip(description.channels.iter().zip(&means.channels));
         let shorter =
@@ -202,6 +225,7 @@ fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
     parallel::for_each_pair(channels, &block.channels, |of, channel| {
         of.screened.push(&block.slots, channel);
         of.means.push(&block.slots, channel);
+        of.push_to_spectrum(&block.slots, channel);
     });
 }
 

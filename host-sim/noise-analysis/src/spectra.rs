@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
+//!               ├► stacked_spectrum ─► lines          the same, of a record that is read stretch by stretch
 //!               ├► sine tapers ─► common_mode            drift that several channels share
 //!               ├► periodic_signal                       a slow signal that repeats and is no sinusoid
 //!               ├► frequency_track                       a line whose frequency runs
@@ -27,15 +28,18 @@ mod markov_spectrum;
 pub(crate) mod periodic_signal;
 mod periodogram;
 mod smooth_shape;
+pub(crate) mod stacked_spectrum;
 mod welch;
 mod white_noise;
+mod whitened_spectrum;
 
 pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
 pub use line_envelope::Modulation;
-pub use lines::{SpectralLine, find_lines};
+pub use lines::find_lines;
 pub(crate) use lines::{find_lines_over, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;
 pub use smooth_shape::{SpectralBand, SpectralShape};
 pub use welch::Welch;
 pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};
+pub use whitened_spectrum::SpectralLine;

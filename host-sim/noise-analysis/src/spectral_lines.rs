@@ -134,6 +134,17 @@ fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLi
         Some(model) => spectra::find_lines_over(&grid, |frequency| markov_background(model, frequency)),
         None => spectra::find_lines(&grid),
     };
+    merged(peaks, duration_s, duration_s, rate_error)
+}
+
+/// The lines of which `peaks` of a spectrum are parts, in a record of `duration_s`; the spectrum resolves the reciprocal of
+/// `resolved_s`.
+pub(crate) fn merged(
+    peaks: Vec<spectra::SpectralLine>,
+    resolved_s: f64,
+    duration_s: f64,
+    rate_error: f64,
+) -> Vec<MergedLine> {
     let is_line = |peak: &spectra::SpectralLine| {
         let is_finite = peak.frequency.error.is_finite() && peak.deviation.error.is_finite();
         is_finite && peak.frequency.value > MIN_WIDTHS_FROM_ZERO * width(peak)
@@ -141,14 +152,14 @@ fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLi
     let mut rest: Vec<spectra::SpectralLine> = peaks.into_iter().filter(is_line).collect();
     let mut lines = Vec::new();
     while let Some(strongest) = rest.first().copied() {
-        let reach = (MERGE_WIDTHS * width(&strongest)).max(MERGE_RESOLUTIONS / duration_s);
+        let reach = (MERGE_WIDTHS * width(&strongest)).max(MERGE_RESOLUTIONS / resolved_s);
         let is_same = |peak: &spectra::SpectralLine| {
             let distance = (peak.frequency.value - strongest.frequency.value).abs();
             let wanders = peak.width.is_some() || strongest.width.is_some();
             distance < reach || (wanders && distance < MERGE_DISTANCE * strongest.frequency.value)
         };
         let (same, others): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_same);
-        lines.push(MergedLine::merge(&same, duration_s, rate_error));
+        lines.push(MergedLine { duration_s, ..MergedLine::merge(&same, resolved_s, rate_error) });
         rest = others;
     }
     lines

@@ -51,9 +51,13 @@ impl UniformSeries {
         if part.end == slots.len() && !values.is_empty() {
             values.resize(values.len() + missing(next, series.span.end), f64::NAN);
         }
+        Self::new(series.period_s, values).rounded_to(series.resolution)
+    }
+
+    /// The same values, which are known to be rounded to steps of this size.
+    pub(crate) fn rounded_to(self, step: f64) -> Self {
         // Rounding to steps of q has the variance q²/12, up to half the sample rate.
-        let rounding_density = 2.0 * series.period_s * series.resolution.powi(2) / 12.0;
-        Self { rounding_density, ..Self::new(series.period_s, values) }
+        Self { rounding_density: 2.0 * self.sample_period * step.powi(2) / 12.0, ..self }
     }
 
     /// One-sided density of the error of rounding the samples to counts, unit²/Hz, where it acts as white noise; 0 where the

@@ -201,25 +201,25 @@ struct Group {
 }
 
 impl Lorentz {
-    /// The likeliest curve near `centre` with about `width`, both in resolutions, over the ordinates from `lowest` on;
-    /// `None` if the fit fails.
-    pub(super) fn fit(whitened: &[f64], lowest: usize, centre: f64, width: f64) -> Option<Self> {
-        let near = Self::fit_within(whitened, lowest, centre, width, REACH * width)?;
+    /// The likeliest curve near `centre` with about `width`, both in resolutions, over the ordinates from `lowest` on, each the
+    /// mean of `looks` exponential variables; `None` if the fit fails.
+    pub(super) fn fit(whitened: &[f64], looks: f64, lowest: usize, centre: f64, width: f64) -> Option<Self> {
+        let near = Self::fit_within(whitened, looks, lowest, centre, width, REACH * width)?;
         // The skirts of a high line exceed the level far beyond its width.
         let skirts = near.width * near.height.sqrt().max(REACH);
-        Self::fit_within(whitened, lowest, near.centre, near.width, skirts.min(whitened.len() as f64 / 8.0))
-            .or(Some(near))
+        let reach = skirts.min(whitened.len() as f64 / 8.0);
+        Self::fit_within(whitened, looks, lowest, near.centre, near.width, reach).or(Some(near))
     }
 
     /// As [`fit`](Self::fit), to the ordinates within `reach` of the centre.
-    fn fit_within(whitened: &[f64], lowest: usize, centre: f64, width: f64, reach: f64) -> Option<Self> {
+    fn fit_within(whitened: &[f64], looks: f64, lowest: usize, centre: f64, width: f64, reach: f64) -> Option<Self> {
         let reach = reach.max(LEAST);
         let low = ((centre - reach).max(lowest as f64)) as usize;
         let high = ((centre + reach) as usize).min(whitened.len().checked_sub(2)?);
         if high < low + LEAST as usize {
             return None;
         }
-        let groups = groups(&whitened[low..=high], low);
+        let groups = groups(&whitened[low..=high], low, looks);
         let weight: f64 = groups.iter().map(|group| group.ordinates).sum();
         let mean = |groups: &mut dyn Iterator<Item = &Group>| {
             let (sum, weight) = groups.fold((0.0, 0.0), |(sum, weight), group| {
@@ -304,12 +304,12 @@ fn bell(position: f64, centre: f64, width: f64) -> f64 {
     at(centre) + at(-centre)
 }
 
-fn groups(ordinates: &[f64], first: usize) -> Vec<Group> {
+fn groups(ordinates: &[f64], first: usize, looks: f64) -> Vec<Group> {
     let size = ordinates.len().div_ceil(GROUPS);
     let group = |(index, chunk): (usize, &[f64])| Group {
         position: (first + index * size) as f64 + (chunk.len() - 1) as f64 / 2.0,
         density: chunk.iter().sum::<f64>() / chunk.len() as f64,
-        ordinates: chunk.len() as f64,
+        ordinates: looks * chunk.len() as f64,
     };
     ordinates.chunks(size).enumerate().map(group).collect()
 }

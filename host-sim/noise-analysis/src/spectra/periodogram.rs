@@ -15,10 +15,13 @@ pub(super) const PADDING: usize = 2;
 const RISE: f64 = 0.05;
 
 /// `2·dt/Σw²·|X(f)|²` under the taper `w`, at the multiples of half a resolution.
+#[derive(Clone)]
 pub(super) struct Periodogram {
     /// Hz between the ordinates of `density`.
     spacing: f64,
     density: Vec<f64>,
+    /// Periodograms that each ordinate is the mean of.
+    looks: u32,
 }
 
 impl Periodogram {
@@ -51,7 +54,27 @@ impl Periodogram {
         Some(Self {
             spacing: 1.0 / (PADDING as f64 * length as f64 * series.sample_period()),
             density: output.iter().map(|bin| scale * bin.norm_sqr()).collect(),
+            looks: 1,
         })
+    }
+
+    /// Makes this the mean of the periodograms that it is made of and of another of the same length.
+    pub(super) fn average_with(&mut self, other: &Self) {
+        self.looks += other.looks;
+        let weight = f64::from(other.looks) / f64::from(self.looks);
+        for (mean, ordinate) in self.density.iter_mut().zip(&other.density) {
+            *mean += weight * (ordinate - *mean);
+        }
+    }
+
+    /// Independent estimates that each ordinate is the mean of.
+    pub(super) fn looks(&self) -> f64 {
+        f64::from(self.looks)
+    }
+
+    /// Sets one of the [`padded`](Self::padded) ordinates.
+    pub(super) fn replace(&mut self, at: usize, density: f64) {
+        self.density[at] = density;
     }
 
     /// Resolution `1/T`, Hz.

@@ -1,0 +1,187 @@
+//! Lines in the mean of the spectra of stretches of a record whose samples are not kept.
+//!
+//! The ordinates of the mean of `K` spectra are gamma variables of shape `K`, so that it shows a line that is lost in the noise of
+//! each stretch. By the tail of that distribution a sinusoid has to be 1.3 times as large for 16 stretches, and 1.9 times for
+//! 150, as for the spectrum of all of the record at once, which resolves more. A resonance that is wider than a stretch resolves has to
+//! be no larger.
+
+use super::lines::MOST;
+use super::smooth_shape::median;
+use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
+use crate::uniform_series::UniformSeries;
+
+/// The mean of the spectra of stretches of equal length.
+pub(crate) struct StackedSpectrum {
+    sample_period: f64,
+    /// Sample periods of a stretch.
+    length: usize,
+    /// Smallest distance of two values, in the channel's unit.
+    resolution: f64,
+    /// The samples of the stretch of this number that were taken, `NaN` where one is missing.
+    stretch: Vec<f64>,
+    number: u64,
+    mean: Option<Spectrum>,
+    /// Samples whose means are transformed: as many as the first stretch needs for its rounding to act as noise.
+    averaged: usize,
+    /// Sum of the levels of the stretches, and of the squares of these.
+    levels: [f64; 2],
+}
+
+impl StackedSpectrum {
+    /// For stretches of `length` samples that are `sample_period` s apart; two values of the channel differ by `resolution` or more.
+    pub(crate) fn new(sample_period: f64, length: usize, resolution: f64) -> Self {
+        let stretch = vec![f64::NAN; length];
+        Self { sample_period, length, resolution, stretch, number: 0, mean: None, averaged: 0, levels: [0.0; 2] }
+    }
+
+    /// Takes the next sample, which was taken in the sample period `slot`. What is left over at the end is in no stretch.
+    pub(crate) fn push(&mut self, slot: u64, value: f64) {
+        let length = self.length as u64;
+        if slot / length != self.number {
+            self.end_stretch();
+            self.number = slot / length;
+        }
+        self.stretch[(slot % length) as usize] = value;
+        if slot % length == length - 1 {
+            self.end_stretch();
+        }
+    }
+
+    /// Adds the spectrum of the stretch, unless half of its samples or more are missing.
+    fn end_stretch(&mut self) {
+        let values = std::mem::replace(&mut self.stretch, vec![f64::NAN; self.length]);
+        let stretch = UniformSeries::new(self.sample_period, values).rounded_to(self.resolution);
+        if 2 * stretch.present() <= self.length {
+            return;
+        }
+        let averaged = match self.averaged {
+            0 => stretch.averaged_until_dithered(),
+            size => stretch.averaged(size),
+        };
+        let Some(spectrum) = Spectrum::new(&averaged.detrended()) else { return };
+        let level = median(&mut spectrum.periodogram.independent());
+        self.levels = [self.levels[0] + level, self.levels[1] + level * level];
+        match &mut self.mean {
+            None => {
+                self.averaged = (averaged.sample_period() / self.sample_period).round() as usize;
+                self.mean = Some(spectrum);
+            }
+            Some(mean) => mean.average_with(&spectrum),
+        }
+    }
+
+    /// The lines with a p-value below 2·10⁻⁴, the strongest first; at most 6.
+    pub(crate) fn lines(&self) -> Vec<SpectralLine> {
+        let Some(mut spectrum) = self.mean.clone() else { return Vec::new() };
+        // Where the level of the noise changes from stretch to stretch, the loud ones have most of the weight.
+        let [sum, squares] = self.levels;
+        spectrum.independent *= sum * sum / squares / spectrum.periodogram.looks();
+        let known = |_: f64| 1.0;
+        let (mut sinusoids, mut resonances): (Vec<SpectralLine>, Vec<Resonance>) = (Vec::new(), Vec::new());
+        while sinusoids.len() + resonances.len() < MOST
+            && let Some(whitened) = WhitenedSpectrum::new(&spectrum, &known, &resonances, None)
+            && let Some((bin, width, p_value)) = whitened.broad_peak(0)
+        {
+            let widths = [width / 2.0, width, 2.0 * width];
+            match whitened.likeliest_lorentz(bin, widths).filter(|lorentz| lorentz.width > NARROWEST) {
+                Some(lorentz) => {
+                    resonances.push(Resonance { line: whitened.resonance_line(&lorentz, p_value), lorentz });
+                    refit(&spectrum, &known, &mut resonances);
+                }
+                None => {
+                    let (line, without) = whitened.sinusoid_near(bin, width, p_value);
+                    sinusoids.push(line);
+                    for (at, density) in without {
+                        spectrum.periodogram.replace(at, density);
+                    }
+                }
+            }
+        }
+        let mut lines: Vec<SpectralLine> =
+            sinusoids.into_iter().chain(resonances.iter().map(|resonance| resonance.line)).collect();
+        lines.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::StackedSpectrum;
+    use crate::spectra::SpectralLine;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const STRETCH: usize = 4096;
+
+    /// Lines in 64 stretches of white noise of deviation 1 at 100 Hz with what `signal` adds.
+    fn lines(seed: u64, mut signal: impl FnMut(f64) -> f64) -> Vec<SpectralLine> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut stacked = StackedSpectrum::new(0.01, STRETCH, 0.0);
+        for slot in 0..64 * STRETCH as u64 {
+            // One sample in a hundred is missing, and half of the stretch before the last.
+            let is_missing = slot % 100 == 7 || slot * 2 / STRETCH as u64 == 124;
+            let value = random.sample::<f64, _>(StandardNormal) + signal(0.01 * slot as f64);
+            if !is_missing {
+                stacked.push(slot, value);
+            }
+        }
+        stacked.lines()
+    }
+
+    #[test]
+    fn noise_has_no_lines() {
+        // Each of 20 has one with a probability of 2·10⁻⁴.
+        for seed in 0..20 {
+            assert_eq!(lines(seed, |_| 0.0), []);
+        }
+    }
+
+    /// A sinusoid whose peak is 2.3 times the noise in each stretch, where noise alone has such an ordinate among ten.
+    #[test]
+    fn a_sinusoid_that_no_stretch_shows_is_measured() {
+        let amplitude = 0.05;
+        let (mut frequencies, mut deviations) = (0, 0);
+        for seed in 0..10 {
+            let found = lines(seed, |time_s| amplitude * (TAU * 23.4567 * time_s).sin());
+            let [line] = found[..] else { panic!("{seed}: {found:?}") };
+            assert_eq!(line.width, None);
+            let frequency = (line.frequency.value - 23.4567) / line.frequency.error;
+            let deviation = (line.deviation.value - amplitude / 2f64.sqrt()) / line.deviation.error;
+            frequencies += usize::from(frequency.abs() < 1.96);
+            deviations += usize::from(deviation.abs() < 1.96);
+            // A probability of 6·10⁻⁵ each.
+            assert!(frequency.abs() < 4.0 && deviation.abs() < 4.0, "{seed}: {line:?}");
+        }
+        // Of ten, 95 % are inside; 6 or fewer have a probability of one in a thousand.
+        assert!(frequencies > 6 && deviations > 6, "{frequencies} {deviations}");
+    }
+
+    /// White noise through a resonator at 20 Hz, 0.5 Hz wide, which no stretch shows.
+    #[test]
+    fn a_resonance_is_measured() {
+        let mut random = ChaCha8Rng::seed_from_u64(99);
+        let (width, frequency) = (0.5, 20.0);
+        let radius = (-std::f64::consts::PI * width * 0.01f64).exp();
+        let turn = TAU * frequency * 0.01;
+        let (mut cosine, mut sine) = (0.0, 0.0);
+        let deviation = 0.1;
+        let found = lines(5, |_| {
+            let kick = deviation * (1.0 - radius * radius).sqrt();
+            (cosine, sine) = (
+                radius * (cosine * turn.cos() - sine * turn.sin()) + kick * random.sample::<f64, _>(StandardNormal),
+                radius * (cosine * turn.sin() + sine * turn.cos()) + kick * random.sample::<f64, _>(StandardNormal),
+            );
+            cosine
+        });
+        let [line] = found[..] else { panic!("{found:?}") };
+        let measured = line.width.expect("wider than the resolution of 0.024 Hz");
+        let within = |measured: crate::findings::MeasuredValue, truth: f64| {
+            assert!((measured.value - truth).abs() < 4.0 * measured.error, "{measured:?} {truth}");
+        };
+        within(line.frequency, frequency);
+        within(line.deviation, deviation);
+        within(measured, width);
+    }
+}
