@@ -22,6 +22,7 @@ use crate::unexplained;
 use crate::unexplained_signals::UnexplainedSignals;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
+use allan_core::model::FittedTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
 
 /// A recording with what was found in all of it.
@@ -106,7 +107,13 @@ impl<'a> TracedRecord<'a> {
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
-        let motions = moved.into_iter().flatten().collect();
+        let is_of_platform = |channel: ChannelProfile| {
+            let own = preprocessing.measured(measurement, channel);
+            let others = || traced.iter().filter(|of| **of != channel);
+            let moves = |other: &ChannelProfile| motion::moves_with(&own, &preprocessing.measured(measurement, *other));
+            others().next().is_none() || others().any(moves)
+        };
+        let motions = moved.into_iter().flatten().filter(|(channel, _)| is_of_platform(*channel)).collect();
         Self {
             measurement,
             condensed,
@@ -119,6 +126,14 @@ impl<'a> TracedRecord<'a> {
             filter,
             coupled,
             motions,
+        }
+    }
+
+    /// Completes the models with the lines of the spectrum that the curve does not resolve.
+    pub(crate) fn add_lines_of_spectrum(&mut self) {
+        for trace in &mut self.channels {
+            let lines: Vec<FittedTerm> = trace.lines.iter().map(MergedLine::fitted_term).collect();
+            trace.fit.add_lines_of_spectrum(&lines);
         }
     }
 
@@ -208,7 +223,7 @@ impl ChannelTrace {
             telegraph: None,
             rest: None,
             slowest: None,
-            signals: UnexplainedSignals::none(),
+            signals: UnexplainedSignals::default(),
         }
     }
 
