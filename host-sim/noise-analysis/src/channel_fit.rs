@@ -334,9 +334,8 @@ impl ChannelFit {
     /// would be that of the other terms.
     pub(crate) fn add_lines_of_spectrum(&mut self, lines: &[FittedTerm]) {
         let trace = &mut self.trace;
-        let keeps_markov = self.markov_by_spectrum.is_some();
         for line in lines.iter().filter(|line| !has_line(&trace.after, line, lines)).collect::<Vec<_>>() {
-            let Some(with_line) = with_line(&self.covariates.curve, &trace.after, line, keeps_markov) else { continue };
+            let Some(with_line) = with_line(&self.covariates.curve, &trace.after, line) else { continue };
             let better = goodness(&self.covariates.curve, &with_line);
             if better.deviance <= trace.after_goodness.deviance + MAX_DEVIANCE_RISE {
                 (trace.after, trace.after_goodness) = (with_line, better);
@@ -399,9 +398,8 @@ fn has_line(model: &Model, line: &FittedTerm, lines: &[FittedTerm]) -> bool {
 }
 
 /// `model` with `line`, whose size the spectrum has measured: the coefficients of the other terms are fitted to what it leaves of
-/// `curve`, their shapes stay, and so do the bounds of a Markov process where it `keeps_markov`. `None` if there is no room for
-/// it, or if its share in every point is hidden by the scatter of the point.
-fn with_line(curve: &Curve<OCTAVES>, model: &Model, line: &FittedTerm, keeps_markov: bool) -> Option<Model> {
+/// `curve`, their shapes and relative bounds stay. `None` if there is no room for it, or if its share in every point is hidden by the scatter of the point.
+fn with_line(curve: &Curve<OCTAVES>, model: &Model, line: &FittedTerm) -> Option<Model> {
     let period_s = curve.sample_period();
     let share = |point: &AllanPoint| line.value * line.value * line.kind.avar(point.n, period_s);
     let is_visible = |point: &AllanPoint| share(point) * (0.5 * model.edf(point)).sqrt() > VISIBLE_SIGMAS * point.avar;
@@ -411,13 +409,11 @@ fn with_line(curve: &Curve<OCTAVES>, model: &Model, line: &FittedTerm, keeps_mar
     let mut others = curve.clone();
     others.replace_avar(|point| (point.avar - share(point)).max(LEAST_LEFT * point.avar));
     let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
-    let fitted = with_bounds_behind_a_filter(&others, &fit(&others, &kinds));
+    let fitted = fit(&others, &kinds);
+    // The spectrum knows the line much better than the curve knows the others: their relative errors stay.
     let kept = |(new, old): (&FittedTerm, &FittedTerm)| {
-        let (mut low, mut high) = (new.low, new.high);
-        if keeps_markov && matches!(old.kind, NoiseTerm::Markov(_)) {
-            (low, high) = (old.low.min(new.value), old.high.max(new.value));
-        }
-        FittedTerm { low, high, shape: old.shape, ..*new }
+        let scaled = |bound: f64, limit: f64| if old.value > 0.0 { bound * new.value / old.value } else { limit };
+        FittedTerm { low: scaled(old.low, 0.0), high: scaled(old.high, new.high), shape: old.shape, ..*new }
     };
     Some(Model::new(period_s, fitted.terms().iter().zip(model.terms()).map(kept).chain([*line])))
 }
@@ -523,7 +519,7 @@ mod tests {
         for seed in 0..40 {
             let curve = curve(seed, AMPLITUDE);
             let plain = fit(&curve, &[NoiseTerm::AngleRandomWalk]);
-            let complete = with_line(&curve, &plain, &line, false).expect("visible");
+            let complete = with_line(&curve, &plain, &line).expect("visible");
             let excess = |model: &Model| model.terms()[0].value.powi(2) / truth - 1.0;
             (without, with) = (without + excess(&plain) / 40.0, with + excess(&complete) / 40.0);
         }

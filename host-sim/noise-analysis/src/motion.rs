@@ -2,7 +2,7 @@
 //!
 //! Over a second noise is averaged, and the bias of a channel at rest moves by less than the biases of two parts differ. A
 //! channel whose means of a second leave their median by three times that is moved: an accelerometer of 50 mg (1 σ over
-//! parts) by a turn of 9° or more, a gyroscope of 3 deg/s by 9 deg/s. A motion is in more than one channel; what goes as far in one channel alone is a drift.
+//! parts) by a turn of 9° or more, a gyroscope of 3 deg/s by 9 deg/s.
 
 use crate::findings::{Effect, Parameter};
 use crate::report::Stretch;
@@ -26,35 +26,9 @@ pub(crate) struct PlatformMotion {
     pub effect: Effect,
 }
 
-/// Standard deviations from which the changes of two channels belong together: by chance for one of five other channels and two
-/// correlations each in less than one of 100,000 records.
-const LEAST_SIGMAS: f64 = 5.0;
-
-/// Whether the changes of the means of a second of two channels belong together, in their sign or in their size.
-///
-/// A platform that is moved moves more than one channel: a tilt is an angular rate before it is another specific force, and takes
-/// from one accelerometer what it gives to another; the axes of a gyroscope are not orthogonal to those of the others. A drift of one
-/// channel, however far it goes, leaves the others alone.
-pub(crate) fn moves_with(series: &Series, other: &Series) -> bool {
-    let (means, others) = (means_of_seconds(series), means_of_seconds(other));
-    let change = |pair: &[Option<f64>]| Some(pair[1]? - pair[0]?);
-    let both = means.windows(2).zip(others.windows(2));
-    let changes: Vec<(f64, f64)> = both.filter_map(|(own, other)| Some((change(own)?, change(other)?))).collect();
-    let sizes: Vec<(f64, f64)> = changes.iter().map(|(own, other)| (own.abs(), other.abs())).collect();
-    [changes, sizes].iter().any(|pairs| correlation(pairs).abs() * (pairs.len() as f64).sqrt() > LEAST_SIGMAS)
-}
-
-/// Coefficient of correlation; 0 where one of the two is constant.
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let count = pairs.len() as f64;
-    let (own, other) = pairs.iter().fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0 / count, sum.1 + pair.1 / count));
-    let product = |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|pair| of(pair.0 - own, pair.1 - other)).sum::<f64>();
-    let scale = (product(&|a, _| a * a) * product(&|_, b| b * b)).sqrt();
-    if scale > 0.0 { product(&|a, b| a * b) / scale } else { 0.0 }
-}
-
-/// The mean of each second of a series, where it has samples.
-fn means_of_seconds(series: &Series) -> Vec<Option<f64>> {
+/// The motion that a channel shows, if any.
+pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<PlatformMotion> {
+    let limit = BIAS_ERRORS * channel.initial_bias_error?;
     let width = (BLOCK_S / series.period_s).round().max(1.0) as u64;
     let mut sums: Vec<(f64, u64)> = Vec::new();
     for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
@@ -65,13 +39,7 @@ fn means_of_seconds(series: &Series) -> Vec<Option<f64>> {
         sums[number].0 += value;
         sums[number].1 += 1;
     }
-    sums.iter().map(|(sum, count)| (*count > 0).then(|| sum / *count as f64)).collect()
-}
-
-/// The motion that a channel shows, if any.
-pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<PlatformMotion> {
-    let limit = BIAS_ERRORS * channel.initial_bias_error?;
-    let means = means_of_seconds(series);
+    let means: Vec<Option<f64>> = sums.iter().map(|(sum, count)| (*count > 0).then(|| sum / *count as f64)).collect();
     let mut sorted: Vec<f64> = means.iter().copied().flatten().collect();
     sorted.sort_by(f64::total_cmp);
     let median = *sorted.get(sorted.len() / 2)?;
@@ -127,13 +95,10 @@ pub(crate) fn at_rest<'a>(motions: impl Iterator<Item = &'a PlatformMotion>, dur
 
 #[cfg(test)]
 mod tests {
-    use super::{at_rest, find, moves_with};
+    use super::{at_rest, find};
     use crate::report::Stretch;
     use crate::series::Series;
     use measurement::adis16405::profile;
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::StandardNormal;
 
     /// An accelerometer at 10 Hz that is turned by `size` g from 40.0 s to 50.0 s.
     fn series(size: f64) -> Series {
@@ -161,42 +126,5 @@ mod tests {
         let rest = [Stretch { from_s: 0.0, to_s: 38.0 }, Stretch { from_s: 52.0, to_s: 100.0 }];
         assert_eq!(at_rest([&motion].into_iter(), 100.0), rest);
         assert_eq!(at_rest([].into_iter(), 100.0), [Stretch { from_s: 0.0, to_s: 100.0 }]);
-    }
-    /// 10 Hz for 400 s: noise of 0.1 with `signal` of the time in s.
-    fn noisy(seed: u64, signal: impl Fn(f64) -> f64) -> Series {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let slots = 0..4000_u64;
-        let value = |slot: u64| signal(0.1 * slot as f64) + 0.1 * random.sample::<f64, _>(StandardNormal);
-        Series {
-            values: slots.clone().map(value).collect(),
-            span: slots.clone(),
-            slots: slots.collect(),
-            period_s: 0.1,
-            resolution: 1e-3,
-            unit: "deg/s",
-        }
-    }
-
-    #[test]
-    fn a_turn_is_in_several_channels_and_a_drift_is_in_one() {
-        // A turn within two seconds and back, and the rates of it: of noise of 0.1/√10 in a mean, 1 is thirty deviations.
-        let turned = noisy(1, |time_s| if (100.0..200.0).contains(&time_s) { 1.0 } else { 0.0 });
-        let rate = noisy(2, |time_s| match time_s {
-            time_s if (99.0..101.0).contains(&time_s) => 20.0,
-            time_s if (199.0..201.0).contains(&time_s) => -20.0,
-            _ => 0.0,
-        });
-        assert!(moves_with(&turned, &rate) && moves_with(&rate, &turned));
-        for seed in 10..40 {
-            let mut random = ChaCha8Rng::seed_from_u64(seed);
-            let walk: Vec<f64> = (0..400)
-                .scan(0.0, |level, _| {
-                    *level += random.sample::<f64, _>(StandardNormal);
-                    Some(*level)
-                })
-                .collect();
-            let drift = noisy(100 + seed, |time_s| walk[time_s as usize]);
-            assert!(!moves_with(&drift, &noisy(200 + seed, |time_s| 0.05 * time_s)), "{seed}");
-        }
     }
 }

@@ -107,13 +107,7 @@ impl<'a> TracedRecord<'a> {
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
-        let is_of_platform = |channel: ChannelProfile| {
-            let own = preprocessing.measured(measurement, channel);
-            let others = || traced.iter().filter(|of| **of != channel);
-            let moves = |other: &ChannelProfile| motion::moves_with(&own, &preprocessing.measured(measurement, *other));
-            others().next().is_none() || others().any(moves)
-        };
-        let motions = moved.into_iter().flatten().filter(|(channel, _)| is_of_platform(*channel)).collect();
+        let motions = moved.into_iter().flatten().collect();
         Self {
             measurement,
             condensed,
