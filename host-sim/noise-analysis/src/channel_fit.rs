@@ -333,12 +333,17 @@ impl ChannelFit {
     /// Adds those of `lines`, the lines of the spectrum, that the model has not: too weak to be traced in the curve, their power
     /// would be that of the other terms.
     pub(crate) fn add_lines_of_spectrum(&mut self, lines: &[FittedTerm]) {
-        let trace = &mut self.trace;
-        for line in lines.iter().filter(|line| !has_line(&trace.after, line, lines)).collect::<Vec<_>>() {
-            let Some(with_line) = with_line(&self.covariates.curve, &trace.after, line) else { continue };
-            let better = goodness(&self.covariates.curve, &with_line);
-            if better.deviance <= trace.after_goodness.deviance + MAX_DEVIANCE_RISE {
-                (trace.after, trace.after_goodness) = (with_line, better);
+        let (curve, trace) = (&self.covariates.curve, &mut self.trace);
+        let traced = trace.after.clone();
+        let mut added: Vec<FittedTerm> = Vec::new();
+        for line in lines.iter().filter(|line| !has_line(&traced, line, lines)) {
+            added.push(*line);
+            let better = with_lines(curve, &traced, &added).map(|model| (goodness(curve, &model), model));
+            match better {
+                Some((better, model)) if better.deviance <= trace.after_goodness.deviance + MAX_DEVIANCE_RISE => {
+                    (trace.after, trace.after_goodness) = (model, better);
+                }
+                _ => drop(added.pop()),
             }
         }
     }
@@ -397,25 +402,29 @@ fn has_line(model: &Model, line: &FittedTerm, lines: &[FittedTerm]) -> bool {
     })
 }
 
-/// `model` with `line`, whose size the spectrum has measured: the coefficients of the other terms are fitted to what it leaves of
-/// `curve`, their shapes and relative bounds stay. `None` if there is no room for it, or if its share in every point is hidden by the scatter of the point.
-fn with_line(curve: &Curve<OCTAVES>, model: &Model, line: &FittedTerm) -> Option<Model> {
+/// `model` with `lines`, whose sizes the spectrum has measured: the coefficients of the other terms are fitted to what they leave
+/// of `curve`, their shapes and relative bounds stay. `None` if there is no room for them, or if the share of the last one in
+/// every point is hidden by the scatter of the point.
+fn with_lines(curve: &Curve<OCTAVES>, model: &Model, lines: &[FittedTerm]) -> Option<Model> {
     let period_s = curve.sample_period();
-    let share = |point: &AllanPoint| line.value * line.value * line.kind.avar(point.n, period_s);
-    let is_visible = |point: &AllanPoint| share(point) * (0.5 * model.edf(point)).sqrt() > VISIBLE_SIGMAS * point.avar;
-    if model.terms().len() == MAX_TERMS || !curve.points().iter().any(is_visible) {
+    let share = |line: &FittedTerm, point: &AllanPoint| line.value * line.value * line.kind.avar(point.n, period_s);
+    let last = lines.last()?;
+    let is_visible =
+        |point: &AllanPoint| share(last, point) * (0.5 * model.edf(point)).sqrt() > VISIBLE_SIGMAS * point.avar;
+    if model.terms().len() + lines.len() > MAX_TERMS || !curve.points().iter().any(is_visible) {
         return None;
     }
     let mut others = curve.clone();
-    others.replace_avar(|point| (point.avar - share(point)).max(LEAST_LEFT * point.avar));
+    let shares = |point: &AllanPoint| lines.iter().map(|line| share(line, point)).sum::<f64>();
+    others.replace_avar(|point| (point.avar - shares(point)).max(LEAST_LEFT * point.avar));
     let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
     let fitted = fit(&others, &kinds);
-    // The spectrum knows the line much better than the curve knows the others: their relative errors stay.
+    // The spectrum knows the lines much better than the curve knows the others: their relative errors stay.
     let kept = |(new, old): (&FittedTerm, &FittedTerm)| {
         let scaled = |bound: f64, limit: f64| if old.value > 0.0 { bound * new.value / old.value } else { limit };
         FittedTerm { low: scaled(old.low, 0.0), high: scaled(old.high, new.high), shape: old.shape, ..*new }
     };
-    Some(Model::new(period_s, fitted.terms().iter().zip(model.terms()).map(kept).chain([*line])))
+    Some(Model::new(period_s, fitted.terms().iter().zip(model.terms()).map(kept).chain(lines.iter().copied())))
 }
 
 /// Frequency of a term that is a line, Hz.
@@ -480,7 +489,7 @@ fn with_resolved_bounds(curve: &Curve<OCTAVES>, model: &Model, decimation: Optio
 
 #[cfg(test)]
 mod tests {
-    use super::with_line;
+    use super::with_lines;
     use crate::OVERLAP;
     use allan_core::fit::fit;
     use allan_core::model::FittedTerm;
@@ -519,7 +528,7 @@ mod tests {
         for seed in 0..40 {
             let curve = curve(seed, AMPLITUDE);
             let plain = fit(&curve, &[NoiseTerm::AngleRandomWalk]);
-            let complete = with_line(&curve, &plain, &line).expect("visible");
+            let complete = with_lines(&curve, &plain, &[line]).expect("visible");
             let excess = |model: &Model| model.terms()[0].value.powi(2) / truth - 1.0;
             (without, with) = (without + excess(&plain) / 40.0, with + excess(&complete) / 40.0);
         }
