@@ -63,6 +63,7 @@ impl Recorded<'_> {
         let mut record = TracedRecord::new(measurement, condensed);
         let first_half = FirstHalf::fit(&record);
         keep_terms_that_held(&mut record, &first_half);
+        record.add_lines_of_spectrum();
         let mut effects = record.effects();
         // What the first half shows by itself, to compare with what the whole record shows.
         let effects_of_half = if effects.iter().all(Vec::is_empty) {

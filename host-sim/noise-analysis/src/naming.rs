@@ -2,7 +2,7 @@
 //! bounds, and with evidence that a person can check.
 
 use crate::OCTAVES;
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, filter_length_s, line_frequency};
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES, filter_length_s, line_frequency};
 use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
@@ -26,8 +26,6 @@ const NEIGHBOURING_COUNTS: f64 = 1.5;
 const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 /// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
-/// Farthest that a line of the curve and the same line of the spectrum are apart, as a part of the frequency.
-const FREQUENCY_BY_OCTAVES: f64 = 0.2;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
 const WIDEST_BAND: f64 = 2.0;
 /// Largest excess kurtosis of a telegraph signal that the curve alone shows, in units of that of two equally frequent levels. A
@@ -91,8 +89,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s => {}
             NoiseTerm::Quantization if rounding_s > 0.0 => {}
             // Reported from the spectrum, which resolves them better than the curve.
-            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_)
-                if is_in_spectrum(&term.kind, &in_spectrum) || has_few_periods(&term.kind, duration_s) => {}
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if is_in_spectrum(&term.kind, &in_spectrum) => {}
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if has_few_periods(&term.kind, duration_s) => {
+                let what = "as by a line of a few periods in the record, which its curve does not tell from a drift";
+                effects.push(unexplained_octave(found, &fit.covariates.curve, what));
+            }
             // In the curve alone: its frequency changes, or it is no line.
             NoiseTerm::Sinusoid(Sinusoid { frequency }) | NoiseTerm::Resonance(Resonance { frequency, .. })
                 if lines.is_some() && !is_band(term, duration_s) =>

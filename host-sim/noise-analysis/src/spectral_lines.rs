@@ -9,9 +9,11 @@ use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::Model;
+use allan_core::confidence::NORMAL_975;
+use allan_core::model::FittedTerm;
 use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
 use measurement::SensorProfile;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 /// Peaks closer than this part of their frequency are one line if either has a width.
 const MERGE_DISTANCE: f64 = 0.03;
@@ -263,6 +265,21 @@ impl MergedLine {
 
     fn is_broad(&self) -> bool {
         self.width.value > BROAD * self.frequency.value
+    }
+
+    /// The term for the line with its size, frequency and width by the spectrum.
+    pub(crate) fn fitted_term(&self) -> FittedTerm {
+        let kind = self.kind();
+        let bounds = |of: MeasuredValue| {
+            let half = NORMAL_975 * of.error;
+            ((of.value - half).max(0.0), of.value + half)
+        };
+        // The coefficient of a sinusoid is its amplitude, that of a resonance its deviation.
+        let scale = if self.is_sinusoid() { SQRT_2 } else { 1.0 };
+        let (low, high) = bounds(self.deviation);
+        let value = scale * self.deviation.value;
+        let shape = [bounds(self.frequency), bounds(self.width)];
+        FittedTerm { low: scale * low, high: scale * high, shape, ..FittedTerm::exact(kind, value) }
     }
 
     /// The model's term for the line: a sinusoid, or a resonance if it is wider than the record resolves.

@@ -22,6 +22,7 @@ use crate::unexplained;
 use crate::unexplained_signals::UnexplainedSignals;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
+use allan_core::model::FittedTerm;
 use measurement::{ChannelProfile, Measurement, Quantity};
 
 /// A recording with what was found in all of it.
@@ -122,6 +123,14 @@ impl<'a> TracedRecord<'a> {
         }
     }
 
+    /// Completes the models with the lines of the spectrum that the curve does not resolve.
+    pub(crate) fn add_lines_of_spectrum(&mut self) {
+        for trace in &mut self.channels {
+            let lines: Vec<FittedTerm> = trace.lines.iter().map(MergedLine::fitted_term).collect();
+            trace.fit.add_lines_of_spectrum(&lines);
+        }
+    }
+
     /// The series of the same channels as [`series`](Self::series), without the samples of `exclusion`.
     pub(crate) fn series_without(&self, exclusion: Exclusion) -> Vec<Series> {
         let coupled: Vec<(&ChannelProfile, &Series)> = self.coupled.iter().zip(&self.series).collect();
@@ -208,7 +217,7 @@ impl ChannelTrace {
             telegraph: None,
             rest: None,
             slowest: None,
-            signals: UnexplainedSignals::none(),
+            signals: UnexplainedSignals::default(),
         }
     }
 

@@ -15,7 +15,8 @@ const LEAST_OF_PERIOD: f64 = 0.02;
 /// constants, that of the line at 0.37 periods, and octaves tell either to a factor of 4.
 const OF_TRACK_PERIOD: [f64; 2] = [0.05, 0.8];
 
-/// The signals of one channel.
+/// The signals of one channel; none by default.
+#[derive(Default)]
 pub(crate) struct UnexplainedSignals {
     periodic: Option<PeriodicSignal>,
     track: Option<FrequencyTrack>,
@@ -43,11 +44,6 @@ impl UnexplainedSignals {
             lines.retain(|line| !track.passes(line.frequency.value) || 0.5 * line.statistic > track.energy());
         }
         Self { periodic, track }
-    }
-
-    /// None, of a channel that is not traced.
-    pub(crate) fn none() -> Self {
-        Self { periodic: None, track: None }
     }
 
     /// Whether what an effect of the channel tells is a part of one of the signals. `lines` are the other lines of the spectrum; those

@@ -303,7 +303,7 @@ fn sentences(finding: &Finding, amount: impl Fn(&Parameter) -> String, reaches: 
         ),
         "motion" => (
             format!("The platform moved{}.", interval_words(&at, value("from").is_some())),
-            "These samples are left out; noise needs a part at rest. Record it again on a firm support.".to_owned(),
+            "The models were fitted to these samples too, and noise needs a part at rest: record it again on a firm support.".to_owned(),
         ),
         "saturated" => (
             format!(

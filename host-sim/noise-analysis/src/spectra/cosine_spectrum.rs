@@ -8,6 +8,7 @@
 
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
 use super::smooth_shape::SpectralBand;
+use crate::detectors::block_means::markov_covariance;
 use crate::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -151,13 +152,8 @@ fn markov_shapes() -> &'static [MarkovShape] {
     static SHAPES: OnceLock<Vec<MarkovShape>> = OnceLock::new();
     SHAPES.get_or_init(|| {
         let of_time = |time: f64| {
-            let kept = (-1.0 / time).exp();
-            // The mean of exp(−|t|/T) over two blocks.
-            let covariance = |lag: usize| match lag {
-                0 => 2.0 * time * (1.0 - time * (1.0 - kept)),
-                lag => time * time * (1.0 - kept).powi(2) * kept.powi(lag as i32 - 1),
-            };
-            MarkovShape { time, expected: expected_squares(covariance) }
+            let covariances: Vec<f64> = markov_covariance(time).take(BLOCKS).collect();
+            MarkovShape { time, expected: expected_squares(|lag| covariances[lag]) }
         };
         time_constants(SHORTEST, LONGEST).map(of_time).collect()
     })
