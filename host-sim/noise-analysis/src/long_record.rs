@@ -1,4 +1,4 @@
-//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁷ of them, the
+//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁹ of them, the
 //! curves at averaging times that are too short for the means, and the first samples.
 //!
 //! ```text
@@ -27,11 +27,13 @@ use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescrip
 use std::collections::BTreeMap;
 
 /// Samples of the longest recording that is analysed without being condensed.
-pub const MOST_SAMPLES: u64 = 1 << 18;
+pub const MOST_SAMPLES: u64 = 1 << 20;
 /// Means of a longer recording, at most.
-const MOST_MEANS: u64 = 1 << 17;
-/// Sample periods at the start of the recording whose samples are analysed, and of each of the stretches whose spectra are averaged.
-const FIRST_PERIODS: u64 = 1 << 16;
+const MOST_MEANS: u64 = 1 << 19;
+/// Sample periods at the start of the recording whose samples are analysed.
+const FIRST_PERIODS: u64 = 1 << 17;
+/// Sample periods of each of the stretches whose spectra are averaged: a line is known to a 2¹⁶th of the sample rate or better.
+const STRETCH_PERIODS: u64 = 1 << 16;
 /// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
 /// deviation of the mean of their roundings, `1/√(12·256)` of a count.
 const MEAN_STEPS_LOG2: u32 = 8;
@@ -91,7 +93,7 @@ impl LongChannel {
         let Some(spectrum) = &self.spectrum else { return Vec::new() };
         let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
         let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
-        let [resolved_s, duration_s] = [FIRST_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
+        let [resolved_s, duration_s] = [STRETCH_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
         let lines = spectral_lines::merged(spectrum.lines(), resolved_s, duration_s, rate_error);
         lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect()
     }
@@ -152,7 +154,7 @@ impl LongRecordReader {
         drop(record);
         let screen = SampleScreen::new(&description.channels, rules, leaves_out_repeated);
         let stacked =
-            |fast: &FastFindings| StackedSpectrum::new(description.period_s(), FIRST_PERIODS as usize, fast.resolution);
+            |fast: &FastFindings| StackedSpectrum::new(description.period_s(), STRETCH_PERIODS as usize, fast.resolution);
         let channel = |(profile, fast): (&ChannelProfile, &FastFindings)| {
             let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
             let largest = at_first.iter().flat_map(|channel| &channel.counts).map(|count| count.unsigned_abs()).max();

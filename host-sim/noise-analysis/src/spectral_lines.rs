@@ -118,13 +118,15 @@ fn before_averaging(line: &MergedLine, width: f64) -> MeasuredValue {
     MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
 }
 
-/// Whether `line` of a series is what the faster line `of` looks like at its sample period, s.
+/// Whether `line` of a series is what the faster line `of` looks like at its sample period, s: as wide, at the alias of its frequency.
 fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
     let turns = of.frequency.value * period_s;
     let alias = (turns - turns.round()).abs() / period_s;
     let reach =
         MERGE_WIDTHS * (of.width.value + of.frequency.error + line.width.value) + MERGE_RESOLUTIONS / line.duration_s;
-    (line.frequency.value - alias).abs() < reach
+    // Which is narrower is a line of its own.
+    let is_as_wide = MERGE_WIDTHS * line.width.value >= of.width.value || of.is_sinusoid();
+    is_as_wide && (line.frequency.value - alias).abs() < reach
 }
 
 /// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
