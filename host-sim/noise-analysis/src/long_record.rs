@@ -153,8 +153,9 @@ impl LongRecordReader {
         let leaves_out_repeated = fast.iter().any(|of| shows(of, "repeated_samples"));
         drop(record);
         let screen = SampleScreen::new(&description.channels, rules, leaves_out_repeated);
-        let stacked =
-            |fast: &FastFindings| StackedSpectrum::new(description.period_s(), STRETCH_PERIODS as usize, fast.resolution);
+        let stacked = |fast: &FastFindings| {
+            StackedSpectrum::new(description.period_s(), STRETCH_PERIODS as usize, fast.resolution)
+        };
         let channel = |(profile, fast): (&ChannelProfile, &FastFindings)| {
             let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
             let largest = at_first.iter().flat_map(|channel| &channel.counts).map(|count| count.unsigned_abs()).max();
