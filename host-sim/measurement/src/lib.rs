@@ -65,6 +65,13 @@ impl MeasuredChannel {
         positions
     }
 
+    /// The sample period and the count of each sample that is not refused; `slots` are the sample periods of all of them.
+    pub fn used_samples<'a>(&'a self, slots: &'a [u64]) -> impl Iterator<Item = (u64, i32)> + 'a {
+        let mut refused = self.refused_positions().into_iter().peekable();
+        let samples = slots.iter().copied().zip(self.counts.iter().copied()).enumerate();
+        samples.filter_map(move |(position, sample)| refused.next_if_eq(&position).is_none().then_some(sample))
+    }
+
     /// Whether the sample at `position` was refused for any cause.
     #[must_use]
     pub fn is_refused(&self, position: usize) -> bool {

@@ -80,11 +80,8 @@ struct LongChannel {
 impl LongChannel {
     fn push_to_spectrum(&mut self, slots: &[u64], channel: &MeasuredChannel) {
         let Some(spectrum) = &mut self.spectrum else { return };
-        let mut refused = channel.refused_positions().into_iter().peekable();
-        for (position, (&slot, &count)) in slots.iter().zip(&channel.counts).enumerate() {
-            if refused.next_if_eq(&position).is_none() {
-                spectrum.push(slot, f64::from(count) * channel.profile.lsb);
-            }
+        for (slot, count) in channel.used_samples(slots) {
+            spectrum.push(slot, f64::from(count) * channel.profile.lsb);
         }
     }
 
@@ -284,11 +281,7 @@ impl Means {
     }
 
     fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
-        let mut refused = channel.refused_positions().into_iter().peekable();
-        for (position, (&slot, &count)) in slots.iter().zip(&channel.counts).enumerate() {
-            if refused.next_if_eq(&position).is_some() {
-                continue;
-            }
+        for (slot, count) in channel.used_samples(slots) {
             self.end_before(slot / self.samples_per_mean);
             self.sum += i64::from(count);
             self.present += 1;

@@ -126,13 +126,14 @@ fn append(block: &mut SampleBlock, later: SampleBlock) {
 
 /// The samples of a channel in a block.
 fn series(block: &SampleBlock, at: usize) -> Series {
-    let MeasuredChannel { profile, counts, .. } = &block.channels[at];
-    let refused = block.channels[at].refused_positions();
-    let used = || (0..counts.len()).filter(|position| refused.binary_search(position).is_err());
+    let channel = &block.channels[at];
+    let profile = channel.profile;
+    let (slots, values): (Vec<u64>, Vec<f64>) =
+        channel.used_samples(&block.slots).map(|(slot, count)| (slot, f64::from(count) * profile.lsb)).unzip();
     let span = block.slots.first().copied().unwrap_or(0)..block.slots.last().map_or(0, |last| last + 1);
     Series {
-        slots: used().map(|position| block.slots[position]).collect(),
-        values: used().map(|position| f64::from(counts[position]) * profile.lsb).collect(),
+        slots: slots.into(),
+        values: values.into(),
         span,
         // Spikes are told by the order of samples alone.
         period_s: 1.0,

@@ -13,16 +13,13 @@ use crate::uniform_series::UniformSeries;
 /// The mean of the spectra of stretches of equal length.
 pub(crate) struct StackedSpectrum {
     sample_period: f64,
-    /// Sample periods of a stretch.
-    length: usize,
     /// Smallest distance of two values, in the channel's unit.
     resolution: f64,
     /// The samples of the stretch of this number that were taken, `NaN` where one is missing.
     stretch: Vec<f64>,
     number: u64,
+    /// Of means of as many samples as the first stretch needs for its rounding to act as noise.
     mean: Option<Spectrum>,
-    /// Samples whose means are transformed: as many as the first stretch needs for its rounding to act as noise.
-    averaged: usize,
     /// Sum of the levels of the stretches, and of the squares of these.
     levels: [f64; 2],
 }
@@ -31,12 +28,12 @@ impl StackedSpectrum {
     /// For stretches of `length` samples that are `sample_period` s apart; two values of the channel differ by `resolution` or more.
     pub(crate) fn new(sample_period: f64, length: usize, resolution: f64) -> Self {
         let stretch = vec![f64::NAN; length];
-        Self { sample_period, length, resolution, stretch, number: 0, mean: None, averaged: 0, levels: [0.0; 2] }
+        Self { sample_period, resolution, stretch, number: 0, mean: None, levels: [0.0; 2] }
     }
 
     /// Takes the next sample, which was taken in the sample period `slot`. What is left over at the end is in no stretch.
     pub(crate) fn push(&mut self, slot: u64, value: f64) {
-        let length = self.length as u64;
+        let length = self.stretch.len() as u64;
         if slot / length != self.number {
             self.end_stretch();
             self.number = slot / length;
@@ -44,28 +41,27 @@ impl StackedSpectrum {
         self.stretch[(slot % length) as usize] = value;
         if slot % length == length - 1 {
             self.end_stretch();
+            self.number += 1;
         }
     }
 
     /// Adds the spectrum of the stretch, unless half of its samples or more are missing.
     fn end_stretch(&mut self) {
-        let values = std::mem::replace(&mut self.stretch, vec![f64::NAN; self.length]);
+        let missing = vec![f64::NAN; self.stretch.len()];
+        let values = std::mem::replace(&mut self.stretch, missing);
         let stretch = UniformSeries::new(self.sample_period, values).rounded_to(self.resolution);
-        if 2 * stretch.present() <= self.length {
+        if 2 * stretch.present() <= stretch.values().len() {
             return;
         }
-        let averaged = match self.averaged {
-            0 => stretch.averaged_until_dithered(),
-            size => stretch.averaged(size),
+        let averaged = match &self.mean {
+            None => stretch.averaged_until_dithered(),
+            Some(mean) => stretch.averaged((mean.sample_period / self.sample_period).round() as usize),
         };
         let Some(spectrum) = Spectrum::new(&averaged.detrended()) else { return };
         let level = median(&mut spectrum.periodogram.independent());
         self.levels = [self.levels[0] + level, self.levels[1] + level * level];
         match &mut self.mean {
-            None => {
-                self.averaged = (averaged.sample_period() / self.sample_period).round() as usize;
-                self.mean = Some(spectrum);
-            }
+            None => self.mean = Some(spectrum),
             Some(mean) => mean.average_with(&spectrum),
         }
     }

@@ -238,7 +238,8 @@ impl<'a> WhitenedSpectrum<'a> {
             let shifted = self.whitened[first + size / 2..ordinates - 1].chunks_exact(size);
             let shifted: Vec<f64> = shifted.map(|chunk| chunk.iter().sum::<f64>() / size as f64).collect();
             let mut peaks = Vec::new();
-            for (offset, values) in [(0, &averages), (size / 2, &shifted)] {
+            // An average over one ordinate cannot be shifted by half of it.
+            for (offset, values) in [(0, &averages), (size / 2, &shifted)].into_iter().take(size) {
                 for (at, &value) in values.iter().enumerate() {
                     let level = neighbourhood(&averages, at, size, self.looks);
                     let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
@@ -318,6 +319,7 @@ impl<'a> WhitenedSpectrum<'a> {
         (line, replaced)
     }
 
+    /// The line of which `lorentz` is the curve.
     pub(super) fn resonance_line(&self, lorentz: &Lorentz, p_value: f64) -> SpectralLine {
         let height = lorentz.height * lorentz.level * self.background.shape_at(lorentz.centre);
         let width = lorentz.width * self.resolution;
