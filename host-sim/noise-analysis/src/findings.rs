@@ -107,6 +107,16 @@ pub struct Detection {
     pub correction: Option<Correction>,
 }
 
+impl Detection {
+    /// The sample periods whose samples become gaps.
+    pub(crate) fn excluded(&self) -> &[u64] {
+        match &self.correction {
+            Some(Correction::Exclude(slots)) => slots,
+            _ => &[],
+        }
+    }
+}
+
 /// What removes an effect from a channel's samples.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Correction {

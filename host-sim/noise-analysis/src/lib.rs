@@ -48,6 +48,7 @@ mod part_report;
 mod preprocessing;
 pub mod quick;
 pub mod report;
+mod sample_effects;
 mod sample_screen;
 mod sampling_faults;
 pub mod series;

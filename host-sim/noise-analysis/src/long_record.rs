@@ -2,7 +2,7 @@
 //! curves at averaging times that are too short for the means, and the first samples.
 //!
 //! ```text
-//! first samples ─► TracedRecord ─► what is fast: resolution, saturation, sample clock
+//! first samples ─► SampleEffects: resolution, saturation, sample clock
 //!        └─► rules ─┐
 //! blocks of samples ─► SampleScreen (spikes, repeated samples) ─► means ─► what is slow: drift, steps, temperature, lines
 //!        │                           ├─► StackedSpectrum ─► faster lines
@@ -15,23 +15,24 @@
 use crate::detectors::spikes::SpikeRule;
 use crate::findings::{Detection, Effect};
 use crate::parallel::{self, in_parallel};
-use crate::preprocessing::Exclusion;
+use crate::sample_effects::SampleEffects;
 use crate::sample_screen::SampleScreen;
 use crate::sampling_faults;
+use crate::series::Series;
 use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::spectra::stacked_spectrum::StackedSpectrum;
 use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
-use crate::traced_record::{Condensed, TracedRecord};
+use crate::traced_record::Condensed;
 use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
 use std::collections::BTreeMap;
 
 /// Samples of the longest recording that is analysed without being condensed.
-pub const MOST_SAMPLES: u64 = 1 << 20;
+pub const MOST_SAMPLES: u64 = 1 << 18;
 /// Means of a longer recording, at most.
-const MOST_MEANS: u64 = 1 << 19;
+const MOST_MEANS: u64 = 1 << 17;
 /// Sample periods at the start of the recording whose samples are analysed.
-const FIRST_PERIODS: u64 = 1 << 17;
+const FIRST_PERIODS: u64 = 1 << 16;
 /// Sample periods of each of the stretches whose spectra are averaged: a line is known to a 2¹⁶th of the sample rate or better.
 const STRETCH_PERIODS: u64 = 1 << 16;
 /// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
@@ -46,7 +47,7 @@ const MEANS_PER_PERIOD: f64 = 2.5;
 /// A block mean at this place has no sample.
 const MISSING: i32 = i32::MIN;
 /// Effects that only the samples themselves show, and that are looked for in the first of them.
-const FAST_KINDS: [&str; 4] = ["saturated", "noise_below_count", "repeated_samples", "sample_clock"];
+const FAST_KINDS: [&str; 5] = ["saturated", "noise_below_count", "quantization", "repeated_samples", "sample_clock"];
 
 /// Reads a long recording block by block.
 pub struct LongRecordReader {
@@ -127,29 +128,26 @@ impl LongRecordReader {
         let samples_per_mean = description.periods.div_ceil(MOST_MEANS).next_power_of_two();
         let means = description.periods / samples_per_mean;
         let boundaries = [means / 2 / 2 * samples_per_mean, means / 2 * samples_per_mean];
-        let record = TracedRecord::new(&first, None);
-        let effects = record.effects();
+        let inertial = |profile: &ChannelProfile| profile.quantity.is_inertial();
+        let traced: Vec<ChannelProfile> = first.profiles().filter(inertial).collect();
+        let shown = SampleEffects::detect(&first, &traced);
+        let is_kept = |effect: &Effect| FAST_KINDS.contains(&effect.kind.as_str());
         let of = |profile: &ChannelProfile| {
-            let at = record.channels.iter().position(|trace| trace.channel.name == profile.name);
-            let effects = at.map(|at| effects[at].clone()).unwrap_or_default();
-            let counts = at.map_or(1, |at| record.preprocessing.counts_per_step(record.channels[at].channel));
+            let all = shown.recording.iter().chain(shown.of(*profile)).map(|detection| &detection.effect);
             FastFindings {
-                effects: effects.into_iter().filter(is_fast).collect(),
-                resolution: profile.lsb * f64::from(counts),
+                effects: all.filter(|effect| inertial(profile) && is_kept(effect)).cloned().collect(),
+                resolution: profile.lsb * f64::from(shown.counts_per_step(*profile)),
             }
         };
         let fast: Vec<FastFindings> = description.channels.iter().map(of).collect();
-        let shows = |of: &FastFindings, kind: &str| of.effects.iter().any(|effect| effect.kind == kind);
-        let inertial: Vec<(&ChannelProfile, &FastFindings)> = description.channels.iter().zip(&fast).collect();
-        let rules = in_parallel(&inertial, |(profile, fast)| {
-            // What is cut off is no noise around which a sample could be a spike.
-            let channel = record.traced.iter().find(|of| of.name == profile.name && !shows(fast, "saturated"))?;
-            let series = record.preprocessing.series(&first, *channel, Exclusion::None);
-            SpikeRule::fit_for(&series, description.samples)
+        let repeated = shown.repeated();
+        let rules = in_parallel(&description.channels, |profile| {
+            let is_sought = inertial(profile) && !shown.is_saturated(*profile);
+            let series =
+                || Series::from_measurement(&first, profile).with_counts_per_step(shown.counts_per_step(*profile));
+            is_sought.then(|| SpikeRule::fit_for(&series().without(&repeated), description.samples)).flatten()
         });
-        let leaves_out_repeated = fast.iter().any(|of| shows(of, "repeated_samples"));
-        drop(record);
-        let screen = SampleScreen::new(&description.channels, rules, leaves_out_repeated);
+        let screen = SampleScreen::new(&description.channels, rules, !repeated.is_empty());
         let stacked = |fast: &FastFindings| {
             StackedSpectrum::new(description.period_s(), STRETCH_PERIODS as usize, fast.resolution)
         };
@@ -160,7 +158,7 @@ impl LongRecordReader {
                 recorded: StreamedCurves::new(&boundaries),
                 screened: StreamedCurves::new(&boundaries),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
-                spectrum: profile.quantity.is_inertial().then(|| stacked(fast)),
+                spectrum: inertial(profile).then(|| stacked(fast)),
             }
         };
         let channels = description.channels.iter().zip(&fast).map(channel).collect();
@@ -302,9 +300,4 @@ impl Means {
             (self.sum, self.present) = (0, 0);
         }
     }
-}
-
-/// Whether only the samples themselves show an effect; a resolution of several counts is a `quantization` with a `step`.
-fn is_fast(effect: &Effect) -> bool {
-    FAST_KINDS.contains(&effect.kind.as_str()) || effect.parameters.contains_key("step")
 }

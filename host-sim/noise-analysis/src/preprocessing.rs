@@ -5,16 +5,16 @@
 //! stays in the samples, because the noise model has a term for it. A sensitivity to temperature or supply stays in them too,
 //! and is kept for the regression on covariates.
 
+use crate::detectors::bias;
 use crate::detectors::bias::{BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
-use crate::detectors::{bias, effective_lsb, output_range};
 use crate::findings::{Correction, Detection, Effect};
 use crate::parallel::in_parallel;
-use crate::sampling_faults;
+use crate::sample_effects::SampleEffects;
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
@@ -47,8 +47,8 @@ struct ChannelExclusion {
 pub(crate) struct Preprocessing {
     /// Sample periods of all samples.
     slots: Arc<[u64]>,
-    /// Effects that concern every channel: sample loss, repeated samples, the sample clock.
-    common_effects: Vec<Effect>,
+    /// What shows in samples alone.
+    samples: SampleEffects,
     channel_effects: Vec<(ChannelProfile, Effect)>,
     /// Sample periods that no channel uses: their sample equals the one before in all channels.
     repeated: Vec<u64>,
@@ -60,15 +60,10 @@ pub(crate) struct Preprocessing {
     responses: Vec<(ChannelProfile, [Vec<BiasResponse>; 2])>,
     /// A channel, the temperature or supply that it depends on, and how much.
     sensitivities: Vec<(ChannelProfile, ChannelProfile, BiasSensitivity)>,
-    /// Channels whose values are all multiples of several counts, and of how many.
-    counts_per_step: Vec<(ChannelProfile, u32)>,
 }
 
 /// What was found in one channel.
 struct ChannelFindings {
-    lsb: Option<Detection>,
-    /// Values that are cut off, or noise below a count.
-    range: Option<Detection>,
     knocks: Vec<Detection>,
     spikes: Option<Detection>,
     bias_changes: BiasChanges,
@@ -89,23 +84,12 @@ impl Preprocessing {
         traced: &[ChannelProfile],
         noise_grids: &NoiseGrids,
     ) -> Self {
-        let mut preprocessing = Self { slots: measurement.slots.as_slice().into(), ..Self::default() };
-        let faults = if means { Vec::new() } else { sampling_faults::detect(measurement) };
-        for finding in faults {
-            preprocessing.repeated.extend(excluded(&finding.correction));
-            preprocessing.common_effects.push(finding.effect);
-        }
+        let samples = if means { SampleEffects::default() } else { SampleEffects::detect(measurement, traced) };
+        let repeated = samples.repeated();
+        let slots = measurement.slots.as_slice().into();
+        let mut preprocessing = Self { slots, samples, repeated, ..Self::default() };
         let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
-        let slots = Arc::clone(&preprocessing.slots);
-        let measured =
-            |channel: ChannelProfile| Series::with_shared_slots(measurement, &channel, || Arc::clone(&slots));
-        if !means {
-            let steps = in_parallel(&recorded, |&channel| effective_lsb::counts_per_step(&measured(channel)));
-            let steps = recorded.iter().copied().zip(steps);
-            preprocessing.counts_per_step = steps.filter(|(_, counts)| *counts > 1).collect();
-        }
-        let series_of =
-            |channel: ChannelProfile| measured(channel).with_counts_per_step(preprocessing.counts_per_step(channel));
+        let series_of = |channel: ChannelProfile| preprocessing.measured(measurement, channel);
         let series: Vec<Series> = in_parallel(traced, |&channel| series_of(channel));
         let knocks = KnocksInChannels::find(&series, measurement.middle(), measurement.profile.dithered_avar_counts2);
         // What a channel may depend on, without its own knocks.
@@ -119,21 +103,10 @@ impl Preprocessing {
         let numbered: Vec<usize> = (0..traced.len()).collect();
         let found = in_parallel(&numbered, |&at| {
             let quiet = knocks.removed_from(&series[at], at);
-            let dithered = measurement.profile.dithered_avar_counts2;
-            let [lsb, saturation, below_count] = if means {
-                [None, None, None]
-            } else {
-                [
-                    effective_lsb::find(&measured(traced[at])),
-                    output_range::find_saturation(&series[at], traced[at].range),
-                    output_range::find_noise_below_count(&series[at], dithered),
-                ]
-            };
-            // What is cut off is no noise around which a sample could be a spike.
-            let spikes = if saturation.is_none() && !means { spikes::find(&quiet) } else { None };
-            let range = saturation.or(below_count);
+            let has_spikes = !means && !preprocessing.samples.is_saturated(traced[at]);
+            let spikes = if has_spikes { spikes::find(&quiet) } else { None };
             let mut exclusion = ChannelExclusion {
-                spikes: spikes.as_ref().map(|finding| excluded(&finding.correction)).unwrap_or_default(),
+                spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
                 knocks: slots_within(&series[at], &knocks.by_whole[at]),
                 by_first_half: Vec::new(),
             };
@@ -157,8 +130,6 @@ impl Preprocessing {
                 bias::find(&own, &others, &accelerations(traced, &all, traced[at]), noise_grids).responses
             };
             ChannelFindings {
-                lsb,
-                range,
                 knocks: knocks.detections(&series[at], at, traced),
                 responses_of_first_half,
                 bias_changes,
@@ -168,16 +139,8 @@ impl Preprocessing {
             }
         });
         for (&channel, found) in traced.iter().zip(found) {
-            let ChannelFindings {
-                lsb,
-                range,
-                knocks,
-                spikes,
-                bias_changes,
-                responses_of_first_half,
-                regressors,
-                exclusion,
-            } = found;
+            let ChannelFindings { knocks, spikes, bias_changes, responses_of_first_half, regressors, exclusion } =
+                found;
             let BiasChanges { step, ramp, sensitivities, responses } = bias_changes;
             if !responses.is_empty() {
                 preprocessing.channel_effects.extend(responses.iter().map(|of| (channel, of.effect.clone())));
@@ -191,7 +154,7 @@ impl Preprocessing {
             let slow = sensitivities.into_iter().map(|(place, sensitivity)| (channel, regressors[place], sensitivity));
             preprocessing.sensitivities.extend(slow.filter(|(_, regressor, _)| regressor.quantity.is_environment()));
             preprocessing.exclusions.push((channel, exclusion));
-            let findings = lsb.into_iter().chain(range).chain(knocks).chain(spikes).chain(step).chain(ramp);
+            let findings = knocks.into_iter().chain(spikes).chain(step).chain(ramp);
             preprocessing.channel_effects.extend(findings.map(|finding| (channel, finding.effect)));
         }
         preprocessing
@@ -199,7 +162,7 @@ impl Preprocessing {
 
     /// How many counts the smallest step of a channel's values has.
     pub(crate) fn counts_per_step(&self, channel: ChannelProfile) -> u32 {
-        self.counts_per_step.iter().find(|(of, _)| *of == channel).map_or(1, |(_, counts)| *counts)
+        self.samples.counts_per_step(channel)
     }
 
     /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
@@ -268,14 +231,15 @@ impl Preprocessing {
         self.responses(channel, Exclusion::ByWhole).iter().any(|of| of.effect.kind != "vibration_rectification")
     }
 
-    /// A channel's series as measured.
+    /// A channel's series as measured, with its resolution.
     pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelProfile) -> Series {
-        Series::with_shared_slots(measurement, &channel, || Arc::clone(&self.slots))
+        let series = Series::with_shared_slots(measurement, &channel, || Arc::clone(&self.slots));
+        series.with_counts_per_step(self.samples.counts_per_step(channel))
     }
 
     /// A channel's series after preprocessing.
     pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelProfile, exclusion: Exclusion) -> Series {
-        let mut series = self.measured(measurement, channel).with_counts_per_step(self.counts_per_step(channel));
+        let mut series = self.measured(measurement, channel);
         for &(_, from, size) in self.offsets.iter().filter(|(of, ..)| *of == channel) {
             series = series.lowered_from(from, size);
         }
@@ -300,7 +264,8 @@ impl Preprocessing {
     /// The effects of a channel, those that concern every channel first.
     pub(crate) fn effects(&self, channel: ChannelProfile) -> impl Iterator<Item = Effect> + '_ {
         let own = self.channel_effects.iter().filter(move |(of, _)| *of == channel).map(|(_, effect)| effect);
-        self.common_effects.iter().chain(own).cloned()
+        let of_samples = self.samples.recording.iter().chain(self.samples.of(channel));
+        of_samples.map(|detection| &detection.effect).chain(own).cloned()
     }
 }
 
@@ -408,13 +373,6 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     all.sort_unstable();
     all.dedup();
     all
-}
-
-fn excluded(correction: &Option<Correction>) -> Vec<u64> {
-    match correction {
-        Some(Correction::Exclude(slots)) => slots.clone(),
-        _ => Vec::new(),
-    }
 }
 
 /// Whether the bias of `channel` may depend on `regressor`: on temperature and supply, and that of a gyroscope on the

@@ -129,7 +129,7 @@ impl KnockRule {
             let mut freedoms: Vec<BlockFreedom> = Vec::new();
             for doublings in doublings(&differences, series.period_s) {
                 let longer = longer_levels(&levels, doublings);
-                let by_length = freedoms.last().map_or(differences.freedom(), |freedom| 2.0 * freedom.block);
+                let by_length = freedoms.last().map_or_else(|| differences.freedom(), |freedom| 2.0 * freedom.block);
                 let block = freedom_by_scatter(&longer).map_or(by_length, |freedom| freedom.min(by_length));
                 // Levels that move together at a short length do so at a longer one, which has too few blocks to show it.
                 let neighbours = freedoms.last().map_or(f64::INFINITY, |freedom| 2.0 * freedom.neighbours);

@@ -5,7 +5,7 @@
 //! is white, flicker and random-walk noise behind a digital filter; `Background` corrects it by local medians, which
 //! lines hardly move.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -20,18 +20,21 @@ pub struct SpectralBand {
     pub ordinates: f64,
 }
 
-/// Most rounds of the multiplicative fit.
-const ROUNDS: usize = 300;
-/// The fit ends with a round that changes the modelled densities by less than this part on average: 300 such rounds would
-/// change them by less than the scatter of 10⁷ ordinates.
-const CONVERGED: f64 = 1e-6;
+/// Rounds of the multiplicative fit, which bring the densities near enough for the scoring.
+const MULTIPLICATIVE_ROUNDS: usize = 8;
+/// Most rounds of the scoring, and the gain in ln likelihood of a round with which it ends: what is left to gain then is far less
+/// than 1/2, by which the likelihood falls at one standard deviation.
+const SCORING_ROUNDS: usize = 50;
+const LEAST_GAIN: f64 = 1e-4;
+/// Shortest part of a step of the scoring that is tried.
+const SHORTEST_STEP: f64 = 1e-3;
 
 /// Fits the densities of `TERMS` shapes whose values in each band are `bases`.
 ///
-/// Begins with each shape alone explaining an equal part of the bands. Each round multiplies the densities by factors
+/// Begins with each shape alone explaining an equal part of the bands. A few rounds multiply the densities by factors
 /// that keep them non-negative and never lower the likelihood (C. Févotte and J. Idier, "Algorithms for nonnegative matrix
 /// factorization with the β-divergence", Neural Computation 23, 2011, for the Itakura-Saito divergence, which is Whittle's
-/// likelihood).
+/// likelihood). Fisher's scoring, with steps that are halved until the likelihood grows, does the rest.
 pub(super) fn fit_mixture<const TERMS: usize>(
     bands: &[SpectralBand],
     bases: &[[f64; TERMS]],
@@ -45,19 +48,77 @@ pub(super) fn fit_mixture<const TERMS: usize>(
         });
         *density = if weight > 0.0 { (sum / weight).exp() / TERMS as f64 } else { 0.0 };
     }
-    for _ in 0..ROUNDS {
-        if multiplicative_step(bands, bases, densities) < CONVERGED {
+    for _ in 0..MULTIPLICATIVE_ROUNDS {
+        multiplicative_step(bands, bases, densities);
+    }
+    let mut objective = mixture_objective(bands, bases, densities);
+    for _ in 0..SCORING_ROUNDS {
+        let next = weighted_least_squares(bands, bases, densities);
+        let step = |part: f64| -> [f64; TERMS] {
+            std::array::from_fn(|term| densities[term] + part * (next[term] - densities[term]))
+        };
+        let parts = std::iter::successors(Some(1.0), |part| Some(part / 2.0)).take_while(|&part| part > SHORTEST_STEP);
+        let tried = parts.map(|part| (mixture_objective(bands, bases, &step(part)), step(part)));
+        let Some((likelier, reached)) = tried.into_iter().find(|(tried, _)| *tried < objective) else { break };
+        let gain = objective - likelier;
+        (objective, *densities) = (likelier, reached);
+        if gain < LEAST_GAIN {
             break;
         }
     }
 }
 
-/// A round of the fit. Returns the part by which it changes the modelled densities, on average over the ordinates.
+/// A round of Fisher's scoring: the densities that are not negative and whose sum is nearest to the bands, each weighted by the
+/// inverse of its variance under the present `densities`. What is negative is set to 0, one term after another.
+fn weighted_least_squares<const TERMS: usize>(
+    bands: &[SpectralBand],
+    bases: &[[f64; TERMS]],
+    densities: &[f64; TERMS],
+) -> [f64; TERMS] {
+    let (mut information, mut pull) = (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
+    for (band, basis) in bands.iter().zip(bases) {
+        let density = mixture_density(basis, densities);
+        if density <= 0.0 {
+            continue;
+        }
+        let relative = SVector::from(basis.map(|value| value / density));
+        information.syger(band.ordinates, &relative, &relative, 1.0);
+        pull.axpy(band.ordinates * band.density / density, &relative, 1.0);
+    }
+    information.fill_upper_triangle_with_lower_triangle();
+    // In units in which each term alone is known to 1.
+    let scale: [f64; TERMS] = std::array::from_fn(|term| information[(term, term)].sqrt());
+    let mut is_left_out: [bool; TERMS] = std::array::from_fn(|term| scale[term] == 0.0);
+    loop {
+        let entry = |row: usize, column: usize| {
+            if is_left_out[row] || is_left_out[column] {
+                f64::from(u8::from(row == column))
+            } else {
+                information[(row, column)] / (scale[row] * scale[column])
+            }
+        };
+        let matrix = SMatrix::<f64, TERMS, TERMS>::from_fn(entry);
+        let right =
+            SVector::<f64, TERMS>::from_fn(|term, _| if is_left_out[term] { 0.0 } else { pull[term] / scale[term] });
+        let Some(cholesky) = matrix.cholesky() else { return *densities };
+        let solved = cholesky.solve(&right);
+        if solved.iter().any(|value| !value.is_finite()) {
+            return *densities;
+        }
+        let (least, value) = solved.argmin();
+        if value >= 0.0 {
+            return std::array::from_fn(|term| if is_left_out[term] { 0.0 } else { solved[term] / scale[term] });
+        }
+        is_left_out[least] = true;
+    }
+}
+
+/// A round of the multiplicative fit.
 fn multiplicative_step<const TERMS: usize>(
     bands: &[SpectralBand],
     bases: &[[f64; TERMS]],
     densities: &mut [f64; TERMS],
-) -> f64 {
+) {
     let (mut pull, mut push) = ([0.0; TERMS], [0.0; TERMS]);
     for (band, basis) in bands.iter().zip(bases) {
         let density = mixture_density(basis, densities);
@@ -70,16 +131,9 @@ fn multiplicative_step<const TERMS: usize>(
             push[term] += weight;
         }
     }
-    // Σ g·(share of a term) is its density times `push`, and the shares of all terms add to 1.
-    let (mut changed, mut total) = (0.0, 0.0);
-    for term in 0..TERMS {
-        if push[term] > 0.0 {
-            let (factor, share) = ((pull[term] / push[term]).sqrt(), densities[term] * push[term]);
-            (changed, total) = (changed + share * (factor - 1.0).abs(), total + share);
-            densities[term] *= factor;
-        }
+    for term in (0..TERMS).filter(|&term| push[term] > 0.0) {
+        densities[term] *= (pull[term] / push[term]).sqrt();
     }
-    if total > 0.0 { changed / total } else { 0.0 }
 }
 
 /// Density of the mixture where its shapes have the values `basis`.
@@ -87,13 +141,23 @@ pub(super) fn mixture_density<const TERMS: usize>(basis: &[f64; TERMS], densitie
     basis.iter().zip(densities).map(|(basis, density)| basis * density).sum()
 }
 
+/// `Σ g·(ln S + P/S)` over the bands, `S` being the mixture.
+fn mixture_objective<const TERMS: usize>(
+    bands: &[SpectralBand],
+    bases: &[[f64; TERMS]],
+    densities: &[f64; TERMS],
+) -> f64 {
+    bands.iter().zip(bases).map(|(band, basis)| band_objective(band, mixture_density(basis, densities))).sum()
+}
+
 /// `Σ g·(ln S + P/S)` over the bands, `S` being the `modelled` densities.
 pub(super) fn whittle_objective(bands: &[SpectralBand], modelled: &[f64]) -> f64 {
-    let of_band = |(band, modelled): (&SpectralBand, &f64)| {
-        let density = modelled.max(f64::MIN_POSITIVE);
-        band.ordinates * (density.ln() + band.density / density)
-    };
-    bands.iter().zip(modelled).map(of_band).sum()
+    bands.iter().zip(modelled).map(|(band, modelled)| band_objective(band, *modelled)).sum()
+}
+
+fn band_objective(band: &SpectralBand, modelled: f64) -> f64 {
+    let density = modelled.max(f64::MIN_POSITIVE);
+    band.ordinates * (density.ln() + band.density / density)
 }
 
 /// Longest filter that is tried: two cascaded averages of `2^6` samples each, the largest setting of the ADIS16405.
