@@ -29,6 +29,7 @@ pub(crate) mod periodic_signal;
 mod periodogram;
 mod smooth_shape;
 pub(crate) mod stacked_spectrum;
+mod transforms;
 mod welch;
 mod white_noise;
 mod whitened_spectrum;

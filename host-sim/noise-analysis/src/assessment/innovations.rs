@@ -115,8 +115,8 @@ impl Mode {
 }
 
 struct KalmanFilter {
-    transition: DMatrix<f64>,
-    process_noise: DMatrix<f64>,
+    /// Each with the place of its first number in the state.
+    modes: Vec<(usize, Mode)>,
     /// Observation vector: 1 for each number of the state that is a part of the measurement.
     observation: DVector<f64>,
     /// Variance of the white noise of a measurement.
@@ -176,24 +176,17 @@ impl KalmanFilter {
 
     fn new(modes: &[Mode], measurement_noise: f64) -> Self {
         let size = modes.iter().map(Mode::size).sum();
-        let (mut transition, mut process_noise) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
         let (mut covariance, mut observation) = (DMatrix::zeros(size, size), DVector::zeros(size));
         let mut at = 0;
-        for mode in modes {
-            let (sin, cos) = mode.rotation.unwrap_or(0.0).sin_cos();
-            observation[at] = 1.0;
-            for offset in 0..mode.size() {
-                transition[(at + offset, at + offset)] = mode.decay * cos;
-                process_noise[(at + offset, at + offset)] = mode.process_noise;
-                covariance[(at + offset, at + offset)] = mode.variance;
-            }
-            if mode.size() == 2 {
-                transition[(at, at + 1)] = -mode.decay * sin;
-                transition[(at + 1, at)] = mode.decay * sin;
-            }
+        let placed = modes.iter().map(|&mode| {
+            let place = at;
+            observation[place] = 1.0;
             at += mode.size();
-        }
-        Self { transition, process_noise, observation, measurement_noise, state: DVector::zeros(size), covariance }
+            (place..at).for_each(|number| covariance[(number, number)] = mode.variance);
+            (place, mode)
+        });
+        let modes = placed.collect();
+        Self { modes, observation, measurement_noise, state: DVector::zeros(size), covariance }
     }
 
     /// Updates the state with the measurement of a block, if there is one, and predicts the next block. Returns the
@@ -204,11 +197,35 @@ impl KalmanFilter {
             let variance = self.observation.dot(&gain) + self.measurement_noise;
             let innovation = measured - self.observation.dot(&self.state);
             self.state += &gain * (innovation / variance);
-            self.covariance -= &gain * gain.transpose() / variance;
+            self.covariance.ger(-1.0 / variance, &gain, &gain, 1.0);
             innovation / variance.sqrt()
         });
-        self.state = &self.transition * &self.state;
-        self.covariance = &self.transition * &self.covariance * self.transition.transpose() + &self.process_noise;
+        self.predict();
         innovation
+    }
+
+    /// Predicts the state at the next block: each mode decays, rotates and takes up its noise.
+    fn predict(&mut self) {
+        let Self { modes, state, covariance, .. } = self;
+        for &(at, mode) in modes.iter() {
+            if let Some(rotation) = mode.rotation {
+                let (sin, cos) = rotation.sin_cos();
+                let turned = |a: f64, b: f64| (mode.decay * (cos * a - sin * b), mode.decay * (sin * a + cos * b));
+                (state[at], state[at + 1]) = turned(state[at], state[at + 1]);
+                for other in 0..covariance.nrows() {
+                    let (a, b) = turned(covariance[(other, at)], covariance[(other, at + 1)]);
+                    (covariance[(other, at)], covariance[(other, at + 1)]) = (a, b);
+                }
+                for other in 0..covariance.ncols() {
+                    let (a, b) = turned(covariance[(at, other)], covariance[(at + 1, other)]);
+                    (covariance[(at, other)], covariance[(at + 1, other)]) = (a, b);
+                }
+            } else if mode.decay != 1.0 {
+                state[at] *= mode.decay;
+                covariance.column_mut(at).scale_mut(mode.decay);
+                covariance.row_mut(at).scale_mut(mode.decay);
+            }
+            (at..at + mode.size()).for_each(|number| covariance[(number, number)] += mode.process_noise);
+        }
     }
 }

@@ -6,10 +6,10 @@
 //! Astrophys. Suppl. 15, 1974: each sum is one of two sums over half as many segments). Of the lengths of segments, that is the
 //! best in which the frequency runs by half of the segment's resolution.
 
+use super::transforms;
 use crate::distributions::exponential_sum_tail;
 use crate::findings::SIGNIFICANCE;
 use crate::uniform_series::UniformSeries;
-use realfft::RealFftPlanner;
 
 /// Numbers of segments that are tried.
 const SEGMENTS: [usize; 4] = [32, 64, 128, 256];
@@ -99,7 +99,7 @@ impl Spectrogram {
         if size < FEWEST_SAMPLES {
             return None;
         }
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(PADDING * size);
+        let transform = transforms::forward(PADDING * size);
         let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
         let mut rows: Vec<Vec<f32>> = Vec::with_capacity(segments);
         for values in series.values().chunks_exact(size).take(segments) {

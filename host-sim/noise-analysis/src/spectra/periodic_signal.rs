@@ -8,10 +8,10 @@
 use super::line_models::Sine;
 use super::periodogram::taper;
 use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use super::transforms;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
 use crate::findings::{Parameter, SIGNIFICANCE};
 use crate::uniform_series::UniformSeries;
-use realfft::RealFftPlanner;
 
 /// Blocks of the record, at least: twice the highest harmonic is half their rate.
 const BLOCKS: usize = 1024;
@@ -188,7 +188,7 @@ impl SmoothNoise {
 impl PaddedSpectrum {
     fn new(blocks: &UniformSeries) -> Option<Self> {
         let values = blocks.values();
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(PADDING * values.len());
+        let transform = transforms::forward(PADDING * values.len());
         let mut input = transform.make_input_vec();
         let mut squares = 0.0;
         for (at, (slot, value)) in input.iter_mut().zip(values).enumerate() {

@@ -1,8 +1,8 @@
 //! Discrete Fourier transforms of a whole record: the tapered periodogram, at the resolution that the record's length
 //! allows, and transforms under sine tapers for its lowest frequencies.
 
+use super::transforms;
 use crate::uniform_series::UniformSeries;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -34,7 +34,7 @@ impl Periodogram {
         if values.iter().filter(|value| value.is_finite()).count() < 2 {
             return None;
         }
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(PADDING * length);
+        let transform = transforms::forward(PADDING * length);
         let mut input = transform.make_input_vec();
         let mut power = 0.0;
         for (at, (slot, value)) in input.iter_mut().zip(values).enumerate() {
@@ -145,7 +145,7 @@ impl SineTapered {
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
         let (filled, _) = series.interpolated();
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length.max(2));
+        let transform = transforms::forward(length.max(2));
         let under = |taper: usize| {
             let mut input = transform.make_input_vec();
             let mut power = 0.0;

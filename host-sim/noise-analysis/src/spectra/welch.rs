@@ -1,8 +1,8 @@
 //! Welch's estimate of a power spectral density: the average of the periodograms of overlapping windowed segments.
 
 use super::smooth_shape::{SpectralBand, SpectralShape};
+use super::transforms;
 use crate::uniform_series::UniformSeries;
-use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
 /// A segment with more than this fraction of its samples missing is left out.
@@ -34,7 +34,7 @@ impl Welch {
             return None;
         }
         let window: Vec<f64> = (0..length).map(|at| (PI * (at as f64 + 0.5) / length as f64).sin().powi(2)).collect();
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let transform = transforms::forward(length);
         let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
         let mut density = vec![0.0; output.len()];
         let mut segments = 0;

@@ -3,7 +3,7 @@
 use super::line_envelope::Modulation;
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
-use super::smooth_shape::{Background, LocalLevel, WINDOW, median};
+use super::smooth_shape::{Background, LocalLevel, WINDOW};
 use crate::distributions::mean_ratio_tail;
 use crate::findings::MeasuredValue;
 use crate::uniform_series::UniformSeries;
@@ -21,6 +21,8 @@ pub(super) const NARROWEST: f64 = 1.5;
 const PREFERENCE: f64 = 10.0;
 /// Least relative excess of a broad peak over the density around it; a smaller one may be an error of the background's shape.
 const LEAST_EXCESS: f64 = 0.1;
+/// An average is no peak within so many standard deviations of the level around it, which chance exceeds in one of a thousand.
+const EXAMINED: f64 = 3.0;
 /// Averages on either side that a broad peak is compared with.
 const NEIGHBOURS: usize = 16;
 /// An ordinate belongs to a sinusoid where it exceeds the background by so many standard deviations, at most so far from the
@@ -131,17 +133,18 @@ impl<'a> WhitenedSpectrum<'a> {
     ) -> Option<Self> {
         let &Spectrum { ref periodogram, sample_period, independent, floor } = spectrum;
         let looks = periodogram.looks();
-        let deflation = |bin: f64, except: Option<usize>| {
-            let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != except);
-            others.map(|(_, resonance)| resonance.lorentz.deflation(bin)).product::<f64>()
-        };
-        let mut density = periodogram.independent();
-        for (bin, ordinate) in density.iter_mut().enumerate() {
-            *ordinate *= deflation(bin as f64, None);
+        let bin = |at: usize| at as f64 / PADDING as f64;
+        let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != kept);
+        let mut deflation = vec![1.0; periodogram.padded().len()];
+        for (_, other) in others {
+            deflation.iter_mut().enumerate().for_each(|(at, factor)| *factor *= other.lorentz.deflation(bin(at)));
+        }
+        let mut density: Vec<f64> =
+            periodogram.independent().iter().zip(deflation.iter().step_by(PADDING)).map(|(a, b)| a * b).collect();
+        if let Some(kept) = kept.and_then(|kept| resonances.get(kept)) {
+            density.iter_mut().enumerate().for_each(|(bin, ordinate)| *ordinate *= kept.lorentz.deflation(bin as f64));
         }
         let background = Background::fit(&density, looks, known, periodogram.resolution(), sample_period)?;
-        let bin = |at: usize| at as f64 / PADDING as f64;
-        let deflation: Vec<f64> = (0..periodogram.padded().len()).map(|at| deflation(bin(at), kept)).collect();
         let over_shape = |(at, (ordinate, deflation)): (usize, (&f64, &f64))| match at {
             0 => 0.0,
             at => ordinate * deflation / background.shape_at(bin(at)),
@@ -237,15 +240,15 @@ impl<'a> WhitenedSpectrum<'a> {
                 .collect();
             let shifted = self.whitened[first + size / 2..ordinates - 1].chunks_exact(size);
             let shifted: Vec<f64> = shifted.map(|chunk| chunk.iter().sum::<f64>() / size as f64).collect();
+            let levels = neighbourhoods(&averages, size, self.looks);
             let mut peaks = Vec::new();
             // An average over one ordinate cannot be shifted by half of it.
             for (offset, values) in [(0, &averages), (size / 2, &shifted)].into_iter().take(size) {
-                for (at, &value) in values.iter().enumerate() {
-                    let level = neighbourhood(&averages, at, size, self.looks);
+                for (at, (&value, level)) in values.iter().zip(&levels).enumerate() {
                     let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
                     let excess = value / level.value.max(self.floor / self.background.shape_at(centre));
-                    if excess > 1.0 + LEAST_EXCESS {
-                        let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
+                    let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
+                    if excess > 1.0 + LEAST_EXCESS.max(EXAMINED * (1.0 / own + 1.0 / others).sqrt()) {
                         let p_value = trials * mean_ratio_tail(excess, own, others);
                         peaks.push((centre, size as f64, p_value));
                     }
@@ -338,15 +341,32 @@ impl<'a> WhitenedSpectrum<'a> {
     }
 }
 
-/// Median of the averages around one of them, each over `size` ordinates.
-fn neighbourhood(averages: &[f64], at: usize, size: usize, looks: f64) -> LocalLevel {
-    let low = at.saturating_sub(NEIGHBOURS);
-    let high = (at + NEIGHBOURS).min(averages.len() - 1);
-    let mut window = averages[low..=high].to_vec();
-    // The median of a gamma variable of shape g is about 1 − 1/(3g) of its mean. The median of many is worth the mean of
-    // 2/π of them.
-    let value = median(&mut window) / (1.0 - 1.0 / (3.0 * size as f64 * looks));
-    LocalLevel { value, ordinates: (window.len() * size) as f64 * 2.0 / PI }
+/// Medians of the averages around each of them, each over `size` ordinates.
+fn neighbourhoods(averages: &[f64], size: usize, looks: f64) -> Vec<LocalLevel> {
+    // In ascending order.
+    let mut window: Vec<f64> = Vec::with_capacity(2 * NEIGHBOURS + 2);
+    let place = |window: &[f64], value: &f64| window.partition_point(|other| other.total_cmp(value).is_lt());
+    let mut next = averages.iter();
+    let mut take = |window: &mut Vec<f64>| {
+        if let Some(value) = next.next() {
+            window.insert(place(window, value), *value);
+        }
+    };
+    (0..NEIGHBOURS).for_each(|_| take(&mut window));
+    let mut level = |at: usize| {
+        take(&mut window);
+        if let Some(passed) = at.checked_sub(NEIGHBOURS + 1) {
+            window.remove(place(&window, &averages[passed]));
+        }
+        let middle = window.len() / 2;
+        let median =
+            if window.len().is_multiple_of(2) { (window[middle - 1] + window[middle]) / 2.0 } else { window[middle] };
+        // The median of a gamma variable of shape g is about 1 − 1/(3g) of its mean. The median of many is worth the mean of
+        // 2/π of them.
+        let value = median / (1.0 - 1.0 / (3.0 * size as f64 * looks));
+        LocalLevel { value, ordinates: (window.len() * size) as f64 * 2.0 / PI }
+    };
+    (0..averages.len()).map(&mut level).collect()
 }
 
 /// A sinusoid whose ordinate is `ratio` times the background, in a record of `duration` s.
