@@ -237,8 +237,9 @@ impl SpectralShape {
 
 /// Values of the terms for a density of 1 at 1 Hz. Without a filter the floor is the same as the white noise, and left out.
 fn shape_basis(frequency: f64, sample_period: f64, taps: u32) -> [f64; TERMS] {
-    let gain = filter_gain(frequency, sample_period, taps);
-    let walk = walk_amplitude(frequency, sample_period);
+    let sine = (PI * frequency * sample_period).sin();
+    let gain = filter_gain(frequency, sample_period, taps, sine);
+    let walk = PI * sample_period / sine;
     [gain, gain / frequency, gain * walk * walk, if taps > 1 { 1.0 } else { 0.0 }]
 }
 
@@ -247,11 +248,14 @@ pub(super) fn walk_amplitude(frequency: f64, sample_period: f64) -> f64 {
     PI * sample_period / (PI * frequency * sample_period).sin()
 }
 
-/// Power gain of two cascaded averages over `taps` samples each (a Bartlett window).
-fn filter_gain(frequency: f64, sample_period: f64, taps: u32) -> f64 {
-    let phase = PI * frequency * sample_period;
+/// Power gain of two cascaded averages over `taps` samples each (a Bartlett window), at a frequency whose phase in one sample has
+/// this `sine`.
+fn filter_gain(frequency: f64, sample_period: f64, taps: u32, sine: f64) -> f64 {
+    if taps == 1 || sine == 0.0 {
+        return 1.0;
+    }
     let taps = f64::from(taps);
-    if phase.sin() == 0.0 { 1.0 } else { ((taps * phase).sin() / (taps * phase.sin())).powi(4) }
+    ((taps * PI * frequency * sample_period).sin() / (taps * sine)).powi(4)
 }
 
 /// Ordinates below this multiple of the resolution are left to the drift of the record.
