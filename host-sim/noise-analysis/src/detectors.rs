@@ -19,6 +19,7 @@ pub mod block_means;
 pub(crate) mod effective_lsb;
 pub mod gls_regression;
 pub(crate) mod knocks;
+pub mod noise_grid;
 mod noise_levels;
 pub(crate) mod output_range;
 pub(crate) mod random_telegraph;

@@ -8,8 +8,8 @@
 use crate::detectors::bias;
 use crate::detectors::bias::{BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
-use crate::detectors::block_means::NoiseGrids;
 use crate::detectors::knocks::{self, Knock, KnockRule};
+use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::findings::{Correction, Detection, Effect};

@@ -3,7 +3,7 @@
 
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::covariates::CovariateFit;
-use crate::detectors::block_means::NoiseGrids;
+use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::random_telegraph;
 use crate::estimators::RecordEstimators;
 use crate::findings::{Detection, Effect};

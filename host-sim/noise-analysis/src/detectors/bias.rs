@@ -6,8 +6,9 @@
 
 use super::bias_response::BiasResponse;
 use super::bias_step::{self, StepPosition};
-use super::block_means::{BlockMeans, NoiseGrid, NoiseGrids};
+use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
+use super::noise_grid::{NoiseGrid, NoiseGrids};
 use super::thermal_response::{self, Lag, TemperatureCourse};
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::distributions::NORMAL_975;

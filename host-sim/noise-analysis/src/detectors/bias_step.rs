@@ -3,8 +3,9 @@
 //! Random walk, flicker noise, ramps and temperature change the bias too, so a step has to explain the data better than any
 //! of them by a margin.
 
-use super::block_means::{BlockMeans, NoiseGrid};
+use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
+use super::noise_grid::NoiseGrid;
 use crate::distributions::{NORMAL_975, quantile};
 use crate::findings::{Correction, Detection, Effect, Parameter};
 use crate::series::Series;

@@ -7,7 +7,8 @@
 //! location and scale parameters of a continuous population of any given form", Biometrika 30, 1939), also where the
 //! slowest noise leaves few degrees of freedom.
 
-use super::block_means::{BlockMeans, NoiseCovariance, NoiseGrid};
+use super::block_means::BlockMeans;
+use super::noise_grid::{NoiseCovariance, NoiseFamily, NoiseGrid};
 use crate::distributions::upper_tail;
 use nalgebra::{DMatrix, DVector};
 
@@ -30,6 +31,14 @@ pub struct RegressionEstimate {
 /// Regression of block means on known regressors, under every mixture of noises.
 pub struct GlsRegression<'a> {
     blocks: &'a BlockMeans,
+    known: usize,
+    families: Vec<FamilyFits<'a>>,
+}
+
+/// The regression under the mixtures of one family.
+struct FamilyFits<'a> {
+    family: &'a NoiseFamily,
+    /// Coordinates of the known regressors.
     known: DMatrix<f64>,
     fits: Vec<GlsFit<'a>>,
 }
@@ -37,7 +46,7 @@ pub struct GlsRegression<'a> {
 /// The regression under one mixture.
 struct GlsFit<'a> {
     noise: &'a NoiseCovariance,
-    /// Means and known regressors, multiplied with the precision matrix.
+    /// Coordinates of means and known regressors, weighted.
     weighted_means: DVector<f64>,
     weighted_known: DMatrix<f64>,
     /// Inverse of the information on the known regressors, and their weighted products with the means.
@@ -58,22 +67,36 @@ struct SizeAndInformation {
 impl<'a> GlsRegression<'a> {
     /// Fits the `known` regressors, one value per block each, and a constant.
     pub fn new(blocks: &'a BlockMeans, grid: &'a NoiseGrid, known: &[DVector<f64>]) -> Self {
-        let known = if known.is_empty() { DMatrix::zeros(blocks.means.len(), 0) } else { DMatrix::from_columns(known) };
-        let fits = grid.iter().filter_map(|noise| GlsFit::new(noise, &blocks.means, &known)).collect();
-        Self { blocks, known, fits }
+        let columns =
+            if known.is_empty() { DMatrix::zeros(blocks.means.len(), 0) } else { DMatrix::from_columns(known) };
+        let of_family = |family: &'a NoiseFamily| {
+            let (means, known) = (family.coordinates(&blocks.means), family.coordinates_of_columns(&columns));
+            let fits = family.mixtures.iter().filter_map(|noise| GlsFit::new(noise, &means, &known)).collect();
+            FamilyFits { family, known, fits }
+        };
+        Self { blocks, known: known.len(), families: grid.iter().map(of_family).collect() }
+    }
+
+    fn fits(&self) -> impl Iterator<Item = &GlsFit<'a>> {
+        self.families.iter().flat_map(|family| &family.fits)
     }
 
     /// Size of one more regressor; `None` if it is a combination of the known ones.
     pub fn estimate(&self, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
-        let sizes: Option<Vec<SizeAndInformation>> =
-            self.fits.iter().map(|fit| fit.estimate(regressor, &self.known)).collect();
-        self.average(&sizes?)
+        let of_family = |FamilyFits { family, known, fits }: &FamilyFits<'a>| {
+            let regressor = family.coordinates(regressor);
+            fits.iter().map(|fit| fit.estimate(&regressor, known)).collect::<Option<Vec<SizeAndInformation>>>()
+        };
+        let sizes: Option<Vec<Vec<SizeAndInformation>>> = self.families.iter().map(of_family).collect();
+        self.average(&sizes?.concat())
     }
 
     /// Sizes of a step at the beginning of each block, every one by itself; `None` where the step is a combination of the
     /// known regressors.
     pub(super) fn estimate_steps(&self) -> Vec<Option<RegressionEstimate>> {
-        let by_mixture: Vec<Vec<Option<SizeAndInformation>>> = self.fits.iter().map(GlsFit::estimate_steps).collect();
+        let of_family =
+            |of: &FamilyFits<'a>| of.fits.iter().map(|fit| fit.estimate_steps(of.family)).collect::<Vec<_>>();
+        let by_mixture: Vec<Vec<Option<SizeAndInformation>>> = self.families.iter().flat_map(of_family).collect();
         let step = |at: usize| {
             let sizes: Option<Vec<SizeAndInformation>> = by_mixture.iter().map(|steps| steps[at]).collect();
             self.average(&sizes?)
@@ -84,7 +107,10 @@ impl<'a> GlsRegression<'a> {
     /// Effective number of independent tests in [`estimate_steps`](Self::estimate_steps).
     pub(super) fn independent_steps(&self) -> f64 {
         let (_, weights) = mean_likelihood(&self.deviances());
-        self.fits.iter().zip(weights).map(|(fit, weight)| weight * fit.noise.independent_steps()).sum()
+        let independent = |of: &FamilyFits<'a>| {
+            of.fits.iter().map(|fit| of.family.independent_steps(fit.noise)).collect::<Vec<f64>>()
+        };
+        self.families.iter().flat_map(independent).zip(weights).map(|(tests, weight)| weight * tests).sum()
     }
 
     /// −2 ln likelihood of the known regressors alone, averaged over all mixtures.
@@ -94,12 +120,12 @@ impl<'a> GlsRegression<'a> {
 
     fn deviances(&self) -> Vec<f64> {
         let freedom = self.degrees_of_freedom() + 1.0;
-        self.fits.iter().map(|fit| freedom * fit.residual.ln() + fit.log_determinant).collect()
+        self.fits().map(|fit| freedom * fit.residual.ln() + fit.log_determinant).collect()
     }
 
     /// Degrees of freedom left by the constant, the known regressors and one more.
     fn degrees_of_freedom(&self) -> f64 {
-        self.blocks.means.len() as f64 - 2.0 - self.known.ncols() as f64
+        self.blocks.means.len() as f64 - 2.0 - self.known as f64
     }
 
     /// Average over the mixtures, each weighted by its restricted likelihood.
@@ -111,9 +137,9 @@ impl<'a> GlsRegression<'a> {
         let residual = |(fit, at): (&GlsFit<'_>, &SizeAndInformation)| {
             (fit.residual - at.size * at.size * at.information).max(1e-12 * fit.residual)
         };
-        let residuals: Vec<f64> = self.fits.iter().zip(sizes).map(residual).collect();
+        let residuals: Vec<f64> = self.fits().zip(sizes).map(residual).collect();
         let deviance = |(fit, residual): (&GlsFit<'_>, &f64)| (freedom + 1.0) * residual.ln() + fit.log_determinant;
-        let profiled: Vec<f64> = self.fits.iter().zip(&residuals).map(deviance).collect();
+        let profiled: Vec<f64> = self.fits().zip(&residuals).map(deviance).collect();
         let restricted = profiled
             .iter()
             .zip(&residuals)
@@ -137,6 +163,7 @@ impl<'a> GlsRegression<'a> {
 }
 
 impl<'a> GlsFit<'a> {
+    /// For means and known regressors with these coordinates.
     fn new(noise: &'a NoiseCovariance, means: &DVector<f64>, known: &DMatrix<f64>) -> Option<Self> {
         let weighted_means = noise.weighted(means);
         let weighted_known = noise.weighted_columns(known);
@@ -159,14 +186,17 @@ impl<'a> GlsFit<'a> {
         self.beside_known(regressor.dot(&weighted), regressor.dot(&self.weighted_means), &with_known)
     }
 
-    fn estimate_steps(&self) -> Vec<Option<SizeAndInformation>> {
-        let information = self.noise.step_information();
+    fn estimate_steps(&self, family: &NoiseFamily) -> Vec<Option<SizeAndInformation>> {
+        let information = family.step_information(self.noise);
+        let of_means = family.products_with_blocks(&self.weighted_means);
+        let of_known: Vec<DVector<f64>> =
+            self.weighted_known.column_iter().map(|column| family.products_with_blocks(&column.into_owned())).collect();
         let mut steps = vec![None; information.len()];
-        let (mut with_means, mut with_known) = (0.0, DVector::zeros(self.weighted_known.ncols()));
+        let (mut with_means, mut with_known) = (0.0, DVector::zeros(of_known.len()));
         // A step before the first block would be the constant.
         for at in (1..information.len()).rev() {
-            with_means += self.weighted_means[at];
-            with_known += self.weighted_known.row(at).transpose();
+            with_means += of_means[at];
+            of_known.iter().zip(with_known.iter_mut()).for_each(|(known, sum)| *sum += known[at]);
             steps[at] = self.beside_known(information[at], with_means, &with_known);
         }
         steps
@@ -198,7 +228,7 @@ fn normal_equivalent(t: f64, freedom: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::block_means::NoiseGrids;
+    use super::super::noise_grid::NoiseGrids;
     use super::*;
     use crate::series::Series;
     use rand::{Rng, SeedableRng};

@@ -1,7 +1,7 @@
 //! Every detector on recordings of the virtual sensor, with and without the effect.
 
 use super::bias::{self, BiasChanges};
-use super::block_means::NoiseGrids;
+use super::noise_grid::NoiseGrids;
 use super::{effective_lsb, spikes};
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::findings::{Correction, Detection};

@@ -8,7 +8,7 @@
 
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
 use super::smooth_shape::SpectralBand;
-use crate::detectors::block_means::markov_covariance;
+use crate::detectors::noise_grid::markov_covariance;
 use crate::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 use std::ops::Range;

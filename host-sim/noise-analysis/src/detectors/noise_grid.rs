@@ -1,0 +1,282 @@
+//! The covariance that white, flicker and random-walk noise give the means of equal blocks.
+//!
+//! The mixture of the three noises is unknown, so the covariances form a grid over the ratios of flicker noise and random
+//! walk to white noise. All points of the grid have the same prior probability: a record that holds few periods of the
+//! slowest noise leaves many of them possible.
+//!
+//! All mixtures with one ratio of flicker to white noise are diagonal in one basis, in which the sum of these two has the variance
+//! 1: that of the generalised eigenvectors of the walk's covariance. So a grid of 153 mixtures needs nine matrices.
+
+use super::block_means::{BLOCKS, BlockMeans};
+use crate::parallel::in_parallel;
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{LN_2, PI};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Variances of flicker noise (B²) and of a walk's increment over a block, relative to the white variance of a block's
+/// mean: 0, and this number of values from the least on, two to a decade.
+const FLICKER: (f64, usize) = (1e-2, 8);
+const WALK: (f64, usize) = (1e-5, 16);
+/// Fills of blocks are rounded to a multiple of this.
+const FILL_STEP: f64 = 1.0 / 64.0;
+
+/// The covariances of all mixtures, for one set of blocks.
+pub type NoiseGrid = Arc<Vec<NoiseFamily>>;
+
+/// The mixtures with one ratio of flicker to white noise.
+pub struct NoiseFamily {
+    /// Column `b` has the coordinates of a 1 in block `b`.
+    basis: DMatrix<f64>,
+    /// Coordinates of a bias of 1.
+    constant: DVector<f64>,
+    pub mixtures: Vec<NoiseCovariance>,
+}
+
+/// Covariance of block means for one mixture of noises, in units of the white variance, with the mean of the record as an
+/// unknown constant.
+pub struct NoiseCovariance {
+    /// Inverse variance of each coordinate.
+    precisions: DVector<f64>,
+    /// `precisions` times the coordinates of the constant, over the root of the information on the constant.
+    along_constant: DVector<f64>,
+    /// Logarithm of the determinant of the covariance times the information on the constant, as REML has it.
+    pub log_determinant: f64,
+    /// What it says of a step before each block: the same for every channel with these blocks.
+    steps: OnceLock<StepInformation>,
+}
+
+/// What a covariance says of a step.
+struct StepInformation {
+    /// On the size of a step before each block, were it the only regressor.
+    of_size: Vec<f64>,
+    /// Effective number of independent tests when a step is tried before every block.
+    independent: f64,
+}
+
+impl NoiseFamily {
+    /// For blocks of these numbers and fills. Noise has the white variance 1 in the mean of a whole block, flicker noise
+    /// with B² = `flicker`, and a random walk that grows by the variance of each of `walks` over a block. `None` if the covariance is
+    /// not positive definite.
+    fn new(numbers: &[usize], fills: &[f64], flicker: f64, walks: impl Iterator<Item = f64>) -> Option<Self> {
+        let coloured = flicker_covariance();
+        let count = numbers.len();
+        let stationary = DMatrix::from_fn(count, count, |row, column| {
+            let white = if row == column { 1.0 / fills[row] } else { 0.0 };
+            white + flicker * coloured[numbers[row].abs_diff(numbers[column])]
+        });
+        // Covariance of the means of a walk over two blocks: its variance in the middle of the earlier block; of a block with itself,
+        // at a third of it.
+        let walk = DMatrix::from_fn(count, count, |row, column| {
+            numbers[row.min(column)] as f64 + if row == column { 1.0 / 3.0 } else { 0.5 }
+        });
+        let factor = stationary.cholesky()?;
+        let log_stationary = 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>();
+        let whitening = factor.l().solve_lower_triangular(&DMatrix::identity(count, count))?;
+        let eigen = (&whitening * walk * whitening.transpose()).symmetric_eigen();
+        let basis = eigen.eigenvectors.transpose() * whitening;
+        let constant = basis.column_sum();
+        let mixture = |walk: f64| {
+            let variances = eigen.eigenvalues.map(|of_walk| 1.0 + walk * of_walk.max(0.0));
+            let precisions = variances.map(f64::recip);
+            let along = precisions.component_mul(&constant);
+            let information = along.dot(&constant);
+            let log_covariance = log_stationary + variances.iter().map(|variance| variance.ln()).sum::<f64>();
+            NoiseCovariance {
+                precisions,
+                along_constant: along / information.sqrt(),
+                log_determinant: log_covariance + information.ln(),
+                steps: OnceLock::new(),
+            }
+        };
+        let mixtures = walks.map(mixture).collect();
+        Some(Self { basis, constant, mixtures })
+    }
+
+    /// Coordinates of one value a block.
+    pub(super) fn coordinates(&self, values: &DVector<f64>) -> DVector<f64> {
+        &self.basis * values
+    }
+
+    /// Coordinates of the values in each column.
+    pub(super) fn coordinates_of_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.basis * columns
+    }
+
+    /// For a vector of coordinates, its products with a 1 in each block.
+    pub(super) fn products_with_blocks(&self, weighted: &DVector<f64>) -> DVector<f64> {
+        self.basis.tr_mul(weighted)
+    }
+
+    /// Information of one of the mixtures on the size of a step before each block, were it the only regressor.
+    pub(super) fn step_information<'a>(&self, mixture: &'a NoiseCovariance) -> &'a [f64] {
+        &self.steps(mixture).of_size
+    }
+
+    /// Effective number of independent tests when a step is tried before every block: the sum of acos of the correlation
+    /// of neighbouring steps, over π.
+    pub(super) fn independent_steps(&self, mixture: &NoiseCovariance) -> f64 {
+        self.steps(mixture).independent
+    }
+
+    fn steps<'a>(&self, mixture: &'a NoiseCovariance) -> &'a StepInformation {
+        mixture.steps.get_or_init(|| StepInformation::new(self, mixture))
+    }
+}
+
+impl NoiseCovariance {
+    /// The inverse covariance, projected so that it does not see a constant, times the values with these coordinates: the product of
+    /// what is returned with the coordinates of other values is their weighted product.
+    pub(super) fn weighted(&self, coordinates: &DVector<f64>) -> DVector<f64> {
+        let mut weighted = self.precisions.component_mul(coordinates);
+        weighted.axpy(-self.along_constant.dot(coordinates), &self.along_constant, 1.0);
+        weighted
+    }
+
+    /// The same for the values in each column.
+    pub(super) fn weighted_columns(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut weighted = coordinates.clone();
+        for mut column in weighted.column_iter_mut() {
+            let along = self.along_constant.dot(&column);
+            column.component_mul_assign(&self.precisions);
+            column.axpy(-along, &self.along_constant, 1.0);
+        }
+        weighted
+    }
+
+    /// Weighted sum of the squares of values with these coordinates, of which the constant does not see anything.
+    fn square(&self, coordinates: &DVector<f64>) -> f64 {
+        let squares: f64 =
+            self.precisions.iter().zip(coordinates).map(|(precision, value)| precision * value * value).sum();
+        squares - self.along_constant.dot(coordinates).powi(2)
+    }
+}
+
+impl StepInformation {
+    fn new(family: &NoiseFamily, mixture: &NoiseCovariance) -> Self {
+        let size = family.basis.ncols();
+        let mut of_size = vec![0.0; size];
+        // The step before the first block is the constant.
+        let mut step = family.constant.clone();
+        for at in 1..size {
+            step -= family.basis.column(at - 1);
+            of_size[at] = mixture.square(&step);
+        }
+        let between = |at: usize| {
+            // Two neighbouring steps differ in one block.
+            let of_block = mixture.square(&family.basis.column(at).into_owned());
+            let shared = 0.5 * (of_size[at] + of_size[at + 1] - of_block);
+            let correlation = shared / (of_size[at] * of_size[at + 1]).sqrt();
+            if correlation.is_finite() { correlation.clamp(-1.0, 1.0).acos() / PI } else { 0.0 }
+        };
+        let independent = (1..size - 1).map(between).sum();
+        Self { of_size, independent }
+    }
+}
+
+/// The grids of a recording's channels: one for each set of blocks, computed once.
+#[derive(Default)]
+pub struct NoiseGrids {
+    known: Mutex<Vec<(Layout, NoiseGrid)>>,
+}
+
+/// Numbers of blocks, and their fills in units of [`FILL_STEP`].
+type Layout = (Vec<usize>, Vec<u32>);
+
+impl NoiseGrids {
+    /// The grid for these blocks.
+    pub fn get(&self, blocks: &BlockMeans) -> NoiseGrid {
+        static WITHOUT_GAPS: OnceLock<NoiseGrid> = OnceLock::new();
+        let fills: Vec<u32> = blocks.fills.iter().map(|fill| (fill / FILL_STEP).round() as u32).collect();
+        let layout = (blocks.numbers.clone(), fills);
+        if layout.0.len() == BLOCKS && layout.1.iter().all(|&fill| f64::from(fill) * FILL_STEP == 1.0) {
+            return WITHOUT_GAPS.get_or_init(|| noise_grid(&layout)).clone();
+        }
+        // After a panic elsewhere the list is still valid: entries are added whole.
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, grid)) = known.iter().find(|(other, _)| *other == layout) {
+            return grid.clone();
+        }
+        let grid = noise_grid(&layout);
+        known.push((layout, grid.clone()));
+        grid
+    }
+}
+
+fn noise_grid((numbers, fills): &Layout) -> NoiseGrid {
+    let fills: Vec<f64> = fills.iter().map(|&fill| f64::from(fill) * FILL_STEP).collect();
+    let values = |(least, count): (f64, usize)| {
+        std::iter::once(0.0).chain((0..count).map(move |at| least * 10f64.powf(0.5 * at as f64)))
+    };
+    let flickers: Vec<f64> = values(FLICKER).collect();
+    let families = in_parallel(&flickers, |&flicker| NoiseFamily::new(numbers, &fills, flicker, values(WALK)));
+    Arc::new(families.into_iter().flatten().collect())
+}
+
+/// Covariance of the means of two blocks in flicker noise with B = 1, by the distance of the blocks.
+///
+/// Flicker noise is approximated by Gauss-Markov processes with correlation times an octave apart, each of the variance
+/// B²·ln 2/π, from an eighth of a block to four records. Faster ones only add to the white noise.
+fn flicker_covariance() -> Vec<f64> {
+    let mut covariance = vec![0.0; BLOCKS];
+    let mut time = 0.125;
+    while time <= 4.0 * BLOCKS as f64 {
+        for (entry, mean) in covariance.iter_mut().zip(markov_covariance(time)) {
+            *entry += LN_2 / PI * mean;
+        }
+        time *= 2.0;
+    }
+    covariance
+}
+
+/// Covariance of the means of two blocks in a Gauss-Markov process of variance 1 whose correlation time is `time` blocks,
+/// by the distance of the blocks.
+pub fn markov_covariance(time: f64) -> impl Iterator<Item = f64> {
+    let decay = move |blocks: f64| (-blocks / time).exp();
+    (0..).map(move |distance: usize| {
+        if distance == 0 {
+            2.0 * time * (1.0 - time * (1.0 - decay(1.0)))
+        } else {
+            let distance = distance as f64;
+            time * time * (decay(distance - 1.0) - 2.0 * decay(distance) + decay(distance + 1.0))
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BLOCKS, NoiseFamily, flicker_covariance};
+    use nalgebra::{DMatrix, DVector};
+
+    /// Weighted products, determinant and information on steps of a mixture, by the inverse of its covariance.
+    #[test]
+    fn mixtures_weigh_as_the_inverse_of_their_covariance() {
+        // Two blocks are missing, and one has half of its samples.
+        let numbers: Vec<usize> = (0..BLOCKS).filter(|number| ![5, 70].contains(number)).collect();
+        let count = numbers.len();
+        let fills: Vec<f64> = (0..count).map(|at| if at == 30 { 0.5 } else { 1.0 }).collect();
+        let (flicker, walk) = (0.3, 0.02);
+        let family = NoiseFamily::new(&numbers, &fills, flicker, [walk].into_iter()).expect("positive definite");
+        let mixture = &family.mixtures[0];
+
+        let coloured = flicker_covariance();
+        let covariance = DMatrix::from_fn(count, count, |row, column| {
+            let (first, second) = (numbers[row.min(column)], numbers[row.max(column)]);
+            let (white, middle) = if row == column { (1.0 / fills[row], 1.0 / 3.0) } else { (0.0, 0.5) };
+            white + flicker * coloured[second - first] + walk * (first as f64 + middle)
+        });
+        let inverse = covariance.clone().try_inverse().expect("positive definite");
+        let ones = DVector::from_element(count, 1.0);
+        let information = (ones.transpose() * &inverse * &ones)[0];
+        let along = &inverse * &ones;
+        let precision = &inverse - &along * along.transpose() / information;
+
+        let values = DVector::from_fn(count, |at, _| (at as f64 * 0.7).sin() + 0.01 * at as f64);
+        let weighted = family.products_with_blocks(&mixture.weighted(&family.coordinates(&values)));
+        assert!((&weighted - &precision * &values).amax() < 1e-9 * (&precision * &values).amax());
+        let log_determinant = covariance.cholesky().expect("positive definite").determinant().ln() + information.ln();
+        assert!((mixture.log_determinant - log_determinant).abs() < 1e-8);
+        let step = DVector::from_fn(count, |at, _| if at >= 40 { 1.0 } else { 0.0 });
+        let of_step = (step.transpose() * &precision * &step)[0];
+        assert!((family.step_information(mixture)[40] / of_step - 1.0).abs() < 1e-9);
+    }
+}
