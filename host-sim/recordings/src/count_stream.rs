@@ -92,6 +92,27 @@ impl CountStream {
 
     /// The next samples, of channels with the profiles of `profile`; `None` at the end.
     pub(crate) fn next(&mut self, profile: &SensorProfile) -> Result<Option<SampleBlock>, StreamError> {
+        let Some(usable) = self.next_usable()? else { return Ok(None) };
+        let first = self.first.map_or(0, |first| first.period);
+        let channel = |channel: &Channel| {
+            let counts = usable.iter().map(|(_, sample)| i32::from(sample.counts.get(*channel))).collect();
+            let refused = refused_positions(*channel, usable.iter().map(|(_, sample)| sample));
+            MeasuredChannel { refused, ..MeasuredChannel::new(profile.channels[*channel as usize], counts) }
+        };
+        Ok(Some(SampleBlock {
+            channels: self.table.channels().iter().map(channel).collect(),
+            slots: usable.iter().map(|(placed, _)| placed.period - first).collect(),
+        }))
+    }
+
+    /// Reads to the end, for what is counted on the way.
+    pub(crate) fn read_to_end(&mut self) -> Result<(), StreamError> {
+        while self.next_usable()?.is_some() {}
+        Ok(())
+    }
+
+    /// The next samples that can be used, with their sample periods; `None` at the end.
+    fn next_usable(&mut self) -> Result<Option<Vec<(Placed, RecordedSample)>>, StreamError> {
         if self.is_finished {
             return Ok(None);
         }
@@ -122,20 +143,9 @@ impl CountStream {
         let stamp =
             |sample: &RecordedSample| Stamp { time_s: sample.time_stamp.time_s, index: sample.time_stamp.index };
         let placed = self.clock.place(self.arrived[before..].iter().map(stamp), self.is_finished)?;
-        let channels = self.table.channels();
-        let ready: Vec<RecordedSample> = self.arrived.drain(..placed.len()).collect();
-        let usable: Vec<(Placed, RecordedSample)> =
-            placed.into_iter().zip(ready).filter(|(placed, sample)| self.is_usable(*placed, sample)).collect();
-        let first = self.first.map_or(0, |first| first.period);
-        let channel = |channel: &Channel| {
-            let counts = usable.iter().map(|(_, sample)| i32::from(sample.counts.get(*channel))).collect();
-            let refused = refused_positions(*channel, usable.iter().map(|(_, sample)| sample));
-            MeasuredChannel { refused, ..MeasuredChannel::new(profile.channels[*channel as usize], counts) }
-        };
-        Ok(Some(SampleBlock {
-            channels: channels.iter().map(channel).collect(),
-            slots: usable.iter().map(|(placed, _)| placed.period - first).collect(),
-        }))
+        let later = self.arrived.split_off(placed.len());
+        let ready = std::mem::replace(&mut self.arrived, later);
+        Ok(Some(placed.into_iter().zip(ready).filter(|(placed, sample)| self.is_usable(*placed, sample)).collect()))
     }
 
     /// Counts a sample, and tells whether it can be used.

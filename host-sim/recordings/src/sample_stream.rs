@@ -317,7 +317,7 @@ impl SampleStream {
             Content::Held => {}
             Content::Counts(source) => {
                 let mut pass = open_counts(source, monitor)?;
-                while pass.next(&description.profile)?.is_some() {}
+                pass.read_to_end()?;
                 if pass.is_stopped() {
                     source.most = pass.rows();
                 }

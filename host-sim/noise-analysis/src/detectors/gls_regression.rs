@@ -204,6 +204,9 @@ impl<'a> GlsFit<'a> {
 
     /// Size of a regressor with this information, and these weighted products with the means and with the known regressors.
     fn beside_known(&self, information: f64, with_means: f64, with_known: &DVector<f64>) -> Option<SizeAndInformation> {
+        if with_known.is_empty() {
+            return (information > 0.0).then(|| SizeAndInformation { size: with_means / information, information });
+        }
         let along = &self.inverse * with_known;
         let left = information - with_known.dot(&along);
         (left > COLLINEAR * information)
