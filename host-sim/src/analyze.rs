@@ -114,7 +114,7 @@ fn report(
         return Ok(report);
     }
     let mut stream = open_stream(recording, monitor, KeptInMemory { rows: MOST_SAMPLES, irregular: true })?;
-    if stream.is_in_memory() && stream.description().samples <= MOST_SAMPLES {
+    if stream.is_in_memory() {
         end_reading(&stream);
         let bar = progress::analysing(None);
         let report = analyze(stream.beginning());
@@ -171,12 +171,13 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
         );
     }
     let recording = replayed(&input, *range)?;
-    analyze_recording(&recording, *rate).with_context(|| file.display().to_string())
+    analyze_recording(recording, *rate).with_context(|| file.display().to_string())
 }
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
-pub(crate) fn analyze_recording(recording: &Recording, rate_hz: Option<f64>) -> Result<Report> {
-    let (measurement, notes) = on_time_base(recording, rate_hz)?;
+pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> Result<Report> {
+    let (measurement, notes) = on_time_base(&recording, rate_hz)?;
+    drop(recording);
     note_all(&notes);
     Ok(analyze(&measurement))
 }

@@ -18,12 +18,12 @@ pub(crate) const DEFAULT_S: f64 = 60.0;
 
 /// The report of the virtual sensor.
 pub(crate) fn simulate(simulation: &Simulation) -> Result<Report> {
-    analyze_recording(&run(simulation, None)?, None).context("virtual sensor")
+    analyze_recording(run(simulation, None)?, None).context("virtual sensor")
 }
 
 /// The same; every bus transaction is written to the frame log `log`.
 pub(crate) fn record_simulation(log: &Path, simulation: &Simulation) -> Result<Report> {
-    analyze_recording(&run(simulation, Some(log))?, None).context("virtual sensor")
+    analyze_recording(run(simulation, Some(log))?, None).context("virtual sensor")
 }
 
 fn run(simulation: &Simulation, log: Option<&Path>) -> Result<Recording> {
@@ -65,5 +65,5 @@ pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> 
         monitor::summary(&recorded.counters)
     ));
     let recording = simulation::replay(log, GyroRange::default())?.recording;
-    analyze_recording(&recording, None).with_context(|| port.to_owned())
+    analyze_recording(recording, None).with_context(|| port.to_owned())
 }

@@ -14,6 +14,7 @@ pub use block::{RecordingDescription, SampleBlock};
 pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity, SensorProfile};
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// The samples of a sensor, all channels taken at the same times.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +71,22 @@ impl MeasuredChannel {
         let mut refused = self.refused_positions().into_iter().peekable();
         let samples = slots.iter().copied().zip(self.counts.iter().copied()).enumerate();
         samples.filter_map(move |(position, sample)| refused.next_if_eq(&position).is_none().then_some(sample))
+    }
+
+    /// The samples at some positions.
+    #[must_use]
+    pub fn part(&self, positions: Range<usize>) -> Self {
+        let within = |of: &[usize]| -> Vec<usize> {
+            let from = of.partition_point(|position| *position < positions.start);
+            let to = of.partition_point(|position| *position < positions.end);
+            of[from..to].iter().map(|position| position - positions.start).collect()
+        };
+        let refused = self.refused.iter().map(|(&cause, of)| (cause, within(of)));
+        Self {
+            profile: self.profile,
+            counts: self.counts[positions.clone()].to_vec(),
+            refused: refused.filter(|(_, of)| !of.is_empty()).collect(),
+        }
     }
 
     /// Whether the sample at `position` was refused for any cause.
@@ -140,6 +157,15 @@ impl Measurement {
             dropped: BTreeMap::from([("gap", gap.round() as u64)]),
             flagged: BTreeMap::new(),
         }
+    }
+
+    /// The samples in blocks of `rows`, the last of which may be shorter.
+    pub fn blocks(&self, rows: usize) -> impl Iterator<Item = SampleBlock> {
+        (0..self.len()).step_by(rows).map(move |from| {
+            let positions = from..(from + rows).min(self.len());
+            let channels = self.channels.iter().map(|channel| channel.part(positions.clone())).collect();
+            SampleBlock { slots: self.slots[positions].to_vec(), channels }
+        })
     }
 
     /// Sample periods from the first sample to the last, both included, with or without a sample.

@@ -15,7 +15,7 @@ use crate::assessment::{AssessedModels, Assessment};
 use crate::causes;
 use crate::figure_data;
 use crate::first_half::{FirstHalf, FirstHalfFit};
-use crate::long_record::LongRecord;
+use crate::long_record::{self, LongRecord};
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::in_parallel;
 use crate::part_report;
@@ -31,10 +31,20 @@ use allan_core::{AllanPoint, Curve};
 use measurement::{ChannelProfile, Measurement, RecordingDescription};
 use std::collections::BTreeMap;
 
-/// Analyses every channel of a measurement. Effects are traced in the inertial channels only; the others get the baseline
-/// model.
+/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](long_record::MOST_SAMPLES) samples.
+/// Effects are traced in the inertial channels only; the others get the baseline model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
+    if measurement.len() as u64 > long_record::MOST_SAMPLES {
+        analyze_long(&LongRecord::from(measurement))
+    } else {
+        analyze_samples(measurement)
+    }
+}
+
+/// Analyses all samples of every channel of a measurement, however many there are.
+#[must_use]
+pub fn analyze_samples(measurement: &Measurement) -> Report {
     let description = RecordingDescription::from(measurement);
     Recorded { description: &description, measurement, first: measurement, long: None }.report()
 }
@@ -66,7 +76,7 @@ impl Recorded<'_> {
         record.add_lines_of_spectrum();
         let mut effects = record.effects();
         // What the first half shows by itself, to compare with what the whole record shows.
-        let effects_of_half = if effects.iter().all(Vec::is_empty) {
+        let mut effects_of_half = if effects.iter().all(Vec::is_empty) {
             vec![Vec::new(); effects.len()]
         } else {
             let half = measurement.before(measurement.middle());
@@ -74,9 +84,14 @@ impl Recorded<'_> {
             let of_half = condensed.zip(shorter.as_ref()).map(|(of, shorter)| Condensed { shorter, ..of });
             TracedRecord::new(&half, of_half).effects()
         };
-        // What the first samples show has nothing to be compared with.
-        for (effects, of_samples) in effects.iter_mut().zip(long.iter().flat_map(|long| &long.effects)) {
-            effects.splice(0..0, of_samples.iter().cloned());
+        if let Some(long) = long {
+            for (effects, of_samples) in
+                [(&mut effects, &long.effects), (&mut effects_of_half, &long.effects_of_first_half)]
+            {
+                for (effects, of_samples) in effects.iter_mut().zip(of_samples) {
+                    effects.splice(0..0, of_samples.iter().cloned());
+                }
+            }
         }
         let mut channels = self.channel_reports(&record, &first_half);
         let duration_s = description.periods as f64 * description.period_s();

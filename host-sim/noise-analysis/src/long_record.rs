@@ -1,4 +1,4 @@
-//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁹ of them, the
+//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁷ of them, the
 //! curves at averaging times that are too short for the means, and the first samples.
 //!
 //! ```text
@@ -12,6 +12,7 @@
 //! The second differences of means are those of the samples at longer averaging times, so that the two curves of a channel are
 //! one. Memory does not depend on the length of the recording.
 
+use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
 use crate::findings::{Detection, Effect};
 use crate::parallel::{self, in_parallel};
@@ -29,6 +30,8 @@ use std::collections::BTreeMap;
 
 /// Samples of the longest recording that is analysed without being condensed.
 pub const MOST_SAMPLES: u64 = 1 << 18;
+/// Samples that are taken at a time of a recording that is in memory.
+const BLOCK: usize = 1 << 14;
 /// Means of a longer recording, at most.
 const MOST_MEANS: u64 = 1 << 17;
 /// Sample periods at the start of the recording whose samples are analysed.
@@ -47,7 +50,7 @@ const MEANS_PER_PERIOD: f64 = 2.5;
 /// A block mean at this place has no sample.
 const MISSING: i32 = i32::MIN;
 /// Effects that only the samples themselves show, and that are looked for in the first of them.
-const FAST_KINDS: [&str; 5] = ["saturated", "noise_below_count", "quantization", "repeated_samples", "sample_clock"];
+const FAST_KINDS: [&str; 4] = ["noise_below_count", "quantization", "repeated_samples", "sample_clock"];
 
 /// Reads a long recording block by block.
 pub struct LongRecordReader {
@@ -74,6 +77,7 @@ struct LongChannel {
     /// Without what the screen leaves out.
     screened: StreamedCurves,
     means: Means,
+    values: ValueCounts,
     /// Of the inertial channels.
     spectrum: Option<StackedSpectrum>,
 }
@@ -109,8 +113,18 @@ pub struct LongRecord {
     pub(crate) faster_lines: Vec<Vec<MergedLine>>,
     /// Of each channel, what only the samples themselves show.
     pub(crate) effects: Vec<Vec<Effect>>,
+    /// The same of the first half of the recording, as far as it is known.
+    pub(crate) effects_of_first_half: Vec<Vec<Effect>>,
     /// Of each channel, the samples that are refused in it alone, by cause.
     pub(crate) refused: Vec<BTreeMap<&'static str, u64>>,
+}
+
+impl From<&Measurement> for LongRecord {
+    fn from(measurement: &Measurement) -> Self {
+        let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
+        measurement.blocks(BLOCK).for_each(|block| reader.push(&block));
+        reader.finish()
+    }
 }
 
 impl LongRecord {
@@ -158,6 +172,7 @@ impl LongRecordReader {
                 recorded: StreamedCurves::new(&boundaries),
                 screened: StreamedCurves::new(&boundaries),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
+                values: ValueCounts::default(),
                 spectrum: inertial(profile).then(|| stacked(fast)),
             }
         };
@@ -173,6 +188,7 @@ impl LongRecordReader {
         }
         parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
             of.recorded.push(&block.slots, channel);
+            channel.used_samples(&block.slots).for_each(|(_, count)| of.values.push(count));
         });
         let channels = &mut self.channels;
         self.screen.push(block, |screened| push_screened(channels, screened));
@@ -185,16 +201,24 @@ impl LongRecordReader {
         let Self { description, first, samples_per_mean, screen, channels, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let lost = lost.map(|Detection { effect, .. }| effect);
-        let hours = description.periods as f64 * description.period_s() / 3600.0;
-        let effects = |(of, spikes): (&FastFindings, Option<Detection>)| {
-            let spikes = spikes.map(|Detection { effect, .. }| effect);
-            lost.iter().chain(&of.effects).cloned().chain(spikes).collect::<Vec<Effect>>()
+        let period_s = description.period_s();
+        let effects = |(((of, channel), profile), spikes): (
+            ((&FastFindings, &LongChannel), &ChannelProfile),
+            Option<Detection>,
+        )| {
+            let saturation = channel.values.saturation(profile, of.resolution);
+            let found = saturation.filter(|_| profile.quantity.is_inertial()).into_iter().chain(spikes);
+            lost.iter().chain(&of.effects).cloned().chain(found.map(|found| found.effect)).collect::<Vec<Effect>>()
         };
-        let effects = fast.iter().zip(screen.spikes(hours)).map(effects).collect();
+        let spikes = screen.spikes(description.periods, period_s);
+        let effects = fast.iter().zip(&channels).zip(&description.channels).zip(spikes).map(effects).collect();
+        let middle = description.periods / samples_per_mean / 2 * samples_per_mean;
+        let of_first_half = screen.spikes(middle, period_s);
+        let effects_of_first_half =
+            of_first_half.map(|spikes| spikes.map(|found| found.effect).into_iter().collect()).collect();
         let refused = channels.iter().map(|of| of.screened.refused.clone()).collect();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
         let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
-        let period_s = description.period_s();
         let all = channels.into_iter().zip(fast).zip(description.channels.iter().zip(&means.channels));
         let shorter =
             |((channel, fast), (profile, mean)): ((LongChannel, FastFindings), (&ChannelProfile, &MeasuredChannel))| {
@@ -215,7 +239,7 @@ impl LongRecordReader {
                 }
             };
         let shorter = ShorterTimes { samples_per_mean, channels: all.map(shorter).collect() };
-        LongRecord { description, first, means, shorter, faster_lines, effects, refused }
+        LongRecord { description, first, means, shorter, faster_lines, effects, effects_of_first_half, refused }
     }
 }
 

@@ -53,6 +53,11 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync)
     results.into_iter().map(|(_, result)| result).collect()
 }
 
+/// Runs `task` for each of `changed`, on as many threads as there are cores.
+pub(crate) fn for_each<T: Send>(changed: &mut [T], task: impl Fn(&mut T) + Sync) {
+    for_each_pair(changed, &vec![(); changed.len()], |changed, ()| task(changed));
+}
+
 /// Runs `task` for each of `changed` with the one of `others` at the same position, on as many threads as there are cores.
 pub(crate) fn for_each_pair<T: Send, U: Sync>(changed: &mut [T], others: &[U], task: impl Fn(&mut T, &U) + Sync) {
     let threads = threads().min(changed.len()).max(1);

@@ -13,6 +13,7 @@
 use crate::OCTAVES;
 use crate::findings::{BoundedEstimate, SIGNIFICANCE};
 use crate::octave_covariance::relative_covariance;
+use crate::parallel;
 use allan_core::fit::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::MovingAverageFilter;
@@ -95,9 +96,7 @@ pub(crate) fn estimate(
     }
     let mut joint: Vec<ChannelDeviance> =
         dithered().zip(&curves).map(|(channel, curve)| ChannelDeviance::new(channel, curve)).collect();
-    for channel in &mut joint {
-        channel.fit_alone(filters);
-    }
+    parallel::for_each(&mut joint, |channel| channel.fit_alone(filters));
     let unfiltered: Vec<f64> = joint.iter_mut().map(|channel| channel.unfiltered()).collect();
     let tried = filters.iter().flat_map(|&filter| [Some(filter), slowest_deviance(&mut joint, filter)]).flatten();
     let tried: Vec<Hypothesis> =

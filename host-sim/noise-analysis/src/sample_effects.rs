@@ -1,7 +1,8 @@
 //! What only the samples of a recording show, and not their means: faults of the sampling, the resolution of each channel, and
 //! whether its output can express its noise and its range.
 
-use crate::detectors::{effective_lsb, output_range};
+use crate::detectors::effective_lsb;
+use crate::detectors::output_range::{ValueCounts, find_noise_below_count};
 use crate::findings::Detection;
 use crate::parallel::in_parallel;
 use crate::sampling_faults;
@@ -32,8 +33,12 @@ impl SampleEffects {
             let series = measured(channel);
             let resolution = effective_lsb::find(&series);
             let series = series.with_counts_per_step(effects.counts_per_step(channel));
-            let range = output_range::find_saturation(&series, channel.range)
-                .or_else(|| output_range::find_noise_below_count(&series, measurement.profile.dithered_avar_counts2));
+            let mut values = ValueCounts::default();
+            let recorded = measurement.channel(&channel).into_iter();
+            recorded.flat_map(|of| of.used_samples(&measurement.slots)).for_each(|(_, count)| values.push(count));
+            let range = values
+                .saturation(&channel, series.resolution)
+                .or_else(|| find_noise_below_count(&series, measurement.profile.dithered_avar_counts2));
             [resolution, range]
         });
         for (&channel, found) in traced.iter().zip(found) {

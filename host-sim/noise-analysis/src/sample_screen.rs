@@ -54,13 +54,16 @@ impl SampleScreen {
         self.settle(self.held.slots.len())
     }
 
-    /// The spikes of each channel, in a recording of so many hours.
-    pub(crate) fn spikes(&self, hours: f64) -> impl Iterator<Item = Option<Detection>> {
-        self.rules
-            .iter()
-            .zip(&self.found)
-            .zip(&self.held.channels)
-            .map(move |((rule, found), channel)| rule.as_ref()?.detection(found, hours, channel.profile.unit))
+    /// The spikes of each channel in the first `periods` sample periods of `period_s` s each.
+    pub(crate) fn spikes(&self, periods: u64, period_s: f64) -> impl Iterator<Item = Option<Detection>> {
+        let hours = periods as f64 * period_s / 3600.0;
+        let of_channel = move |((rule, found), channel): ((&Option<SpikeRule>, &FoundSpikes), &MeasuredChannel)| {
+            let rule = rule.as_ref()?;
+            // Where they are no spikes in the whole recording, those of a part of it are none.
+            rule.detection(found, hours, channel.profile.unit)?;
+            rule.detection(&found.before(periods), hours, channel.profile.unit)
+        };
+        self.rules.iter().zip(&self.found).zip(&self.held.channels).map(of_channel)
     }
 
     /// The samples up to `end` that were not passed on, with those refused that are spikes or repeated.
@@ -95,21 +98,8 @@ impl SampleScreen {
 
 /// Some samples of a block.
 fn part(block: &SampleBlock, positions: Range<usize>) -> SampleBlock {
-    let channel = |channel: &MeasuredChannel| {
-        let within = |of: &[usize]| -> Vec<usize> {
-            let first = of.partition_point(|position| *position < positions.start);
-            let within = of[first..].iter().take_while(|position| **position < positions.end);
-            within.map(|position| position - positions.start).collect()
-        };
-        let refused = channel.refused.iter().map(|(&cause, of)| (cause, within(of)));
-        MeasuredChannel {
-            profile: channel.profile,
-            counts: channel.counts[positions.clone()].to_vec(),
-            refused: refused.filter(|(_, of)| !of.is_empty()).collect(),
-        }
-    };
-    let channels = block.channels.iter().map(channel).collect();
-    SampleBlock { slots: block.slots[positions.clone()].to_vec(), channels }
+    let channels = block.channels.iter().map(|channel| channel.part(positions.clone())).collect();
+    SampleBlock { slots: block.slots[positions].to_vec(), channels }
 }
 
 /// Adds the samples that follow.

@@ -15,7 +15,7 @@ use crate::sample_slots::SampleSlots;
 use crate::sensor_measurement::quantizer_note;
 use crate::sensor_table::SensorTable;
 use crate::stamp_quality::StampQuality;
-use crate::stream_clock::StreamClock;
+use crate::stream_clock::{BLOCK, StreamClock};
 use crate::time_base::time_base;
 use crate::time_base_error::TimeBaseError;
 use crate::value_stream::{self, ColumnSample, ValueColumn, ValueHead, ValueStream};
@@ -257,7 +257,7 @@ impl SampleStream {
     fn read_pass(&mut self, mut take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
         let stopped_at = match &mut self.content {
             Content::Held => {
-                take_held(&self.beginning, take);
+                self.beginning.blocks(BLOCK).for_each(take);
                 None
             }
             Content::Counts(source) => {
@@ -403,9 +403,4 @@ fn open_values(
     let clock = (source.clock()?, source.period_s());
     let file = (source.input.path(), source.input.format());
     Ok(ValueStream::open(file, &source.options, monitor, clock, time_unit_s, source.most)?)
-}
-
-/// The samples of a recording that is in memory.
-fn take_held(measurement: &Measurement, mut take: impl FnMut(SampleBlock)) {
-    take(SampleBlock { slots: measurement.slots.clone(), channels: measurement.channels.clone() });
 }

@@ -115,7 +115,7 @@ fn curves_and_baseline_models_without_time_stamps_are_those_of_the_whole_analysi
     assert_eq!(arguments(&plain), arguments(&zipped));
 }
 
-/// The whole analysis condenses a recording of more than 2²⁰ samples, whose curves are still those of all of them.
+/// The whole analysis condenses a recording of more than 2¹⁸ samples, whose curves are still those of all of them.
 #[test]
 fn curves_of_a_long_recording_are_those_of_the_whole_analysis() {
     let dir = tempdir().expect("a folder");

@@ -52,6 +52,12 @@ impl FoundSpikes {
         Self { slots, sizes, jumps: self.jumps }
     }
 
+    /// Those before a sample period. Where jumps of the bias are, is not known.
+    pub(crate) fn before(&self, slot: u64) -> Self {
+        let count = self.slots.partition_point(|of| *of < slot);
+        Self { slots: self.slots[..count].to_vec(), sizes: self.sizes[..count].to_vec(), jumps: 0 }
+    }
+
     /// Adds those of later samples.
     pub(crate) fn extend(&mut self, later: Self) {
         self.slots.extend(later.slots);

@@ -68,8 +68,7 @@ impl CosineSpectrum {
             *filled = latest - mean;
         }
         let square = |order: usize| {
-            let phase = PI * order as f64 / BLOCKS as f64;
-            let terms = filled.iter().enumerate().map(|(at, value)| value * (phase * (at as f64 + 0.5)).cos());
+            let terms = filled.iter().enumerate().map(|(at, value)| value * cosine(order * (2 * at + 1)));
             2.0 / BLOCKS as f64 * terms.sum::<f64>().powi(2)
         };
         let squares: Vec<f64> = bands().map(|band| mean_over(&band, square)).collect();
@@ -113,6 +112,18 @@ impl CosineSpectrum {
         let fits: Vec<MarkovFit> = slow.map(|shape| fit(Some(shape))).collect();
         most_likely(&fits, without).filter(|found| found.gain > LEAST_GAIN)
     }
+}
+
+/// The cosine of a multiple of π/512: half the phase by which the coefficient of the first order grows from block to block.
+fn cosine(multiple: usize) -> f64 {
+    static COSINES: OnceLock<Vec<f64>> = OnceLock::new();
+    let value = |multiple: usize| (PI * multiple as f64 / (2 * BLOCKS) as f64).cos();
+    COSINES.get_or_init(|| (0..4 * BLOCKS).map(value).collect())[multiple % (4 * BLOCKS)]
+}
+
+/// The sine of such a multiple.
+fn sine(multiple: usize) -> f64 {
+    cosine(multiple + 3 * BLOCKS)
 }
 
 /// The mean of a function of the order over a band.
@@ -163,12 +174,12 @@ fn markov_shapes() -> &'static [MarkovShape] {
 fn expected_squares(covariance: impl Fn(usize) -> f64) -> Vec<f64> {
     let covariances: Vec<f64> = (0..BLOCKS).map(covariance).collect();
     let of_order = |order: usize| {
-        let phase = PI * order as f64 / BLOCKS as f64;
         // Σ of the products of two values of the cosine at this lag.
-        let products =
-            |lag: f64| 0.5 * ((BLOCKS as f64 - lag) * (phase * lag).cos() - (phase * lag).sin() / phase.sin());
-        let of_lag =
-            |(lag, covariance): (usize, &f64)| if lag == 0 { 1.0 } else { 2.0 } * covariance * products(lag as f64);
+        let products = |lag: usize| {
+            let (lagged, sines) = (2 * order * lag, sine(2 * order * lag) / sine(2 * order));
+            0.5 * ((BLOCKS - lag) as f64 * cosine(lagged) - sines)
+        };
+        let of_lag = |(lag, covariance): (usize, &f64)| if lag == 0 { 1.0 } else { 2.0 } * covariance * products(lag);
         2.0 / BLOCKS as f64 * covariances.iter().enumerate().map(of_lag).sum::<f64>()
     };
     bands().map(|band| mean_over(&band, of_order)).collect()
