@@ -15,6 +15,7 @@
 use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
 use crate::findings::{Detection, Effect};
+use crate::nonstationarity::epochs;
 use crate::parallel::{self, in_parallel};
 use crate::sample_effects::SampleEffects;
 use crate::sample_screen::SampleScreen;
@@ -26,7 +27,7 @@ use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
 use crate::traced_record::Condensed;
 use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Samples of the longest recording that is analysed without being condensed.
 pub const MOST_SAMPLES: u64 = 1 << 18;
@@ -141,7 +142,13 @@ impl LongRecordReader {
         let first = beginning.before(FIRST_PERIODS);
         let samples_per_mean = description.periods.div_ceil(MOST_MEANS).next_power_of_two();
         let means = description.periods / samples_per_mean;
-        let boundaries = [means / 2 / 2 * samples_per_mean, means / 2 * samples_per_mean];
+        let middle = means / 2;
+        let halves = [middle / 2 * samples_per_mean, middle * samples_per_mean];
+        let of_epochs = epochs(0..means, middle).into_iter().flat_map(|(_, ranges)| ranges).flatten();
+        let starts: BTreeSet<u64> =
+            of_epochs.flat_map(|range| [range.start, range.end]).chain([middle / 2, middle]).collect();
+        let within = starts.into_iter().filter(|start| (1..means).contains(start));
+        let epochs: Vec<u64> = within.map(|start| start * samples_per_mean).collect();
         let inertial = |profile: &ChannelProfile| profile.quantity.is_inertial();
         let traced: Vec<ChannelProfile> = first.profiles().filter(inertial).collect();
         let shown = SampleEffects::detect(&first, &traced);
@@ -169,8 +176,8 @@ impl LongRecordReader {
             let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
             let largest = at_first.iter().flat_map(|channel| &channel.counts).map(|count| count.unsigned_abs()).max();
             LongChannel {
-                recorded: StreamedCurves::new(&boundaries),
-                screened: StreamedCurves::new(&boundaries),
+                recorded: StreamedCurves::new(&halves),
+                screened: StreamedCurves::new(&epochs),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
                 values: ValueCounts::default(),
                 spectrum: inertial(profile).then(|| stacked(fast)),
@@ -222,17 +229,15 @@ impl LongRecordReader {
         let all = channels.into_iter().zip(fast).zip(description.channels.iter().zip(&means.channels));
         let shorter =
             |((channel, fast), (profile, mean)): ((LongChannel, FastFindings), (&ChannelProfile, &MeasuredChannel))| {
-                let halves = |curves: &StreamedCurves| {
-                    let mut parts: Vec<_> = curves.parts().cloned().collect();
-                    let second = parts.split_off(parts.len() - 1);
-                    [parts, second]
-                };
+                let parts =
+                    |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
                 ShorterTimesOfChannel {
                     profile: mean.profile,
                     resolution: fast.resolution,
                     measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
-                    recorded: halves(&channel.recorded),
-                    screened: halves(&channel.screened),
+                    recorded: parts(&channel.recorded),
+                    screened: parts(&channel.screened),
+                    middle,
                     is_screened: channel.screened.refused != channel.recorded.refused,
                     period_s,
                     lsb: profile.lsb,

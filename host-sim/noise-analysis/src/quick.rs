@@ -110,9 +110,9 @@ impl FittedChannel {
     fn fit(description: &RecordingDescription, profile: ChannelProfile, estimators: &StreamedCurves) -> Self {
         let period_s = description.period_s();
         let part = |cascade: Cascade<OCTAVES, OVERLAP>| RecordPart::of_channel(profile, cascade, period_s);
-        let mut halves = estimators.parts().cloned().map(part);
+        let mut halves = estimators.parts().map(|(_, half)| part(half.clone()));
         let [first, second] = std::array::from_fn(|_| halves.next().unwrap_or_else(|| part(Cascade::new())));
-        let both = part(joined(estimators.parts()));
+        let both = part(joined(estimators.parts().map(|(_, part)| part)));
         let filters = &description.profile.filters;
         let fit = |part: &RecordPart| {
             let curve = CovariateFit::estimate(part, 0, false, |_| None);

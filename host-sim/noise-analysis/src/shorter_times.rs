@@ -5,13 +5,14 @@ use crate::streamed_curves::{STEPS_PER_COUNT, joined};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
 use measurement::ChannelProfile;
+use std::ops::Range;
 
 /// The curve of the means is used from this averaging factor on, in means: from there on it has as many differences as that of the
 /// samples ([`OVERLAP`] in an averaging time).
 const LEAST_FACTOR: u64 = OVERLAP as u64;
 
-/// By half of the record, the estimators of the parts that it is made of.
-pub(crate) type Halves = [Vec<Cascade<OCTAVES, OVERLAP>>; 2];
+/// Estimators of parts of the record that follow each other, each with its first sample period.
+pub(crate) type Parts = Vec<(u64, Cascade<OCTAVES, OVERLAP>)>;
 
 /// The averaging times that are too short for the means of a long recording.
 pub(crate) struct ShorterTimes {
@@ -29,9 +30,11 @@ pub(crate) struct ShorterTimesOfChannel {
     pub resolution: f64,
     /// The whole curve as recorded.
     pub measured: Curve<OCTAVES>,
-    /// With all samples, and without those that the screen leaves out: by half of the record, the parts that it is made of.
-    pub recorded: Halves,
-    pub screened: Halves,
+    /// With all samples, and without those that the screen leaves out.
+    pub recorded: Parts,
+    pub screened: Parts,
+    /// First sample period of the second half.
+    pub middle: u64,
     /// Whether the screen leaves out a sample.
     pub is_screened: bool,
     pub period_s: f64,
@@ -43,13 +46,16 @@ impl ShorterTimes {
     /// Those of the first half of the record.
     pub(crate) fn of_first_half(&self) -> Self {
         let half = |of: &ShorterTimesOfChannel| {
-            let halves = |[first, _]: &Halves| {
-                let (earlier, later) = first.split_at(first.len() / 2);
-                [earlier.to_vec(), later.to_vec()]
-            };
-            ShorterTimesOfChannel { recorded: halves(&of.recorded), screened: halves(&of.screened), ..of.clone() }
+            let first = |parts: &Parts| parts.iter().filter(|(start, _)| *start < of.middle).cloned().collect();
+            let middle = self.slots_of(0..of.middle / self.samples_per_mean / 2).end;
+            ShorterTimesOfChannel { recorded: first(&of.recorded), screened: first(&of.screened), middle, ..of.clone() }
         };
         Self { samples_per_mean: self.samples_per_mean, channels: self.channels.iter().map(half).collect() }
+    }
+
+    /// Sample periods of some means.
+    pub(crate) fn slots_of(&self, means: Range<u64>) -> Range<u64> {
+        means.start * self.samples_per_mean..means.end * self.samples_per_mean
     }
 
     /// Averaging factor from which on the curve is that of the means, samples.
@@ -76,31 +82,34 @@ impl ShorterTimes {
 impl ShorterTimesOfChannel {
     /// The curve of a half as recorded, or without spikes and repeated samples; 0 is the first half.
     pub(crate) fn half(&self, half: usize, exclusion: Exclusion) -> Curve<OCTAVES> {
-        self.curve(&self.parts(exclusion)[half])
+        let slots = if half == 0 { 0..self.middle } else { self.middle..u64::MAX };
+        self.curve(self.parts(exclusion).iter().filter(|(start, _)| slots.contains(start)))
     }
 
     /// The curve of both halves.
     pub(crate) fn both(&self, exclusion: Exclusion) -> Curve<OCTAVES> {
-        self.curve(&self.parts(exclusion).concat())
+        self.curve(self.parts(exclusion))
     }
 
-    /// The curves of the quarters of the first half.
-    pub(crate) fn quarters(&self, exclusion: Exclusion) -> [Curve<OCTAVES>; 2] {
-        let [first, _] = self.parts(exclusion);
-        let (earlier, later) = first.split_at(first.len() / 2);
-        [self.curve(earlier), self.curve(later)]
+    /// The curve of some sample periods; `None` where they are not whole parts.
+    pub(crate) fn within(&self, slots: Range<u64>, exclusion: Exclusion) -> Option<Curve<OCTAVES>> {
+        let parts = self.parts(exclusion);
+        let from = parts.iter().position(|(start, _)| *start == slots.start)?;
+        let to = parts.iter().position(|(start, _)| *start >= slots.end).unwrap_or(parts.len());
+        let is_whole = parts.get(to).is_none_or(|(start, _)| *start == slots.end);
+        is_whole.then(|| self.curve(&parts[from..to]))
     }
 
     /// Samples that were replaced because they are missing.
     pub(crate) fn replaced(&self, exclusion: Exclusion) -> u64 {
-        self.parts(exclusion).iter().flatten().map(Cascade::replaced).sum()
+        self.parts(exclusion).iter().map(|(_, part)| part.replaced()).sum()
     }
 
-    fn parts(&self, exclusion: Exclusion) -> &Halves {
+    fn parts(&self, exclusion: Exclusion) -> &Parts {
         if exclusion == Exclusion::None { &self.recorded } else { &self.screened }
     }
 
-    fn curve(&self, parts: &[Cascade<OCTAVES, OVERLAP>]) -> Curve<OCTAVES> {
-        joined(parts).curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
+    fn curve<'a>(&self, parts: impl IntoIterator<Item = &'a (u64, Cascade<OCTAVES, OVERLAP>)>) -> Curve<OCTAVES> {
+        joined(parts.into_iter().map(|(_, part)| part)).curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
     }
 }

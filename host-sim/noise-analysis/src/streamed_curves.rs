@@ -70,9 +70,10 @@ impl StreamedCurves {
         &self.whole.cascade
     }
 
-    /// The estimator of each part, in steps of a count ([`STEPS_PER_COUNT`]).
-    pub(crate) fn parts(&self) -> impl Iterator<Item = &Cascade<OCTAVES, OVERLAP>> {
-        self.parts.iter().map(|part| &part.cascade)
+    /// The first sample period of each part and its estimator, in steps of a count ([`STEPS_PER_COUNT`]).
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (u64, &Cascade<OCTAVES, OVERLAP>)> {
+        let starts = std::iter::once(0).chain(self.boundaries.iter().copied());
+        starts.zip(self.parts.iter().map(|part| &part.cascade))
     }
 
     /// Takes the next samples of the channel, which were taken in the sample periods `slots`.

@@ -48,14 +48,7 @@ impl EpochCurves {
     #[must_use]
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
         let (from, to) = (series.span.start, series.span.end);
-        let half = middle.checked_sub(from)?.min(to.checked_sub(middle)?);
-        let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;
-        if epoch < SHORTEST_EPOCH {
-            return None;
-        }
-        let epochs =
-            |from: u64| -> Vec<_> { (0..half / epoch).map(|k| from + k * epoch..from + (k + 1) * epoch).collect() };
-        let ranges = [epochs(middle - half / epoch * epoch), epochs(middle)];
+        let (epoch, ranges) = epochs(series.span.clone(), middle)?;
         let curves = |ranges: &[Range<u64>]| ranges.iter().map(|range| curve(series, range.clone())).collect();
         let quarter = from + (middle - from) / 2;
         let curves = Self {
@@ -70,25 +63,26 @@ impl EpochCurves {
         parts.all(|part| part.points().iter().any(|point| point.avar > 0.0)).then_some(curves)
     }
 
-    /// The same curves of a channel by averaging factors in samples, where the series has means; the quarters and the second half
-    /// with the `shorter` averaging times.
+    /// The same curves of a channel by averaging factors in samples, where the series has means, with the `shorter` averaging times.
     #[must_use]
     pub(crate) fn in_samples(self, shorter: &ShorterTimes, channel: ChannelProfile) -> Self {
-        let [of_earlier, of_later] = &self.quarters;
-        let (quarters, unseen) = match shorter.of(channel) {
-            Some(of) => {
-                let [earlier, later] = of.quarters(Exclusion::ByFirstHalf);
-                let unseen = shorter.continued(of.half(1, Exclusion::ByFirstHalf), &self.unseen);
-                ([shorter.continued(earlier, of_earlier), shorter.continued(later, of_later)], unseen)
-            }
-            None => ([shorter.in_samples(of_earlier), shorter.in_samples(of_later)], shorter.in_samples(&self.unseen)),
+        let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
+            let of_samples = shorter.of(channel).and_then(|of| of.within(slots, Exclusion::ByFirstHalf));
+            of_samples.map_or_else(|| shorter.in_samples(means), |of_samples| shorter.continued(of_samples, means))
         };
-        let epochs = |curves: &[Curve<OCTAVES>]| curves.iter().map(|curve| shorter.in_samples(curve)).collect();
+        let epochs = |curves: &[Curve<OCTAVES>], ranges: &[Range<u64>]| {
+            let slots = ranges.iter().map(|range| shorter.slots_of(range.clone()));
+            curves.iter().zip(slots).map(|(curve, slots)| in_samples(curve, slots)).collect()
+        };
+        let [fitted, unseen] = &self.ranges;
+        let middle = unseen.first().map_or(0, |range| range.start);
+        let [quarter, half] = [middle / 2, middle].map(|means| shorter.slots_of(0..means).end);
+        let [earlier, later] = &self.quarters;
         Self {
-            quarters,
-            unseen,
-            fitted_epochs: epochs(&self.fitted_epochs),
-            unseen_epochs: epochs(&self.unseen_epochs),
+            quarters: [in_samples(earlier, 0..quarter), in_samples(later, quarter..half)],
+            unseen: in_samples(&self.unseen, half..u64::MAX),
+            fitted_epochs: epochs(&self.fitted_epochs, fitted),
+            unseen_epochs: epochs(&self.unseen_epochs, unseen),
             ..self
         }
     }
@@ -110,6 +104,18 @@ impl EpochCurves {
         curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));
         curve
     }
+}
+
+/// Sample periods in an epoch, a power of 2, and those of each epoch up to the middle of a record and from there on; `None` of a record
+/// that is too short.
+pub(crate) fn epochs(record: Range<u64>, middle: u64) -> Option<(u64, [Vec<Range<u64>>; 2])> {
+    let half = middle.checked_sub(record.start)?.min(record.end.checked_sub(middle)?);
+    let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;
+    if epoch < SHORTEST_EPOCH {
+        return None;
+    }
+    let from = |from: u64| -> Vec<_> { (0..half / epoch).map(|k| from + k * epoch..from + (k + 1) * epoch).collect() };
+    Some((epoch, [from(middle - half / epoch * epoch), from(middle)]))
 }
 
 /// The curve of the sample periods `slots`.
