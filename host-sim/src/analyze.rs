@@ -6,7 +6,7 @@ use crate::progress::{self, Progress};
 use crate::{many, streaming};
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
-use noise_analysis::analysis::{analyze, analyze_long};
+use noise_analysis::analysis::{analyze_and_release, analyze_long};
 use noise_analysis::long_record::MOST_SAMPLES;
 use noise_analysis::report::Report;
 use noise_analysis::several::{self, NoiseAgreement, NoiseInflation};
@@ -117,7 +117,7 @@ fn report(
     if stream.is_in_memory() {
         end_reading(&stream);
         let bar = progress::analysing(None);
-        let report = analyze(stream.beginning());
+        let report = analyze_and_release(stream.into_beginning());
         bar.finish_and_clear();
         return Ok(report);
     }
@@ -179,7 +179,7 @@ pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> R
     let (measurement, notes) = on_time_base(&recording, rate_hz)?;
     drop(recording);
     note_all(&notes);
-    Ok(analyze(&measurement))
+    Ok(analyze_and_release(measurement))
 }
 
 /// What a file of any format holds.

@@ -42,6 +42,18 @@ pub fn analyze(measurement: &Measurement) -> Report {
     }
 }
 
+/// As [`analyze`], of a measurement that is not needed afterwards: the samples of a long one are released when it is condensed.
+#[must_use]
+pub fn analyze_and_release(measurement: Measurement) -> Report {
+    if measurement.len() as u64 > long_record::MOST_SAMPLES {
+        let long = LongRecord::from(&measurement);
+        drop(measurement);
+        analyze_long(&long)
+    } else {
+        analyze_samples(&measurement)
+    }
+}
+
 /// Analyses all samples of every channel of a measurement, however many there are.
 #[must_use]
 pub fn analyze_samples(measurement: &Measurement) -> Report {

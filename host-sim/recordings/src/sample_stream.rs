@@ -225,6 +225,12 @@ impl SampleStream {
         &self.beginning
     }
 
+    /// The same, of a recording that is not read any more.
+    #[must_use]
+    pub fn into_beginning(self) -> Measurement {
+        self.beginning
+    }
+
     /// What is known of the recording before its samples are used.
     #[must_use]
     pub fn description(&self) -> &RecordingDescription {
