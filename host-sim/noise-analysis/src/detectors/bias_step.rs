@@ -4,7 +4,7 @@
 //! of them by a margin.
 
 use super::block_means::BlockMeans;
-use super::gls_regression::{GlsRegression, RegressionEstimate};
+use super::gls_regression::{GlsRegression, RegressionEstimate, StepSizes};
 use super::noise_grid::NoiseGrid;
 use crate::distributions::{NORMAL_975, quantile};
 use crate::findings::{Correction, Detection, Effect, Parameter};
@@ -126,19 +126,19 @@ struct StepScan {
 
 impl StepScan {
     fn new(regression: &GlsRegression<'_>) -> Option<Self> {
-        let steps = regression.estimate_steps();
+        let steps = regression.steps();
         let sought = ENDS..steps.len().saturating_sub(ENDS) + 1;
-        let tried = |(at, step): (usize, &Option<RegressionEstimate>)| step.filter(|_| sought.contains(&at));
-        let tried: Vec<Option<RegressionEstimate>> = steps.iter().enumerate().map(tried).collect();
+        let tried = |(at, step): (usize, &Option<StepSizes>)| {
+            step.as_ref().filter(|_| sought.contains(&at)).and_then(|step| regression.deviance_with(step))
+        };
+        let tried: Vec<Option<f64>> = steps.iter().enumerate().map(tried).collect();
         let without = regression.deviance();
-        let deviances: Vec<f64> = tried.iter().map(|step| step.map_or(without, |step| step.deviance)).collect();
-        let (at, best) = tried
-            .iter()
-            .enumerate()
-            .filter_map(|(at, step)| Some((at, (*step)?)))
-            .min_by(|(_, a), (_, b)| a.deviance.total_cmp(&b.deviance))?;
+        let deviances: Vec<f64> = tried.iter().map(|deviance| deviance.unwrap_or(without)).collect();
+        let of_steps = tried.iter().enumerate().filter_map(|(at, deviance)| Some((at, (*deviance)?)));
+        let (at, deviance) = of_steps.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let best = regression.estimate_step(steps[at].as_ref()?)?;
         let independent = regression.independent_steps();
-        Some(Self { deviances, deviance: best.deviance, at, p_value: best.p_value, independent })
+        Some(Self { deviances, deviance, at, p_value: best.p_value, independent })
     }
 
     /// p-value for an unknown position: adds Rice's expected number of crossings of a level by a smooth process.

@@ -57,6 +57,9 @@ struct GlsFit<'a> {
     log_determinant: f64,
 }
 
+/// The sizes of a step under every mixture.
+pub(super) struct StepSizes(Vec<SizeAndInformation>);
+
 /// A size and its information under one mixture.
 #[derive(Clone, Copy)]
 struct SizeAndInformation {
@@ -91,20 +94,28 @@ impl<'a> GlsRegression<'a> {
         self.average(&sizes?.concat())
     }
 
-    /// Sizes of a step at the beginning of each block, every one by itself; `None` where the step is a combination of the
-    /// known regressors.
-    pub(super) fn estimate_steps(&self) -> Vec<Option<RegressionEstimate>> {
+    /// Sizes of a step at the beginning of each block, every one by itself, under every mixture; `None` where the step is a combination
+    /// of the known regressors.
+    pub(super) fn steps(&self) -> Vec<Option<StepSizes>> {
         let of_family =
             |of: &FamilyFits<'a>| of.fits.iter().map(|fit| fit.estimate_steps(of.family)).collect::<Vec<_>>();
         let by_mixture: Vec<Vec<Option<SizeAndInformation>>> = self.families.iter().flat_map(of_family).collect();
-        let step = |at: usize| {
-            let sizes: Option<Vec<SizeAndInformation>> = by_mixture.iter().map(|steps| steps[at]).collect();
-            self.average(&sizes?)
-        };
+        let step = |at: usize| by_mixture.iter().map(|steps| steps[at]).collect::<Option<_>>().map(StepSizes);
         (0..self.blocks.means.len()).map(step).collect()
     }
 
-    /// Effective number of independent tests in [`estimate_steps`](Self::estimate_steps).
+    /// −2 ln likelihood with such a step; `None` where too few blocks are left.
+    pub(super) fn deviance_with(&self, StepSizes(sizes): &StepSizes) -> Option<f64> {
+        let residuals = self.residuals(sizes)?;
+        Some(mean_likelihood(&self.profiled(&residuals)).0)
+    }
+
+    /// Such a step with its error and its p-value.
+    pub(super) fn estimate_step(&self, StepSizes(sizes): &StepSizes) -> Option<RegressionEstimate> {
+        self.average(sizes)
+    }
+
+    /// Effective number of independent tests in [`steps`](Self::steps).
     pub(super) fn independent_steps(&self) -> f64 {
         let (_, weights) = mean_likelihood(&self.deviances());
         let independent = |of: &FamilyFits<'a>| {
@@ -128,18 +139,27 @@ impl<'a> GlsRegression<'a> {
         self.blocks.means.len() as f64 - 2.0 - self.known as f64
     }
 
-    /// Average over the mixtures, each weighted by its restricted likelihood.
-    fn average(&self, sizes: &[SizeAndInformation]) -> Option<RegressionEstimate> {
-        let freedom = self.degrees_of_freedom();
-        if sizes.is_empty() || freedom < 1.0 {
-            return None;
-        }
+    /// Weighted sums of the squares of the residuals beside one more regressor; `None` where too few blocks are left.
+    fn residuals(&self, sizes: &[SizeAndInformation]) -> Option<Vec<f64>> {
         let residual = |(fit, at): (&GlsFit<'_>, &SizeAndInformation)| {
             (fit.residual - at.size * at.size * at.information).max(1e-12 * fit.residual)
         };
-        let residuals: Vec<f64> = self.fits().zip(sizes).map(residual).collect();
+        let is_enough = !sizes.is_empty() && self.degrees_of_freedom() >= 1.0;
+        is_enough.then(|| self.fits().zip(sizes).map(residual).collect())
+    }
+
+    /// −2 ln likelihood under each mixture for these residuals.
+    fn profiled(&self, residuals: &[f64]) -> Vec<f64> {
+        let freedom = self.degrees_of_freedom();
         let deviance = |(fit, residual): (&GlsFit<'_>, &f64)| (freedom + 1.0) * residual.ln() + fit.log_determinant;
-        let profiled: Vec<f64> = self.fits().zip(&residuals).map(deviance).collect();
+        self.fits().zip(residuals).map(deviance).collect()
+    }
+
+    /// Average over the mixtures, each weighted by its restricted likelihood.
+    fn average(&self, sizes: &[SizeAndInformation]) -> Option<RegressionEstimate> {
+        let freedom = self.degrees_of_freedom();
+        let residuals = self.residuals(sizes)?;
+        let profiled = self.profiled(&residuals);
         let restricted = profiled
             .iter()
             .zip(&residuals)
@@ -296,7 +316,7 @@ mod tests {
         // 2/√n for a step in the middle of n samples, twice that beside a ramp.
         let error = 2.0 * 2.0 / count.sqrt();
         assert!((beside.size - 1.0).abs() < 4.0 * error && beside.error > 0.9 * error, "{beside:?}");
-        let scanned = regression.estimate_steps()[64].unwrap();
+        let scanned = regression.estimate_step(regression.steps()[64].as_ref().unwrap()).unwrap();
         assert!((scanned.size - beside.size).abs() < 1e-9 && (scanned.p_value - beside.p_value).abs() < 1e-12);
         assert!((scanned.deviance - beside.deviance).abs() < 1e-6);
         assert!(regression.estimate(&ramp).is_none(), "a regressor beside itself has no information");

@@ -151,26 +151,31 @@ impl TwoStateChain {
         let scale = 0.5 * (2.0 * PI * self.variance).ln();
         // Densities of a number under both levels over that of the nearer one, and the logarithm of the latter: far from both
         // levels the densities themselves underflow.
-        let densities = |value: f64| {
+        let densities_of = |value: f64| {
             if value.is_nan() {
                 return ([1.0; 2], 0.0);
             }
-            let squares = self.levels.map(|level| 0.5 * (value - level).powi(2) / self.variance);
-            let least = squares[0].min(squares[1]);
-            (squares.map(|square| (least - square).exp()), -least - scale)
+            let [lower, upper] = self.levels.map(|level| 0.5 * (value - level).powi(2) / self.variance);
+            let farther = (-(upper - lower).abs()).exp();
+            (if lower < upper { [1.0, farther] } else { [farther, 1.0] }, -lower.min(upper) - scale)
         };
         let mut statistics = StateStatistics::default();
+        let mut densities: Vec<[f64; 2]> = Vec::with_capacity(values.len());
         let mut forward: Vec<[f64; 2]> = Vec::with_capacity(values.len());
         let mut belief = [down / (up + down), up / (up + down)];
+        let mut sums = LogOfProduct::default();
         for &value in values {
-            let ([a, b], nearer) = densities(value);
-            let (a, b) = (belief[0] * a, belief[1] * b);
+            let (of_value, nearer) = densities_of(value);
+            let (a, b) = (belief[0] * of_value[0], belief[1] * of_value[1]);
             let sum = a + b;
-            statistics.log_likelihood += sum.ln() + nearer;
+            statistics.log_likelihood += nearer;
+            sums.multiply(sum);
             let now = [a / sum, b / sum];
+            densities.push(of_value);
             forward.push(now);
             belief = [now[0] * (1.0 - up) + now[1] * down, now[0] * up + now[1] * (1.0 - down)];
         }
+        statistics.log_likelihood += sums.value();
         // Likelihood of the later numbers given each state, up to a factor.
         let mut later = [1.0; 2];
         for (at, &value) in values.iter().enumerate().rev() {
@@ -183,8 +188,7 @@ impl TwoStateChain {
                 }
             }
             let Some(before) = at.checked_sub(1) else { break };
-            let ([a, b], _) = densities(value);
-            let (a, b) = (a * later[0], b * later[1]);
+            let (a, b) = (densities[at][0] * later[0], densities[at][1] * later[1]);
             let from = forward[before];
             let joint = [from[0] * (1.0 - up) * a, from[0] * up * b, from[1] * (1.0 - down) * b, from[1] * down * a];
             let sum: f64 = joint.iter().sum();
@@ -197,6 +201,33 @@ impl TwoStateChain {
             later = back.map(|value| value / scale);
         }
         statistics
+    }
+}
+
+/// The logarithm of a product, of whose factors few are far from 1.
+struct LogOfProduct {
+    product: f64,
+    log: f64,
+}
+
+impl Default for LogOfProduct {
+    fn default() -> Self {
+        Self { product: 1.0, log: 0.0 }
+    }
+}
+
+impl LogOfProduct {
+    fn multiply(&mut self, factor: f64) {
+        self.product *= factor;
+        // So far from the ends of the range of a float the next factor leaves it only if it is itself near them.
+        if !(1e-100..1e100).contains(&self.product) {
+            self.log += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    fn value(&self) -> f64 {
+        self.log + self.product.ln()
     }
 }
 
@@ -242,13 +273,13 @@ fn kalman_log_likelihood(values: &[f64], time: f64, ratio: f64) -> f64 {
     // 1 − decay², without cancellation.
     let drive = -(-2.0 / time).exp_m1() * ratio;
     let (mut state, mut variance) = (0.0, ratio);
-    let (mut squares, mut logs, mut count) = (0.0, 0.0, 0.0);
+    let (mut squares, mut spreads, mut count) = (0.0, LogOfProduct::default(), 0.0);
     for &value in values {
         if value.is_finite() {
             let spread = variance + 1.0;
             let error: f64 = value - state;
             squares += error * error / spread;
-            logs += spread.ln();
+            spreads.multiply(spread);
             count += 1.0;
             let gain = variance / spread;
             state += gain * error;
@@ -257,5 +288,5 @@ fn kalman_log_likelihood(values: &[f64], time: f64, ratio: f64) -> f64 {
         state *= decay;
         variance = decay * decay * variance + drive;
     }
-    -0.5 * (count * ((2.0 * PI * squares / count).ln() + 1.0) + logs)
+    -0.5 * (count * ((2.0 * PI * squares / count).ln() + 1.0) + spreads.value())
 }

@@ -85,6 +85,9 @@ const BLOCKS: usize = 4096;
 struct PhaseSums {
     /// ω of the sums over 2π, Hz.
     frequency: f64,
+    /// Middle of the first block, s after the first sample of the series, and time from one block to the next.
+    first_s: f64,
+    block_s: f64,
     /// Sum of the squares of the taper's weights.
     squared_weights: f64,
     blocks: Vec<BlockSums>,
@@ -92,8 +95,6 @@ struct PhaseSums {
 
 /// Over the samples y of a block under the taper w.
 struct BlockSums {
-    /// Middle of the block, s after the first sample of the series.
-    time: f64,
     /// Σw.
     weight: f64,
     /// Σwe^(−2iωt).
@@ -106,13 +107,8 @@ impl PhaseSums {
     fn new(series: &UniformSeries, frequency: f64) -> Self {
         let length = series.values().len();
         let size = (length / BLOCKS).clamp(1, STEPS);
-        let block = |number: usize| BlockSums {
-            time: ((number * size) as f64 + 0.5 * (size as f64 - 1.0)) * series.sample_period(),
-            weight: 0.0,
-            double: Complex::ZERO,
-            product: Complex::ZERO,
-        };
-        let mut blocks: Vec<BlockSums> = (0..length.div_ceil(size)).map(block).collect();
+        let empty = || BlockSums { weight: 0.0, double: Complex::ZERO, product: Complex::ZERO };
+        let mut blocks: Vec<BlockSums> = (0..length.div_ceil(size)).map(|_| empty()).collect();
         let mut squared_weights = 0.0;
         for_each_phase(series, frequency, |at, value, cosine, sine| {
             if value.is_finite() {
@@ -124,17 +120,24 @@ impl PhaseSums {
                 squared_weights += weight * weight;
             }
         });
-        Self { frequency, squared_weights, blocks }
+        let (first_s, block_s) =
+            (0.5 * (size as f64 - 1.0) * series.sample_period(), size as f64 * series.sample_period());
+        Self { frequency, first_s, block_s, squared_weights, blocks }
     }
 
     /// The least-squares sinusoid of one frequency, in Hz.
     fn fit_at(&self, frequency: f64) -> Sine {
         let (mut weight, mut double, mut product) = (0.0, Complex::<f64>::ZERO, Complex::<f64>::ZERO);
-        for block in &self.blocks {
-            let turned = Complex::cis(-TAU * (frequency - self.frequency) * block.time);
-            weight += block.weight;
-            double += block.double * turned * turned;
-            product += block.product * turned;
+        let offset = -TAU * (frequency - self.frequency);
+        let turn = Complex::cis(offset * self.block_s);
+        for (number, blocks) in self.blocks.chunks(STEPS).enumerate() {
+            let mut turned = Complex::cis(offset * (self.first_s + (number * STEPS) as f64 * self.block_s));
+            for block in blocks {
+                weight += block.weight;
+                double += block.double * turned * turned;
+                product += block.product * turned;
+                turned *= turn;
+            }
         }
         // cos² = (1 + cos 2ωt)/2, sin² = (1 − cos 2ωt)/2, cos·sin = sin(2ωt)/2.
         let (cc, ss, cs) = (0.5 * (weight + double.re), 0.5 * (weight - double.re), -0.5 * double.im);
