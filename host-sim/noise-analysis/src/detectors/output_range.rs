@@ -148,6 +148,7 @@ pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64
 #[cfg(test)]
 mod tests {
     use super::{MOST_BINS, ValueCounts};
+    use crate::distributions::upper_tail;
     use measurement::adis16405::profile;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -166,12 +167,15 @@ mod tests {
     #[test]
     fn values_that_are_cut_off_are_told_from_rare_ones() {
         let channel = profile(0.05).channel("gyro_x").expect("a gyro");
-        // Cut off at 1.5 σ: 6.7 % of the samples, ± 0.06 %. The second noise spreads over ten times as many counts as there are bins.
-        for deviation in [10.0, 0.1 * 10.0 * MOST_BINS as f64] {
-            let limit = (1.5 * deviation) as i32;
+        // Cut off at half a standard deviation; the second noise spreads over ten times as many counts as there are bins.
+        for deviation in [10.0, MOST_BINS as f64] {
+            let limit = (0.5 * deviation) as i32;
             let found = counted(deviation, limit).saturation(&channel, channel.lsb).expect("cut off");
             let parameter = |name: &str| found.effect.parameters[name].value;
-            assert!((parameter("share") - 0.0668).abs() < 0.003, "{deviation}: {}", parameter("share"));
+            let expected = upper_tail((f64::from(limit) - 0.5) / deviation);
+            // Four standard deviations of a share of 200,000 samples.
+            let scatter = (expected * (1.0 - expected) / 200_000.0).sqrt();
+            assert!((parameter("share") - expected).abs() < 4.0 * scatter, "{deviation}: {}", parameter("share"));
             assert_eq!(parameter("level"), f64::from(limit) * channel.lsb);
             assert_eq!(counted(deviation, i32::MAX).saturation(&channel, channel.lsb), None);
         }
