@@ -58,3 +58,14 @@ pub struct SampleBlock {
     /// The channels, in the order of [`RecordingDescription::channels`]. Positions of refused samples are those in the block.
     pub channels: Vec<MeasuredChannel>,
 }
+
+impl Measurement {
+    /// The samples in blocks of `rows`, the last of which may be shorter.
+    pub fn blocks(&self, rows: usize) -> impl Iterator<Item = SampleBlock> {
+        (0..self.len()).step_by(rows).map(move |from| {
+            let positions = from..(from + rows).min(self.len());
+            let channels = self.channels.iter().map(|channel| channel.part(positions.clone())).collect();
+            SampleBlock { slots: self.slots[positions].to_vec(), channels }
+        })
+    }
+}

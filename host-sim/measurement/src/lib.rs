@@ -159,15 +159,6 @@ impl Measurement {
         }
     }
 
-    /// The samples in blocks of `rows`, the last of which may be shorter.
-    pub fn blocks(&self, rows: usize) -> impl Iterator<Item = SampleBlock> {
-        (0..self.len()).step_by(rows).map(move |from| {
-            let positions = from..(from + rows).min(self.len());
-            let channels = self.channels.iter().map(|channel| channel.part(positions.clone())).collect();
-            SampleBlock { slots: self.slots[positions].to_vec(), channels }
-        })
-    }
-
     /// Sample periods from the first sample to the last, both included, with or without a sample.
     #[must_use]
     pub fn periods(&self) -> u64 {
