@@ -72,6 +72,19 @@ struct FastFindings {
     resolution: f64,
 }
 
+impl FastFindings {
+    /// Of the channel with this profile, and with that of `first` among the first samples, of which `shown` is known.
+    fn new(profile: &ChannelProfile, first: Option<ChannelProfile>, shown: &SampleEffects) -> Self {
+        let traced = first.filter(|of| of.quantity.is_inertial());
+        let all = traced.into_iter().flat_map(|of| shown.recording.iter().chain(shown.of(of)));
+        let effects = all.map(|detection| &detection.effect);
+        Self {
+            effects: effects.filter(|effect| FAST_KINDS.contains(&effect.kind.as_str())).cloned().collect(),
+            resolution: profile.lsb * f64::from(first.map_or(1, |of| shown.counts_per_step(of))),
+        }
+    }
+}
+
 /// What is kept of one channel.
 struct LongChannel {
     recorded: StreamedCurves,
@@ -142,31 +155,25 @@ impl LongRecordReader {
         let first = beginning.before(FIRST_PERIODS);
         let samples_per_mean = description.periods.div_ceil(MOST_MEANS).next_power_of_two();
         let means = description.periods / samples_per_mean;
-        let middle = means / 2;
-        let halves = [middle / 2 * samples_per_mean, middle * samples_per_mean];
-        let of_epochs = epochs(0..means, middle).into_iter().flat_map(|(_, ranges)| ranges).flatten();
-        let starts: BTreeSet<u64> =
-            of_epochs.flat_map(|range| [range.start, range.end]).chain([middle / 2, middle]).collect();
-        let within = starts.into_iter().filter(|start| (1..means).contains(start));
-        let epochs: Vec<u64> = within.map(|start| start * samples_per_mean).collect();
-        let inertial = |profile: &ChannelProfile| profile.quantity.is_inertial();
-        let traced: Vec<ChannelProfile> = first.profiles().filter(inertial).collect();
+        let halves = [means / 2 / 2, means / 2].map(|start| start * samples_per_mean);
+        let epochs: Vec<u64> = epoch_starts(means).map(|start| start * samples_per_mean).collect();
+        // The same channels, of which the size of a count may be another one.
+        let of_first: Vec<Option<ChannelProfile>> =
+            description.channels.iter().map(|of| first.profiles().find(|first| first.name == of.name)).collect();
+        let traced: Vec<ChannelProfile> = first.profiles().filter(|of| of.quantity.is_inertial()).collect();
         let shown = SampleEffects::detect(&first, &traced);
-        let is_kept = |effect: &Effect| FAST_KINDS.contains(&effect.kind.as_str());
-        let of = |profile: &ChannelProfile| {
-            let all = shown.recording.iter().chain(shown.of(*profile)).map(|detection| &detection.effect);
-            FastFindings {
-                effects: all.filter(|effect| inertial(profile) && is_kept(effect)).cloned().collect(),
-                resolution: profile.lsb * f64::from(shown.counts_per_step(*profile)),
-            }
-        };
-        let fast: Vec<FastFindings> = description.channels.iter().map(of).collect();
+        let fast: Vec<FastFindings> = description
+            .channels
+            .iter()
+            .zip(&of_first)
+            .map(|(of, first)| FastFindings::new(of, *first, &shown))
+            .collect();
         let repeated = shown.repeated();
-        let rules = in_parallel(&description.channels, |profile| {
-            let is_sought = inertial(profile) && !shown.is_saturated(*profile);
+        let rules = in_parallel(&of_first, |first_profile| {
+            let profile = first_profile.filter(|of| of.quantity.is_inertial() && !shown.is_saturated(*of))?;
             let series =
-                || Series::from_measurement(&first, profile).with_counts_per_step(shown.counts_per_step(*profile));
-            is_sought.then(|| SpikeRule::fit_for(&series().without(&repeated), description.samples)).flatten()
+                Series::from_measurement(&first, &profile).with_counts_per_step(shown.counts_per_step(profile));
+            SpikeRule::fit_for(&series.without(&repeated), description.samples)
         });
         let screen = SampleScreen::new(&description.channels, rules, !repeated.is_empty());
         let stacked = |fast: &FastFindings| {
@@ -180,7 +187,7 @@ impl LongRecordReader {
                 screened: StreamedCurves::new(&epochs),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
                 values: ValueCounts::default(),
-                spectrum: inertial(profile).then(|| stacked(fast)),
+                spectrum: profile.quantity.is_inertial().then(|| stacked(fast)),
             }
         };
         let channels = description.channels.iter().zip(&fast).map(channel).collect();
@@ -246,6 +253,15 @@ impl LongRecordReader {
         let shorter = ShorterTimes { samples_per_mean, channels: all.map(shorter).collect() };
         LongRecord { description, first, means, shorter, faster_lines, effects, effects_of_first_half, refused }
     }
+}
+
+/// The means with which the quarters of the first half, the second half and the epochs of a record of so many begin, and the one
+/// behind the last epoch.
+fn epoch_starts(means: u64) -> impl Iterator<Item = u64> {
+    let middle = means / 2;
+    let ranges = epochs(0..means, middle).into_iter().flat_map(|(_, ranges)| ranges).flatten();
+    let starts: BTreeSet<u64> = ranges.flat_map(|range| [range.start, range.end]).chain([middle / 2, middle]).collect();
+    starts.into_iter().filter(move |start| (1..means).contains(start))
 }
 
 fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
