@@ -108,7 +108,7 @@ impl Recorded<'_> {
         let mut channels = self.channel_reports(&record, &first_half);
         let duration_s = description.periods as f64 * description.period_s();
         let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
-        let part = part_report::report(first, &record.filter);
+        let part = part_report::report(first, description.samples, &record.filter);
         // The samples are transformed once more for the figures: what is not needed then is released.
         drop((record, first_half));
         let mut report = Report {

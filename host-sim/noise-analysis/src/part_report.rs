@@ -7,13 +7,14 @@ use crate::report::PartReport;
 use crate::sampling_faults::rate_by_time_stamps;
 use measurement::Measurement;
 
-/// The report on the filter that the inertial channels of `measurement` have in common.
-pub(crate) fn report(measurement: &Measurement, common: &Result<PartFilter, Unidentified>) -> PartReport {
+/// The report on the filter that the inertial channels of a recording of so many samples have in common; `measurement` has its first
+/// samples, or all of them.
+pub(crate) fn report(measurement: &Measurement, samples: u64, common: &Result<PartFilter, Unidentified>) -> PartReport {
     let name = measurement.profile.name.to_owned();
     match common {
         Ok(common) => identified(measurement, common, name),
         Err(unidentified) => {
-            PartReport { name, note: Some(reason(measurement, unidentified)), ..PartReport::default() }
+            PartReport { name, note: Some(reason(measurement, samples, unidentified)), ..PartReport::default() }
         }
     }
 }
@@ -98,7 +99,7 @@ fn contradiction(common: &PartFilter) -> Option<String> {
 }
 
 /// Why no filter is identified.
-fn reason(measurement: &Measurement, unidentified: &Unidentified) -> String {
+fn reason(measurement: &Measurement, samples: u64, unidentified: &Unidentified) -> String {
     match unidentified {
         Unidentified::NotDithered => {
             "no inertial channel is dithered: its noise is smaller than a step of its counts, whose rounding hides the \
@@ -108,7 +109,7 @@ fn reason(measurement: &Measurement, unidentified: &Unidentified) -> String {
         Unidentified::NotCorrelated => format!(
             "in {} samples the neighbours of the inertial channels are not correlated: there is no filter, or one that is shorter than \
              the sample period of {:.3} ms, and nothing tells its taps and its clock",
-            measurement.len(),
+            samples,
             1e3 * measurement.period_s(),
         ),
         Unidentified::Minority(names) => format!(
