@@ -148,7 +148,7 @@ pub(crate) fn describe(channels: &[TracedChannel], of: usize) -> Option<Nonstati
         quarters: *quarters,
         fitted_to: *part,
         tracked,
-        epoch_s: curves.epoch as f64 * series.period_s,
+        epoch_s: curves.epoch_s,
         epochs: curves.ranges.iter().flatten().zip(epochs.into_iter().flatten()).map(parameters).collect(),
         beyond_drift: beyond_drift(&tracked_model, drift, &curves.unseen),
         tracking: track(&tracked_model, tracked, epochs, &curves.unseen),

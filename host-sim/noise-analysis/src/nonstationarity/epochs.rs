@@ -32,13 +32,15 @@ pub(crate) struct EpochCurves {
     pub quarters: [Curve<OCTAVES>; 2],
     /// Second half of the record.
     pub unseen: Curve<OCTAVES>,
-    /// Sample periods in an epoch: a power of 2.
+    /// Samples in an epoch: a power of 2.
     pub epoch: u64,
+    /// Length of an epoch, s.
+    pub epoch_s: f64,
     /// Epochs up to the middle of the record; the sample periods that are left over lie before the first.
     pub fitted_epochs: Vec<Curve<OCTAVES>>,
     /// Epochs from the middle on; the sample periods that are left over lie behind the last.
     pub unseen_epochs: Vec<Curve<OCTAVES>>,
-    /// Sample periods of each of these.
+    /// Sample periods of the series in each of these.
     pub(crate) ranges: [Vec<Range<u64>>; 2],
 }
 
@@ -55,6 +57,7 @@ impl EpochCurves {
             quarters: [curve(series, from..quarter), curve(series, quarter..middle)],
             unseen: curve(series, middle..to),
             epoch,
+            epoch_s: epoch as f64 * series.period_s,
             fitted_epochs: curves(&ranges[0]),
             unseen_epochs: curves(&ranges[1]),
             ranges,
@@ -83,6 +86,7 @@ impl EpochCurves {
             unseen: in_samples(&self.unseen, half..u64::MAX),
             fitted_epochs: epochs(&self.fitted_epochs, fitted),
             unseen_epochs: epochs(&self.unseen_epochs, unseen),
+            epoch: self.epoch * shorter.samples_per_mean,
             ..self
         }
     }
