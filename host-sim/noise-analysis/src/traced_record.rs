@@ -107,7 +107,11 @@ impl<'a> TracedRecord<'a> {
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
-        let motions = moved.into_iter().flatten().collect();
+        let distance_of_levels = |channel: ChannelProfile| {
+            let telegraph = channels.iter().find(|trace| trace.channel == channel)?.telegraph.as_ref()?;
+            telegraph.effect.parameters.get("amplitude").map(|amplitude| amplitude.value)
+        };
+        let motions = motion::of_platform(moved.into_iter().flatten().collect(), distance_of_levels);
         Self {
             measurement,
             condensed,
