@@ -18,6 +18,7 @@
 //! ```
 
 mod autocorrelation;
+mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
 pub(crate) mod decaying_disturbances;

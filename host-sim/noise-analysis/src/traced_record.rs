@@ -203,6 +203,10 @@ impl<'a> TracedRecord<'a> {
         let own = self.series_of(channel);
         let temperature = self.coupled.iter().position(|of| of.quantity == Quantity::Temperature);
         let level = own.zip(temperature).and_then(|(own, at)| unexplained::level_by_temperature(own, &self.series[at]));
+        if level.is_some() {
+            // The limit above which a sample is a spike is that of a constant level.
+            effects.retain(|effect| effect.kind != "spikes");
+        }
         effects.extend(level);
         effects
     }

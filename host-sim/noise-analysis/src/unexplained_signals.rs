@@ -8,6 +8,7 @@ use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
 use crate::spectral_lines::MergedLine;
 use crate::uniform_series::UniformSeries;
+use std::f64::consts::PI;
 
 /// Shortest time constant of a process, in periods of a periodic signal, that may be the signal's: its jumps and slopes have the
 /// spectrum of one with its time scale.
@@ -89,6 +90,11 @@ impl UnexplainedSignals {
                 is_part && !is_in_spectrum
             }),
             "rate_ramp" => self.periodic.is_some(),
+            // A sawtooth falls by π times the amplitude of its fundamental; less than a period from the ends of a record a fall is a step.
+            "bias_step" => effect.parameters.get("size").is_some_and(|size| {
+                let least = size.low.abs().min(size.high.abs());
+                self.periodic.as_ref().is_some_and(|periodic| least < PI * periodic.amplitude)
+            }),
             _ => false,
         }
     }
