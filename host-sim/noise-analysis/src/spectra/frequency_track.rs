@@ -237,18 +237,24 @@ mod tests {
 
     #[test]
     fn a_weak_line_is_found_by_its_phases() {
-        for (seed, frequencies) in [(4, [8.0, 20.0]), (5, [30.0, 24.0]), (6, [5.0, 25.0])] {
-            // 0.055²·SAMPLES/4 = 99 over the noise, where all frequencies and runs have 30 by chance. Over 128 segments an excess of 0.8,
-            // less a third that is lost between the ordinates, is 6 standard deviations: chance has it at one of 10⁷ lines of 10⁶.
-            let series = series(seed, 0.055, frequencies).detrended();
-            let found = FrequencyTrack::find(&series).expect("coherent");
-            let by_segments = SEGMENTS.iter().filter_map(|of| FrequencyTrack::in_segments(&series, *of));
-            assert!(by_segments.map(|track| track.p_value).all(|p_value| p_value > SIGNIFICANCE), "{found:?}");
-            for (found_hz, expected) in found.frequencies.into_iter().zip(frequencies) {
-                // Two resolutions of the run over 655 s.
-                assert!((found_hz - expected).abs() < 0.01, "{found:?}");
+        // 0.048²·SAMPLES/4 = 75 over the noise, where all frequencies and runs have 32 by chance. Over 128 segments an excess of 0.6, less a
+        // third that is lost between the ordinates, is 4.5 standard deviations, as chance has at one of 10⁵ lines of 10⁵.
+        let frequencies = [8.0, 20.0];
+        let (mut found, mut by_segments) = (0, 0);
+        for seed in 40..52 {
+            let series = series(seed, 0.048, frequencies).detrended();
+            let Some(track) = FrequencyTrack::find(&series) else { continue };
+            found += 1;
+            let alone = SEGMENTS.iter().filter_map(|of| FrequencyTrack::in_segments(&series, *of));
+            let is_clear = alone.map(|track| 4.0 * track.p_value).any(|p_value| p_value < SIGNIFICANCE);
+            by_segments += usize::from(is_clear);
+            for (found_hz, expected) in track.frequencies.into_iter().zip(frequencies) {
+                // An ordinate of the segments, 0.1 Hz, or some resolutions of the run over 655 s.
+                assert!((found_hz - expected).abs() < if is_clear { 0.5 } else { 0.01 }, "{track:?}");
             }
         }
+        // Three quarters and one in six are expected.
+        assert!(found >= 6 && by_segments + 3 <= found, "{found} {by_segments}");
     }
 
     #[test]
