@@ -3,8 +3,14 @@
 //! Over a second noise is averaged, and the bias of a channel at rest moves by less than the biases of two parts differ. A
 //! channel whose means of a second leave their median by three times that is moved: an accelerometer of 50 mg (1 σ over
 //! parts) by a turn of 9° or more, a gyroscope of 3 deg/s by 9 deg/s.
+//!
+//! Drift of a bias may go as far, given time. A turn of the platform changes the specific force along two axes at least, and begins and
+//! ends at some time. So a motion is in two channels of one quantity in the same seconds, or it is sudden: faster than a Gaussian process
+//! with the changes of the rest of the record. A jump to and fro in one channel alone is that of random telegraph noise where that is
+//! found.
 
-use crate::findings::{Effect, Parameter};
+use crate::distributions::quantile;
+use crate::findings::{Effect, Parameter, SIGNIFICANCE};
 use crate::report::Stretch;
 use crate::series::Series;
 use measurement::ChannelProfile;
@@ -16,12 +22,18 @@ const BLOCK_S: f64 = 1.0;
 const BIAS_ERRORS: f64 = 3.0;
 /// Means on either side of one that is moved that belong to the motion: its beginning and its end.
 const AROUND: usize = 2;
+/// Seconds within which a sudden motion begins.
+const BEGINS_WITHIN: usize = AROUND + 1;
+/// Median of the absolute value of a standard normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_75;
 
 /// The motion of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlatformMotion {
     /// Numbers of the seconds in which the channel is moved, in ascending order.
     seconds: Vec<Range<usize>>,
+    /// Whether the channel changes faster than a Gaussian process would.
+    is_sudden: bool,
     /// As reported.
     pub effect: Effect,
 }
@@ -71,7 +83,44 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
         ("to", exact(to, BLOCK_S, "s")),
         ("size", exact(largest, channel.initial_bias_error?, channel.unit)),
     ];
-    Some(PlatformMotion { seconds, effect: Effect::new("motion", parameters, evidence) })
+    Some(PlatformMotion { seconds, is_sudden: is_sudden(&means), effect: Effect::new("motion", parameters, evidence) })
+}
+
+/// Whether one of the changes within three seconds is larger than chance has one in a Gaussian process of their median size.
+fn is_sudden(means: &[Option<f64>]) -> bool {
+    let pairs = means.iter().zip(means.iter().skip(BEGINS_WITHIN));
+    let mut changes: Vec<f64> =
+        pairs.filter_map(|(before, after)| Some((after.as_ref()? - before.as_ref()?).abs())).collect();
+    changes.sort_by(f64::total_cmp);
+    let (Some(median), Some(largest)) = (changes.get(changes.len() / 2), changes.last()) else { return false };
+    *largest > quantile(0.5 * SIGNIFICANCE / changes.len() as f64) * median / NORMAL_MEDIAN
+}
+
+/// Those of the `motions` of all channels that are of the platform. `distance_of_levels` is that of the levels of the random telegraph
+/// noise of a channel.
+pub(crate) fn of_platform(
+    motions: Vec<(ChannelProfile, PlatformMotion)>,
+    distance_of_levels: impl Fn(ChannelProfile) -> Option<f64>,
+) -> Vec<(ChannelProfile, PlatformMotion)> {
+    let is_of_platform = |(channel, motion): &(ChannelProfile, PlatformMotion)| {
+        let others = motions.iter().filter(|(other, _)| other != channel && other.quantity == channel.quantity);
+        let is_shared = others.clone().any(|(_, other)| motion.overlaps(other));
+        let is_telegraph = || {
+            let size = &motion.effect.parameters["size"];
+            distance_of_levels(*channel).is_some_and(|distance| size.low.abs().min(size.high.abs()) < distance)
+        };
+        is_shared || (motion.is_sudden && !is_telegraph())
+    };
+    let kept: Vec<bool> = motions.iter().map(is_of_platform).collect();
+    motions.into_iter().zip(kept).filter_map(|(motion, is_kept)| is_kept.then_some(motion)).collect()
+}
+
+impl PlatformMotion {
+    /// Whether both channels are moved in the same seconds.
+    fn overlaps(&self, other: &Self) -> bool {
+        let is_in = |range: &Range<usize>| other.seconds.iter().any(|of| of.start < range.end && range.start < of.end);
+        self.seconds.iter().any(is_in)
+    }
 }
 
 /// The stretches of a recording of `duration_s` seconds in which no channel was moved.
@@ -95,15 +144,21 @@ pub(crate) fn at_rest<'a>(motions: impl Iterator<Item = &'a PlatformMotion>, dur
 
 #[cfg(test)]
 mod tests {
-    use super::{at_rest, find};
+    use super::{at_rest, find, of_platform};
     use crate::report::Stretch;
     use crate::series::Series;
     use measurement::adis16405::profile;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
 
     /// An accelerometer at 10 Hz that is turned by `size` g from 40.0 s to 50.0 s.
     fn series(size: f64) -> Series {
-        let slots = 0..1000_u64;
-        let value = |slot: u64| if (400..500).contains(&slot) { 1.0 + size } else { 1.0 };
+        accelerometer(1000, |slot| if (400..500).contains(&slot) { 1.0 + size } else { 1.0 })
+    }
+
+    fn accelerometer(samples: u64, value: impl FnMut(u64) -> f64) -> Series {
+        let slots = 0..samples;
         Series {
             values: slots.clone().map(value).collect(),
             span: slots.clone(),
@@ -112,6 +167,32 @@ mod tests {
             resolution: 3.33e-3,
             unit: "g",
         }
+    }
+
+    #[test]
+    fn a_drift_that_goes_far_in_one_channel_is_no_motion() {
+        let profile = profile(0.05);
+        let [x, y] = ["accl_x", "accl_y"].map(|name| profile.channel(name).unwrap());
+        for seed in 0..10 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            // A process of deviation 0.1 g with a time constant of 10 s over 1000 s leaves its median by 0.15 g many times.
+            let kept = (-0.1f64 / 10.0).exp();
+            let mut state = 0.0;
+            let drift = accelerometer(10_000, |_| {
+                state = kept * state + 0.1 * (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+                state
+            });
+            let found = find(&drift, &x).expect("goes far");
+            let alone = of_platform(vec![(x, found.clone())], |_| None);
+            assert!(alone.is_empty(), "{seed}: {alone:?}");
+            let both = vec![(x, found.clone()), (y, found)];
+            assert_eq!(of_platform(both.clone(), |_| None), both, "{seed}");
+        }
+        // A turn begins at once, and is one unless the channel jumps as far again and again.
+        let turn = vec![(x, find(&series(-0.7), &x).unwrap())];
+        assert_eq!(of_platform(turn.clone(), |_| None), turn);
+        assert_eq!(of_platform(turn.clone(), |_| Some(0.3)), turn);
+        assert_eq!(of_platform(turn, |_| Some(0.7)), []);
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //!               ├► sine tapers ─► common_mode            drift that several channels share
 //!               ├► periodic_signal                       a slow signal that repeats and is no sinusoid
 //!               ├► frequency_track                       a line whose frequency runs
+//!               ├► decaying_disturbances                 disturbances that begin at once and decay
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
 //!               ├► Welch ─► white_noise                  N, independent of the Allan variance
 //!               │        ├► equation_5                   the Allan deviation, by equation (5) of the paper
@@ -17,8 +18,10 @@
 //! ```
 
 mod autocorrelation;
+mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
+pub(crate) mod decaying_disturbances;
 mod equation_5;
 pub(crate) mod frequency_track;
 mod line_envelope;

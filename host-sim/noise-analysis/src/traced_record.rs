@@ -107,7 +107,11 @@ impl<'a> TracedRecord<'a> {
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
-        let motions = moved.into_iter().flatten().collect();
+        let distance_of_levels = |channel: ChannelProfile| {
+            let telegraph = channels.iter().find(|trace| trace.channel == channel)?.telegraph.as_ref()?;
+            telegraph.effect.parameters.get("amplitude").map(|amplitude| amplitude.value)
+        };
+        let motions = motion::of_platform(moved.into_iter().flatten().collect(), distance_of_levels);
         Self {
             measurement,
             condensed,
@@ -199,6 +203,10 @@ impl<'a> TracedRecord<'a> {
         let own = self.series_of(channel);
         let temperature = self.coupled.iter().position(|of| of.quantity == Quantity::Temperature);
         let level = own.zip(temperature).and_then(|(own, at)| unexplained::level_by_temperature(own, &self.series[at]));
+        if level.is_some() {
+            // The limit above which a sample is a spike is that of a constant level.
+            effects.retain(|effect| effect.kind != "spikes");
+        }
         effects.extend(level);
         effects
     }

@@ -1,12 +1,14 @@
-//! Signals in the samples of a channel that no effect of a name has: a slow periodic one that is no sinusoid, and a line whose
-//! frequency runs. What was named in their place is taken back.
+//! Signals in the samples of a channel that no effect of a name has: a slow periodic one that is no sinusoid, a line whose
+//! frequency runs, and disturbances that begin at once and decay. What was named in their place is taken back.
 
 use crate::distributions::NORMAL_975;
 use crate::findings::{Effect, Parameter};
+use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
 use crate::spectral_lines::MergedLine;
 use crate::uniform_series::UniformSeries;
+use std::f64::consts::PI;
 
 /// Shortest time constant of a process, in periods of a periodic signal, that may be the signal's: its jumps and slopes have the
 /// spectrum of one with its time scale.
@@ -14,12 +16,19 @@ const LEAST_OF_PERIOD: f64 = 0.02;
 /// Time constants of a process, in periods of a line, that may be the line's: the Allan deviation of the process is largest at 1.89 time
 /// constants, that of the line at 0.37 periods, and octaves tell either to a factor of 4.
 const OF_TRACK_PERIOD: [f64; 2] = [0.05, 0.8];
+/// Averaging time of the largest Allan deviation of a process with the spectrum of a Markov process, in time constants (IEEE Std 952,
+/// annex C).
+const MARKOV_PEAK: f64 = 1.89;
+/// Farthest that the time constant of a process that was named and that of disturbances that decay are apart, in octaves: either is known
+/// to a factor of 2.
+const SAME_TIME_OCTAVES: f64 = 2.0;
 
 /// The signals of one channel; none by default.
 #[derive(Default)]
 pub(crate) struct UnexplainedSignals {
     periodic: Option<PeriodicSignal>,
     track: Option<FrequencyTrack>,
+    decays: Option<DecayingDisturbances>,
 }
 
 impl UnexplainedSignals {
@@ -43,7 +52,9 @@ impl UnexplainedSignals {
         if let Some(track) = &track {
             lines.retain(|line| !track.passes(line.frequency.value) || 0.5 * line.statistic > track.energy());
         }
-        Self { periodic, track }
+        // The falls of a slow periodic signal are told by that.
+        let decays = if periodic.is_none() { DecayingDisturbances::find(series) } else { None };
+        Self { periodic, track, decays }
     }
 
     /// Whether what an effect of the channel tells is a part of one of the signals. `lines` are the other lines of the spectrum; those
@@ -51,13 +62,24 @@ impl UnexplainedSignals {
     pub(crate) fn has(&self, effect: &Effect, lines: &[MergedLine]) -> bool {
         match effect.kind.as_str() {
             "markov" | "telegraph" => effect.parameters.get("time_constant").is_some_and(|time| {
+                let is_decay = |decays: &DecayingDisturbances| {
+                    (time.value / decays.time_constant.value).log2().abs() <= SAME_TIME_OCTAVES
+                };
                 let is_periodic = |periodic: &PeriodicSignal| time.value > LEAST_OF_PERIOD * periodic.period_s();
                 let is_track = |track: &FrequencyTrack| {
                     let [least, most] = OF_TRACK_PERIOD;
                     let [first, last] = track.frequencies;
                     (least / first.max(last)..=most / first.min(last)).contains(&time.value)
                 };
-                self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track)
+                self.periodic.as_ref().is_some_and(is_periodic)
+                    || self.track.as_ref().is_some_and(is_track)
+                    || self.decays.as_ref().is_some_and(is_decay)
+            }),
+            // An octave of the curve.
+            "unexplained" => effect.parameters.get("tau").is_some_and(|tau| {
+                self.decays.as_ref().is_some_and(|decays| {
+                    (tau.value / (MARKOV_PEAK * decays.time_constant.value)).log2().abs() <= SAME_TIME_OCTAVES
+                })
             }),
             "sinusoid" | "resonance" => effect.parameters.get("frequency").is_some_and(|frequency| {
                 let is_in_spectrum = lines.iter().any(|line| line.frequency.value == frequency.value);
@@ -68,13 +90,20 @@ impl UnexplainedSignals {
                 is_part && !is_in_spectrum
             }),
             "rate_ramp" => self.periodic.is_some(),
+            // A sawtooth falls by π times the amplitude of its fundamental; less than a period from the ends of a record a fall is a step.
+            "bias_step" => effect.parameters.get("size").is_some_and(|size| {
+                let least = size.low.abs().min(size.high.abs());
+                self.periodic.as_ref().is_some_and(|periodic| least < PI * periodic.amplitude)
+            }),
             _ => false,
         }
     }
 
     /// As they are reported.
     pub(crate) fn effects(&self) -> impl Iterator<Item = Effect> {
-        self.periodic.as_ref().map(periodic_effect).into_iter().chain(self.track.as_ref().map(track_effect))
+        let periodic = self.periodic.as_ref().map(periodic_effect);
+        let track = self.track.as_ref().map(track_effect);
+        periodic.into_iter().chain(track).chain(self.decays.as_ref().map(decays_effect))
     }
 }
 
@@ -111,6 +140,22 @@ fn track_effect(track: &FrequencyTrack) -> Effect {
         track.p_value,
     );
     Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
+}
+
+fn decays_effect(decays: &DecayingDisturbances) -> Effect {
+    let time = &decays.time_constant;
+    let of_peak = |time_s: f64| MARKOV_PEAK * time_s;
+    let tau = Parameter::new(of_peak(time.value), of_peak(time.low), of_peak(time.high), "s");
+    let evidence = format!(
+        "disturbances {} that begin at once and decay within {:.2} s: the third moment behind a filter for such is {:.1} standard deviations \
+         from that of a Gaussian process, by chance {:.0e}, and {:.1} behind the same filter in reversed time",
+        if decays.sum > 0.0 { "upwards" } else { "downwards" },
+        time.value,
+        decays.sum.abs(),
+        decays.p_value,
+        decays.reversed.abs(),
+    );
+    Effect::new("unexplained", [("tau", tau)], evidence)
 }
 
 #[cfg(test)]

@@ -101,7 +101,7 @@ pub(super) fn taper(at: usize, length: usize) -> f64 {
 }
 
 /// The largest length up to `length` without a prime factor above 7.
-fn smooth_length(length: usize) -> usize {
+pub(super) fn smooth_length(length: usize) -> usize {
     (1..=length).rev().find(|&candidate| is_smooth(candidate)).unwrap_or(0)
 }
 
