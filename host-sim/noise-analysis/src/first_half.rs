@@ -75,6 +75,7 @@ impl FirstHalf {
                 Some(TracedChannel {
                     name: profile.name,
                     series,
+                    shorter: record.condensed.and_then(|of| Some((of.shorter, of.shorter.of(*profile)?))),
                     epochs: half.epochs.as_ref(),
                     baseline: &half.fit.trace.before,
                     model: &half.fit.trace.after,

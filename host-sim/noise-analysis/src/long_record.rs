@@ -22,6 +22,7 @@ use crate::sample_screen::SampleScreen;
 use crate::sampling_faults;
 use crate::series::Series;
 use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
+use crate::spectra::epoch_spectra::{EpochSpectra, PartSpectra};
 use crate::spectra::stacked_spectrum::StackedSpectrum;
 use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
@@ -93,24 +94,32 @@ struct LongChannel {
     means: Means,
     values: ValueCounts,
     /// Of the inertial channels.
-    spectrum: Option<StackedSpectrum>,
+    spectra: Option<SampleSpectra>,
+}
+
+/// Spectra of the samples of a channel.
+struct SampleSpectra {
+    stacked: StackedSpectrum,
+    epochs: EpochSpectra,
 }
 
 impl LongChannel {
-    fn push_to_spectrum(&mut self, slots: &[u64], channel: &MeasuredChannel) {
-        let Some(spectrum) = &mut self.spectrum else { return };
+    fn push_to_spectra(&mut self, slots: &[u64], channel: &MeasuredChannel) {
+        let Some(SampleSpectra { stacked, epochs }) = &mut self.spectra else { return };
         for (slot, count) in channel.used_samples(slots) {
-            spectrum.push(slot, f64::from(count) * channel.profile.lsb);
+            let value = f64::from(count) * channel.profile.lsb;
+            stacked.push(slot, value);
+            epochs.push(slot, value);
         }
     }
 
     /// The lines that are too fast for the means.
     fn faster_lines(&self, description: &RecordingDescription, samples_per_mean: u64) -> Vec<MergedLine> {
-        let Some(spectrum) = &self.spectrum else { return Vec::new() };
+        let Some(SampleSpectra { stacked, .. }) = &self.spectra else { return Vec::new() };
         let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
         let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
         let [resolved_s, duration_s] = [STRETCH_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
-        let lines = spectral_lines::merged(spectrum.lines(), resolved_s, duration_s, rate_error);
+        let lines = spectral_lines::merged(stacked.lines(), resolved_s, duration_s, rate_error);
         lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect()
     }
 }
@@ -176,8 +185,10 @@ impl LongRecordReader {
             SpikeRule::fit_for(&series.without(&repeated), description.samples)
         });
         let screen = SampleScreen::new(&description.channels, rules, !repeated.is_empty());
-        let stacked = |fast: &FastFindings| {
-            StackedSpectrum::new(description.period_s(), STRETCH_PERIODS as usize, fast.resolution)
+        let period_s = description.period_s();
+        let spectra = |fast: &FastFindings| SampleSpectra {
+            stacked: StackedSpectrum::new(period_s, STRETCH_PERIODS as usize, fast.resolution),
+            epochs: EpochSpectra::new(period_s, &epochs),
         };
         let channel = |(profile, fast): (&ChannelProfile, &FastFindings)| {
             let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
@@ -187,7 +198,7 @@ impl LongRecordReader {
                 screened: StreamedCurves::new(&epochs),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
                 values: ValueCounts::default(),
-                spectrum: profile.quantity.is_inertial().then(|| stacked(fast)),
+                spectra: profile.quantity.is_inertial().then(|| spectra(fast)),
             }
         };
         let channels = description.channels.iter().zip(&fast).map(channel).collect();
@@ -245,6 +256,9 @@ impl LongRecordReader {
                     recorded: parts(&channel.recorded),
                     screened: parts(&channel.screened),
                     middle,
+                    spectra: channel
+                        .spectra
+                        .map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
                     is_screened: channel.screened.refused != channel.recorded.refused,
                     period_s,
                     lsb: profile.lsb,
@@ -268,7 +282,7 @@ fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
     parallel::for_each_pair(channels, &block.channels, |of, channel| {
         of.screened.push(&block.slots, channel);
         of.means.push(&block.slots, channel);
-        of.push_to_spectrum(&block.slots, channel);
+        of.push_to_spectra(&block.slots, channel);
     });
 }
 

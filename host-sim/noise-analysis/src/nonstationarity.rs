@@ -31,11 +31,13 @@ pub(crate) use epochs::{EpochCurves, epochs};
 pub use epochs::{FittedPart, Stationarity};
 pub use prediction::{Baselines, TrackingErrors};
 pub use prediction_intervals::IntervalCoverage;
+use related_line::LineSource;
 pub use related_line::RelatedLine;
 pub use tracked_parameters::TrackedSet;
 
 use crate::OCTAVES;
 use crate::series::Series;
+use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use allan_core::{Curve, Model};
 use prediction::{beyond_drift, expected_drift, select_tracked, track};
 use serde::Serialize;
@@ -96,6 +98,8 @@ pub(crate) struct TracedChannel<'a> {
     pub name: &'static str,
     /// The samples, without what the rules of the first half exclude.
     pub series: &'a Series,
+    /// Where `series` has means of samples, what is known of these.
+    pub shorter: Option<(&'a ShorterTimes, &'a ShorterTimesOfChannel)>,
     /// `None` of a record that is too short for epochs.
     pub epochs: Option<&'a ChannelEpochs>,
     /// The baseline model of the first half.
@@ -119,7 +123,7 @@ impl ChannelEpochs {
 }
 
 /// How the noise of the channel at position `of` changes; `None` where the record is too short for epochs.
-pub(crate) fn describe(channels: &[TracedChannel], of: usize) -> Option<Nonstationarity> {
+pub(crate) fn describe<'a>(channels: &[TracedChannel<'a>], of: usize) -> Option<Nonstationarity> {
     let TracedChannel { series, epochs, baseline, model, .. } = channels[of];
     let ChannelEpochs { curves, quarters, part } = epochs?;
     let epochs = [&curves.fitted_epochs[..], &curves.unseen_epochs[..]];
@@ -143,7 +147,8 @@ pub(crate) fn describe(channels: &[TracedChannel], of: usize) -> Option<Nonstati
             line_error_hz: line_hz.map(|frequency| frequency * error[1]),
         }
     };
-    let names: Vec<(&str, &Series)> = channels.iter().map(|channel| (channel.name, channel.series)).collect();
+    let source = |of: &TracedChannel<'a>| LineSource { name: of.name, series: of.series, shorter: of.shorter };
+    let sources: Vec<LineSource> = channels.iter().map(source).collect();
     Some(Nonstationarity {
         quarters: *quarters,
         fitted_to: *part,
@@ -154,6 +159,6 @@ pub(crate) fn describe(channels: &[TracedChannel], of: usize) -> Option<Nonstati
         tracking: track(&tracked_model, tracked, epochs, &curves.unseen),
         baselines: Baselines::new(curves, baseline, model),
         intervals: IntervalCoverage::of_second_half(curves, model),
-        related_line: RelatedLine::find(&names, of, &tracked_model, curves),
+        related_line: RelatedLine::find(&sources, of, &tracked_model, curves),
     })
 }

@@ -1,6 +1,8 @@
 //! The averaging times that are too short for the means that are kept of a long recording.
 
 use crate::preprocessing::Exclusion;
+use crate::spectra::Welch;
+use crate::spectra::epoch_spectra::PartSpectra;
 use crate::streamed_curves::{STEPS_PER_COUNT, joined};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
@@ -35,6 +37,8 @@ pub(crate) struct ShorterTimesOfChannel {
     pub screened: Parts,
     /// First sample period of the second half.
     pub middle: u64,
+    /// Spectra of the samples in the parts of `screened`.
+    pub spectra: PartSpectra,
     /// Whether the screen leaves out a sample.
     pub is_screened: bool,
     pub period_s: f64,
@@ -98,6 +102,11 @@ impl ShorterTimesOfChannel {
         let to = parts.iter().position(|(start, _)| *start >= slots.end).unwrap_or(parts.len());
         let is_whole = parts.get(to).is_none_or(|(start, _)| *start == slots.end);
         is_whole.then(|| self.curve(&parts[from..to]))
+    }
+
+    /// The spectrum of the samples of the parts that begin in some sample periods; `None` where they have none.
+    pub(crate) fn spectrum_within(&self, slots: Range<u64>) -> Option<Welch> {
+        Welch::joined(self.spectra.iter().filter(|(start, _)| slots.contains(start)).map(|(_, spectrum)| spectrum))
     }
 
     /// Samples that were replaced because they are missing.

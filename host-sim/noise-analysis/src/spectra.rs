@@ -22,6 +22,7 @@ mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
 pub(crate) mod decaying_disturbances;
+pub(crate) mod epoch_spectra;
 mod equation_5;
 pub(crate) mod frequency_track;
 mod line_envelope;

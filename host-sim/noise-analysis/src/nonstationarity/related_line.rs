@@ -7,6 +7,7 @@ use super::epochs::{ComparedCurve, EpochCurves, SIGNIFICANCE};
 use super::prediction::mean_avar;
 use super::tracked_parameters::{TrackedModel, minimum};
 use crate::series::Series;
+use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::spectra::Welch;
 use crate::uniform_series::UniformSeries;
 use allan_core::Model;
@@ -28,6 +29,14 @@ const MAX_FREQUENCY: f64 = 0.4;
 /// Rounds of the fit along the related line's frequencies, one parameter after the other, and its first step.
 const ROUNDS: usize = 12;
 const FIRST_STEP: f64 = 0.02;
+
+/// A channel that may have a line.
+pub(crate) struct LineSource<'a> {
+    pub name: &'static str,
+    pub series: &'a Series,
+    /// Where `series` has means of samples, what is known of these.
+    pub shorter: Option<(&'a ShorterTimes, &'a ShorterTimesOfChannel)>,
+}
 
 /// A line of another channel that moves with the line of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -58,20 +67,15 @@ pub struct RelatedLine {
 impl RelatedLine {
     /// Searches all other channels for a line that moves with the tracked line of channel `of`; `None` if no line is
     /// tracked or none moves with it.
-    pub(crate) fn find(
-        channels: &[(&str, &Series)],
-        of: usize,
-        model: &TrackedModel,
-        curves: &EpochCurves,
-    ) -> Option<Self> {
+    pub(crate) fn find(channels: &[LineSource], of: usize, model: &TrackedModel, curves: &EpochCurves) -> Option<Self> {
         let near = model.line_frequency()?;
         let frequencies = |channel: usize, near: f64, epochs: &[Range<u64>]| -> Option<Vec<f64>> {
-            epochs.iter().map(|slots| centroid(channels[channel].1, slots.clone(), near)).collect()
+            epochs.iter().map(|slots| centroid(&channels[channel], slots.clone(), near)).collect()
         };
         let [fitted, unseen] = &curves.ranges;
         // The second half of the channel itself is not used.
         let middle = unseen.first()?.start;
-        let mean = centroid(channels[of].1, channels[of].1.span.start..middle, near)?;
+        let mean = centroid(&channels[of], channels[of].series.span.start..middle, near)?;
         let line = frequencies(of, mean, fitted)?;
         let others = (0..channels.len()).filter(|&other| other != of);
         let candidates: Vec<(usize, (u8, u8))> = others.flat_map(|other| RATIOS.map(|ratio| (other, ratio))).collect();
@@ -91,7 +95,7 @@ impl RelatedLine {
         let ratios: Vec<f64> = line.iter().zip(&related_fitted_hz).map(|(line, related)| line / related).collect();
         let (measured_ratio, measured_ratio_deviation) = moments(&ratios);
         Some(Self {
-            channel: channels[channel].0.to_owned(),
+            channel: channels[channel].name.to_owned(),
             ratio,
             correlation,
             p_value,
@@ -107,21 +111,8 @@ impl RelatedLine {
 
 /// Centroid of the strongest line of the spectrum of the sample periods `slots` around `near` Hz, above the median of that
 /// band, Hz. `None` if there is no line.
-fn centroid(series: &Series, slots: Range<u64>, near: f64) -> Option<f64> {
-    let rate = 1.0 / series.period_s;
-    if near > MAX_FREQUENCY * rate {
-        return None;
-    }
-    let length = ((rate / (RESOLUTION * near)) as usize).next_power_of_two();
-    let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
-    let range = position(slots.start)..position(slots.end);
-    let stretch = Series {
-        span: slots,
-        slots: series.slots[range.clone()].into(),
-        values: series.values[range].into(),
-        ..*series
-    };
-    let welch = Welch::estimate(&UniformSeries::from_series(&stretch), length)?;
+fn centroid(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<f64> {
+    let welch = spectrum(channel, slots, near)?;
     let band: Vec<(f64, f64)> = welch.points().filter(|(f, _)| (f / near - 1.0).abs() < BAND).collect();
     let mut sorted: Vec<f64> = band.iter().map(|point| point.1).collect();
     sorted.sort_by(f64::total_cmp);
@@ -133,6 +124,26 @@ fn centroid(series: &Series, slots: Range<u64>, near: f64) -> Option<f64> {
     let (moment, sum) =
         above(peak).fold((0.0, 0.0), |(moment, sum), &(f, d)| (moment + f * weight(d), sum + weight(d)));
     (sum > 0.0).then(|| moment / sum)
+}
+
+/// The spectrum of the sample periods `slots` of a channel, which resolves a line near `near` Hz; `None` if the samples do not show such.
+fn spectrum(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<Welch> {
+    let LineSource { series, shorter, .. } = channel;
+    let rate = 1.0 / series.period_s;
+    if near > MAX_FREQUENCY * rate {
+        let of_samples = shorter.and_then(|(times, of)| of.spectrum_within(times.slots_of(slots)));
+        return of_samples.filter(|spectrum| near <= MAX_FREQUENCY / spectrum.sample_period());
+    }
+    let length = ((rate / (RESOLUTION * near)) as usize).next_power_of_two();
+    let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
+    let range = position(slots.start)..position(slots.end);
+    let stretch = Series {
+        span: slots,
+        slots: series.slots[range.clone()].into(),
+        values: series.values[range].into(),
+        ..**series
+    };
+    Welch::estimate(&UniformSeries::from_series(&stretch), length)
 }
 
 /// Changes of the logarithm from epoch to epoch: unrelated drifts correlate, their changes do not.

@@ -3,7 +3,10 @@
 use super::smooth_shape::{SpectralBand, SpectralShape};
 use super::transforms;
 use crate::uniform_series::UniformSeries;
+use realfft::RealToComplex;
+use realfft::num_complex::Complex;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A segment with more than this fraction of its samples missing is left out.
 const MOST_MISSING: f64 = 0.5;
@@ -26,6 +29,64 @@ pub struct Welch {
     density: Vec<f64>,
 }
 
+/// Sums the spectra of segments.
+pub(super) struct WelchSum {
+    sample_period: f64,
+    window: Vec<f64>,
+    transform: Arc<dyn RealToComplex<f64>>,
+    input: Vec<f64>,
+    output: Vec<Complex<f64>>,
+    density: Vec<f64>,
+    segments: usize,
+}
+
+impl WelchSum {
+    /// For segments of `length` samples.
+    pub(super) fn new(sample_period: f64, length: usize) -> Self {
+        let transform = transforms::forward(length);
+        let (input, output) = (transform.make_input_vec(), transform.make_output_vec());
+        Self {
+            sample_period,
+            window: (0..length).map(|at| (PI * (at as f64 + 0.5) / length as f64).sin().powi(2)).collect(),
+            transform,
+            density: vec![0.0; output.len()],
+            input,
+            output,
+            segments: 0,
+        }
+    }
+
+    /// Adds a segment, unless more than half of its samples are missing; `filled` are the same samples with short gaps interpolated.
+    pub(super) fn add(&mut self, segment: &[f64], filled: &[f64]) {
+        let present = || segment.iter().zip(&self.window).filter(|(value, _)| value.is_finite());
+        let count = present().count();
+        if ((segment.len() - count) as f64) > MOST_MISSING * segment.len() as f64 {
+            return;
+        }
+        let mean = present().map(|(value, _)| value).sum::<f64>() / count as f64;
+        let power: f64 = present().map(|(_, weight)| weight * weight).sum();
+        for ((slot, value), weight) in self.input.iter_mut().zip(filled).zip(&self.window) {
+            *slot = if value.is_finite() { (value - mean) * weight } else { 0.0 };
+        }
+        // An error means buffers of the wrong length; these are the planner's own.
+        if self.transform.process(&mut self.input, &mut self.output).is_err() {
+            return;
+        }
+        let scale = 2.0 * self.sample_period / power;
+        for (sum, bin) in self.density.iter_mut().zip(&self.output) {
+            *sum += scale * bin.norm_sqr();
+        }
+        self.segments += 1;
+    }
+
+    /// The mean over the segments; `None` without any.
+    pub(super) fn mean(self) -> Option<Welch> {
+        let Self { sample_period, window, mut density, segments, .. } = self;
+        density.iter_mut().for_each(|sum| *sum /= segments as f64);
+        (segments > 0).then_some(Welch { sample_period, length: window.len(), segments, density })
+    }
+}
+
 impl Welch {
     /// Estimates the density from segments of `length` samples, at least 8; `None` if the series has no such segment.
     #[must_use]
@@ -33,36 +94,23 @@ impl Welch {
         if length < 8 {
             return None;
         }
-        let window: Vec<f64> = (0..length).map(|at| (PI * (at as f64 + 0.5) / length as f64).sin().powi(2)).collect();
-        let transform = transforms::forward(length);
-        let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
-        let mut density = vec![0.0; output.len()];
-        let mut segments = 0;
+        let mut sum = WelchSum::new(series.sample_period(), length);
         let (filled, _) = series.interpolated();
         let filled = filled.values().windows(length).step_by(length / 2);
         for (segment, filled) in series.values().windows(length).step_by(length / 2).zip(filled) {
-            let present = || segment.iter().zip(&window).filter(|(value, _)| value.is_finite());
-            let count = present().count();
-            if ((length - count) as f64) > MOST_MISSING * length as f64 {
-                continue;
-            }
-            let mean = present().map(|(value, _)| value).sum::<f64>() / count as f64;
-            let power: f64 = present().map(|(_, weight)| weight * weight).sum();
-            for ((slot, value), weight) in input.iter_mut().zip(filled).zip(&window) {
-                *slot = if value.is_finite() { (value - mean) * weight } else { 0.0 };
-            }
-            // An error means buffers of the wrong length; these are the planner's own.
-            transform.process(&mut input, &mut output).ok()?;
-            let scale = 2.0 * series.sample_period() / power;
-            for (sum, bin) in density.iter_mut().zip(&output) {
-                *sum += scale * bin.norm_sqr();
-            }
-            segments += 1;
+            sum.add(segment, filled);
         }
-        for sum in &mut density {
-            *sum /= segments as f64;
-        }
-        (segments > 0).then_some(Self { sample_period: series.sample_period(), length, segments, density })
+        sum.mean()
+    }
+
+    /// The mean over the segments of several estimates with segments of one length; `None` of no estimate.
+    pub(crate) fn joined<'a>(estimates: impl IntoIterator<Item = &'a Self>) -> Option<Self> {
+        estimates.into_iter().cloned().reduce(|mut joined, other| {
+            let segments = joined.segments + other.segments;
+            let weight = other.segments as f64 / segments as f64;
+            joined.density.iter_mut().zip(&other.density).for_each(|(mean, of)| *mean += weight * (of - *mean));
+            Self { segments, ..joined }
+        })
     }
 
     /// Number of segments that were averaged.
