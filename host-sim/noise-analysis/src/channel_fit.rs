@@ -49,13 +49,15 @@ pub(crate) struct ChannelFit {
     pub markov_by_spectrum: Option<MarkovEstimate>,
     /// The curve that the model with added terms is fitted to, where that is not the curve of the whole part.
     recent: Option<Curve<OCTAVES>>,
+    /// Lines of the spectrum with which the model fits the curve worse.
+    refuted: Vec<NoiseTerm>,
 }
 
 impl ChannelFit {
     /// The baseline model alone.
     pub(crate) fn fit_baseline(covariates: CovariateFit) -> Self {
         let trace = Trace::baseline(&covariates.curve);
-        Self { covariates, trace, markov_by_spectrum: None, recent: None }
+        Self { covariates, trace, markov_by_spectrum: None, recent: None, refuted: Vec::new() }
     }
 
     /// The baseline model and what it lacks; `lines` are those of the spectrum, `filters` those that the sensor may have.
@@ -65,7 +67,13 @@ impl ChannelFit {
     pub(crate) fn fit_traced(covariates: CovariateFit, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
         let by_spectrum = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
         if lines.is_empty() || by_spectrum.after_goodness.p_value > POOR_FIT {
-            return Self { covariates, trace: by_spectrum, markov_by_spectrum: None, recent: None };
+            return Self {
+                covariates,
+                trace: by_spectrum,
+                markov_by_spectrum: None,
+                recent: None,
+                refuted: Vec::new(),
+            };
         }
         let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
         let is_better = by_curve.after_goodness.deviance < by_spectrum.after_goodness.deviance;
@@ -74,13 +82,14 @@ impl ChannelFit {
             trace: if is_better { by_curve } else { by_spectrum },
             markov_by_spectrum: None,
             recent: None,
+            refuted: Vec::new(),
         }
     }
 
     /// The baseline model and what it lacks by the curve alone; `filters` are those that the sensor may have.
     pub(crate) fn fit_curve(covariates: CovariateFit, filters: &[MovingAverageFilter]) -> Self {
         let trace = trace(&covariates.curve, LineCandidates::Curve, filters);
-        let mut fit = Self { covariates, trace, markov_by_spectrum: None, recent: None };
+        let mut fit = Self { covariates, trace, markov_by_spectrum: None, recent: None, refuted: Vec::new() };
         fit.resolve(None);
         fit
     }
@@ -343,9 +352,17 @@ impl ChannelFit {
                 Some((better, model)) if better.deviance <= trace.after_goodness.deviance + MAX_DEVIANCE_RISE => {
                     (trace.after, trace.after_goodness) = (model, better);
                 }
-                _ => drop(added.pop()),
+                refuted => {
+                    added.pop();
+                    self.refuted.extend(refuted.map(|_| line.kind));
+                }
             }
         }
+    }
+
+    /// Whether the curve contradicts a line of the spectrum.
+    pub(crate) fn refutes(&self, line: &NoiseTerm) -> bool {
+        self.refuted.contains(line)
     }
 
     /// The residual of the model at the shortest averaging time.

@@ -76,7 +76,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     let in_spectrum: Vec<Effect> = lines
         .unwrap_or_default()
         .iter()
-        .map(|line| line_effect(line, model, unit))
+        .map(|line| line_effect(line, fit, unit))
         .filter(|effect| is_shown(effect, duration_s))
         .collect();
     for found in &fit.trace.added {
@@ -375,10 +375,18 @@ fn shared_drift_effect(
     Effect::new("shared_drift", [("ratio", Parameter::new(sensitivity.value, low, high, unit))], evidence)
 }
 
-/// A line of the spectrum over the noise of `model`.
-fn line_effect(line: &MergedLine, model: &Model, unit: &str) -> Effect {
+/// A line of the spectrum beside what `fit` has.
+fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &str) -> Effect {
+    let model = &fit.trace.after;
     if line.shape_p_value < SIGNIFICANCE {
-        return unexplained_band(line, model);
+        let why = format!(
+            "has not the spectrum of a resonance, by chance {:.0e}: a frequency or a strength that changes",
+            line.shape_p_value
+        );
+        return unexplained_band(line, model, &why);
+    }
+    if line.is_broad() && fit.refutes(&line.kind()) {
+        return unexplained_band(line, model, "the Allan deviation contradicts a resonance there");
     }
     if let Some(modulation) = &line.modulation {
         return modulated_line(line, modulation);
@@ -436,8 +444,8 @@ fn modulated_line(line: &MergedLine, modulation: &Modulation) -> Effect {
     Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
 }
 
-/// A band of the spectrum that stands out of the noise and has not the form of a resonance.
-fn unexplained_band(line: &MergedLine, model: &Model) -> Effect {
+/// A band of the spectrum that stands out of the noise and is no resonance, for this reason.
+fn unexplained_band(line: &MergedLine, model: &Model, why: &str) -> Effect {
     let (centre, half) = (line.frequency.value, 0.5 * line.width.value);
     let is_noise = |kind: &NoiseTerm| !matches!(kind, NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_));
     let noise = Model::new(model.sample_period(), model.terms().iter().copied().filter(|term| is_noise(&term.kind)));
@@ -446,11 +454,9 @@ fn unexplained_band(line: &MergedLine, model: &Model) -> Effect {
     let excess = |times: f64| 100.0 * ((1.0 + times * density / (2.0 * noise.density(centre))).sqrt() - 1.0);
     let relative = NORMAL_975 * 2.0 * line.deviation.error / line.deviation.value;
     let evidence = format!(
-        "a band around {centre:.4} Hz, {:.4} Hz wide, stands out of the noise ({:.0} sigma) and has not the spectrum of a \
-         resonance, by chance {:.0e}: a frequency or a strength that changes",
+        "a band around {centre:.4} Hz, {:.4} Hz wide, stands out of the noise ({:.0} sigma) and {why}",
         line.width.value,
         line.statistic.sqrt(),
-        line.shape_p_value,
     );
     let frequency = Parameter::new(centre, (centre - half).max(0.0), centre + half, "Hz");
     let percent = Parameter::new(excess(1.0), excess((1.0 - relative).max(0.0)), excess(1.0 + relative), "%");

@@ -265,7 +265,8 @@ impl MergedLine {
         self.frequency.value * self.duration_s < FEW_PERIODS
     }
 
-    fn is_broad(&self) -> bool {
+    /// Whether it may be an error of the form of the background.
+    pub(crate) fn is_broad(&self) -> bool {
         self.width.value > BROAD * self.frequency.value
     }
 

@@ -168,7 +168,6 @@ fn common_mode(report: &Report, run: &Run) {
 }
 
 #[test]
-#[ignore = "long: a minute and more; run with --long"]
 fn static_run_1() {
     check(
         "static_run_1",
@@ -190,7 +189,6 @@ fn static_run_1() {
 }
 
 #[test]
-#[ignore = "long: a minute and more; run with --long"]
 fn static_run_2() {
     check(
         "static_run_2",
@@ -212,7 +210,6 @@ fn static_run_2() {
 }
 
 #[test]
-#[ignore = "long: a minute and more; run with --long"]
 fn static_run_3() {
     check(
         "static_run_3",
