@@ -323,7 +323,6 @@ fn of_simulated(seconds: f64, seeds: std::ops::Range<u64>) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "long: four simulated recordings"]
 fn reports_of_simulated_recordings_do_not_contradict_themselves() {
     let found = of_simulated(300.0, 0..4);
     assert!(found.is_empty(), "{}", found.join("\n"));
@@ -337,7 +336,6 @@ fn reports_of_a_hundred_simulated_recordings_do_not_contradict_themselves() {
 }
 
 #[test]
-#[ignore = "long: the measured recordings in the folder that ADIS_RECORDINGS names"]
 fn reports_of_measured_recordings_do_not_contradict_themselves() {
     let folder = std::env::var_os("ADIS_RECORDINGS").map(PathBuf::from).expect("the folder of the recordings");
     let mut files: Vec<PathBuf> = ["adis16405-static", "adis16405-burst"]
