@@ -2,10 +2,12 @@
 //! curves at averaging times that are too short for the means, and the first samples.
 //!
 //! ```text
-//! first samples ─► SampleEffects: resolution, saturation, sample clock
+//! first samples ─► SampleEffects: resolution, repeated samples, sample clock
 //!        └─► rules ─┐
 //! blocks of samples ─► SampleScreen (spikes, repeated samples) ─► means ─► what is slow: drift, steps, temperature, lines
 //!        │                           ├─► StackedSpectrum ─► faster lines
+//!        │                           ├─► EpochSpectra ─► lines of two channels that move with each other
+//!        ├─► ValueCounts ─► saturation
 //!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
 //! ```
 //!
