@@ -38,7 +38,7 @@ static ALLOCATOR: MiMalloc = MiMalloc;
 
 /// `mi_option_purge_delay` of mimalloc 2 and 3: ms after which released memory is returned to the system. An analysis releases
 /// and takes the memory of a series many times a second; with the 1,000 ms of mimalloc 3 it holds half as much again.
-const PURGE_DELAY: (libmimalloc_sys::mi_option_t, c_long) = (15, 20);
+const PURGE_DELAY: (libmimalloc_sys::mi_option_t, c_long) = (15, 10);
 
 /// Folder of the page if none is named.
 const DEFAULT_PAGE: &str = "report";

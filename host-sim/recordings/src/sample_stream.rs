@@ -25,7 +25,7 @@ use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock
 pub use crate::time_base_error::StreamError;
 
 /// Sample periods at the start of a recording that are kept of one that is not held in memory.
-const BEGINNING: u64 = 1 << 17;
+const BEGINNING: u64 = 1 << 16;
 
 /// Which recordings are kept in memory, instead of being read in blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -218,7 +218,7 @@ impl SampleStream {
         Ok(stream)
     }
 
-    /// The samples at the start of the recording with their time stamps: all of one that is held in memory, else those of the first 2¹⁷
+    /// The samples at the start of the recording with their time stamps: all of one that is held in memory, else those of the first 2¹⁶
     /// sample periods, of which the size of a count may be that of these samples alone.
     #[must_use]
     pub fn beginning(&self) -> &Measurement {
