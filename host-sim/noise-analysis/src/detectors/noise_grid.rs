@@ -154,13 +154,13 @@ impl NoiseCovariance {
 impl StepInformation {
     fn new(family: &NoiseFamily, mixture: &NoiseCovariance) -> Self {
         let size = family.basis.ncols();
-        let mut of_size = vec![0.0; size];
-        // The step before the first block is the constant.
+        // The step before the first block is the constant, on which there is no information.
         let mut step = family.constant.clone();
-        for at in 1..size {
-            step -= family.basis.column(at - 1);
-            of_size[at] = mixture.square(&step);
-        }
+        let later = family.basis.column_iter().take(size - 1).map(|block| {
+            step -= block;
+            mixture.square(&step)
+        });
+        let of_size: Vec<f64> = std::iter::once(0.0).chain(later).collect();
         let between = |at: usize| {
             // Two neighbouring steps differ in one block.
             let of_block = mixture.square(&family.basis.column(at).into_owned());
