@@ -15,11 +15,15 @@ use crate::spectra::correlation_time;
 use crate::uniform_series::UniformSeries;
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
-use allan_core::term::MovingAverageFilter;
+use allan_core::term::{MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
 use serde::Serialize;
+use std::f64::consts::PI;
+
+/// Least part of a line that means of samples have.
+const LEAST_GAIN: f64 = 1e-6;
 
 /// Assessment of a channel's model. The JSON report has it under `practice`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -149,17 +153,43 @@ impl Assessment {
     }
 }
 
-/// A model of samples every `period` s of the same noise, of which the samples may be means: only a filter counts samples.
+/// A model of samples every `period` s of the same noise, of which the samples may be means: a filter counts samples, and of a line the
+/// means have a part, at the alias of its frequency.
 fn sampled_every(model: &Model, period: f64) -> Model {
     let ratio = period / model.sample_period();
-    let term = |term: &FittedTerm| match term.kind {
-        NoiseTerm::Filtered(filter) => {
-            let decimation = filter.decimation * ratio;
-            FittedTerm { kind: NoiseTerm::Filtered(MovingAverageFilter { decimation, ..filter }), ..*term }
-        }
-        _ => *term,
+    if ratio <= 1.0 {
+        return model.clone();
+    }
+    let line = |frequency: f64| {
+        let (turns, of_sample) = (frequency * period, frequency * model.sample_period());
+        let gain = (PI * turns).sin() / (ratio * (PI * of_sample).sin());
+        ((turns - turns.round()).abs() / period, gain.abs())
     };
-    Model::new(period, model.terms().iter().map(term))
+    let term = |term: &FittedTerm| {
+        let (kind, gain) = match term.kind {
+            NoiseTerm::Filtered(filter) => {
+                (NoiseTerm::Filtered(MovingAverageFilter { decimation: filter.decimation * ratio, ..filter }), 1.0)
+            }
+            NoiseTerm::Sinusoid(sinusoid) => {
+                let (frequency, gain) = line(sinusoid.frequency);
+                (NoiseTerm::Sinusoid(Sinusoid { frequency }), gain)
+            }
+            NoiseTerm::Resonance(resonance) => {
+                let (frequency, gain) = line(resonance.frequency);
+                (NoiseTerm::Resonance(Resonance { frequency, ..resonance }), gain)
+            }
+            kind => (kind, 1.0),
+        };
+        // Of a line at a multiple of the rate of the means nothing is left.
+        (gain > LEAST_GAIN).then(|| FittedTerm {
+            kind,
+            value: gain * term.value,
+            low: gain * term.low,
+            high: gain * term.high,
+            ..*term
+        })
+    };
+    Model::new(period, model.terms().iter().filter_map(term))
 }
 
 /// Whether the record says anything of a term: an upper bound of 0 belongs to a channel that never changes.
@@ -245,4 +275,29 @@ fn record_lengths(model: &Model, duration: f64) -> Vec<RecordLength> {
         RecordLength { kind: name(&term.kind).to_owned(), half_s: length.map(|length| length / 2.0), more_hours }
     };
     model.terms().iter().enumerate().filter(|(_, term)| !is_smaller(term)).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sampled_every;
+    use allan_core::model::FittedTerm;
+    use allan_core::term::Sinusoid;
+    use allan_core::{Model, NoiseTerm};
+
+    /// The second differences of means of eight samples are those of the samples at eight times the averaging time.
+    #[test]
+    fn means_of_a_line_have_the_allan_variance_of_its_samples() {
+        for frequency in [1.0, 5.0, 20.5, 33.0] {
+            let line = FittedTerm::exact(NoiseTerm::Sinusoid(Sinusoid { frequency }), 0.2);
+            let samples = Model::new(0.005, [line]);
+            let means = sampled_every(&samples, 0.04);
+            for n in [1, 2, 4, 64] {
+                let (of_means, of_samples) = (means.avar(n), samples.avar(8 * n));
+                assert!((of_means - of_samples).abs() < 1e-9 * 0.04, "{frequency} Hz, {n}: {of_means} {of_samples}");
+            }
+        }
+        // A multiple of the rate of the means.
+        let line = FittedTerm::exact(NoiseTerm::Sinusoid(Sinusoid { frequency: 25.0 }), 0.2);
+        assert!(sampled_every(&Model::new(0.005, [line]), 0.04).terms().is_empty());
+    }
 }
