@@ -181,7 +181,7 @@ fn sampled_every(model: &Model, period: f64) -> Model {
             kind => (kind, 1.0),
         };
         // Of a line at a multiple of the rate of the means nothing is left.
-        (gain > LEAST_GAIN).then(|| FittedTerm {
+        (gain > LEAST_GAIN).then_some(FittedTerm {
             kind,
             value: gain * term.value,
             low: gain * term.low,
