@@ -251,7 +251,10 @@ impl Assessed {
         // Means tell nothing of the averaging times that are shorter than they are.
         let shorter = record.condensed.map_or(0, |condensed| condensed.shorter.samples_per_mean.ilog2() as usize);
         by_spectrum.splice(0..0, vec![None; shorter]);
-        Self { assessment: Assessment::new(own, models), by_spectrum }
+        let of_channel = record.condensed.and_then(|condensed| condensed.shorter.of(channel));
+        let samples = of_channel.and_then(|of| Some((of.spectrum_within(0..u64::MAX)?, of.resolution)));
+        let samples = samples.as_ref().map(|(spectrum, resolution)| (spectrum, *resolution));
+        Self { assessment: Assessment::new(own, samples, models), by_spectrum }
     }
 }
 

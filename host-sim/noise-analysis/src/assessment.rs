@@ -11,7 +11,7 @@ pub use innovations::Innovations;
 
 use crate::findings::{BoundedEstimate, Parameter};
 use crate::series::Series;
-use crate::spectra::correlation_time;
+use crate::spectra::{Welch, correlation_time};
 use crate::uniform_series::UniformSeries;
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
@@ -20,6 +20,7 @@ use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
 use serde::Serialize;
+use spectral_white_noise::WELCH_SAMPLES;
 use std::f64::consts::PI;
 
 /// Least part of a line that means of samples have.
@@ -101,9 +102,10 @@ pub struct AssessedModels<'a> {
 }
 
 impl Assessment {
-    /// Assesses the models of the channel whose samples are `series`.
+    /// Assesses the models of the channel whose samples, or means of them, are `series`; of means `samples` has the spectrum of
+    /// the samples and the smallest distance of two of them.
     #[must_use]
-    pub fn new(series: &Series, models: AssessedModels) -> Self {
+    pub fn new(series: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
         let AssessedModels { refitted, uncompensated, of_first_half } = models;
         let whole = UniformSeries::from_series(series);
         let halfway = whole.values().len() / 2;
@@ -114,7 +116,13 @@ impl Assessment {
             return Self::unknown(!series.values.is_empty());
         }
         let of_series = |model: &Model| sampled_every(model, whole.sample_period());
-        let by_spectrum = spectral_white_noise::estimate(&whole, &of_series(refitted), series.resolution, series.unit);
+        let by_spectrum = match samples {
+            Some((welch, resolution)) => spectral_white_noise::estimate(Some(welch), refitted, resolution, series.unit),
+            None => {
+                let welch = Welch::estimate(&whole, WELCH_SAMPLES);
+                spectral_white_noise::estimate(welch.as_ref(), &of_series(refitted), series.resolution, series.unit)
+            }
+        };
         Self {
             coefficients: coefficients(refitted, series.unit),
             coefficients_note: None,

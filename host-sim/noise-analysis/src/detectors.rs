@@ -5,7 +5,8 @@
 //!         ├► spikes                                        single samples
 //!         ├► effective_lsb                                 values rounded to several counts
 //!         ├► output_range                                  values that are cut off, and noise below a count
-//!         └► block_means ─► gls_regression ─► bias         steps, ramps, covariates of the bias: thermal_response,
+//!         └► block_means, noise_grid ─► gls_regression ─► bias
+//!                                                          steps, ramps, covariates of the bias: thermal_response,
 //!                                                          vibration_rectification (bias_response)
 //! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
 //! ```

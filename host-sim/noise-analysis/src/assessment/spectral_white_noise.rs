@@ -2,13 +2,12 @@
 
 use crate::findings::{BoundedEstimate, Parameter};
 use crate::spectra::{KnownShapes, Welch, WhiteNoiseFit, fit_white_noise};
-use crate::uniform_series::UniformSeries;
 use crate::units::coefficient_unit;
 use allan_core::{Model, NoiseTerm};
 
 /// Segment length of Welch's estimate, samples: long enough to resolve the nulls of the sensor's filter, short enough for
 /// many segments.
-const WELCH_SAMPLES: usize = 1 << 13;
+pub(super) const WELCH_SAMPLES: usize = 1 << 13;
 /// Least variance of the noise of a sample, in counts², at which rounding acts as white noise: then the error's correlation
 /// with the noise, `exp(−2π²σ²)`, is 2 %.
 const DITHERED_COUNTS2: f64 = 0.2;
@@ -24,20 +23,20 @@ pub(super) struct SpectralWhiteNoise {
     pub note: Option<String>,
 }
 
-/// N by the spectrum of `whole`, whose values are multiples of `count` and in `unit`.
+/// N by the spectrum of a record, `welch`, whose values are multiples of `count` and in `unit`; `None` of a record that is too short.
 ///
 /// `fitted` is the model of the whole record, whose N is reported and whose lines and Markov processes the spectrum has as
 /// well.
-pub(super) fn estimate(whole: &UniformSeries, fitted: &Model, count: f64, unit: &str) -> SpectralWhiteNoise {
+pub(super) fn estimate(welch: Option<&Welch>, fitted: &Model, count: f64, unit: &str) -> SpectralWhiteNoise {
     let without = |reason: String| SpectralWhiteNoise { angle_random_walk: None, note: Some(reason) };
-    let Some(welch) = Welch::estimate(whole, WELCH_SAMPLES) else {
+    let Some(welch) = welch else {
         return without(format!("the record has no {WELCH_SAMPLES} samples in a row for a spectrum"));
     };
     let is_read_slowly = fitted.terms().iter().any(|term| match term.kind {
         NoiseTerm::Filtered(filter) => filter.decimation != 1.0,
         _ => false,
     });
-    let Some(fit) = fit_white_noise(&welch, &KnownShapes { model: fitted, is_read_slowly }) else {
+    let Some(fit) = fit_white_noise(welch, &KnownShapes { model: fitted, is_read_slowly }) else {
         return without("drift, lines or rounding hide the white noise in the spectrum".to_owned());
     };
     let in_counts = fit.sample_deviation / count;
