@@ -7,7 +7,7 @@ use crate::{many, streaming};
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
 use noise_analysis::analysis::{analyze_and_release, analyze_long};
-use noise_analysis::long_record::MOST_SAMPLES;
+use noise_analysis::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
 use noise_analysis::report::Report;
 use noise_analysis::several::{self, NoiseAgreement, NoiseInflation};
 use recordings::any_sensor::{ReadOptions, SensorRecording};
@@ -105,7 +105,11 @@ fn report(
     end_reading: &mut dyn FnMut(&SampleStream),
 ) -> Result<Report> {
     if is_quick {
-        let mut stream = open_stream(recording, monitor, KeptInMemory { rows: QUICK_ROWS, irregular: false })?;
+        let mut stream = open_stream(
+            recording,
+            monitor,
+            KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0, irregular: false },
+        )?;
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream);
         let bar = progress::analysing(Some(stream.description().channels.len()));
@@ -113,7 +117,13 @@ fn report(
         bar.finish_and_clear();
         return Ok(report);
     }
-    let mut stream = open_stream(recording, monitor, KeptInMemory { rows: MOST_SAMPLES, irregular: true })?;
+    let kept = KeptInMemory {
+        rows: MOST_SAMPLES,
+        rows_with_losses: MOST_SAMPLES_WITH_LOSSES,
+        most_lost: MOST_LOST,
+        irregular: true,
+    };
+    let mut stream = open_stream(recording, monitor, kept)?;
     if stream.is_in_memory() {
         end_reading(&stream);
         let bar = progress::analysing(None);

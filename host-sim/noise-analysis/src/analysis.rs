@@ -31,11 +31,12 @@ use allan_core::{AllanPoint, Curve};
 use measurement::{ChannelProfile, Measurement, RecordingDescription};
 use std::collections::BTreeMap;
 
-/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](long_record::MOST_SAMPLES) samples.
+/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](long_record::MOST_SAMPLES) samples, or
+/// [`MOST_SAMPLES_WITH_LOSSES`](long_record::MOST_SAMPLES_WITH_LOSSES).
 /// Effects are traced in the inertial channels only; the others get the baseline model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
-    if measurement.len() as u64 > long_record::MOST_SAMPLES {
+    if long_record::is_condensed(measurement) {
         analyze_long(&LongRecord::from(measurement))
     } else {
         analyze_samples(measurement)
@@ -45,7 +46,7 @@ pub fn analyze(measurement: &Measurement) -> Report {
 /// As [`analyze`], of a measurement that is not needed afterwards: the samples of a long one are released when it is condensed.
 #[must_use]
 pub fn analyze_and_release(measurement: Measurement) -> Report {
-    if measurement.len() as u64 > long_record::MOST_SAMPLES {
+    if long_record::is_condensed(&measurement) {
         let long = LongRecord::from(&measurement);
         drop(measurement);
         analyze_long(&long)

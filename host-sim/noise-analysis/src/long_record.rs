@@ -34,6 +34,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Samples of the longest recording that is analysed without being condensed.
 pub const MOST_SAMPLES: u64 = 1 << 18;
+/// The same of a recording of which more than [`MOST_LOST`] of the samples are missing: the means of fewer samples have more noise.
+pub const MOST_SAMPLES_WITH_LOSSES: u64 = 1 << 20;
+/// Largest part of the samples of a shorter recording that may be missing where it is condensed.
+pub const MOST_LOST: f64 = 1.0 / 32.0;
 /// Samples that are taken at a time of a recording that is in memory.
 const BLOCK: usize = 1 << 14;
 /// Means of a longer recording, at most.
@@ -142,6 +146,13 @@ pub struct LongRecord {
     pub(crate) effects_of_first_half: Vec<Vec<Effect>>,
     /// Of each channel, the samples that are refused in it alone, by cause.
     pub(crate) refused: Vec<BTreeMap<&'static str, u64>>,
+}
+
+/// Whether a measurement is condensed for its analysis.
+pub(crate) fn is_condensed(measurement: &Measurement) -> bool {
+    let (samples, periods) = (measurement.len() as u64, measurement.periods());
+    let has_losses = (periods - samples) as f64 > MOST_LOST * periods as f64;
+    samples > if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES }
 }
 
 impl From<&Measurement> for LongRecord {

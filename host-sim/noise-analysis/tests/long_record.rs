@@ -3,7 +3,7 @@
 
 use measurement::adis16405::profile;
 use measurement::{MeasuredChannel, Measurement, RecordingDescription};
-use noise_analysis::analysis::{analyze_long, analyze_samples};
+use noise_analysis::analysis::{analyze, analyze_long, analyze_samples};
 use noise_analysis::long_record::LongRecordReader;
 use noise_analysis::report::{ChannelReport, Parameter, Report, Validation};
 use rand::{Rng, SeedableRng};
@@ -185,4 +185,24 @@ fn a_channel_that_is_cut_off_later_is_told() {
     assert_eq!(share.value, f64::from(cut_off) / measurement.len() as f64);
     let level = f64::from(limit) * measurement.channels[0].profile.lsb;
     assert_eq!(parameter(&report, "gyro_x", "saturated", "level").value, level);
+}
+
+/// White noise of which a tenth of the samples is lost: means of fewer samples than the others are no second noise.
+#[test]
+fn lost_samples_are_no_noise() {
+    let mut measurement = recorded();
+    let mut random = ChaCha8Rng::seed_from_u64(53);
+    let channel = &mut measurement.channels[1];
+    (channel.counts, measurement.slots) = (0..400_000_u64)
+        .filter_map(|slot| {
+            let (is_lost, value) = (random.random_bool(0.1), random.sample::<f64, _>(StandardNormal));
+            (!is_lost).then(|| ((10.0 * value).round() as i32, slot))
+        })
+        .unzip();
+    measurement.channels = vec![measurement.channels.swap_remove(1)];
+    let missing = measurement.periods() - measurement.len() as u64;
+    measurement.dropped = BTreeMap::from([("gap", missing)]);
+    let report = analyze(&measurement);
+    let kinds: Vec<&str> = report.findings.iter().map(|finding| finding.kind.as_str()).collect();
+    assert_eq!(kinds, ["dropped_samples"]);
 }

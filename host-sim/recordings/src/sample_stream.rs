@@ -28,15 +28,24 @@ pub use crate::time_base_error::StreamError;
 const BEGINNING: u64 = 1 << 16;
 
 /// Which recordings are kept in memory, instead of being read in blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KeptInMemory {
     /// Those of at most so many rows.
     pub rows: u64,
+    /// Those of at most so many rows where a larger part than `most_lost` of the first samples never arrived.
+    pub rows_with_losses: u64,
+    /// Part of the samples.
+    pub most_lost: f64,
     /// Those whose time stamps are too irregular to be understood without all of them. Where they are not kept, they are an error.
     pub irregular: bool,
 }
 
 impl KeptInMemory {
+    /// Whether a larger part is missing of `samples` in so many sample periods.
+    fn has_losses(self, samples: u64, periods: u64) -> bool {
+        periods.saturating_sub(samples) as f64 > self.most_lost * periods as f64
+    }
+
     /// Whether a recording that has more rows is kept because of its time stamps.
     fn has_to_be_kept(self, has_index: bool, stamps: Option<&StampQuality>) -> bool {
         self.irregular && matches!(StreamClock::new(has_index, stamps), Err(TimeBaseError::Irregular(_)))
@@ -129,6 +138,10 @@ impl SampleStream {
         let (mut recording, mut is_all) = head(kept.rows)?;
         let first = recording.samples.first().map(|sample| sample.time_stamp).unwrap_or_default();
         let mut base = time_base(&recording, stated_hz)?;
+        if !is_all && kept.has_losses(base.measurement.len() as u64, base.measurement.periods()) {
+            (recording, is_all) = head(kept.rows_with_losses)?;
+            base = time_base(&recording, stated_hz)?;
+        }
         if !is_all && kept.has_to_be_kept(first.index.is_some(), base.stamps.as_ref()) {
             (recording, is_all) = head(u64::MAX)?;
             base = time_base(&recording, stated_hz)?;
@@ -181,6 +194,11 @@ impl SampleStream {
             SampleSlots::new(rows, table.times_s.as_deref(), table.indices.as_deref(), stated_hz)
         };
         let ValueHead { mut table, time_unit_s, mut is_all } = head(kept.rows)?;
+        let periods = |table: &SensorTable| slots_of(table).map(|of| of.slots.last().map_or(0, |last| last + 1));
+        let rows = |table: &SensorTable| table.columns.first().map_or(0, |column| column.values.len() as u64);
+        if !is_all && kept.has_losses(rows(&table), periods(&table)?) {
+            ValueHead { table, is_all, .. } = head(kept.rows_with_losses)?;
+        }
         if !is_all && kept.has_to_be_kept(table.indices.is_some(), slots_of(&table)?.stamps.as_ref()) {
             ValueHead { table, is_all, .. } = head(u64::MAX)?;
         }
