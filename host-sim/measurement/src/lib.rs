@@ -96,6 +96,12 @@ impl MeasuredChannel {
     }
 }
 
+/// The part of the samples that is missing, of `samples` in so many sample periods; 0 of no period.
+#[must_use]
+pub fn lost_part(samples: u64, periods: u64) -> f64 {
+    periods.saturating_sub(samples) as f64 / periods.max(1) as f64
+}
+
 impl Measurement {
     /// Number of samples.
     #[must_use]

@@ -29,7 +29,7 @@ use crate::spectra::stacked_spectrum::StackedSpectrum;
 use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
 use crate::traced_record::Condensed;
-use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock};
+use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, lost_part};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Samples of the longest recording that is analysed without being condensed.
@@ -65,6 +65,8 @@ pub struct LongRecordReader {
     description: RecordingDescription,
     first: Measurement,
     samples_per_mean: u64,
+    /// First sample period of the second half.
+    middle: u64,
     screen: SampleScreen,
     channels: Vec<LongChannel>,
     fast: Vec<FastFindings>,
@@ -151,7 +153,7 @@ pub struct LongRecord {
 /// Whether a measurement is condensed for its analysis.
 pub(crate) fn is_condensed(measurement: &Measurement) -> bool {
     let (samples, periods) = (measurement.len() as u64, measurement.periods());
-    let has_losses = (periods - samples) as f64 > MOST_LOST * periods as f64;
+    let has_losses = lost_part(samples, periods) > MOST_LOST;
     samples > if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES }
 }
 
@@ -215,7 +217,8 @@ impl LongRecordReader {
             }
         };
         let channels = description.channels.iter().zip(&fast).map(channel).collect();
-        Self { description, first, samples_per_mean, screen, channels, fast, last: None, gaps: 0 }
+        let [_, middle] = halves;
+        Self { description, first, samples_per_mean, middle, screen, channels, fast, last: None, gaps: 0 }
     }
 
     /// Takes the next samples, the channels on as many threads as there are cores.
@@ -236,7 +239,7 @@ impl LongRecordReader {
     #[must_use]
     pub fn finish(mut self) -> LongRecord {
         push_screened(&mut self.channels, &self.screen.finish());
-        let Self { description, first, samples_per_mean, screen, channels, fast, gaps, .. } = self;
+        let Self { description, first, samples_per_mean, middle, screen, channels, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let lost = lost.map(|Detection { effect, .. }| effect);
         let period_s = description.period_s();
@@ -250,7 +253,6 @@ impl LongRecordReader {
         };
         let spikes = screen.spikes(description.periods, period_s);
         let effects = fast.iter().zip(&channels).zip(&description.channels).zip(spikes).map(effects).collect();
-        let middle = description.periods / samples_per_mean / 2 * samples_per_mean;
         let of_first_half = screen.spikes(middle, period_s);
         let effects_of_first_half =
             of_first_half.map(|spikes| spikes.map(|found| found.effect).into_iter().collect()).collect();

@@ -20,7 +20,7 @@ use crate::time_base::time_base;
 use crate::time_base_error::TimeBaseError;
 use crate::value_stream::{self, ColumnSample, ValueColumn, ValueHead, ValueStream};
 use adis16405_driver::GyroRange;
-use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock};
+use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock, lost_part};
 
 pub use crate::time_base_error::StreamError;
 
@@ -43,7 +43,7 @@ pub struct KeptInMemory {
 impl KeptInMemory {
     /// Whether a larger part is missing of `samples` in so many sample periods.
     fn has_losses(self, samples: u64, periods: u64) -> bool {
-        periods.saturating_sub(samples) as f64 > self.most_lost * periods as f64
+        lost_part(samples, periods) > self.most_lost
     }
 
     /// Whether a recording that has more rows is kept because of its time stamps.

@@ -11,10 +11,10 @@
 
 use super::periodogram::{smooth_length, taper};
 use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use super::transforms;
 use crate::distributions::{quantile, upper_tail};
 use crate::findings::{Parameter, SIGNIFICANCE};
 use crate::uniform_series::UniformSeries;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -73,7 +73,7 @@ impl DecayingDisturbances {
             return None;
         }
         let blocks = series.averaged(size);
-        let mut record = WhitenedRecord::new(filled(blocks.values())?)?;
+        let record = WhitenedRecord::new(filled(blocks.values())?)?;
         let responses = (0..TIMES).filter_map(|power| record.response(1 << power, false));
         let best = responses.max_by(|a, b| a.sum.abs().total_cmp(&b.sum.abs()))?;
         // Either direction of each filter. The sum of many terms is nearly normal: of 1,500 simulated records of white and flicker noise
@@ -109,7 +109,6 @@ fn filled(means: &[f64]) -> Option<Vec<f64>> {
 
 /// The Fourier transform of a record and the density of its noise.
 struct WhitenedRecord {
-    planner: RealFftPlanner<f64>,
     length: usize,
     transform: Vec<Complex<f64>>,
     /// One over the density, 0 at lines.
@@ -119,8 +118,7 @@ struct WhitenedRecord {
 impl WhitenedRecord {
     fn new(values: Vec<f64>) -> Option<Self> {
         let length = values.len();
-        let mut planner = RealFftPlanner::new();
-        let forward = planner.plan_fft_forward(length);
+        let forward = transforms::forward(length);
         // A periodic continuation without a jump.
         let end = length / 256;
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -133,16 +131,16 @@ impl WhitenedRecord {
         let mut tapered: Vec<f64> = values.iter().enumerate().map(|(at, value)| taper(at, length) * value).collect();
         let squares: f64 = (0..length).map(|at| taper(at, length).powi(2)).sum();
         let mut transform = forward.make_output_vec();
-        // An error means buffers of the wrong length; these are the planner's own.
+        // An error means buffers of the wrong length; these are the plan's own.
         forward.process(&mut tapered, &mut transform).ok()?;
         let ordinates: Vec<f64> = transform.iter().map(|bin| bin.norm_sqr() / squares).collect();
         forward.process(&mut values, &mut transform).ok()?;
-        Some(Self { planner, length, transform, weights: weights(&ordinates)? })
+        Some(Self { length, transform, weights: weights(&ordinates)? })
     }
 
     /// The response of the filter for a decay of `time` blocks, or for one in reversed time.
-    fn response(&mut self, time: usize, is_reversed: bool) -> Option<Response> {
-        let inverse = self.planner.plan_fft_inverse(self.length);
+    fn response(&self, time: usize, is_reversed: bool) -> Option<Response> {
+        let inverse = transforms::inverse(self.length);
         let kept = (-1.0 / time as f64).exp();
         let decay = |order: usize| 1.0 / (1.0 - kept * Complex::cis(-TAU * order as f64 / self.length as f64));
         let last = self.transform.len() - 1;
