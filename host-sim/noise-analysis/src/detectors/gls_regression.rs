@@ -10,7 +10,7 @@
 use super::block_means::BlockMeans;
 use super::noise_grid::{NoiseCovariance, NoiseFamily, NoiseGrid};
 use crate::distributions::upper_tail;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// A regressor that keeps less than this fraction of its information when the others are fitted too is a combination of them.
 const COLLINEAR: f64 = 1e-6;
@@ -97,9 +97,8 @@ impl<'a> GlsRegression<'a> {
     /// Sizes of a step at the beginning of each block, every one by itself, under every mixture; `None` where the step is a combination
     /// of the known regressors.
     pub(super) fn steps(&self) -> Vec<Option<StepSizes>> {
-        let of_family =
-            |of: &FamilyFits<'a>| of.fits.iter().map(|fit| fit.estimate_steps(of.family)).collect::<Vec<_>>();
-        let by_mixture: Vec<Vec<Option<SizeAndInformation>>> = self.families.iter().flat_map(of_family).collect();
+        let by_mixture: Vec<Vec<Option<SizeAndInformation>>> =
+            self.families.iter().flat_map(FamilyFits::estimate_steps).collect();
         let step = |at: usize| by_mixture.iter().map(|steps| steps[at]).collect::<Option<_>>().map(StepSizes);
         (0..self.blocks.means.len()).map(step).collect()
     }
@@ -182,6 +181,28 @@ impl<'a> GlsRegression<'a> {
     }
 }
 
+impl FamilyFits<'_> {
+    /// Under each mixture, the size of a step at the beginning of each block.
+    fn estimate_steps(&self) -> Vec<Vec<Option<SizeAndInformation>>> {
+        // One product of matrices is faster than one of a matrix and a vector for each mixture.
+        let columns = self
+            .fits
+            .iter()
+            .flat_map(|fit| std::iter::once(fit.weighted_means.column(0)).chain(fit.weighted_known.column_iter()));
+        let columns: Vec<_> = columns.collect();
+        if columns.is_empty() {
+            return Vec::new();
+        }
+        let products = self.family.products_with_blocks(&DMatrix::from_columns(&columns));
+        let of_fits = self.fits.iter().zip(0..);
+        let estimate = |(fit, at): (&GlsFit<'_>, usize)| {
+            let vectors = 1 + fit.weighted_known.ncols();
+            fit.estimate_steps(self.family.step_information(fit.noise), &products.rows(at * vectors, vectors))
+        };
+        of_fits.map(estimate).collect()
+    }
+}
+
 impl<'a> GlsFit<'a> {
     /// For means and known regressors with these coordinates.
     fn new(noise: &'a NoiseCovariance, means: &DVector<f64>, known: &DMatrix<f64>) -> Option<Self> {
@@ -206,17 +227,15 @@ impl<'a> GlsFit<'a> {
         self.beside_known(regressor.dot(&weighted), regressor.dot(&self.weighted_means), &with_known)
     }
 
-    fn estimate_steps(&self, family: &NoiseFamily) -> Vec<Option<SizeAndInformation>> {
-        let information = family.step_information(self.noise);
-        let of_means = family.products_with_blocks(&self.weighted_means);
-        let of_known: Vec<DVector<f64>> =
-            self.weighted_known.column_iter().map(|column| family.products_with_blocks(&column.into_owned())).collect();
+    /// Of the information on each step, and the products of each block with the weighted means and with the weighted known regressors, a
+    /// row each.
+    fn estimate_steps(&self, information: &[f64], products: &DMatrixView<'_, f64>) -> Vec<Option<SizeAndInformation>> {
         let mut steps = vec![None; information.len()];
-        let (mut with_means, mut with_known) = (0.0, DVector::zeros(of_known.len()));
+        let (mut with_means, mut with_known) = (0.0, DVector::zeros(products.nrows() - 1));
         // A step before the first block would be the constant.
         for at in (1..information.len()).rev() {
-            with_means += of_means[at];
-            of_known.iter().zip(with_known.iter_mut()).for_each(|(known, sum)| *sum += known[at]);
+            with_means += products[(0, at)];
+            with_known += products.column(at).rows(1, products.nrows() - 1);
             steps[at] = self.beside_known(information[at], with_means, &with_known);
         }
         steps

@@ -102,9 +102,9 @@ impl NoiseFamily {
         &self.basis * columns
     }
 
-    /// For a vector of coordinates, its products with a 1 in each block.
-    pub(super) fn products_with_blocks(&self, weighted: &DVector<f64>) -> DVector<f64> {
-        self.basis.tr_mul(weighted)
+    /// For coordinates in columns, the products of each with a 1 in each block, in rows.
+    pub(super) fn products_with_blocks(&self, weighted: &DMatrix<f64>) -> DMatrix<f64> {
+        weighted.transpose() * &self.basis
     }
 
     /// Information of one of the mixtures on the size of a step before each block, were it the only regressor.
@@ -271,7 +271,8 @@ mod tests {
         let precision = &inverse - &along * along.transpose() / information;
 
         let values = DVector::from_fn(count, |at, _| (at as f64 * 0.7).sin() + 0.01 * at as f64);
-        let weighted = family.products_with_blocks(&mixture.weighted(&family.coordinates(&values)));
+        let weighted = DMatrix::from_columns(&[mixture.weighted(&family.coordinates(&values))]);
+        let weighted = family.products_with_blocks(&weighted).transpose();
         assert!((&weighted - &precision * &values).amax() < 1e-9 * (&precision * &values).amax());
         let log_determinant = covariance.cholesky().expect("positive definite").determinant().ln() + information.ln();
         assert!((mixture.log_determinant - log_determinant).abs() < 1e-8);

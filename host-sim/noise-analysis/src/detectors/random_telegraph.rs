@@ -4,7 +4,7 @@
 //! walk. The detector compares the likelihood of a hidden Markov chain of two states with that of a Gaussian process of any
 //! variance and correlation time, on means of equal parts of the record.
 
-use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood};
+use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood, white_log_likelihood};
 use crate::distributions::{NORMAL_975, quantile};
 use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
 use crate::uniform_series::UniformSeries;
@@ -119,7 +119,8 @@ fn robust_variance(values: Vec<f64>) -> f64 {
 /// The chain, and its gain in ln likelihood over any Gaussian process; `None` if the gain or a property of the chain is below
 /// its limit.
 fn fit(parts: &PartMeans) -> Option<(TwoStateChain, f64)> {
-    let chain = TwoStateChain::fit(&parts.means)?;
+    // White noise is one of the Gaussian processes.
+    let chain = TwoStateChain::fit(&parts.means, white_log_likelihood(&parts.means) + LEAST_GAIN)?;
     let around = robust_variance(chain.residuals(&parts.means));
     let jumps = chain.jumps >= FEWEST_JUMPS && chain.correlation_time() > LEAST_TIME;
     if !jumps

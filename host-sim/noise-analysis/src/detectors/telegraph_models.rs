@@ -7,6 +7,9 @@ use std::f64::consts::PI;
 /// Rounds of the fit of the chain, at most; it ends when a round gains less than `SETTLED` in ln likelihood.
 const ROUNDS: usize = 60;
 const SETTLED: f64 = 1e-3;
+/// What all later rounds gain, in gains of the last one, at most: the gains fall by a factor a round, which is 0.6 in the sixth and
+/// 0.85 in the fifteenth round of white noise.
+const LATER_GAINS: f64 = 10.0;
 /// Probability of a jump per step with which the fit begins.
 const FIRST_JUMP: f64 = 0.05;
 /// Step in the logarithm of a parameter for the curvature of the likelihood.
@@ -42,9 +45,9 @@ struct StateStatistics {
 impl TwoStateChain {
     /// The likeliest chain, by expectation maximisation (L. Baum et al., "A maximization technique occurring in the
     /// statistical analysis of probabilistic functions of Markov chains", Ann. Math. Statist. 41, 1970). Begins with the
-    /// means of the lower and of the upper half of the numbers as levels. `None` of fewer than 16 numbers, or if they never
-    /// change.
-    pub(super) fn fit(values: &[f64]) -> Option<Self> {
+    /// means of the lower and of the upper half of the numbers as levels. `None` of fewer than 16 numbers, if they never
+    /// change, or if the ln likelihood does not come near `least`.
+    pub(super) fn fit(values: &[f64], least: f64) -> Option<Self> {
         let mut present: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let half = present.len() / 2;
         if half < 8 {
@@ -73,11 +76,14 @@ impl TwoStateChain {
             let statistics = chain.expectation(values);
             let gained = statistics.log_likelihood - chain.log_likelihood;
             chain.maximise(&statistics);
+            if chain.log_likelihood + LATER_GAINS * gained < least {
+                return None;
+            }
             if gained < SETTLED {
                 break;
             }
         }
-        Some(chain)
+        (chain.log_likelihood >= least).then_some(chain)
     }
 
     /// Sets the likeliest parameters for these expected statistics.
@@ -170,7 +176,8 @@ impl TwoStateChain {
             let sum = a + b;
             statistics.log_likelihood += nearer;
             sums.multiply(sum);
-            let now = [a / sum, b / sum];
+            let norm = sum.recip();
+            let now = [a * norm, b * norm];
             densities.push(of_value);
             forward.push(now);
             belief = [now[0] * (1.0 - up) + now[1] * down, now[0] * up + now[1] * (1.0 - down)];
@@ -181,24 +188,25 @@ impl TwoStateChain {
         for (at, &value) in values.iter().enumerate().rev() {
             let now = forward[at];
             let weights = [now[0] * later[0], now[1] * later[1]];
-            let sum = weights[0] + weights[1];
+            let norm = (weights[0] + weights[1]).recip();
             for (moments, weight) in statistics.moments.iter_mut().zip(weights).filter(|_| value.is_finite()) {
+                let share = weight * norm;
                 for (moment, power) in moments.iter_mut().zip([1.0, value, value * value]) {
-                    *moment += weight / sum * power;
+                    *moment += share * power;
                 }
             }
             let Some(before) = at.checked_sub(1) else { break };
             let (a, b) = (densities[at][0] * later[0], densities[at][1] * later[1]);
             let from = forward[before];
             let joint = [from[0] * (1.0 - up) * a, from[0] * up * b, from[1] * (1.0 - down) * b, from[1] * down * a];
-            let sum: f64 = joint.iter().sum();
-            statistics.steps[0] += (joint[0] + joint[1]) / sum;
-            statistics.left[0] += joint[1] / sum;
-            statistics.steps[1] += (joint[2] + joint[3]) / sum;
-            statistics.left[1] += joint[3] / sum;
+            let norm = joint.iter().sum::<f64>().recip();
+            statistics.steps[0] += (joint[0] + joint[1]) * norm;
+            statistics.left[0] += joint[1] * norm;
+            statistics.steps[1] += (joint[2] + joint[3]) * norm;
+            statistics.left[1] += joint[3] * norm;
             let back = [(1.0 - up) * a + up * b, down * a + (1.0 - down) * b];
-            let scale = back[0] + back[1];
-            later = back.map(|value| value / scale);
+            let norm = (back[0] + back[1]).recip();
+            later = back.map(|value| value * norm);
         }
         statistics
     }
@@ -241,6 +249,14 @@ const STRONGEST: f64 = 1e7;
 /// Number of values of each that are tried first, and how often the step is halved after that.
 const TRIED: usize = 9;
 const HALVED: usize = 9;
+
+/// ln likelihood of white Gaussian noise of any mean and variance.
+pub(super) fn white_log_likelihood(values: &[f64]) -> f64 {
+    let present = values.iter().filter(|value| value.is_finite());
+    let (count, sum) = present.clone().fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+    let squares: f64 = present.map(|value| (value - sum / count).powi(2)).sum();
+    -0.5 * count * ((2.0 * PI * squares / count).ln() + 1.0)
+}
 
 /// The highest ln likelihood of a Gaussian process with exponential autocorrelation in white noise, over all variances and
 /// correlation times.

@@ -75,10 +75,10 @@ impl Sine {
 }
 
 /// Blocks that the sums of a series are kept in, at least. Between the frequency of the sums and one that is half an ordinate of
-/// the padded periodogram away, the phase turns by a quarter of a turn over the series, and so by π/4/4096 between the middle
+/// the padded periodogram away, the phase turns by a quarter of a turn over the series, and so by π/4/1024 between the middle
 /// of a block and its ends. Taking the phase of the middle for all of a block changes a sum by a sixth of the square of that:
-/// 6·10⁻⁹.
-const BLOCKS: usize = 4096;
+/// 10⁻⁷.
+const BLOCKS: usize = 1024;
 
 /// Sums over blocks of a series, from which the least-squares sinusoid of any frequency near that of the sums follows without
 /// another pass over the samples.

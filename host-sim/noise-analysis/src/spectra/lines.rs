@@ -26,6 +26,9 @@ const FEWEST_SLOW_PERIODS: usize = 2;
 /// Least part of the slow variation, over what it leaves, of such a sinusoid. A random walk has most of its variation in the
 /// lowest ordinates: that one of two periods or more holds all but a thousandth has a probability below 10⁻⁶.
 const SLOW_GAIN: f64 = 1000.0;
+/// Largest part of the slow variation that the first fit of such a sinusoid leaves. A straight line has at most the part `6/(πm)²` of a
+/// sinusoid of `m` periods, 0.15 of one of two, which is missing in the series that the first fit is given.
+const SLOW_LEFT: f64 = 0.5;
 /// Most such sinusoids, and rounds in which each is fitted together with the straight line of the record; a round takes at
 /// least nine tenths off what the line has of a sinusoid of two periods.
 const MOST_SLOW: usize = 2;
@@ -111,6 +114,13 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
         let Some(at) = searched.max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b])) else { break };
         let spacing = spectrum.resolution() / PADDING as f64;
         let mut sine = Sine::fit_near(&level, at as f64 * spacing, spacing);
+        let part_left = |sine: &Sine| {
+            let left = Periodogram::new(&sine.subtracted_from(&series).detrended())?;
+            Some(slow(&left) / slow(&spectrum))
+        };
+        if part_left(&sine).is_none_or(|part| part.is_nan() || part > SLOW_LEFT) {
+            break;
+        }
         for _ in 0..SLOW_ROUNDS {
             let without = sine.subtracted_from(&series);
             let lines =
@@ -118,17 +128,13 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
             let lineless = series.values().iter().zip(lines).map(|(value, line)| value - line).collect();
             sine = Sine::fit_near(&series.with_values(lineless), sine.frequency, 0.3 * spacing);
         }
-        let without = sine.subtracted_from(&series);
-        let Some(left) = Periodogram::new(&without.detrended()).map(|spectrum| slow(&spectrum)) else { break };
-        let part = left / slow(&spectrum);
-        if part.is_nan() || part * SLOW_GAIN > 1.0 {
-            break;
-        }
-        let ratio = sine.density(&level) / (left / FEWEST_PERIODS as f64).max(series.rounding_density());
+        let Some(part) = part_left(&sine).filter(|part| part * SLOW_GAIN <= 1.0) else { break };
+        let left = part * slow(&spectrum) / FEWEST_PERIODS as f64;
+        let ratio = sine.density(&level) / left.max(series.rounding_density());
         // What is left has two degrees of freedom an ordinate, less the sinusoid's and the line's.
         let p_value = part.powi(FEWEST_PERIODS as i32 - 2);
         found.push((sine, sine_line(&sine, series.duration(), ratio, p_value)));
-        series = without;
+        series = sine.subtracted_from(&series);
     }
     found
 }

@@ -158,8 +158,9 @@ impl Bands {
     /// The mean of a density over each band, as the Hann window shows it: a point of the spectrum has 2/3 of the density
     /// at its own frequency and 1/6 of that at either neighbour's.
     fn averaged(&self, density: impl Fn(f64) -> f64) -> DVector<f64> {
-        let at = |point: usize| density(point as f64 * self.resolution);
-        let shown = |&point: &usize| 2.0 / 3.0 * at(point) + (at(point - 1) + at(point + 1)) / 6.0;
+        let last = self.points.iter().flatten().max().map_or(0, |last| last + 1);
+        let at: Vec<f64> = (0..=last).map(|point| density(point as f64 * self.resolution)).collect();
+        let shown = |&point: &usize| 2.0 / 3.0 * at[point] + (at[point - 1] + at[point + 1]) / 6.0;
         let mean = |band: &Vec<usize>| band.iter().map(shown).sum::<f64>() / band.len() as f64;
         DVector::from_iterator(self.points.len(), self.points.iter().map(mean))
     }
@@ -337,6 +338,6 @@ fn misfit(bands: &Bands, modelled: &DVector<f64>, parameters: usize) -> f64 {
 /// Power gain of two cascaded averages over `taps` samples each.
 fn bartlett_gain(frequency: f64, sample_period: f64, taps: u32) -> f64 {
     let phase = PI * frequency * sample_period;
-    let taps = f64::from(taps);
-    if phase.sin() == 0.0 { 1.0 } else { ((taps * phase).sin() / (taps * phase.sin())).powi(4) }
+    let (taps, sine) = (f64::from(taps), phase.sin());
+    if sine == 0.0 { 1.0 } else { ((taps * phase).sin() / (taps * sine)).powi(4) }
 }
