@@ -15,7 +15,7 @@ use crate::assessment::{AssessedModels, Assessment};
 use crate::causes;
 use crate::figure_data;
 use crate::first_half::{FirstHalf, FirstHalfFit};
-use crate::long_record::{self, LongRecord};
+use crate::long_record::LongRecord;
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::in_parallel;
 use crate::part_report;
@@ -30,43 +30,72 @@ use crate::uniform_series::UniformSeries;
 use allan_core::{AllanPoint, Curve};
 use measurement::{ChannelProfile, Measurement, RecordingDescription};
 use std::collections::BTreeMap;
+use std::fmt;
 
-/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](long_record::MOST_SAMPLES) samples, or
-/// [`MOST_SAMPLES_WITH_LOSSES`](long_record::MOST_SAMPLES_WITH_LOSSES).
-/// Effects are traced in the inertial channels only; the others get the baseline model.
-#[must_use]
-pub fn analyze(measurement: &Measurement) -> Report {
-    if long_record::is_condensed(measurement) {
-        analyze_long(&LongRecord::from(measurement))
-    } else {
-        analyze_samples(measurement)
+/// What an analysis does, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Fits the models of the whole record.
+    WholeRecord,
+    /// Fits the models of the first half, and compares them with the second.
+    FirstHalf,
+    /// Names the effects, in the whole record and in its first half alone.
+    Effects,
+    /// Assesses the models, and gathers the figures of the report.
+    Assessment,
+}
+
+impl Stage {
+    /// How many there are.
+    pub const COUNT: usize = 4;
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::WholeRecord => "models of the whole record",
+            Self::FirstHalf => "models of the first half",
+            Self::Effects => "effects",
+            Self::Assessment => "assessment",
+        })
     }
 }
 
-/// As [`analyze`], of a measurement that is not needed afterwards: the samples of a long one are released when it is condensed.
+/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](crate::long_record::MOST_SAMPLES)
+/// samples, or [`MOST_SAMPLES_WITH_LOSSES`](crate::long_record::MOST_SAMPLES_WITH_LOSSES).
+/// Effects are traced in the inertial channels only; the others get the baseline model.
 #[must_use]
-pub fn analyze_and_release(measurement: Measurement) -> Report {
-    if long_record::is_condensed(&measurement) {
-        let long = LongRecord::from(&measurement);
-        drop(measurement);
-        analyze_long(&long)
-    } else {
-        analyze_samples(&measurement)
+pub fn analyze(measurement: &Measurement) -> Report {
+    match LongRecord::condensed_from(measurement) {
+        Some(long) => analyze_long(&long, &|_| {}),
+        None => analyze_samples(measurement),
+    }
+}
+
+/// As [`analyze`], of a measurement that is not needed afterwards: the samples of a long one are released when it is condensed. Calls
+/// `watch` with each stage when it begins.
+#[must_use]
+pub fn analyze_and_release(measurement: Measurement, watch: &dyn Fn(Stage)) -> Report {
+    match LongRecord::condensed_from(&measurement) {
+        Some(long) => {
+            drop(measurement);
+            analyze_long(&long, watch)
+        }
+        None => Recorded::of_samples(&measurement, &RecordingDescription::from(&measurement)).report(watch),
     }
 }
 
 /// Analyses all samples of every channel of a measurement, however many there are.
 #[must_use]
 pub fn analyze_samples(measurement: &Measurement) -> Report {
-    let description = RecordingDescription::from(measurement);
-    Recorded { description: &description, measurement, first: measurement, long: None }.report()
+    Recorded::of_samples(measurement, &RecordingDescription::from(measurement)).report(&|_| {})
 }
 
-/// Analyses a recording of which not all samples are kept.
+/// Analyses a recording of which not all samples are kept. Calls `watch` with each stage when it begins.
 #[must_use]
-pub fn analyze_long(record: &LongRecord) -> Report {
+pub fn analyze_long(record: &LongRecord, watch: &dyn Fn(Stage)) -> Report {
     let LongRecord { description, first, means, .. } = record;
-    Recorded { description, measurement: means, first, long: Some(record) }.report()
+    Recorded { description, measurement: means, first, long: Some(record) }.report(watch)
 }
 
 /// What a report is made of.
@@ -79,14 +108,21 @@ struct Recorded<'a> {
     long: Option<&'a LongRecord>,
 }
 
-impl Recorded<'_> {
-    fn report(&self) -> Report {
+impl<'a> Recorded<'a> {
+    fn of_samples(measurement: &'a Measurement, description: &'a RecordingDescription) -> Self {
+        Self { description, measurement, first: measurement, long: None }
+    }
+
+    fn report(&self, watch: &dyn Fn(Stage)) -> Report {
         let &Self { description, measurement, first, long } = self;
         let condensed = long.map(LongRecord::condensed);
+        watch(Stage::WholeRecord);
         let mut record = TracedRecord::new(measurement, condensed);
+        watch(Stage::FirstHalf);
         let first_half = FirstHalf::fit(&record);
         keep_terms_that_held(&mut record, &first_half);
         record.add_lines_of_spectrum();
+        watch(Stage::Effects);
         let mut effects = record.effects();
         // What the first half shows by itself, to compare with what the whole record shows.
         let mut effects_of_half = if effects.iter().all(Vec::is_empty) {
@@ -106,6 +142,7 @@ impl Recorded<'_> {
                 }
             }
         }
+        watch(Stage::Assessment);
         let mut channels = self.channel_reports(&record, &first_half);
         let duration_s = description.periods as f64 * description.period_s();
         let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);

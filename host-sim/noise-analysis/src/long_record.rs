@@ -150,13 +150,6 @@ pub struct LongRecord {
     pub(crate) refused: Vec<BTreeMap<&'static str, u64>>,
 }
 
-/// Whether a measurement is condensed for its analysis.
-pub(crate) fn is_condensed(measurement: &Measurement) -> bool {
-    let (samples, periods) = (measurement.len() as u64, measurement.periods());
-    let has_losses = lost_part(samples, periods) > MOST_LOST;
-    samples > if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES }
-}
-
 impl From<&Measurement> for LongRecord {
     fn from(measurement: &Measurement) -> Self {
         let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
@@ -166,6 +159,14 @@ impl From<&Measurement> for LongRecord {
 }
 
 impl LongRecord {
+    /// A measurement, condensed; `None` where its analysis needs all samples.
+    pub(crate) fn condensed_from(measurement: &Measurement) -> Option<Self> {
+        let (samples, periods) = (measurement.len() as u64, measurement.periods());
+        let has_losses = lost_part(samples, periods) > MOST_LOST;
+        let most = if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES };
+        (samples > most).then(|| Self::from(measurement))
+    }
+
     /// What the analysis of the means needs beside them.
     pub(crate) fn condensed(&self) -> Condensed<'_> {
         Condensed { shorter: &self.shorter, faster_lines: &self.faster_lines }

@@ -402,9 +402,10 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &str) -> Effect {
         }
     };
     let frequency = ("frequency", normal_bounds(line.frequency, "Hz"));
-    let width = match line.width.value {
-        width if width > 0.0 => format!("{width:.4} Hz wide"),
-        _ => "no wider than the record resolves".to_owned(),
+    let width = if line.is_wider_than_resolution() {
+        format!("{:.4} Hz wide", line.width.value)
+    } else {
+        "no wider than the record resolves".to_owned()
     };
     let evidence = format!(
         "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {:.0e}; {}",

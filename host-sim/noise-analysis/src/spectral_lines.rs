@@ -53,7 +53,7 @@ pub(crate) struct MergedLine {
     pub frequency: MeasuredValue,
     /// Standard deviation of the line's signal, in the channel's unit.
     pub deviation: MeasuredValue,
-    /// Full width at half maximum, Hz; 0 where it is no wider than the record resolves.
+    /// Full width at half maximum, Hz; of a line that the record does not resolve 0, or the scatter of its peaks.
     pub width: MeasuredValue,
     /// −2 log-likelihood ratio of the strongest peak.
     pub statistic: f64,
@@ -268,6 +268,10 @@ impl MergedLine {
     /// Whether it may be an error of the form of the background.
     pub(crate) fn is_broad(&self) -> bool {
         self.width.value > BROAD * self.frequency.value
+    }
+
+    pub(crate) fn is_wider_than_resolution(&self) -> bool {
+        self.width.value * self.duration_s >= 1.0
     }
 
     /// The term for the line with its size, frequency and width by the spectrum.

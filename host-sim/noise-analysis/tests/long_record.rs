@@ -77,7 +77,7 @@ fn spikes(measurement: &Measurement) -> u64 {
 fn condensed(measurement: &Measurement, rows: usize) -> Report {
     let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
     measurement.blocks(rows).for_each(|block| reader.push(&block));
-    analyze_long(&reader.finish())
+    analyze_long(&reader.finish(), &|_| {})
 }
 
 fn channel<'a>(report: &'a Report, name: &str) -> &'a ChannelReport {
