@@ -25,6 +25,13 @@ use std::path::{Path, PathBuf};
 const ADIS16405: &str = "adis16405";
 /// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
+/// Recordings that are not condensed for their analysis.
+const KEPT: KeptInMemory = KeptInMemory {
+    rows: MOST_SAMPLES,
+    rows_with_losses: MOST_SAMPLES_WITH_LOSSES,
+    most_lost: MOST_LOST,
+    irregular: true,
+};
 /// Name of a sensor without a data sheet.
 const GENERIC: &str = "generic";
 
@@ -117,13 +124,11 @@ fn report(
         bar.finish_and_clear();
         return Ok(report);
     }
-    let kept = KeptInMemory {
-        rows: MOST_SAMPLES,
-        rows_with_losses: MOST_SAMPLES_WITH_LOSSES,
-        most_lost: MOST_LOST,
-        irregular: true,
-    };
-    let mut stream = open_stream(recording, monitor, kept)?;
+    analyze_stream(open_stream(recording, monitor, KEPT)?, end_reading)
+}
+
+/// The report of all samples of `stream`; `end_reading` is called when they were read, before they are analysed.
+fn analyze_stream(mut stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStream)) -> Result<Report> {
     if stream.is_in_memory() {
         end_reading(&stream);
         let bar = progress::analysing(None);
@@ -151,9 +156,7 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
         Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate, kept),
         Opened::AnySensor(input, options) => SampleStream::any_sensor(input, options, recording.rate, kept),
         Opened::Replayed(replayed) => {
-            let (measurement, notes) = on_time_base(&replayed, recording.rate).with_context(name)?;
-            note_all(&notes);
-            return Ok(SampleStream::held(measurement, monitor));
+            return SampleStream::recorded(replayed, recording.rate, kept).with_context(name);
         }
     };
     opened.map_err(|error| match error {
@@ -186,10 +189,8 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
 pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> Result<Report> {
-    let (measurement, notes) = on_time_base(&recording, rate_hz)?;
-    drop(recording);
-    note_all(&notes);
-    Ok(analyze_and_release(measurement))
+    let stream = SampleStream::recorded(recording, rate_hz, KEPT)?;
+    analyze_stream(stream, &mut |stream| note_all(stream.notes()))
 }
 
 /// What a file of any format holds.

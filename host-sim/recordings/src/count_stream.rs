@@ -7,10 +7,10 @@ use crate::read_monitor::ReadMonitor;
 use crate::recording::{RecordedSample, Recorder, Recording};
 use crate::sample_slots::MAX_REPEATED_READ_INTERVAL;
 use crate::stream_clock::{BLOCK, Placed, Stamp, StreamClock};
-use crate::time_base::{REFUSED, REFUSED_IN_A_CHANNEL, refused_positions};
+use crate::time_base::{REFUSED, REFUSED_IN_A_CHANNEL, channels};
 use crate::time_base_error::StreamError;
-use adis16405_driver::{Burst, Channel, Faults, GyroRange};
-use measurement::{MeasuredChannel, SampleBlock, SensorProfile};
+use adis16405_driver::{Burst, Faults, GyroRange};
+use measurement::{SampleBlock, SensorProfile};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -94,13 +94,8 @@ impl CountStream {
     pub(crate) fn next(&mut self, profile: &SensorProfile) -> Result<Option<SampleBlock>, StreamError> {
         let Some(usable) = self.next_usable()? else { return Ok(None) };
         let first = self.first.map_or(0, |first| first.period);
-        let channel = |channel: &Channel| {
-            let counts = usable.iter().map(|(_, sample)| i32::from(sample.counts.get(*channel))).collect();
-            let refused = refused_positions(*channel, usable.iter().map(|(_, sample)| sample));
-            MeasuredChannel { refused, ..MeasuredChannel::new(profile.channels[*channel as usize], counts) }
-        };
         Ok(Some(SampleBlock {
-            channels: self.table.channels().iter().map(channel).collect(),
+            channels: channels(&self.table.channels(), profile, usable.iter().map(|(_, sample)| *sample)),
             slots: usable.iter().map(|(placed, _)| placed.period - first).collect(),
         }))
     }

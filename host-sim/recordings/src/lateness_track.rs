@@ -83,6 +83,7 @@ impl Track {
         let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
         // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
         let quartile = quantile(&mut above, 3, 4) * 4.0 / 3.0;
+        drop(above);
         let width = tick_s.map_or(quartile, |tick| quartile.max((tick / period_s).min(quartile * 2.0)));
         let is_coarse = width >= COARSE;
         let (memory, threshold) = if is_coarse {
@@ -90,15 +91,20 @@ impl Track {
         } else {
             (MEMORY, LOSS)
         };
-        let envelope =
-            if queue.max(memory) == SEARCH_QUEUE { near } else { minimum_ahead(&lateness, queue.max(memory)) };
+        let envelope = if queue.max(memory) == SEARCH_QUEUE {
+            near
+        } else {
+            drop(near);
+            minimum_ahead(&lateness, queue.max(memory))
+        };
         // In the last ticks no later sample tells how far the envelope is: no loss is found there.
         let undecided = if is_coarse { (2.0 * width).ceil() as usize + 1 } else { 0 };
         let last = times.len().saturating_sub(undecided + 1);
-        let mut track = Self { period_s, periods: Vec::with_capacity(times.len()), above, losses: Vec::new(), width };
+        let periods = Vec::with_capacity(times.len());
+        let mut track = Self { period_s, periods, above: lateness, losses: Vec::new(), width };
         let mut level = MinimumBehind::new(memory);
         let mut missing = 0u64;
-        for (at, late) in lateness.iter().enumerate() {
+        for at in 0..times.len() {
             let least = envelope[at.min(last)];
             let excess = level.minimum().map_or(0.0, |level| least - missing as f64 - level);
             // Towards the end the envelope is that of fewer ticks, and may rise by a period without a loss.
@@ -118,7 +124,8 @@ impl Track {
             }
             level.push(least - missing as f64);
             track.periods.push(missing.saturating_add(at as u64));
-            track.above[at] = late - missing as f64 - level.minimum().unwrap_or(0.0);
+            track.above[at] -= missing as f64;
+            track.above[at] -= level.minimum().unwrap_or(0.0);
         }
         track
     }

@@ -29,6 +29,7 @@ mod numpy;
 pub mod numpy_matrix;
 mod quantizer;
 mod read_monitor;
+mod recorded_blocks;
 pub mod recorded_file;
 pub mod recording;
 mod ros_bag;

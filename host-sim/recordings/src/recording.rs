@@ -80,6 +80,14 @@ impl Recorder {
         }
     }
 
+    /// Takes the memory of so many samples at once, if it is there; without, it grows with them.
+    #[must_use]
+    pub fn with_capacity(mut self, samples: u64) -> Self {
+        // Samples that need more memory than there is fail when they come.
+        let _ = self.recording.samples.try_reserve_exact(usize::try_from(samples).unwrap_or(0));
+        self
+    }
+
     /// Adds a burst.
     pub fn push(&mut self, time_stamp: TimeStamp, burst: &Burst) {
         let faults = self.validator.validate(burst).faults & self.detectable;

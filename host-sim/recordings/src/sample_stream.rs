@@ -3,7 +3,7 @@
 //! Tables of register counts, tables in any units and arrays of NumPy are read twice: once for the sample rate, the length, and the
 //! size of a count, and once for the samples. Their first rows are read before that, as many as the caller says, to tell the clock of
 //! the time stamps; a recording that has no more rows, or another format, is held in memory and is the same as that of the other
-//! readers.
+//! readers. What a simulation or a log of the bus recorded is in memory already: it is read once, and released as it is read.
 
 use crate::any_sensor::{ReadOptions, SensorRecording};
 use crate::count_stream::{self, CountStream};
@@ -11,12 +11,14 @@ use crate::file_format::{FileFormat, InputFile};
 use crate::input_error::{InputError, Reason};
 use crate::quantizer::Quantizer;
 use crate::read_monitor::ReadMonitor;
+use crate::recorded_blocks::RecordedBlocks;
+use crate::recording::Recording;
 use crate::sample_slots::SampleSlots;
 use crate::sensor_measurement::quantizer_note;
 use crate::sensor_table::SensorTable;
 use crate::stamp_quality::StampQuality;
 use crate::stream_clock::{BLOCK, StreamClock};
-use crate::time_base::time_base;
+use crate::time_base::{UsableSamples, time_base};
 use crate::time_base_error::TimeBaseError;
 use crate::value_stream::{self, ColumnSample, ValueColumn, ValueHead, ValueStream};
 use adis16405_driver::GyroRange;
@@ -27,7 +29,7 @@ pub use crate::time_base_error::StreamError;
 /// Sample periods at the start of a recording that are kept of one that is not held in memory.
 const BEGINNING: u64 = 1 << 16;
 
-/// Which recordings are kept in memory, instead of being read in blocks.
+/// Which recordings become one measurement in memory, instead of being read in blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KeptInMemory {
     /// Those of at most so many rows.
@@ -44,6 +46,11 @@ impl KeptInMemory {
     /// Whether a larger part is missing of `samples` in so many sample periods.
     fn has_losses(self, samples: u64, periods: u64) -> bool {
         lost_part(samples, periods) > self.most_lost
+    }
+
+    /// Whether so many samples in so many sample periods are kept.
+    fn has_room(self, samples: u64, periods: u64) -> bool {
+        samples <= if self.has_losses(samples, periods) { self.rows_with_losses } else { self.rows }
     }
 
     /// Whether a recording that has more rows is kept because of its time stamps.
@@ -64,6 +71,7 @@ pub struct SampleStream {
 
 enum Content {
     Held,
+    Recorded(Box<RecordedBlocks>),
     Counts(Box<Source<GyroRange>>),
     Values(Box<Values>),
 }
@@ -120,6 +128,23 @@ impl SampleStream {
             notes: Vec::new(),
             monitor: monitor.clone(),
         }
+    }
+
+    /// What a simulation or a log of the bus recorded; `stated_hz` overrides the rate that its time stamps show.
+    ///
+    /// # Errors
+    /// It has no time base.
+    pub fn recorded(recording: Recording, stated_hz: Option<f64>, kept: KeptInMemory) -> Result<Self, TimeBaseError> {
+        let usable = UsableSamples::place(&recording, stated_hz)?;
+        let monitor = ReadMonitor::default();
+        let notes = usable.stamps.iter().flat_map(StampQuality::notes).collect();
+        let description = usable.description(&recording);
+        if kept.has_room(description.samples, description.periods) {
+            return Ok(Self { notes, ..Self::held(usable.into_measurement(&recording), &monitor) });
+        }
+        let beginning = usable.before(BEGINNING, &recording);
+        let content = Content::Recorded(Box::new(RecordedBlocks::new(recording, usable)));
+        Ok(Self { content, beginning, description, notes, monitor })
     }
 
     /// Opens a table of register counts whose rates were taken in `range`.
@@ -261,13 +286,14 @@ impl SampleStream {
         &self.notes
     }
 
-    /// Whether the recording is held in memory: its [beginning](Self::beginning) is all of it.
+    /// Whether the recording is one measurement in memory: its [beginning](Self::beginning) is all of it.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         matches!(self.content, Content::Held)
     }
 
-    /// Reads the recording once and calls `take` with each block of its samples.
+    /// Reads the recording once and calls `take` with each block of its samples. [Recorded](Self::recorded) samples that do not become
+    /// one measurement are released then, and cannot be read again.
     ///
     /// False if what the [description](Self::description) says has changed on the way, so that it has to be read again: a number
     /// is no multiple of the step of the others, or the reading was stopped. That happens a bounded number of times.
@@ -282,6 +308,10 @@ impl SampleStream {
         let stopped_at = match &mut self.content {
             Content::Held => {
                 self.beginning.blocks(BLOCK).for_each(take);
+                None
+            }
+            Content::Recorded(blocks) => {
+                blocks.for_each(take);
                 None
             }
             Content::Counts(source) => {
@@ -313,7 +343,7 @@ impl SampleStream {
         };
         let Some(rows) = stopped_at else { return Ok(true) };
         match &mut self.content {
-            Content::Held => {}
+            Content::Held | Content::Recorded(_) => {}
             Content::Counts(source) => source.most = rows,
             Content::Values(values) => values.source.most = rows,
         }
@@ -338,7 +368,7 @@ impl SampleStream {
     fn survey_pass(&mut self) -> Result<(), StreamError> {
         let Self { content, description, notes, monitor, .. } = self;
         match content {
-            Content::Held => {}
+            Content::Held | Content::Recorded(_) => {}
             Content::Counts(source) => {
                 let mut pass = open_counts(source, monitor)?;
                 pass.read_to_end()?;

@@ -9,7 +9,7 @@ use crate::sample_slots::{MAX_REPEATED_READ_INTERVAL, contradiction, slots, usua
 use crate::stamp_alignment::StampAlignment;
 use crate::time_base_error::MIN_SAMPLES;
 use adis16405_driver::{Channel, Faults};
-use measurement::{MeasuredChannel, Measurement, adis16405};
+use measurement::{MeasuredChannel, Measurement, RecordingDescription, SensorProfile, adis16405};
 use std::collections::BTreeMap;
 
 pub use crate::indexed_clock::ClockStep;
@@ -57,55 +57,109 @@ pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measur
 /// There is no usable rate or the given one contradicts the stamps, there are fewer than 4 usable samples, no two of them
 /// are neighbours, or the gaps are more than 64 times as long as the samples.
 pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
-    if let Some(rate) = rate_hz
-        && !(rate.is_finite() && rate > 0.0)
-    {
-        return Err(TimeBaseError::InvalidRate(rate));
-    }
-    let samples = &recording.samples;
-    let mut usable = Usable::select(samples, rate_hz);
-    if (usable.positions.len() as u64) < MIN_SAMPLES {
-        return Err(TimeBaseError::TooShort { used: usable.positions.len() as u64, dropped: usable.dropped });
-    }
-    let SamplePeriods { periods, never_arrived, stamps } = sample_periods(samples, &mut usable, rate_hz)?;
-    let Usable { positions, mut dropped, mut flagged, .. } = usable;
-    let measured_hz = stamps.as_ref().and_then(|stamps| stamps.rate).map(|rate| rate.hz);
-    let sample_rate_hz = rate_hz.or(measured_hz).ok_or(TimeBaseError::NoRate)?;
-    let slots = slots(&periods)?;
-    dropped.insert("gap", never_arrived);
-    if let Some(stamps) = &stamps {
-        flagged.extend(stamps.warnings());
+    let usable = UsableSamples::place(recording, rate_hz)?;
+    Ok(EstimatedTimeBase { stamps: usable.stamps.clone(), measurement: usable.into_measurement(recording) })
+}
+
+/// Which samples of a recording can be used, and where they lie in time.
+pub(crate) struct UsableSamples {
+    /// Indices into [`Recording::samples`].
+    pub(crate) positions: Vec<usize>,
+    /// The measurement without counts and time stamps.
+    pub(crate) base: Measurement,
+    /// What the time stamps show.
+    pub(crate) stamps: Option<StampQuality>,
+}
+
+impl UsableSamples {
+    /// Of a recording, as [`time_base`].
+    pub(crate) fn place(recording: &Recording, rate_hz: Option<f64>) -> Result<Self, TimeBaseError> {
+        if let Some(rate) = rate_hz
+            && !(rate.is_finite() && rate > 0.0)
+        {
+            return Err(TimeBaseError::InvalidRate(rate));
+        }
+        let samples = &recording.samples;
+        let mut usable = Usable::select(samples, rate_hz);
+        if (usable.positions.len() as u64) < MIN_SAMPLES {
+            return Err(TimeBaseError::TooShort { used: usable.positions.len() as u64, dropped: usable.dropped });
+        }
+        let SamplePeriods { periods, never_arrived, stamps } = sample_periods(samples, &mut usable, rate_hz)?;
+        let Usable { positions, mut dropped, mut flagged, .. } = usable;
+        let measured_hz = stamps.as_ref().and_then(|stamps| stamps.rate).map(|rate| rate.hz);
+        let sample_rate_hz = rate_hz.or(measured_hz).ok_or(TimeBaseError::NoRate)?;
+        let slots = slots(&periods)?;
+        dropped.insert("gap", never_arrived);
+        if let Some(stamps) = &stamps {
+            flagged.extend(stamps.warnings());
+        }
+        let base = Measurement {
+            profile: adis16405::profile(recording.range.lsb()),
+            sample_rate_hz,
+            stated_rate_hz: rate_hz,
+            slots,
+            times_s: None,
+            channels: Vec::new(),
+            dropped,
+            flagged,
+        };
+        Ok(Self { positions, base, stamps })
     }
 
-    let profile = adis16405::profile(recording.range.lsb());
-    let channel = |channel: &Channel| {
-        let counts = positions.iter().map(|&p| i32::from(samples[p].counts.get(*channel))).collect();
-        let refused = refused_positions(*channel, positions.iter().map(|&p| &samples[p]));
-        MeasuredChannel { refused, ..MeasuredChannel::new(profile.channels[*channel as usize], counts) }
+    /// The samples of `recording`, of which these are the usable ones.
+    pub(crate) fn into_measurement(self, recording: &Recording) -> Measurement {
+        with_samples(self.base, recording, &self.positions)
+    }
+
+    /// The same, before the sample period `slot`, as [`Measurement::before`].
+    pub(crate) fn before(&self, slot: u64, recording: &Recording) -> Measurement {
+        let base = self.base.before(slot);
+        let positions = &self.positions[..base.len()];
+        with_samples(base, recording, positions)
+    }
+
+    /// What is known of `recording` before its samples are used.
+    pub(crate) fn description(&self, recording: &Recording) -> RecordingDescription {
+        let profile = |channel: &Channel| self.base.profile.channels[*channel as usize];
+        let channels = recording.channels.iter().map(profile).collect();
+        RecordingDescription { channels, ..RecordingDescription::from(&self.base) }
+    }
+}
+
+fn with_samples(base: Measurement, recording: &Recording, positions: &[usize]) -> Measurement {
+    let samples = positions.iter().map(|&position| recording.samples[position]);
+    Measurement {
+        channels: channels(&recording.channels, &base.profile, samples.clone()),
+        times_s: samples.map(|sample| sample.time_stamp.time_s).collect(),
+        ..base
+    }
+}
+
+/// The channels of some samples.
+pub(crate) fn channels(
+    recorded: &[Channel],
+    profile: &SensorProfile,
+    samples: impl Iterator<Item = RecordedSample> + Clone,
+) -> Vec<MeasuredChannel> {
+    let channel = |&channel: &Channel| {
+        let counts = samples.clone().map(|sample| i32::from(sample.counts.get(channel))).collect();
+        let refused = refused_positions(channel, samples.clone());
+        MeasuredChannel { refused, ..MeasuredChannel::new(profile.channels[channel as usize], counts) }
     };
-    let measurement = Measurement {
-        channels: recording.channels.iter().map(channel).collect(),
-        profile,
-        sample_rate_hz,
-        stated_rate_hz: rate_hz,
-        times_s: positions.iter().map(|&p| samples[p].time_stamp.time_s).collect(),
-        slots,
-        dropped,
-        flagged,
-    };
-    Ok(EstimatedTimeBase { measurement, stamps })
+    recorded.iter().map(channel).collect()
 }
 
 /// Positions of the samples that are refused in `channel` alone, by cause.
-pub(crate) fn refused_positions<'a>(
+fn refused_positions(
     channel: Channel,
-    samples: impl Iterator<Item = &'a RecordedSample>,
+    samples: impl Iterator<Item = RecordedSample>,
 ) -> BTreeMap<&'static str, Vec<usize>> {
     let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
+    if ![Channel::GyroX, Channel::GyroY, Channel::GyroZ].contains(&channel) {
+        return refused;
+    }
     for (position, sample) in samples.enumerate().filter(|(_, sample)| sample.faults.intersects(REFUSED_IN_A_CHANNEL)) {
-        let is_gyro = [Channel::GyroX, Channel::GyroY, Channel::GyroZ].contains(&channel);
-        let impossible = is_gyro && sample.counts.get(channel).unsigned_abs() > Faults::LARGEST_RATE.unsigned_abs();
-        let own = if impossible {
+        let own = if sample.counts.get(channel).unsigned_abs() > Faults::LARGEST_RATE.unsigned_abs() {
             Faults::IMPOSSIBLE_RATE
         } else if channel == Channel::GyroX {
             sample.faults & Faults::X_SIGN

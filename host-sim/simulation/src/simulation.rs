@@ -210,7 +210,7 @@ impl Simulation {
         let bus = faulty.bus();
         let mut driver = Adis16405::new(device, bus.delay(), self.config().map_err(SimulationError::Config)?);
         driver.init().map_err(|e| SimulationError::Driver(e.to_string()))?;
-        let mut recorder = Recorder::new(Channel::ALL.to_vec(), driver.config().range());
+        let mut recorder = Recorder::new(Channel::ALL.to_vec(), driver.config().range()).with_capacity(samples);
         let mut stamps = TimeStamps::new(self.host, self.scenario.missed_fraction(), self.seed);
         let mut faults = self.faults.iter().peekable();
         for taken in 0..samples {

@@ -24,6 +24,7 @@ mod environment;
 mod faults;
 mod interface;
 mod noise;
+mod noise_ahead;
 mod part;
 mod registers;
 mod signal_chain;

@@ -91,7 +91,6 @@ impl NoiseModel {
 #[derive(Clone, Debug)]
 pub struct NoiseSource {
     channels: [ChannelSource; 12],
-    longest_tau_s: f64,
 }
 
 impl NoiseSource {
@@ -103,13 +102,14 @@ impl NoiseSource {
             ChannelSource {
                 random,
                 noise: model.channels[index],
+                longest_tau_s: model.longest_tau_s,
                 walk: 0.0,
                 white: 0.0,
                 step: 0.0,
                 flicker: Vec::new(),
             }
         });
-        let mut source = Self { channels, longest_tau_s: model.longest_tau_s };
+        let mut source = Self { channels };
         source.set_sample_period(sample_period_s);
         source
     }
@@ -117,7 +117,7 @@ impl NoiseSource {
     /// Changes the time between samples, s. The random walks go on from where they are; flicker noise starts anew.
     pub fn set_sample_period(&mut self, sample_period_s: f64) {
         for channel in &mut self.channels {
-            channel.set_sample_period(sample_period_s, self.longest_tau_s);
+            channel.set_sample_period(sample_period_s);
         }
     }
 
@@ -125,12 +125,19 @@ impl NoiseSource {
     pub fn sample(&mut self) -> [f64; 12] {
         std::array::from_fn(|index| self.channels[index].sample())
     }
+
+    /// The channels, in burst order.
+    pub(crate) fn into_channels(self) -> [ChannelSource; 12] {
+        self.channels
+    }
 }
 
+/// Generates the values of one channel.
 #[derive(Clone, Debug)]
-struct ChannelSource {
+pub(crate) struct ChannelSource {
     random: ChaCha8Rng,
     noise: ChannelNoise,
+    longest_tau_s: f64,
     walk: f64,
     white: f64,
     step: f64,
@@ -138,13 +145,13 @@ struct ChannelSource {
 }
 
 impl ChannelSource {
-    fn set_sample_period(&mut self, sample_period_s: f64, longest_tau_s: f64) {
+    pub(crate) fn set_sample_period(&mut self, sample_period_s: f64) {
         self.white = self.noise.angle_random_walk / sample_period_s.sqrt();
         self.step = self.noise.rate_random_walk * sample_period_s.sqrt();
         self.flicker.clear();
         if self.noise.bias_instability != 0.0 {
             let mut correlation_time_s = sample_period_s;
-            while correlation_time_s <= 4.0 * longest_tau_s {
+            while correlation_time_s <= 4.0 * self.longest_tau_s {
                 let process = FlickerOctave::new(
                     self.noise.bias_instability,
                     sample_period_s / correlation_time_s,
@@ -156,7 +163,7 @@ impl ChannelSource {
         }
     }
 
-    fn sample(&mut self) -> f64 {
+    pub(crate) fn sample(&mut self) -> f64 {
         let mut value = self.noise.bias;
         if self.white != 0.0 {
             value += self.white * standard_normal(&mut self.random);

@@ -208,7 +208,7 @@ pub(crate) fn writable(address: u8) -> bool {
     find(address).is_some_and(|entry| entry.access != Access::Read && (address & 1 == 0 || entry.bits > 8))
 }
 
-/// The contents of the registers.
+/// The contents of the registers, as a read gives them: those of signed ones with their sign extended.
 #[derive(Clone, Debug)]
 pub(crate) struct RegisterFile {
     words: [u16; 0x40],
@@ -226,14 +226,7 @@ impl RegisterFile {
 
     /// The word that a read of `address` (of either byte) gives; 0 where there is no register.
     pub(crate) fn read(&self, address: u8) -> u16 {
-        let word = self.words[usize::from(address & 0x7F) / 2];
-        match find(address) {
-            Some(entry) if entry.storage == Storage::FlashSigned => {
-                let shift = 16 - entry.bits;
-                (((word << shift) as i16) >> shift) as u16
-            }
-            _ => word,
-        }
+        self.words[usize::from(address & 0x7F) / 2]
     }
 
     /// The value of a signed register (an offset or a hard-iron correction), in its counts.
@@ -251,7 +244,11 @@ impl RegisterFile {
     /// Sets a whole register, as the part itself does; bits outside the width of the register are dropped.
     pub(crate) fn store(&mut self, address: u8, word: u16) {
         if let Some(entry) = find(address) {
-            self.words[usize::from(entry.address / 2)] = word & (u16::MAX >> (16 - entry.bits));
+            let shift = 16 - entry.bits;
+            let signed = entry.storage == Storage::FlashSigned;
+            let field = word << shift;
+            self.words[usize::from(entry.address / 2)] =
+                if signed { (field as i16 >> shift) as u16 } else { field >> shift };
         }
     }
 

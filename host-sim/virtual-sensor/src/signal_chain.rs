@@ -3,6 +3,7 @@
 
 use crate::effects::{EffectSource, SensorScenario};
 use crate::noise::{NoiseModel, NoiseSource};
+use crate::noise_ahead::NoiseAhead;
 use crate::registers::{self, OutputRegister, RegisterFile};
 
 /// Size of a count of the gyro offsets, °/s.
@@ -26,7 +27,7 @@ const STIMULUS: [(OutputRegister, f64); 6] = [
 /// The signal chain of all channels, with the latest sample. Arrays are in burst order.
 #[derive(Clone, Debug)]
 pub(crate) struct SignalChain {
-    noise: NoiseSource,
+    noise: NoiseAhead,
     effects: EffectSource,
     filters: [CascadedBoxFilter; 12],
     counts: [i16; 12],
@@ -37,7 +38,7 @@ pub(crate) struct SignalChain {
 impl SignalChain {
     pub(crate) fn new(scenario: &SensorScenario, model: &NoiseModel, seed: u64) -> Self {
         Self {
-            noise: NoiseSource::new(model, seed, 1.0),
+            noise: NoiseAhead::new(NoiseSource::new(model, seed, 1.0)),
             effects: EffectSource::new(scenario, seed),
             filters: std::array::from_fn(|_| CascadedBoxFilter::new(0)),
             counts: [0; 12],

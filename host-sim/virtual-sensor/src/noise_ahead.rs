@@ -1,0 +1,151 @@
+//! Noise that is generated before it is needed, on other threads.
+//!
+//! The values are those that [`NoiseSource`] gives sample by sample. They depend on the sample period alone, which the controller
+//! programs: where it changes, the channels go back to the last sample that was taken.
+
+use crate::noise::{ChannelSource, NoiseSource};
+use crate::registers::OutputRegister;
+use std::thread::{self, JoinHandle};
+
+/// Samples of the longest block: those of three gyros take about 2 ms, a hundred times what it takes to start a thread.
+const LONGEST: usize = 1 << 12;
+
+/// The noise of all channels, in two groups that have about the same work.
+#[derive(Clone, Debug)]
+pub(crate) struct NoiseAhead {
+    groups: [ChannelGroup; 2],
+}
+
+impl NoiseAhead {
+    pub(crate) fn new(source: NoiseSource) -> Self {
+        let mut first = Vec::from(source.into_channels());
+        let second = first.split_off(OutputRegister::AcclX as usize);
+        Self { groups: [first, second].map(ChannelGroup::new) }
+    }
+
+    /// As [`NoiseSource::set_sample_period`].
+    pub(crate) fn set_sample_period(&mut self, sample_period_s: f64) {
+        self.groups.iter_mut().for_each(|group| group.set_sample_period(sample_period_s));
+    }
+
+    /// As [`NoiseSource::sample`].
+    pub(crate) fn sample(&mut self) -> [f64; 12] {
+        let mut values = [0.0; 12];
+        let mut rest = values.iter_mut();
+        for group in &mut self.groups {
+            group.advance();
+            rest.by_ref().zip(group.latest()).for_each(|(value, latest)| *value = latest);
+        }
+        values
+    }
+}
+
+/// Some channels, block by block.
+#[derive(Debug)]
+struct ChannelGroup {
+    block: Block,
+    /// Samples of the block that were taken.
+    taken: usize,
+    /// Generates the block that follows, once the blocks have reached their full length.
+    ahead: Option<JoinHandle<Block>>,
+}
+
+impl Clone for ChannelGroup {
+    /// The clone generates the block that follows itself.
+    fn clone(&self) -> Self {
+        Self { block: self.block.clone(), taken: self.taken, ahead: None }
+    }
+}
+
+impl ChannelGroup {
+    fn new(channels: Vec<ChannelSource>) -> Self {
+        Self { block: Block::generate(channels, 0), taken: 0, ahead: None }
+    }
+
+    fn set_sample_period(&mut self, sample_period_s: f64) {
+        let mut channels = Block::generate(self.block.before.clone(), self.taken).behind;
+        channels.iter_mut().for_each(|channel| channel.set_sample_period(sample_period_s));
+        *self = Self::new(channels);
+    }
+
+    /// Takes the next sample.
+    fn advance(&mut self) {
+        if self.taken == self.block.samples {
+            self.begin_block();
+        }
+        self.taken += 1;
+    }
+
+    /// The sample that was taken last, of every channel.
+    fn latest(&self) -> impl Iterator<Item = f64> {
+        self.block.values.chunks_exact(self.block.samples).map(|of_channel| of_channel[self.taken - 1])
+    }
+
+    /// Each block has twice the length of the one before, so that little is generated in vain for a part that takes few samples.
+    fn begin_block(&mut self) {
+        let samples = (2 * self.block.samples).clamp(1, LONGEST);
+        let ahead = self.ahead.take().and_then(|thread| thread.join().ok());
+        self.block = ahead.unwrap_or_else(|| Block::generate(self.block.behind.clone(), samples));
+        self.taken = 0;
+        if samples == LONGEST {
+            let channels = self.block.behind.clone();
+            // Where no thread can be started, the block is generated when it is needed.
+            self.ahead = thread::Builder::new().spawn(move || Block::generate(channels, LONGEST)).ok();
+        }
+    }
+}
+
+/// Consecutive samples of some channels.
+#[derive(Clone, Debug)]
+struct Block {
+    /// The channels before the first sample.
+    before: Vec<ChannelSource>,
+    /// The channels behind the last one.
+    behind: Vec<ChannelSource>,
+    samples: usize,
+    /// All samples of the first channel, then those of the others.
+    values: Vec<f64>,
+}
+
+impl Block {
+    fn generate(before: Vec<ChannelSource>, samples: usize) -> Self {
+        let mut behind = before.clone();
+        let values = behind.iter_mut().flat_map(|channel| (0..samples).map(|_| channel.sample())).collect();
+        Self { before, behind, samples, values }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::NoiseModel;
+
+    /// Samples over every length of a block, and over three blocks that threads generate.
+    const SAMPLES: usize = 5 * LONGEST;
+
+    #[test]
+    fn the_noise_is_that_of_the_source_sample_by_sample() {
+        let mut source = NoiseSource::new(&NoiseModel::paper(), 7, 0.005);
+        let mut ahead = NoiseAhead::new(source.clone());
+        for sample in 0..SAMPLES {
+            assert_eq!(ahead.sample(), source.sample(), "sample {sample}");
+        }
+        let mut clone = ahead.clone();
+        assert_eq!([ahead.sample(), clone.sample()], [source.sample(); 2]);
+    }
+
+    #[test]
+    fn a_sample_period_holds_from_the_sample_on_before_which_it_is_set() {
+        let mut source = NoiseSource::new(&NoiseModel::paper(), 7, 0.005);
+        let mut ahead = NoiseAhead::new(source.clone());
+        // Before the first sample, twice in a row, inside a block, at the end of one (1 + 2 + 4 samples), and ahead of a thread.
+        for (samples, period_s) in [(0, 0.01), (0, 0.02), (5, 0.01), (7, 0.005), (3 * LONGEST, 0.01), (10, 0.02)] {
+            for _ in 0..samples {
+                assert_eq!(ahead.sample(), source.sample());
+            }
+            source.set_sample_period(period_s);
+            ahead.set_sample_period(period_s);
+        }
+        assert_eq!(ahead.sample(), source.sample());
+    }
+}
