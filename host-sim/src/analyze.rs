@@ -119,7 +119,7 @@ fn report(
         )?;
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream);
-        let bar = progress::analysing(Some(stream.description().channels.len()));
+        let bar = progress::fitting(stream.description().channels.len());
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
         return Ok(report);
@@ -131,18 +131,12 @@ fn report(
 fn analyze_stream(mut stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStream)) -> Result<Report> {
     if stream.is_in_memory() {
         end_reading(&stream);
-        let bar = progress::analysing(None);
-        let report = analyze_and_release(stream.into_beginning());
-        bar.finish_and_clear();
-        return Ok(report);
+        return Ok(progress::analysing(|watch| analyze_and_release(stream.into_beginning(), watch)));
     }
     let long = streaming::long_record(&mut stream)?;
     end_reading(&stream);
     drop(stream);
-    let bar = progress::analysing(None);
-    let report = analyze_long(&long);
-    bar.finish_and_clear();
-    Ok(report)
+    Ok(progress::analysing(|watch| analyze_long(&long, watch)))
 }
 
 fn note_all(notes: &[String]) {

@@ -3,7 +3,8 @@
 use crate::output::progress_bar;
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
-use recordings::ReadMonitor;
+use noise_analysis::analysis::Stage;
+use recordings::{ReadMonitor, ReadPass};
 use std::fs;
 use std::path::Path;
 use std::process;
@@ -14,10 +15,10 @@ use std::time::Duration;
 
 /// Time between two looks at the reader.
 const INTERVAL: Duration = Duration::from_millis(100);
-const READING: &str = "reading {wide_bar} {bytes}/{total_bytes} {eta}";
-const READING_PIPE: &str = "reading {spinner} {bytes} {elapsed}";
+const READING: &str = "{msg} {wide_bar} {bytes}/{total_bytes} {eta}";
+const READING_PIPE: &str = "{msg} {spinner} {bytes} {elapsed}";
 const FITTING: &str = "fitting {wide_bar} {pos}/{len} channels {elapsed}";
-const ANALYSING: &str = "analysing {spinner} {elapsed}";
+const ANALYSING: &str = "analysing {wide_bar} {pos}/{len} {msg} {elapsed}";
 /// Exit status of a program that an interrupt has ended, as shells have it.
 const INTERRUPTED: i32 = 130;
 
@@ -52,7 +53,12 @@ impl Progress {
         let is_over = Arc::new(AtomicBool::new(false));
         let (of_watcher, is_ended) = (monitor.clone(), Arc::clone(&is_over));
         let watcher = thread::spawn(move || {
+            let mut pass = None;
             while !is_ended.load(Relaxed) {
+                if pass.replace(of_watcher.pass()) != Some(of_watcher.pass()) {
+                    bar.set_message(purpose(of_watcher.pass()));
+                    bar.reset_eta();
+                }
                 if of_watcher.is_reading() {
                     bar.set_position(of_watcher.bytes());
                 }
@@ -87,13 +93,30 @@ impl Drop for Progress {
     }
 }
 
-/// The bar of an analysis of which `channels` channels are fitted one after the other; of one that does not tell how far it is, where
-/// that is `None`.
-pub(crate) fn analysing(channels: Option<usize>) -> ProgressBar {
-    let bar = match channels {
-        Some(channels) => progress_bar(channels as u64, FITTING),
-        None => progress_bar(0, ANALYSING),
-    };
+/// What a recording is read for, beside its bar.
+fn purpose(pass: ReadPass) -> &'static str {
+    match pass {
+        ReadPass::FirstRows => "reading",
+        ReadPass::Survey => "reading, 1 of 2: rate and length",
+        ReadPass::Samples => "reading, 2 of 2: samples",
+    }
+}
+
+/// The bar of the fits of so many channels, one after the other.
+pub(crate) fn fitting(channels: usize) -> ProgressBar {
+    let bar = progress_bar(channels as u64, FITTING);
     bar.enable_steady_tick(INTERVAL);
     bar
+}
+
+/// Runs `analyze` beside the bar of its stages.
+pub(crate) fn analysing<R>(analyze: impl FnOnce(&dyn Fn(Stage)) -> R) -> R {
+    let bar = progress_bar(Stage::COUNT as u64, ANALYSING);
+    bar.enable_steady_tick(INTERVAL);
+    let result = analyze(&|stage| {
+        bar.set_position(stage as u64);
+        bar.set_message(stage.to_string());
+    });
+    bar.finish_and_clear();
+    result
 }

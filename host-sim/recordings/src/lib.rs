@@ -53,4 +53,4 @@ mod value_stream;
 
 pub use column_selection::{ColumnSelection, SelectionError};
 pub use input_error::{InputError, Printable, Reason};
-pub use read_monitor::ReadMonitor;
+pub use read_monitor::{ReadMonitor, ReadPass};

@@ -2,7 +2,18 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
+
+/// What a recording is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReadPass {
+    /// The first rows, which tell the clock of the time stamps: all of a recording that is held in memory.
+    FirstRows,
+    /// The first reading of a recording that is read in blocks: its rate, its length, and the size of its counts.
+    Survey,
+    /// The second reading of such a recording: its samples.
+    Samples,
+}
 
 /// Shared by the reader of a file and by those who watch it. All clones are one monitor.
 #[derive(Debug, Clone, Default)]
@@ -11,6 +22,7 @@ pub struct ReadMonitor(Arc<State>);
 #[derive(Debug, Default)]
 struct State {
     bytes: AtomicU64,
+    pass: AtomicU8,
     is_reading: AtomicBool,
     stop: AtomicBool,
     is_interrupted: AtomicBool,
@@ -22,6 +34,19 @@ impl ReadMonitor {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.0.bytes.load(Relaxed)
+    }
+
+    /// What the file is read for.
+    #[must_use]
+    pub fn pass(&self) -> ReadPass {
+        let passes = [ReadPass::FirstRows, ReadPass::Survey, ReadPass::Samples];
+        let pass = self.0.pass.load(Relaxed);
+        passes.into_iter().find(|of| *of as u8 == pass).unwrap_or(ReadPass::FirstRows)
+    }
+
+    /// Begins a reading.
+    pub(crate) fn begin_pass(&self, pass: ReadPass) {
+        self.0.pass.store(pass as u8, Relaxed);
     }
 
     /// Whether a file is being read that can be stopped.

@@ -10,7 +10,7 @@ use crate::count_stream::{self, CountStream};
 use crate::file_format::{FileFormat, InputFile};
 use crate::input_error::{InputError, Reason};
 use crate::quantizer::Quantizer;
-use crate::read_monitor::ReadMonitor;
+use crate::read_monitor::{ReadMonitor, ReadPass};
 use crate::recorded_blocks::RecordedBlocks;
 use crate::recording::Recording;
 use crate::sample_slots::SampleSlots;
@@ -305,6 +305,7 @@ impl SampleStream {
     }
 
     fn read_pass(&mut self, mut take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
+        self.monitor.begin_pass(ReadPass::Samples);
         let stopped_at = match &mut self.content {
             Content::Held => {
                 self.beginning.blocks(BLOCK).for_each(take);
@@ -367,6 +368,7 @@ impl SampleStream {
 
     fn survey_pass(&mut self) -> Result<(), StreamError> {
         let Self { content, description, notes, monitor, .. } = self;
+        monitor.begin_pass(ReadPass::Survey);
         match content {
             Content::Held | Content::Recorded(_) => {}
             Content::Counts(source) => {
