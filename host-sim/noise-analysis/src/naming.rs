@@ -92,7 +92,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if is_in_spectrum(&term.kind, &in_spectrum) => {}
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if has_few_periods(&term.kind, duration_s) => {
                 let what = "as by a line of a few periods in the record, which its curve does not tell from a drift";
-                effects.push(unexplained_octave(found, &fit.covariates.curve, what));
+                effects.push(unexplained_line(term, unexplained_octave(found, &fit.covariates.curve, what)));
             }
             // In the curve alone: its frequency changes, or it is no line.
             NoiseTerm::Sinusoid(Sinusoid { frequency }) | NoiseTerm::Resonance(Resonance { frequency, .. })
@@ -103,7 +103,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
                     continue;
                 }
                 let what = format!("as by a line at {frequency:.4} Hz, where the spectrum has none");
-                effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
+                effects.push(unexplained_line(term, unexplained_octave(found, &fit.covariates.curve, &what)));
             }
             // In the curve, random telegraph noise and a common-mode drift look like these.
             NoiseTerm::Markov(_) | NoiseTerm::RateRamp if telegraph.is_some() || common.is_some() => {}
@@ -142,7 +142,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             _ => effects.push(term_effect(term, found, unit, period_s)),
         }
     }
-    keep_first_of(&mut effects, "unexplained");
+    keep_first_octave(&mut effects);
     effects.extend(telegraph.map(|found| found.effect.clone()));
     effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
     effects.extend(in_spectrum);
@@ -150,11 +150,13 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     effects
 }
 
-/// Leaves the first effect of this kind alone: of several terms that stand for one thing that has no name, the first was the
-/// clearest.
-fn keep_first_of(effects: &mut Vec<Effect>, kind: &str) {
+/// Of several terms that stand for one thing that has no name, leaves the first, which was the clearest, and the lines.
+fn keep_first_octave(effects: &mut Vec<Effect>) {
     let mut is_first = true;
-    effects.retain(|effect| effect.kind != kind || std::mem::take(&mut is_first));
+    effects.retain(|effect| {
+        let is_octave = effect.kind == "unexplained" && !effect.parameters.contains_key("frequency");
+        !is_octave || std::mem::take(&mut is_first)
+    });
 }
 
 /// Whether the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of
@@ -283,6 +285,12 @@ fn unexplained_octave(found: &AddedTerm, curve: &Curve<OCTAVES>, what: &str) -> 
     let parameters =
         [("tau", Parameter::new(tau, tau, tau, "s")), ("excess_percent", Parameter::new(percent(1.0), low, high, "%"))];
     Effect::new("unexplained", parameters, evidence)
+}
+
+/// An unexplained octave that the model describes by a line, with the frequency of that.
+fn unexplained_line(term: &FittedTerm, mut octave: Effect) -> Effect {
+    octave.parameters.extend(term_parameters(term, "").into_iter().filter(|(name, _)| name == "frequency"));
+    octave
 }
 
 /// A Markov term that the spectrum shows and the curve does not.

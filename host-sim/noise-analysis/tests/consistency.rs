@@ -202,8 +202,12 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     for term in channel.refitted.terms.iter().filter(added) {
         let frequency = term.parameters.get("frequency").map(|frequency| frequency.value);
         let is_of = |kind: &str| channel.effects.iter().any(|effect| effect.kind == kind);
-        // A line of the curve that the spectrum does not show has no name, as what else the curve alone shows; the clearest is listed.
-        let is_octave = |effect: &Effect| effect.kind == "unexplained" && effect.parameters.contains_key("tau");
+        // Disturbances of which the curve shows a line have the averaging time at which that is largest, 0.371/f, within an octave on
+        // either side and the tenths to which octaves tell a frequency.
+        let is_octave = |effect: &Effect| {
+            let tau = effect.parameters.get("tau").filter(|_| effect.kind == "unexplained");
+            tau.zip(frequency).is_some_and(|(tau, frequency)| (tau.value * frequency / 0.371).ln().abs() < 3f64.ln())
+        };
         let is_told = match term.kind.as_str() {
             "sinusoid" | "resonance" => channel.effects.iter().any(|effect| {
                 let of = effect.parameters.get("frequency").map(|frequency| frequency.value);

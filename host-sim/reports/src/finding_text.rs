@@ -354,7 +354,10 @@ fn unexplained_place(finding: &Finding) -> String {
 pub(crate) fn place_and_excess(finding: &Finding) -> (String, Option<f64>) {
     let value = |name: &str| finding.parameters.get(name).map(|parameter| parameter.value);
     let place = match (value("tau"), value("frequency"), value("time")) {
-        (Some(tau), ..) => format!("at averaging times around {}", span(tau)),
+        (Some(tau), Some(frequency), _) => {
+            format!("at averaging times around {}, as by a line at {}", span(tau), quantity(frequency, "Hz"))
+        }
+        (Some(tau), None, _) => format!("at averaging times around {}", span(tau)),
         (None, Some(frequency), _) => format!("around {}", quantity(frequency, "Hz")),
         (None, None, Some(time)) => format!("at {} into the record", span(time)),
         _ => "somewhere".to_owned(),

@@ -33,7 +33,10 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
             .and_then(|axis| beside(report, channel, &format!("accl_{axis}"))),
         "telegraph" => histogram(channel),
         "unexplained" if finding.parameters.contains_key("time") => in_time(report, channel, finding),
-        "unexplained" if finding.parameters.contains_key("frequency") => line_in_spectrum(report, channel, finding),
+        // A line of the curve alone, which has an averaging time too, is not in the spectrum.
+        "unexplained" if finding.parameters.contains_key("frequency") && !finding.parameters.contains_key("tau") => {
+            line_in_spectrum(report, channel, finding)
+        }
         _ => Some(residual(report, channel)),
     }?;
     let title = format!("Evidence {}: {} in {}", index + 1, words(&finding.kind), channel_list(&finding.channels));
