@@ -51,11 +51,8 @@ impl Iterator for RecordedBlocks {
         let block = self.blocks.pop_front()?;
         let slots = self.slots[self.taken..self.taken + block.len()].to_vec();
         self.taken += block.len();
-        let sample = |&Outputs { counts, faults }: &Outputs| RecordedSample {
-            time_stamp: TimeStamp::default(),
-            counts,
-            faults,
-        };
+        let sample =
+            |&Outputs { counts, faults }: &Outputs| RecordedSample { time_stamp: TimeStamp::default(), counts, faults };
         Some(SampleBlock { slots, channels: channels(&self.channels, &self.profile, block.iter().map(sample)) })
     }
 }
