@@ -67,12 +67,12 @@ mod tests {
 
     const ROWS: u64 = 3 * BLOCK as u64 + 1000;
 
-    /// Every thousandth row was lost, one in 1,500 shows a rate that no sensor of this range has, and one in 2,000 has no supply.
+    /// Of a thousand rows the last two were lost, one in 1,500 shows a rate that no sensor of this range has, and one in 2,000 has a supply of 0 V.
     fn recording() -> Recording {
         let mut recorder = Recorder::new(vec![Channel::GyroX, Channel::GyroY, Channel::Supply], GyroRange::Dps300);
-        for row in (0..ROWS).filter(|row| row % 1000 != 999) {
+        for row in (0..ROWS).filter(|row| row % 1000 < 998) {
             let mut counts = [0; 12];
-            counts[Channel::GyroX as usize] = if row % 1500 == 1499 { i16::MAX >> 2 } else { (row * 7919 % 11) as i16 };
+            counts[Channel::GyroX as usize] = if row % 1500 == 1400 { i16::MAX >> 2 } else { (row * 7919 % 11) as i16 };
             counts[Channel::GyroY as usize] = (row % 13) as i16;
             counts[Channel::Supply as usize] = if row % 2000 == 1500 { 0 } else { 2068 };
             recorder.push(TimeStamp::from_time(row as f64 / 100.0), &Burst::from_counts(&Counts::new(counts)));
@@ -85,8 +85,8 @@ mod tests {
     fn blocks_beginning_and_description_are_those_of_the_measurement() {
         let recording = recording();
         let measurement = time_base(&recording, None).expect("a time base").measurement;
-        assert_eq!(measurement.dropped["gap"], ROWS / 1000);
-        assert_eq!(measurement.channels[0].refused_positions().len() as u64, ROWS / 1500);
+        assert_eq!(measurement.dropped["gap"], 2 * (ROWS / 1000));
+        assert_eq!(measurement.channels[1].refused_positions().len() as u64, ROWS / 1500);
         let usable = UsableSamples::place(&recording, None).expect("a time base");
         assert_eq!(usable.description(&recording), RecordingDescription::from(&measurement));
         for slot in [0, 1, 1000, 20_000, ROWS] {

@@ -228,9 +228,10 @@ impl Usable {
         (0..samples).filter(|position| self.read_twice.binary_search(position).is_err()).collect()
     }
 
-    /// Takes samples back that equal the one before by chance: where the coarse stamps of the others, `arrived`, show that as
-    /// many samples are missing. Returns whether there are any.
-    fn take_back(&mut self, samples: &[RecordedSample], arrived: &[usize], alignment: &StampAlignment) -> bool {
+    /// Takes samples back that equal the one before by chance: where the coarse stamps of the others show that as many samples are
+    /// missing. Returns whether there are any.
+    fn take_back(&mut self, samples: &[RecordedSample], alignment: &StampAlignment) -> bool {
+        let arrived = self.arrived(samples.len());
         let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
         let mut taken = Vec::new();
         let mut read_twice = self.read_twice.iter().copied().peekable();
@@ -282,7 +283,11 @@ fn sample_periods(
 ) -> Result<SamplePeriods, TimeBaseError> {
     let indices: Option<Vec<u64>> = usable.positions.iter().map(|&p| samples[p].time_stamp.index).collect();
     let times_of = |positions: &[usize]| -> Option<Vec<f64>> {
-        positions.iter().map(|&position| samples[position].time_stamp.time_s).collect()
+        let mut times = Vec::with_capacity(positions.len());
+        for &position in positions {
+            times.push(samples[position].time_stamp.time_s?);
+        }
+        Some(times)
     };
     if let Some(indices) = indices {
         let least = indices.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
@@ -297,8 +302,8 @@ fn sample_periods(
         let never_arrived = never_arrived.fold(0, u64::saturating_add);
         return Ok(SamplePeriods { periods: indices, never_arrived, stamps });
     }
-    let mut arrived = usable.arrived(samples.len());
-    let Some(mut times) = times_of(&arrived) else {
+    // The positions of those that arrived are made anew where they are needed: the alignment takes the memory.
+    let Some(mut times) = times_of(&usable.arrived(samples.len())) else {
         // Without time stamps a sample that is left out leaves its own period empty, and nothing else is missing.
         let periods = usable.positions.iter().map(|&position| position as u64).collect();
         return Ok(SamplePeriods { periods, never_arrived: 0, stamps: None });
@@ -306,9 +311,8 @@ fn sample_periods(
     let mut alignment = StampAlignment::new(&times, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
     // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number of
     // samples does.
-    if alignment.width >= COARSE && usable.take_back(samples, &arrived, &alignment) {
-        arrived = usable.arrived(samples.len());
-        times = times_of(&arrived).unwrap_or_default();
+    if alignment.width >= COARSE && usable.take_back(samples, &alignment) {
+        times = times_of(&usable.arrived(samples.len())).unwrap_or_default();
         alignment = StampAlignment::new(&times, rate_hz).ok_or(TimeBaseError::NoPeriod)?;
     }
     match rate_hz {
@@ -316,6 +320,8 @@ fn sample_periods(
         None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
         None => {}
     }
+    drop(times);
+    let arrived = usable.arrived(samples.len());
     let StampAlignment { periods, late, mut losses, rate, tick_s, width, resolved } = alignment;
     losses.iter_mut().for_each(|loss| loss.before = arrived[loss.before]);
     let usable_range = usable.positions.first().zip(usable.positions.last());

@@ -2,6 +2,7 @@
 
 use crate::program::{self, gzip, host_sim, json_of, write};
 use recordings::frame_log::{Frame, FrameLogReader, FrameLogWriter};
+use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
 use tempfile::tempdir;
@@ -79,7 +80,7 @@ fn a_recorded_simulation_replays_to_the_same_report() {
         let log = log.to_str().expect("UTF-8");
         let recorded = json_of(&dir, &["record", log, "--seconds", "5", "--seed", "7"]);
         assert!(recorded == json_of(&dir, &["replay", log]), "{name}");
-        let report: serde_json::Value = serde_json::from_slice(&recorded).expect("JSON");
+        let report: Value = serde_json::from_slice(&recorded).expect("JSON");
         // 5 s at 204.8 samples per second.
         assert_eq!(report["samples"].as_u64().expect("a number") + dropped(&report), 1024);
         assert_eq!(report["dropped"]["gap"], 0);
@@ -90,8 +91,47 @@ fn a_recorded_simulation_replays_to_the_same_report() {
     }
 }
 
-fn dropped(report: &serde_json::Value) -> u64 {
-    report["dropped"].as_object().expect("causes").values().filter_map(serde_json::Value::as_u64).sum()
+/// Of more samples than are analysed without being condensed. The log is condensed from memory, the table as it is read: two rates, both
+/// least-squares slopes, whose sums of 3·10⁵ stamps are rounded to 3·10⁻¹¹ of them. Figures may follow the rate with a factor of 10⁴,
+/// as where a fit ends.
+#[test]
+fn a_long_simulation_has_the_report_of_its_table() {
+    const TOLERANCE: f64 = 1e-6;
+    let dir = tempdir().expect("a folder");
+    let [log, table] = ["log.csv", "table.csv"].map(|name| dir.path().join(name).display().to_string());
+    let recorded = json_of(&dir, &["record", &log, "--seconds", "1400", "--seed", "3"]);
+    let converted = host_sim(&["convert", &log, &table]);
+    assert!(converted.status.success(), "{}", String::from_utf8_lossy(&converted.stderr));
+    let read = json_of(&dir, &["analyze", &table]);
+    let parsed = |bytes: Vec<u8>| serde_json::from_slice::<Value>(&bytes).expect("JSON");
+    let [recorded, read] = [recorded, read].map(parsed);
+    assert!(recorded["samples"].as_u64() > Some(1 << 18), "{}", recorded["samples"]);
+    assert_same(&recorded, &read, TOLERANCE, "");
+}
+
+/// Checks that all is equal, numbers that are no integers to within the relative `tolerance`.
+fn assert_same(one: &Value, other: &Value, tolerance: f64, path: &str) {
+    match (one, other) {
+        (Value::Object(one), Value::Object(other)) => {
+            assert!(one.keys().eq(other.keys()), "{path}: {:?} {:?}", one.keys(), other.keys());
+            one.iter().for_each(|(key, value)| assert_same(value, &other[key], tolerance, &format!("{path}/{key}")));
+        }
+        (Value::Array(one), Value::Array(other)) => {
+            assert_eq!(one.len(), other.len(), "{path}");
+            for (at, (one, other)) in one.iter().zip(other).enumerate() {
+                assert_same(one, other, tolerance, &format!("{path}/{at}"));
+            }
+        }
+        (Value::Number(number), Value::Number(of_other)) if number.is_f64() && of_other.is_f64() => {
+            let [one, other] = [number, of_other].map(|number| number.as_f64().expect("a number"));
+            assert!((one - other).abs() <= tolerance * one.abs().max(other.abs()), "{path}: {one} {other}");
+        }
+        _ => assert_eq!(one, other, "{path}"),
+    }
+}
+
+fn dropped(report: &Value) -> u64 {
+    report["dropped"].as_object().expect("causes").values().filter_map(Value::as_u64).sum()
 }
 
 #[test]
@@ -134,7 +174,7 @@ fn the_gyro_range_is_read_from_the_log() {
     let adev = |text: &str| {
         let file = program::write(&dir, "log.csv", text.as_bytes());
         let report = json_of(&dir, &["replay", file.to_str().expect("UTF-8")]);
-        let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+        let report: Value = serde_json::from_slice(&report).expect("JSON");
         let gyro = report["channels"][1].clone();
         assert_eq!(gyro["name"], "gyro_x");
         gyro["curve"][0]["adev"].as_f64().expect("a deviation")

@@ -110,7 +110,8 @@ struct Block {
 impl Block {
     fn generate(before: Vec<ChannelSource>, samples: usize) -> Self {
         let mut behind = before.clone();
-        let values = behind.iter_mut().flat_map(|channel| (0..samples).map(|_| channel.sample())).collect();
+        let mut values = Vec::with_capacity(samples * behind.len());
+        behind.iter_mut().for_each(|channel| values.extend((0..samples).map(|_| channel.sample())));
         Self { before, behind, samples, values }
     }
 }
