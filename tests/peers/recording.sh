@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Time and memory of this program and of a script of pandas and allantools on the same table, plain and gzip, from the file to the
-# curves, in one run:
+# curves, in one run; then of one virtual hour, and of a table of a million rows beside the recordings of a minute that it is cut into:
 #
 #     tests/peers/recording.sh [--quick-only] [ROWS…]   (a million rows by default, of six channels)
 #
 # allantools gives the curves alone, `analyze --quick` curves, models, errors and what the trace of the curves finds, `analyze`
-# everything that a report has. With --quick-only neither the script, which does not hold every table, nor the whole analysis runs.
+# everything that a report has. With --quick-only neither the script, which does not hold every table, nor the whole analysis, nor what
+# follows the tables runs.
 # A table of a hundred million rows takes 1.6 GB. Installs the script's packages into target/peers.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -44,9 +45,14 @@ memory = usage.ru_maxrss / 1024
 print(f"{name:<36} {wall:8.2f} s {work:8.2f} s of processor {memory:7.0f} MB {1e6 * work / rows:8.3f} us a row", flush=True)
 MEASURE
 }
+# The table of so many rows, which is made once.
+table_of() {
+    [ -f "$folder/$1.csv" ] || "$python" tests/peers/recording/table.py "$1" "$folder/$1.csv"
+    echo "$folder/$1.csv"
+}
+
 for rows in "${@:-1000000}"; do
-    table=$folder/$rows.csv
-    [ -f "$table" ] || "$python" tests/peers/recording/table.py "$rows" "$table"
+    table=$(table_of "$rows")
     [ -f "$table.gz" ] || gzip --keep --fast "$table"
     for file in "$table" "$table.gz"; do
         echo "$(basename "$file")"
@@ -58,4 +64,28 @@ for rows in "${@:-1000000}"; do
             measure "host-sim analyze" "$rows" "$target/release/host-sim" analyze "$file" --rate 100 --quiet
         fi
     done
+done
+
+if $only_quick; then
+    exit
+fi
+echo "virtual hour"
+hour=$((3600 * 2048 / 10))
+measure "host-sim" "$hour" "$target/release/host-sim" --page "$folder/page" --quiet
+# 166 recordings of a minute at 100 Hz.
+rows=996000 minute=6000
+table=$(table_of "$rows")
+minutes=$folder/minutes
+if [ ! -d "$minutes" ]; then
+    mkdir -p "$minutes"
+    header=$(head -n 1 "$table")
+    export header
+    # shellcheck disable=SC2016 # the shell of the filter expands it
+    tail -n +2 "$table" | split --lines "$minute" --filter='{ echo "$header"; cat; } > "$FILE.csv"' - "$minutes/minute-"
+fi
+echo "$((rows / minute)) recordings of a minute, and one of their length"
+for option in --quick ""; do
+    measure "host-sim analyze $option, one" "$rows" "$target/release/host-sim" analyze "$table" --rate 100 --quiet $option
+    measure "host-sim analyze $option, minutes" "$rows" "$target/release/host-sim" analyze "$minutes"/*.csv --rate 100 \
+        --reports "$folder/reports" --quiet $option
 done
