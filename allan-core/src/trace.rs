@@ -114,7 +114,7 @@ impl Trace {
 /// # Cost
 /// | `trace::trace` | Cortex-M4F | Cortex-M0+ |
 /// |---|---|---|
-/// | instructions | 135 million | — |
+/// | instructions | 115 million | — |
 /// | instructions that add two terms | 2,600 million | — |
 /// | stack, bytes | 9,740 | — |
 /// | flash, bytes | 48,600 | — |
