@@ -251,9 +251,13 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
     fn subtract(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity], variance: impl Fn(usize, u64) -> f64) {
         curve.replace_avar(|point| {
             let change = |a: &Sensitivity| {
+                let with_channel = self.with_channel(a.covariate, point.n);
+                // Where its own variance is not known, the channel's covariance with it has the share: `cov(y, c) = β·σ²(c)`.
+                if self.covariates[a.covariate].signal(point.n).is_none() {
+                    return -a.value * with_channel;
+                }
                 let others = sensitivities.iter().filter(|b| b.covariate < a.covariate);
                 let products = others.map(|b| 2.0 * b.value * self.shared(a.covariate, b.covariate, point.n));
-                let with_channel = self.with_channel(a.covariate, point.n);
                 a.value * (a.value * variance(a.covariate, point.n) - 2.0 * with_channel + products.sum::<f64>())
             };
             // The estimate can be negative where almost nothing remains.

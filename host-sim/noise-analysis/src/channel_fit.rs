@@ -11,7 +11,7 @@ use crate::spectra::cosine_spectrum::CosineSpectrum;
 use allan_core::fit::{Goodness, fit, fit_shapes_except, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter};
-use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Residual, Trace, trace};
+use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelProfile, SensorProfile};
 
@@ -236,6 +236,11 @@ impl ChannelFit {
             let other = self.with_filter(&again, common);
             best = if cost(&other) < cost(&best) { other } else { best };
         }
+        // White noise is never absent.
+        if best.0.terms().first().is_none_or(|filter| filter.value == 0.0) {
+            let other = self.with_filter(&traced_behind(&self.covariates.curve, common.filter), common);
+            best = if cost(&other) < cost(&best) + MAX_DEVIANCE_RISE { other } else { best };
+        }
         if !had && cost(&best) > cost_of(own.0, own.1) + MAX_DEVIANCE_RISE {
             return;
         }
@@ -399,6 +404,16 @@ impl ChannelFit {
         self.trace.added.clone_from(&held.added);
         self.markov_by_spectrum = None;
     }
+}
+
+/// What a model of white noise behind `filter`, bias instability and random walk lacks of a curve.
+fn traced_behind(curve: &Curve<OCTAVES>, filter: MovingAverageFilter) -> Trace {
+    let mut traced = Trace::baseline(curve);
+    let kinds = [NoiseTerm::Filtered(filter), NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk];
+    traced.after = fit(curve, &kinds);
+    traced.after_goodness = goodness(curve, &traced.after);
+    let _ = trace_while(&mut traced, curve, LineCandidates::Curve, &[], &mut || true);
+    traced
 }
 
 /// The residual of a model at a point of a curve.

@@ -1,7 +1,6 @@
 //! Names the effects that the whole record shows in a channel: which of them are reported, with parameters, units and
 //! bounds, and with evidence that a person can check.
 
-use crate::OCTAVES;
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES, filter_length_s, line_frequency};
 use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
@@ -9,18 +8,21 @@ use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
 use crate::spectra::{MarkovEstimate, Modulation};
 use crate::spectral_lines::{FEW_PERIODS, MergedLine};
+use crate::streamed_curves::STEPS_PER_COUNT;
 use crate::uniform_series::UniformSeries;
+use crate::{OCTAVES, OVERLAP};
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 use allan_core::trace::AddedTerm;
-use allan_core::{AllanPoint, Curve, Model};
+use allan_core::{AllanPoint, Cascade, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::PI;
 
-/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts.
+/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts, and a
+/// correlated process of no more than their deviation is the rounding error.
 const NEIGHBOURING_COUNTS: f64 = 1.5;
 /// In a channel that is not dithered, the rounding error is correlated over about this many lengths of the filter.
 const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
@@ -72,6 +74,8 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     };
     let telegraph = findings.telegraph.filter(|found| !is_rounding(found));
     let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
+    // Two levels have half their distance as their deviation.
+    let is_rounding_error = |term: &FittedTerm| 2.0 * term.low < NEIGHBOURING_COUNTS * resolution;
     let duration_s = fit.covariates.curve.samples() as f64 * period_s;
     let in_spectrum: Vec<Effect> = lines
         .unwrap_or_default()
@@ -86,10 +90,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
                 effects.push(filter_effect((term, &filter), found, unit, period_s, profile.internal_rate_hz));
             }
             _ if !is_dithered => {}
-            NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s => {}
+            NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s && is_rounding_error(term) => {}
             NoiseTerm::Quantization if rounding_s > 0.0 => {}
             // Reported from the spectrum, which resolves them better than the curve.
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if is_in_spectrum(&term.kind, &in_spectrum) => {}
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if rounding_s > 0.0 && is_rounding_error(term) => {}
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if has_few_periods(&term.kind, duration_s) => {
                 let what = "as by a line of a few periods in the record, which its curve does not tell from a drift";
                 effects.push(unexplained_line(term, unexplained_octave(found, &fit.covariates.curve, what)));
@@ -123,7 +128,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
             NoiseTerm::Markov(_) if let Some(by_spectrum) = &fit.markov_by_spectrum => {
                 effects.push(markov_effect(term, by_spectrum, unit));
             }
-            NoiseTerm::Markov(markov) => match telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov) {
+            NoiseTerm::Markov(markov) => match kurtosis_ratio(fit, findings.rest, resolution, markov) {
+                // Beside a telegraph signal it is that one's.
+                Some(_) if effects.iter().any(|effect| effect.kind == "telegraph") => {
+                    effects.push(term_effect(term, found, unit, period_s));
+                }
                 Some(kurtosis) if kurtosis.ratio - 3.0 * kurtosis.error > LARGEST_KURTOSIS_RATIO => {
                     let what = format!(
                         "with the spectrum of a process that forgets within {} s, but an excess kurtosis {:.1} ± {:.1} times \
@@ -148,6 +157,27 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     effects.extend(in_spectrum);
     effects.retain(|effect| is_shown(effect, duration_s));
     effects
+}
+
+/// Kurtosis of a Markov term of the model. That of the curve of a channel with covariates is theirs as well, such as that of a
+/// supply that jumps; so it is estimated from the samples less their share, `rest`, in steps of the `resolution`.
+fn kurtosis_ratio(
+    fit: &ChannelFit,
+    rest: Option<&UniformSeries>,
+    resolution: f64,
+    markov: Markov,
+) -> Option<KurtosisRatio> {
+    let model = &fit.trace.after;
+    if fit.covariates.is_empty() {
+        return telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov);
+    }
+    let rest = rest?;
+    let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
+    let step = resolution / STEPS_PER_COUNT;
+    for value in rest.values() {
+        if value.is_finite() { estimator.push((value / step).round() as i32) } else { estimator.gap(1) }
+    }
+    telegraph::kurtosis_ratio(&estimator.curve(rest.sample_period()).scaled(step), model, markov)
 }
 
 /// Of several terms that stand for one thing that has no name, leaves the first, which was the clearest, and the lines.

@@ -220,7 +220,10 @@ fn an_interrupted_simulation_leaves_a_log_that_can_be_read() {
                 // A kill may end the program within a write to the disk, so that its last line is torn.
                 Err(error) => {
                     let last = fs::read_to_string(&log).map_or(0, |text| text.lines().count());
-                    assert!(signal == "KILL" && error.to_string().contains(&format!("line {last}")), "{signal}: {error}");
+                    assert!(
+                        signal == "KILL" && error.to_string().contains(&format!("line {last}")),
+                        "{signal}: {error}"
+                    );
                     break;
                 }
             }

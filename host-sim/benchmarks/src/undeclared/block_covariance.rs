@@ -1,6 +1,7 @@
 //! Covariance of the means of the blocks of a record, from the definitions of the noises, and the two tests of a waveform of
-//! the bias that it allows: with the noise known, and with the noise estimated.
+//! the bias that it allows: its expected log likelihood ratio, and its p-value in one recording.
 
+use super::channel_under_test::{Densities, fit_baseline};
 use super::environment::EnvironmentCourse;
 use crate::spectral_noise::flicker_density;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -80,10 +81,63 @@ fn exponential(length: f64, lag: usize) -> f64 {
     }
 }
 
-/// Expected log likelihood ratio of a waveform of the block means `values` in noise of this covariance, with a free mean.
-pub(super) fn ratio_of_waveform(values: &[f64], covariance: DMatrix<f64>) -> f64 {
-    let Some(factor) = covariance.cholesky() else { return 0.0 };
-    0.5 * energy(&factor, &DVector::from_column_slice(values))
+/// The expected log likelihood ratio of a waveform of the bias in noise of N, B and K, which the description with the waveform
+/// knows, against a constant with the best N, B and K.
+///
+/// Over the cosines of the blocks, which are nearly uncorrelated in each of the noises (Whittle): of a cosine whose
+/// coefficient has the variance `c` and the waveform's share `s`, and the variance `m` in the best description without it, the
+/// ratio is `½·((c + s²)/m − 1 + ln(m/c))`. With `m = c` the sum is `½·sᵀC⁻¹s`, the ratio in known noise; but a random walk takes
+/// up most of a slow drift.
+pub(super) struct WaveformTest {
+    cosines: DMatrix<f64>,
+    /// In the noise as it is.
+    densities: Vec<Densities>,
+    /// N², B² and K² of the channel.
+    squares: [f64; 3],
+}
+
+impl WaveformTest {
+    /// In `noise`, of which N, B and K have these `squares`; what its white noise has beyond N, and its processes, are known.
+    pub(super) fn new(noise: &BlockNoise, squares: [f64; 3], noises: &BlockNoises) -> Self {
+        let cosines = cosines();
+        let variances = |noise: &BlockNoise| cosine_variances(&cosines, &noises.covariance(noise));
+        let unit = |white: f64, flicker: f64, walk: f64| BlockNoise { white, flicker, walk, processes: &[] };
+        let [white, flicker, walk] =
+            [unit(1.0, 0.0, 0.0), unit(0.0, 1.0, 0.0), unit(0.0, 0.0, 1.0)].map(|of| variances(&of));
+        let truth = variances(noise);
+        let known = variances(&BlockNoise { white: noise.white - squares[0], flicker: 0.0, walk: 0.0, ..*noise });
+        let of_cosine =
+            |k: usize| Densities { baseline: [white[k], flicker[k], walk[k]], known: known[k], truth: truth[k] };
+        let densities = (0..cosines.ncols()).map(of_cosine).collect();
+        Self { cosines, densities, squares }
+    }
+
+    /// Of the block means `values`.
+    pub(super) fn ratio(&self, values: &[f64]) -> f64 {
+        let shares = self.cosines.tr_mul(&DVector::from_column_slice(values));
+        let with = |(of, share): (&Densities, &f64)| Densities { truth: of.truth + share * share, ..*of };
+        let shown: Vec<Densities> = self.densities.iter().zip(&shares).map(with).collect();
+        let squares = fit_baseline(&shown, &vec![1.0; shown.len()], self.squares);
+        let ratio = |(with, without): (&Densities, &Densities)| {
+            let modelled = with.modelled(&squares);
+            0.5 * (with.truth / modelled - 1.0 + (modelled / without.truth).ln())
+        };
+        shown.iter().zip(&self.densities).map(ratio).sum()
+    }
+}
+
+/// The cosines of 1, 2, … half periods over the blocks, of length 1, in columns: each is orthogonal to a constant.
+fn cosines() -> DMatrix<f64> {
+    let length = (2.0 / BLOCKS as f64).sqrt();
+    DMatrix::from_fn(BLOCKS, BLOCKS - 1, |block, k| {
+        length * (PI * (block as f64 + 0.5) * (k + 1) as f64 / BLOCKS as f64).cos()
+    })
+}
+
+/// Variance of the coefficient of each cosine in noise of this covariance.
+fn cosine_variances(cosines: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Vec<f64> {
+    let weighted = covariance * cosines;
+    (0..cosines.ncols()).map(|k| cosines.column(k).dot(&weighted.column(k))).collect()
 }
 
 /// `sᵀC⁻¹s` of what a waveform `s` has beside a constant.

@@ -3,16 +3,27 @@
 
 use super::generator::TrueRecording;
 use adis16405_driver::GyroRange;
+use nalgebra::{Matrix3, Vector3};
 use simulation::SAMPLE_RATE_HZ;
 use std::f64::consts::PI;
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister};
 
-/// Iterations of the fit of N, B and K. Each halves the remaining distance to the optimum, roughly.
-const ITERATIONS: usize = 60;
+/// Most iterations of the fit of N, B and K, most halvings of a step, and its largest length in logarithms of their squares.
+const ITERATIONS: usize = 100;
+const HALVINGS: i32 = 12;
+const STEP: f64 = 3.0;
+/// Fall of the deviance of an iteration that is the last one: a thousandth of what a parameter is worth by chance.
+const CONVERGED: f64 = 1e-3;
+/// Least part of some density with which each noise starts.
+const START: f64 = 0.01;
+/// Part of the information of all noises that is added to that of each.
+const LEAST_INFORMATION: f64 = 1e-9;
 /// Number of intervals of the logarithmic frequency grid.
 const GRID: usize = 1500;
-/// Lower limit of the filter's power gain in divisions: at the nulls the gain is 0.
-const LEAST_GAIN: f64 = 1e-3;
+/// Logarithm of the taps of a stage of the longest filter.
+const LONGEST_FILTER_LOG2: u32 = 6;
+/// Lower limit of the filter's power gain in divisions: at the nulls the gain is 0. Between them it falls to 10⁻⁷.
+const LEAST_GAIN: f64 = 1e-9;
 
 /// Length and sample period of a recording.
 #[derive(Debug, Clone, Copy)]
@@ -68,20 +79,69 @@ pub(super) fn filter_gain(taps_log2: u8, period_s: f64, frequency: f64) -> f64 {
     ((taps * half).sin() / (taps * half.sin())).powi(4)
 }
 
-/// Densities of an observed and a modelled output at one frequency.
-struct Densities {
+/// Densities of an observed and a modelled output at one frequency, or the variances of one cosine.
+#[derive(Clone, Copy)]
+pub(super) struct Densities {
     /// Modelled per unit of N², B² and K², behind the filter.
-    baseline: [f64; 3],
+    pub(super) baseline: [f64; 3],
     /// Modelled without a free parameter.
-    known: f64,
+    pub(super) known: f64,
     /// Of the output.
-    truth: f64,
+    pub(super) truth: f64,
 }
 
 impl Densities {
-    fn modelled(&self, squares: &[f64; 3]) -> f64 {
+    pub(super) fn modelled(&self, squares: &[f64; 3]) -> f64 {
         self.known + squares.iter().zip(&self.baseline).map(|(square, density)| square * density).sum::<f64>()
     }
+}
+
+/// N², B² and K² that fit `densities` best (Whittle), each of which counts as often as `counts` has it, from `squares` on:
+/// Fisher's scoring of their logarithms, with shorter steps where the deviance would rise. A smaller noise starts where it is a
+/// hundredth of a density: it has next to no slope below.
+pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f64; 3]) -> [f64; 3] {
+    let deviance = |squares: &[f64; 3]| -> f64 {
+        let of = |(densities, count): (&Densities, &f64)| {
+            let modelled = densities.modelled(squares);
+            count * (modelled.ln() + densities.truth / modelled)
+        };
+        densities.iter().zip(counts).map(of).sum()
+    };
+    let visible = |at: usize| {
+        let ratio = |densities: &Densities| START * densities.truth / densities.baseline[at];
+        densities.iter().map(ratio).fold(f64::INFINITY, f64::min)
+    };
+    let mut best: [f64; 3] = std::array::from_fn(|at| squares[at].max(visible(at)));
+    let mut least = deviance(&best);
+    for _ in 0..ITERATIONS {
+        let (mut information, mut score) = (Matrix3::zeros(), Vector3::zeros());
+        for (densities, count) in densities.iter().zip(counts) {
+            let modelled = densities.modelled(&best);
+            let shares = Vector3::from_fn(|at, _| best[at] * densities.baseline[at] / modelled);
+            information += *count * shares * shares.transpose();
+            score += *count * (densities.truth / modelled - 1.0) * shares;
+        }
+        // A noise that the densities do not show has next to no information.
+        information += Matrix3::identity() * (LEAST_INFORMATION * information.trace());
+        let Some(step) = information.cholesky().map(|factor| factor.solve(&score)) else { break };
+        let lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
+        let tried = lengths.map(|length| {
+            let moved: [f64; 3] = std::array::from_fn(|at| best[at] * (length * step[at]).clamp(-STEP, STEP).exp());
+            (deviance(&moved), moved)
+        });
+        let Some((deviance, moved)) = tried.into_iter().find(|(deviance, _)| *deviance < least) else { break };
+        let fall = least - deviance;
+        (best, least) = (moved, deviance);
+        if fall < CONVERGED {
+            break;
+        }
+    }
+    best
+}
+
+/// N², B² and K² of `noise`.
+pub(super) fn squares(noise: &ChannelNoise) -> [f64; 3] {
+    [noise.angle_random_walk, noise.bias_instability, noise.rate_random_walk].map(|coefficient| coefficient.powi(2))
 }
 
 impl RecordLength {
@@ -117,25 +177,8 @@ impl RecordLength {
             Densities { baseline, known: known(frequency), truth: truth(frequency) }
         };
         let densities: Vec<Densities> = grid.iter().map(at).collect();
-        let mut squares = [
-            noise.angle_random_walk.powi(2),
-            noise.bias_instability.powi(2).max(1e-12),
-            noise.rate_random_walk.powi(2).max(1e-15),
-        ];
-        for _ in 0..ITERATIONS {
-            // This multiplicative step never increases the deviance and keeps the squares positive.
-            let (mut over, mut under) = ([0.0; 3], [0.0; 3]);
-            for (densities, (_, count)) in densities.iter().zip(&grid) {
-                let modelled = densities.modelled(&squares);
-                for ((over, under), density) in over.iter_mut().zip(&mut under).zip(&densities.baseline) {
-                    *over += count * density * densities.truth / (modelled * modelled);
-                    *under += count * density / modelled;
-                }
-            }
-            for ((square, over), under) in squares.iter_mut().zip(over).zip(under) {
-                *square *= (over / under).sqrt();
-            }
-        }
+        let counts: Vec<f64> = grid.iter().map(|(_, count)| *count).collect();
+        let squares = fit_baseline(&densities, &counts, squares(noise));
         let deviance = |(densities, (_, count)): (&Densities, &(f64, f64))| {
             let ratio = densities.truth / densities.modelled(&squares);
             count * (ratio - 1.0 - ratio.ln())
@@ -276,10 +319,27 @@ impl<'a> ChannelUnderTest<'a> {
         self.gain(frequency) * baseline + self.known_density(frequency)
     }
 
-    /// Whether the white noise of a sample, behind the filter, is less than half a count, so that rounding is no white noise.
+    /// Whether the white noise, behind the filter, has an Allan deviation of less than half a count at all averaging times up to the
+    /// length of the longest filter, so that rounding is no white noise; or of less than half of a coarser quantum.
     pub(super) fn is_below_a_count(&self) -> bool {
-        let of_sample = |frequency: f64| self.gain(frequency) * self.white_density() / self.record.period_s;
-        self.record.mean(of_sample) < (0.5 * self.resolution()).powi(2)
+        let quantum = |effect: &InjectedEffect| match *effect {
+            // The angle is rounded to multiples of √12 times the coefficient.
+            InjectedEffect::Quantization { coefficient, .. } => 12f64.sqrt() * coefficient / self.record.period_s,
+            _ => 0.0,
+        };
+        let step = self.others().map(quantum).fold(self.resolution(), f64::max);
+        let largest = (0..=LONGEST_FILTER_LOG2).map(|log2| self.white_avar(1 << log2)).fold(0.0, f64::max);
+        largest < (0.5 * step).powi(2)
+    }
+
+    /// Allan variance of the white noise behind the filter at `n` samples: the density times `2·sin⁴(πfnT)/(n·sin(πfT))²`.
+    fn white_avar(&self, n: u32) -> f64 {
+        let (n, period_s) = (f64::from(n), self.record.period_s);
+        self.record.mean(|frequency| {
+            let half = PI * frequency * period_s;
+            let transfer = 2.0 * (n * half).sin().powi(4) / (n * half.sin()).powi(2);
+            self.gain(frequency) * self.white_density() / period_s * transfer
+        })
     }
 
     /// Density of the output divided by the gain of the filter: effects are added before the filter.

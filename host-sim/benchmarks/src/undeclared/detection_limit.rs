@@ -7,22 +7,27 @@
 //! effect has free N, B and K; that of a telegraph signal also has a Markov process, and that of a common mode has
 //! independent processes. The other effect of a pair is known exactly.
 //!
+//! The *strength* of an effect is its size over the limit, or, where that is less, its `z` over the one at the limit
+//! ([`strength`]). `z` does not grow with the size of a process that has few correlation times in the record, which is a random
+//! walk but for its lowest frequencies, nor with that of a slow drift beside a walk of free K; and it grows with the root of a
+//! number of events.
+//!
 //! | effect | log likelihood ratio |
 //! |---|---|
 //! | Markov, resonance, quantization, filter | Whittle's, over the Fourier frequencies |
 //! | common mode | Whittle's, one process in all channels against independent processes |
 //! | telegraph | hidden Markov chain against Kalman filter, on a simulated signal |
 //! | sinusoid, acceleration | matched filter, with the density of the noise at their frequencies |
-//! | ramp, step, temperature, supply | block means in noise of the exact covariance |
+//! | ramp, step, temperature, supply | block means, with the variances of their cosines by the exact covariance |
 //! | spikes | mixture of normal distributions |
 //! | dropped and repeated samples | Poisson counts |
 //! | sample clock | what exceeds the tolerance of the host's clock |
 
-use super::block_covariance::{BLOCKS, BlockNoise, BlockNoises, environment_means, ratio_of_waveform};
+use super::block_covariance::{BLOCKS, BlockNoise, BlockNoises, WaveformTest, environment_means};
 use super::channel_under_test::{
-    ChannelUnderTest, RecordLength, filter_gain, markov_density, quantization_density, resonance_density,
+    ChannelUnderTest, RecordLength, filter_gain, markov_density, quantization_density, resonance_density, squares,
 };
-use super::effect::GYROS;
+use super::effect::{GYROS, size};
 use super::generator::TrueRecording;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -45,6 +50,34 @@ const AXES: f64 = 3.0;
 const TELEGRAPH_STEPS: f64 = 20.0;
 /// Number of steps of a simulated telegraph signal. The log likelihood ratio is proportional to it.
 const TELEGRAPH_LENGTH: usize = 20_000;
+
+/// Strength of an effect beside the effects `others`.
+pub(super) fn strength(effect: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
+    let of_size = size(effect) / smallest_size(effect, recording, others);
+    let in_channel = |channel: OutputRegister| ChannelUnderTest::new(recording, channel, others);
+    let of_z = |ratio: f64, required: f64| (ratio / required).max(0.0).sqrt();
+    match *effect {
+        InjectedEffect::Markov { channel, time_constant_s, deviation } => {
+            let place = in_channel(channel);
+            let density = |frequency: f64| markov_density(time_constant_s, place.record.period_s, frequency);
+            of_size.min(of_z(ratio_of_process(&place, None, deviation, density), required_ratio(TIME_CONSTANTS)))
+        }
+        InjectedEffect::RateRamp { channel, .. }
+        | InjectedEffect::BiasStep { channel, .. }
+        | InjectedEffect::Temperature { channel, .. }
+        | InjectedEffect::Supply { channel, .. } => {
+            let Some((values, places)) = waveform(effect, recording) else { return of_size };
+            let values: Vec<f64> = values.iter().map(|value| size(effect) * value).collect();
+            of_size.min(of_z(waveform_test(&in_channel(channel)).ratio(&values), required_ratio(places)))
+        }
+        // None of the rarest spikes may fall into the record.
+        InjectedEffect::Spikes { rate_per_hour, .. } => {
+            of_size.min((rate_per_hour * recording.seconds / 3600.0 / smallest_count(0.0)).sqrt())
+        }
+        InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => of_size.sqrt(),
+        _ => of_size,
+    }
+}
 
 /// Size at the detection limit of an effect with the parameters of `unit`, beside the effects `others`.
 pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
@@ -92,20 +125,15 @@ pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, ot
             // The size of a filter is fixed at 1; this limit makes its strength the ratio of `z` to the required one.
             (required_ratio(1.0) / ratio_against_baseline(&place, None, truth)).sqrt()
         }
-        InjectedEffect::RateRamp { channel, .. } => {
-            smallest_waveform(1.0, &in_channel(channel), |block| block as f64 * block_s(record))
-        }
-        InjectedEffect::BiasStep { channel, time_s, .. } => {
-            let at = time_s / block_s(record);
-            smallest_waveform(TIMES, &in_channel(channel), |block| (1.0 - (at - block as f64)).clamp(0.0, 1.0))
-        }
-        InjectedEffect::Temperature { channel, .. } => {
-            let [means, _] = environment_means(&recording.environment(recording.samples()));
-            smallest_waveform(1.0, &in_channel(channel), |block| means[block])
-        }
-        InjectedEffect::Supply { channel, .. } => {
-            let [_, means] = environment_means(&recording.environment(recording.samples()));
-            smallest_waveform(1.0, &in_channel(channel), |block| means[block])
+        InjectedEffect::RateRamp { channel, .. }
+        | InjectedEffect::BiasStep { channel, .. }
+        | InjectedEffect::Temperature { channel, .. }
+        | InjectedEffect::Supply { channel, .. } => {
+            let Some((values, places)) = waveform(unit, recording) else { return f64::INFINITY };
+            let test = waveform_test(&in_channel(channel));
+            solve_size(required_ratio(places), |size| {
+                test.ratio(&values.iter().map(|value| size * value).collect::<Vec<f64>>())
+            })
         }
         InjectedEffect::Acceleration { channel, .. } => {
             let (place, motion) = (in_channel(channel), recording.scenario.environment.motion);
@@ -156,13 +184,21 @@ fn smallest_deviation(
 ) -> f64 {
     // The search is for the ratio to the white noise of a sample, to begin near the result.
     let white = place.noise.angle_random_walk / place.record.period_s.sqrt();
-    let ratio = |relative: f64| {
-        let square = (relative * white).powi(2);
-        let truth =
-            |frequency: f64| place.density(frequency) + square * place.gain(frequency) * unit_density(frequency);
-        ratio_against_baseline(place, peak, truth)
-    };
+    let ratio = |relative: f64| ratio_of_process(place, peak, relative * white, &unit_density);
     white * solve_size(required_ratio(places), ratio)
+}
+
+/// Expected log likelihood ratio of such a process of standard deviation `deviation`.
+fn ratio_of_process(
+    place: &ChannelUnderTest<'_>,
+    peak: Option<(f64, f64)>,
+    deviation: f64,
+    unit_density: impl Fn(f64) -> f64,
+) -> f64 {
+    let truth = |frequency: f64| {
+        place.density(frequency) + deviation * deviation * place.gain(frequency) * unit_density(frequency)
+    };
+    ratio_against_baseline(place, peak, truth)
 }
 
 fn ratio_against_baseline(place: &ChannelUnderTest<'_>, peak: Option<(f64, f64)>, truth: impl Fn(f64) -> f64) -> f64 {
@@ -259,10 +295,26 @@ pub(super) fn smallest_count(by_chance: f64) -> f64 {
     if fewest == 1 { LN_2 } else { fewest as f64 - 1.0 / 3.0 - by_chance }
 }
 
-/// Size at the limit of a waveform that has the block means `unit` for a size of 1 and could be at `places` places.
-fn smallest_waveform(places: f64, place: &ChannelUnderTest<'_>, unit: impl Fn(usize) -> f64) -> f64 {
-    let values: Vec<f64> = (0..BLOCKS).map(unit).collect();
-    (required_ratio(places) / ratio_of_block_means(&values, place)).sqrt()
+/// Block means of a slow drift of size 1, with the number of places where it could be; `None` of other effects.
+fn waveform(effect: &InjectedEffect, recording: &TrueRecording) -> Option<(Vec<f64>, f64)> {
+    let block_s = block_s(RecordLength::new(recording));
+    let of_environment = || environment_means(&recording.environment(recording.samples()));
+    match effect {
+        InjectedEffect::RateRamp { .. } => Some(((0..BLOCKS).map(|block| block as f64 * block_s).collect(), 1.0)),
+        InjectedEffect::BiasStep { time_s, .. } => {
+            let at = time_s / block_s;
+            Some(((0..BLOCKS).map(|block| (1.0 - (at - block as f64)).clamp(0.0, 1.0)).collect(), TIMES))
+        }
+        InjectedEffect::Temperature { .. } => {
+            let [means, _] = of_environment();
+            Some((means, 1.0))
+        }
+        InjectedEffect::Supply { .. } => {
+            let [_, means] = of_environment();
+            Some((means, 1.0))
+        }
+        _ => None,
+    }
 }
 
 /// Length of a block, s.
@@ -270,8 +322,8 @@ fn block_s(record: RecordLength) -> f64 {
     record.seconds / BLOCKS as f64
 }
 
-/// Expected log likelihood ratio of the block means `values` against a constant, in noise of known covariance.
-pub(super) fn ratio_of_block_means(values: &[f64], place: &ChannelUnderTest<'_>) -> f64 {
+/// The test of a slow drift in this channel.
+pub(super) fn waveform_test(place: &ChannelUnderTest<'_>) -> WaveformTest {
     let rounding = place.resolution().powi(2) / 12.0 * place.record.period_s;
     let processes: Vec<(f64, f64)> = place.processes().collect();
     let noise = BlockNoise {
@@ -280,5 +332,5 @@ pub(super) fn ratio_of_block_means(values: &[f64], place: &ChannelUnderTest<'_>)
         walk: place.noise.rate_random_walk,
         processes: &processes,
     };
-    ratio_of_waveform(values, BlockNoises::new(place.record.seconds).covariance(&noise))
+    WaveformTest::new(&noise, squares(place.noise), &BlockNoises::new(place.record.seconds))
 }

@@ -4,8 +4,8 @@
 //! sometimes a motion. The analysis must not report these as effects, and must find those effects that depend on them.
 
 use super::channel_under_test::{ChannelUnderTest, RecordLength};
-use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size};
-use super::effect::{EffectKind, GYROS, draw_unit, scaled, size};
+use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size, strength};
+use super::effect::{EffectKind, GYROS, draw_unit, scaled};
 use super::environment::log_uniform;
 use super::generator::TrueRecording;
 use super::outside::{OutsideEffect, OutsideKind};
@@ -136,9 +136,10 @@ impl DrawnRecording {
     }
 }
 
-/// Effects of `kinds`, each in a channel from `channel`, with their strengths: size over the detection limit beside the
-/// other effects. The strength of an effect beside the effects before it is drawn from `range`, as far as the size of its
-/// kind has no upper limit. Sets with a strength below `at_least` are drawn again.
+/// Effects of `kinds`, each in a channel from `channel`, with their strengths beside the other effects. The strength of an effect
+/// beside the effects before it is drawn from `range`, as far as the size of its kind has no upper limit. Sets with a strength
+/// below `at_least` are drawn again, and those of which an effect is in a channel whose noise is below a count: no detection limit
+/// holds there.
 fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
@@ -157,9 +158,13 @@ fn draw_effects(
             let limit = smallest_size(&unit, recording, &effects);
             effects.push(with_strength(unit, strength, limit, recording));
         }
-        let strengths = (0..effects.len()).map(|at| strength(&effects, at, recording)).collect();
+        let strengths = (0..effects.len()).map(|at| strength_beside(&effects, at, recording)).collect();
+        let is_rounded = effects
+            .iter()
+            .flat_map(InjectedEffect::channels)
+            .any(|&channel| ChannelUnderTest::new(recording, channel, &effects).is_below_a_count());
         drawn = (effects, strengths);
-        if drawn.1.iter().all(|strength| *strength >= at_least) {
+        if !is_rounded && drawn.1.iter().all(|strength| *strength >= at_least) {
             break;
         }
     }
@@ -167,10 +172,10 @@ fn draw_effects(
 }
 
 /// Strength of the effect at the index `at` beside the others.
-fn strength(effects: &[InjectedEffect], at: usize, recording: &TrueRecording) -> f64 {
+fn strength_beside(effects: &[InjectedEffect], at: usize, recording: &TrueRecording) -> f64 {
     let others: Vec<InjectedEffect> =
         effects.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, effect)| effect.clone()).collect();
-    size(&effects[at]) / smallest_size(&effects[at], recording, &others)
+    strength(&effects[at], recording, &others)
 }
 
 /// `unit` at `strength` times `limit`, or at the largest size of its kind.

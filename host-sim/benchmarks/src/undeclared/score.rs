@@ -167,12 +167,21 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
         .filter_map(|channel| Some((channel, report.channels.iter().find(|of| of.name == channel.name())?)))
         .collect();
     let effects = &drawn.simulation.scenario.effects;
+    let is_below_a_count = |channel: Channel| {
+        let output = simulation::output_register(channel);
+        ChannelUnderTest::new(&drawn.simulation, output, effects).is_below_a_count()
+    };
     let answers = drawn
         .kinds
         .iter()
         .zip(effects)
         .zip(&drawn.strengths)
-        .map(|((&kind, effect), &strength)| score_effect(kind, effect, strength, &scored))
+        .map(|((&kind, effect), &strength)| {
+            // Counts that seldom change do not show a filter.
+            let is_shown = |channel: Channel| kind != EffectKind::FilterBandwidth || !is_below_a_count(channel);
+            let shown = scored.iter().filter(|(channel, _)| shows_in(effect, *channel) && is_shown(*channel));
+            score_effect(kind, strength, &shown.map(|(_, report)| *report).collect::<Vec<_>>())
+        })
         .collect();
     let outside = drawn.simulation.outside.first();
     let is_true = |channel: Channel, kind: &str| {
@@ -181,13 +190,9 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
         let is_unexplained = kind == UNEXPLAINED
             && (outside.is_some_and(|effect| simulation::channel(effect.channel()) == channel)
                 || effects.iter().any(|effect| shows_in(effect, channel)));
-        let is_below_a_count = kind == "noise_below_count" && {
-            let output = simulation::output_register(channel);
-            ChannelUnderTest::new(&drawn.simulation, output, effects).is_below_a_count()
-        };
         is_lost
             || is_unexplained
-            || is_below_a_count
+            || (kind == "noise_below_count" && is_below_a_count(channel))
             || effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel))
     };
     let false_alarms = scored
@@ -218,16 +223,9 @@ fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
     effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }
 
-/// An effect counts as named if the report lists it in at least half of its channels; dropped and repeated samples and the
-/// sample clock count as named if they are listed in one channel.
-fn score_effect(
-    kind: EffectKind,
-    effect: &InjectedEffect,
-    strength: f64,
-    scored: &[(Channel, &ChannelReport)],
-) -> EffectScore {
-    let affected: Vec<&ChannelReport> =
-        scored.iter().filter(|(channel, _)| shows_in(effect, *channel)).map(|(_, report)| *report).collect();
+/// An effect counts as named if the report lists it in at least half of the channels that it affects; dropped and repeated samples
+/// and the sample clock count as named if they are listed in one channel.
+fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) -> EffectScore {
     let listing = affected.iter().filter(|report| report.effects.iter().any(|found| found.kind == kind.name())).count();
     let once = matches!(kind, EffectKind::DroppedSamples | EffectKind::RepeatedSamples | EffectKind::SampleClock);
     let named = listing >= if once { 1 } else { affected.len().div_ceil(2).max(1) };

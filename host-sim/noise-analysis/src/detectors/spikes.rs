@@ -256,7 +256,7 @@ impl Interpolation {
         let errors = self.errors(series, &values);
         let mut candidates: Vec<usize> = (0..errors.len()).filter(|&at| errors[at].abs() > threshold).collect();
         candidates.sort_by(|a, b| errors[*b].abs().total_cmp(&errors[*a].abs()));
-        let (mut spikes, mut jumps) = (Vec::new(), 0);
+        let (mut spikes, mut jumps) = (Vec::<Spike>::new(), 0);
         let mut partial = BTreeMap::new();
         for position in candidates {
             // Again, because a larger spike nearby may have been removed.
@@ -266,7 +266,9 @@ impl Interpolation {
             }
             let mean = |from: usize| values[from..from + REACH].iter().sum::<f64>() / REACH as f64;
             if (mean(position + 1) - mean(position - REACH)).abs() > SETTLED * error.abs() {
-                jumps += 1;
+                // What a filter spreads over the neighbours of a spike is no jump.
+                let is_part = |spike: &Spike| spike.position.abs_diff(position) <= REACH;
+                jumps += usize::from(!spikes.iter().any(is_part));
                 continue;
             }
             Arc::make_mut(&mut values)[position] -= error;
