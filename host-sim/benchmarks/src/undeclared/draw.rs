@@ -5,7 +5,7 @@
 
 use super::channel_under_test::{ChannelUnderTest, RecordLength};
 use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size, strength};
-use super::effect::{EffectKind, GYROS, draw_unit, scaled};
+use super::effect::{EffectKind, GYROS, draw_unit, scaled, size};
 use super::environment::log_uniform;
 use super::generator::TrueRecording;
 use super::outside::{OutsideEffect, OutsideKind};
@@ -35,6 +35,8 @@ const LARGEST_FRACTION: f64 = 0.02;
 const LARGEST_SENSITIVITIES: [f64; 3] = [0.3, 9.6, 1.5];
 /// Largest relative error of the sample clock.
 const LARGEST_CLOCK_ERROR: f64 = 0.01;
+/// Largest size of an effect in counts, a tenth of the output's range: what no test sees at any size is not hidden at all sizes.
+const LARGEST_COUNTS: f64 = 819.2;
 /// Number of draws after which a set of effects is accepted although an effect is too weak.
 const DRAWS: usize = 100;
 
@@ -138,8 +140,8 @@ impl DrawnRecording {
 
 /// Effects of `kinds`, each in a channel from `channel`, with their strengths beside the other effects. The strength of an effect
 /// beside the effects before it is drawn from `range`, as far as the size of its kind has no upper limit. Sets with a strength
-/// below `at_least` are drawn again, and those of which an effect is in a channel whose noise is below a count: no detection limit
-/// holds there.
+/// below `at_least` are drawn again, and those of which an effect is in a channel whose noise is below a count, as no detection limit
+/// holds there, or is larger than [`LARGEST_COUNTS`].
 fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
@@ -159,16 +161,34 @@ fn draw_effects(
             effects.push(with_strength(unit, strength, limit, recording));
         }
         let strengths = (0..effects.len()).map(|at| strength_beside(&effects, at, recording)).collect();
-        let is_rounded = effects
-            .iter()
-            .flat_map(InjectedEffect::channels)
-            .any(|&channel| ChannelUnderTest::new(recording, channel, &effects).is_below_a_count());
+        let is_outside = effects.iter().any(|effect| {
+            let place = |&channel: &OutputRegister| ChannelUnderTest::new(recording, channel, &effects);
+            let is_large = |place: &ChannelUnderTest<'_>| {
+                largest_change(effect, recording.seconds) > LARGEST_COUNTS * place.resolution()
+            };
+            effect.channels().iter().map(place).any(|place| place.is_below_a_count() || is_large(&place))
+        });
         drawn = (effects, strengths);
-        if !is_rounded && drawn.1.iter().all(|strength| *strength >= at_least) {
+        if !is_outside && drawn.1.iter().all(|strength| *strength >= at_least) {
             break;
         }
     }
     drawn
+}
+
+/// By how much an effect changes the output by its size alone, in the unit of the channel; 0 of those with sizes in other units.
+fn largest_change(effect: &InjectedEffect, seconds: f64) -> f64 {
+    match effect {
+        InjectedEffect::RateRamp { .. } => size(effect) * seconds,
+        InjectedEffect::Sinusoid { .. }
+        | InjectedEffect::Resonance { .. }
+        | InjectedEffect::Markov { .. }
+        | InjectedEffect::Telegraph { .. }
+        | InjectedEffect::CommonMode { .. }
+        | InjectedEffect::Spikes { .. }
+        | InjectedEffect::BiasStep { .. } => size(effect),
+        _ => 0.0,
+    }
 }
 
 /// Strength of the effect at the index `at` beside the others.
