@@ -35,11 +35,8 @@ const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
 const MIN_NOISE: f64 = 1e-6;
 /// A line wider than this part of its frequency may be an error of the form of the background.
 const BROAD: f64 = 0.1;
-/// A line of several peaks whose bandwidth times the length of the record is below this is treated as a sinusoid.
+/// A line whose bandwidth times the length of the record is below this is treated as a sinusoid.
 const MIN_PHASE_CHANGES: f64 = 30.0;
-/// The same of a single peak, whose spectrum is more likely that of a resonance: it has fifty correlation times in the record. The
-/// lines of a motor that is switched on and off, in the measured recordings, have up to fifteen phase changes.
-const MIN_PHASE_CHANGES_OF_PEAK: f64 = 16.0;
 /// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
 const MIN_OWN_DEVIATION: f64 = 0.5;
 /// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
@@ -66,8 +63,6 @@ pub(crate) struct MergedLine {
     pub shape_p_value: f64,
     /// How the amplitude or the phase of the strongest peak changes to and fro.
     pub modulation: Option<spectra::Modulation>,
-    /// Whether it is a single peak.
-    is_single: bool,
     duration_s: f64,
 }
 
@@ -251,7 +246,6 @@ impl MergedLine {
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
             modulation: sidebands(peaks, duration_s).or(strongest.modulation),
-            is_single: peaks.len() == 1,
             duration_s,
         }
     }
@@ -298,8 +292,7 @@ impl MergedLine {
     /// The model's term for the line: a sinusoid, or a resonance if it is wider than the record resolves.
     pub(crate) fn kind(&self) -> NoiseTerm {
         let (frequency, bandwidth) = (self.frequency.value, self.width.value);
-        let least = if self.is_single { MIN_PHASE_CHANGES_OF_PEAK } else { MIN_PHASE_CHANGES };
-        if bandwidth * self.duration_s < least {
+        if bandwidth * self.duration_s < MIN_PHASE_CHANGES {
             NoiseTerm::Sinusoid(Sinusoid { frequency })
         } else {
             NoiseTerm::Resonance(Resonance { frequency, bandwidth })

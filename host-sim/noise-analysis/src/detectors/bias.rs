@@ -12,10 +12,13 @@ use super::noise_grid::{NoiseGrid, NoiseGrids};
 use super::thermal_response::{self, Lag, TemperatureCourse};
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::distributions::NORMAL_975;
-use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::findings::{Detection, Effect, Parameter};
 use crate::series::Series;
 use nalgebra::DVector;
 
+/// Highest p-value of a ramp or a regressor. Three or four candidates are tried in each of six channels, so that about one
+/// recording in a hundred has a false one.
+pub(crate) const SIGNIFICANCE: f64 = 5e-4;
 /// Least fraction of a channel's samples that a regressor must have too.
 const LEAST_COMMON: f64 = 0.9;
 /// Largest number of candidates that are accepted.
@@ -169,7 +172,7 @@ fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
     means.max() - means.min() >= regressor.resolution
 }
 
-/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step with one below its own limit, the one that explains the data best beside those accepted before.
+/// Of the candidates with a p-value below their limit, the one that explains the data best beside those accepted before.
 fn best_candidate(
     series: &Series,
     blocks: &BlockMeans,
