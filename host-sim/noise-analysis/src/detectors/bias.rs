@@ -12,13 +12,10 @@ use super::noise_grid::{NoiseGrid, NoiseGrids};
 use super::thermal_response::{self, Lag, TemperatureCourse};
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::distributions::NORMAL_975;
-use crate::findings::{Detection, Effect, Parameter};
+use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
 use crate::series::Series;
 use nalgebra::DVector;
 
-/// Highest p-value of a ramp or a regressor. Three or four candidates are tried in each of six channels, so that about one
-/// recording in a hundred has a false one.
-pub(crate) const SIGNIFICANCE: f64 = 5e-4;
 /// Least fraction of a channel's samples that a regressor must have too.
 const LEAST_COMMON: f64 = 0.9;
 /// Largest number of candidates that are accepted.
@@ -159,7 +156,14 @@ fn find_on_common_samples(
             }
         }
     }
-    if let Some((_, course)) = &covariates.temperature {
+    if let Some((index, course)) = &covariates.temperature {
+        // A curved response has a sensitivity at the mean temperature, be it significant or not.
+        let beside = || {
+            let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
+            let (_, temperature) = covariates.regressors.iter().find(|(of, _)| of == index)?;
+            GlsRegression::new(&blocks, &grid, &known).estimate(temperature)
+        };
+        let linear = if squared.is_some() { linear.or_else(beside) } else { linear };
         let curved = squared.map(|estimate| course.squared_response(linear.as_ref(), &estimate, series.unit));
         let behind_lag = lagged.map(|(lag, estimate)| course.lag_response(lag, &estimate, series.unit));
         changes.responses.extend(behind_lag.or(curved));
@@ -172,7 +176,8 @@ fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
     means.max() - means.min() >= regressor.resolution
 }
 
-/// Of the candidates with a p-value below their limit, the one that explains the data best beside those accepted before.
+/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step with one below its own limit, the one that explains the data best
+/// beside those accepted before.
 fn best_candidate(
     series: &Series,
     blocks: &BlockMeans,
