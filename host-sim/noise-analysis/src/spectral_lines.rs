@@ -270,6 +270,7 @@ impl MergedLine {
         self.width.value > BROAD * self.frequency.value
     }
 
+    /// Whether the record resolves its width: whether that is at least the reciprocal of the length of the record.
     pub(crate) fn is_wider_than_resolution(&self) -> bool {
         self.width.value * self.duration_s >= 1.0
     }

@@ -250,7 +250,7 @@ pub(super) fn walk_amplitude(frequency: f64, sample_period: f64) -> f64 {
 
 /// Power gain of two cascaded averages over `taps` samples each (a Bartlett window), at a frequency whose phase in one sample has
 /// this `sine`.
-fn filter_gain(frequency: f64, sample_period: f64, taps: u32, sine: f64) -> f64 {
+pub(super) fn filter_gain(frequency: f64, sample_period: f64, taps: u32, sine: f64) -> f64 {
     if taps == 1 || sine == 0.0 {
         return 1.0;
     }

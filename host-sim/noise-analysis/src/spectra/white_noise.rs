@@ -13,7 +13,7 @@
 //! second white term behind a filter leaves `ln L` where it is (twice its rise is χ² of one or two degrees of freedom), and
 //! costs 2·ln n, about 20. A filter that halves the density at the highest frequency changes `ln L` by about 0.02·n.
 
-use super::smooth_shape::walk_amplitude;
+use super::smooth_shape::{filter_gain, walk_amplitude};
 use super::welch::Welch;
 use crate::findings::BoundedEstimate;
 use allan_core::{Model, NoiseTerm};
@@ -337,7 +337,5 @@ fn misfit(bands: &Bands, modelled: &DVector<f64>, parameters: usize) -> f64 {
 
 /// Power gain of two cascaded averages over `taps` samples each.
 fn bartlett_gain(frequency: f64, sample_period: f64, taps: u32) -> f64 {
-    let phase = PI * frequency * sample_period;
-    let (taps, sine) = (f64::from(taps), phase.sin());
-    if sine == 0.0 { 1.0 } else { ((taps * phase).sin() / (taps * sine)).powi(4) }
+    filter_gain(frequency, sample_period, taps, (PI * frequency * sample_period).sin())
 }
