@@ -7,14 +7,17 @@
 //! ```
 
 mod cause;
+mod harmonic_series;
+mod line;
 mod periodic;
 mod shares;
 mod validation;
+mod waveform;
 
 #[cfg(test)]
 mod tests;
 
-use crate::findings::{Effect, Finding, Validation};
+use crate::findings::{Effect, Finding, Parameter, Validation};
 use crate::report::ChannelReport;
 use cause::{Cause, Shown};
 use measurement::SensorProfile;
@@ -73,13 +76,16 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
     let mut causes = periodic::causes(channels, duration_s);
     let periodic = causes.len();
     for (channel, (unit, effects)) in channels.iter().enumerate() {
-        for effect in effects.iter().filter(|effect| !periodic::is_line(effect)) {
+        for effect in effects.iter().filter(|effect| !line::is_line(effect)) {
             if is_common_line(effect, channel, &causes[..periodic]) {
                 continue;
             }
             let is_same = |cause: &&mut Cause| {
                 let known = &cause.shown[0];
-                is_one_cause(&known.effect, channels[known.channel].0, effect, unit)
+                let is_known_here = cause.shown.iter().any(|shown| shown.channel == channel);
+                // Bands of one channel are two of them.
+                let is_other_band = is_known_here && effect.kind == "unexplained";
+                !is_other_band && is_one_cause(&known.effect, channels[known.channel].0, effect, unit)
             };
             let shown = Shown { channel, effect: effect.clone(), parts: vec![effect.clone()] };
             match causes.iter_mut().find(is_same) {
@@ -119,12 +125,18 @@ fn is_one_cause(a: &Effect, unit: &str, b: &Effect, other_unit: &str) -> bool {
         }
         _ => both("time").is_some_and(|(time, other)| time.low <= other.high && other.low <= time.high),
     };
+    // What has no name in several channels at one frequency.
+    let is_at_one_frequency = || {
+        let has = |of: &Parameter, value: f64| (of.low..=of.high).contains(&value);
+        a.kind == "unexplained"
+            && both("frequency").is_some_and(|(one, other)| has(one, other.value) && has(other, one.value))
+    };
     // A filter of the first order in one channel, and the filter of the part.
     let is_one_filter = a.parameters.contains_key("bandwidth") == b.parameters.contains_key("bandwidth");
     if ONCE.contains(&a.kind.as_str()) {
         return is_one_filter;
     }
-    (ONCE_A_UNIT.contains(&a.kind.as_str()) && unit == other_unit) || is_at_one_time()
+    (ONCE_A_UNIT.contains(&a.kind.as_str()) && unit == other_unit) || is_at_one_time() || is_at_one_frequency()
 }
 
 /// A cause as it is reported.

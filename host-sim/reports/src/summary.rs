@@ -273,8 +273,16 @@ pub fn unexplained(report: &Report) -> Option<String> {
         excesses: Vec<f64>,
     }
     let mut departures: Vec<Departure> = Vec::new();
-    for finding in report.findings.iter().filter(|finding| finding.kind == "unexplained") {
+    // Each channel has its own excess at the place of the finding.
+    let in_channels = |number: usize| {
+        let effects = report.channels.iter().flat_map(|channel| &channel.effects);
+        let shown = effects.filter(move |effect| effect.finding == number);
+        shown.filter_map(|effect| Some(effect.parameters.get("excess_percent")?.value))
+    };
+    let all = report.findings.iter().enumerate();
+    for (number, finding) in all.filter(|(_, finding)| finding.kind == "unexplained") {
         let (place, excess) = place_and_excess(finding);
+        let excesses = in_channels(number).chain(excess);
         let is_same_side = |of: &Departure| match (of.excesses.first(), excess) {
             (Some(first), Some(excess)) => first.signum() == excess.signum(),
             (first, excess) => first.is_none() && excess.is_none(),
@@ -284,12 +292,12 @@ pub fn unexplained(report: &Report) -> Option<String> {
         match known {
             Some(departure) => {
                 departure.channels.extend(finding.channels.iter().cloned());
-                departure.excesses.extend(excess);
+                departure.excesses.extend(excesses);
             }
             None => departures.push(Departure {
                 place,
                 channels: finding.channels.clone(),
-                excesses: excess.into_iter().collect(),
+                excesses: excesses.collect(),
             }),
         }
     }

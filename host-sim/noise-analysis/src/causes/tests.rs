@@ -82,6 +82,48 @@ fn a_modulated_square_wave_whose_third_harmonic_wanders_is_one_cause() {
 }
 
 #[test]
+fn a_modulated_square_wave_of_which_the_third_and_fifth_harmonic_show_a_sideband_is_one_cause() {
+    // As two measured records of 10,000 s have it: 0.5667 Hz, modulated at 0.1005 Hz, and a line of 0.6 Hz width far above, which
+    // lies at a multiple in any case.
+    let line = |frequency: f64, error: f64, width: f64, amplitude: f64| {
+        let parameters = [
+            ("frequency", parameter(frequency, error, "Hz")),
+            ("bandwidth", parameter(width, 0.3 * width, "Hz")),
+            ("deviation", parameter(amplitude / 2f64.sqrt(), 0.07 * amplitude, "g")),
+        ];
+        Effect::new("resonance", parameters, String::new())
+    };
+    let effects = vec![
+        line(0.56669, 1.2e-4, 0.0039, 9.7e-4),
+        line(0.46593, 2.3e-4, 0.0, 1.9e-4),
+        line(0.66746, 2.8e-4, 0.0031, 1.6e-4),
+        line(1.59869, 6.2e-4, 0.0094, 2.0e-4),
+        line(1.6976, 4.6e-4, 0.0079, 2.5e-4),
+        line(2.72628, 2.8e-4, 0.0, 1e-4),
+        line(20.36, 0.02, 0.6, 4e-3),
+    ];
+    let found = merged(&[("g", &effects)], 10_000.0);
+    let kinds: Vec<(&str, usize)> =
+        found.iter().map(|cause| (cause.shown[0].effect.kind.as_str(), cause.shown[0].parts.len())).collect();
+    assert_eq!(kinds, [("square_wave", 6), ("resonance", 1)]);
+    let evidence = &found[0].shown[0].effect.evidence;
+    assert!(evidence.starts_with("harmonics 1 and 3 with 4 sidebands"), "{evidence}");
+}
+
+#[test]
+fn bands_without_a_name_at_one_frequency_are_one_cause_in_several_channels() {
+    let band = |frequency: f64, error: f64| {
+        Effect::new("unexplained", [("frequency", parameter(frequency, error, "Hz"))], String::new())
+    };
+    let channels = [vec![band(9.95, 0.24), band(34.7, 0.1)], vec![band(9.97, 0.25)], vec![band(10.9, 0.26)]];
+    let found = causes(&channels);
+    let name = |channels: &[usize]| ("unexplained".to_owned(), channels.to_vec());
+    assert_eq!(found, [name(&[0, 1]), name(&[0]), name(&[2])]);
+    // Two bands of one channel are two.
+    assert_eq!(causes(&[vec![band(9.95, 0.24), band(9.97, 0.25)]]).len(), 2);
+}
+
+#[test]
 fn unrelated_lines_are_seldom_harmonics() {
     // A line in each of five channels, at frequencies that are drawn evenly over the logarithm from one over the length of the
     // record to 50 Hz, in 1,000 records. By the bound of the test 1 % of the records may have a series by chance; a binomial
