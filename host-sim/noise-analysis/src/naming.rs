@@ -379,8 +379,8 @@ fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &s
     temperature.into_iter().chain(supply).chain(acceleration).collect()
 }
 
-/// Whether a sensitivity of a channel may be one by what is known of the sensor: its interval reaches within the largest
-/// plausible multiple of the data sheet's.
+/// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value, the
+/// middle of its interval, is within the largest plausible multiple of the data sheet's, or the interval includes zero.
 fn is_plausible(
     profile: &SensorProfile,
     channel: ChannelProfile,
@@ -388,9 +388,11 @@ fn is_plausible(
     sensitivity: &Sensitivity,
 ) -> bool {
     let (low, high) = sensitivity.bounds();
-    let least = if low * high <= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
     let typical = channel.sensitivities.to(regressor);
-    typical.is_none_or(|typical| least <= profile.largest_sensitivity_multiple * typical)
+    let includes_zero = low * high <= 0.0;
+    typical.is_none_or(|typical| {
+        includes_zero || sensitivity.value.abs() <= profile.largest_sensitivity_multiple * typical
+    })
 }
 
 /// Drift that a channel shares with another one, too large to be caused by what that one measures.
