@@ -5,6 +5,7 @@
 
 use crate::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input_error::{InputError, Reason};
+use crate::read_ahead::ReadAhead;
 use crate::read_monitor::{Counted, ReadMonitor};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
@@ -19,7 +20,7 @@ const BUFFER_BYTES: usize = 1 << 16;
 /// An open file, read one line at a time.
 pub(crate) struct Lines {
     file: PathBuf,
-    input: BufReader<Box<dyn Read>>,
+    input: BufReader<Box<dyn Read + Send>>,
     line: u64,
     bytes: Vec<u8>,
     /// Whether the line in `bytes` is read once more.
@@ -55,7 +56,11 @@ impl Lines {
         monitor.begin();
         let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
         let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
-        let bytes: Box<dyn Read> = if compressed { Box::new(GzipMembers::new(whole)) } else { Box::new(whole) };
+        let bytes: Box<dyn Read + Send> = if compressed {
+            Box::new(ReadAhead::new(GzipMembers::new(whole)).map_err(|e| fail(Reason::Io(e)))?)
+        } else {
+            Box::new(whole)
+        };
         let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
         Ok(Self {
             file: file.to_owned(),

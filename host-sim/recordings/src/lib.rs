@@ -28,6 +28,7 @@ mod named_arrays;
 mod numpy;
 pub mod numpy_matrix;
 mod quantizer;
+mod read_ahead;
 mod read_monitor;
 mod recorded_blocks;
 pub mod recorded_file;

@@ -10,6 +10,7 @@ use crate::count_stream::{self, CountStream};
 use crate::file_format::{FileFormat, InputFile};
 use crate::input_error::{InputError, Reason};
 use crate::quantizer::Quantizer;
+use crate::read_ahead::for_each_ahead;
 use crate::read_monitor::{ReadMonitor, ReadPass};
 use crate::recorded_blocks::RecordedBlocks;
 use crate::recording::Recording;
@@ -317,9 +318,7 @@ impl SampleStream {
             }
             Content::Counts(source) => {
                 let mut pass = open_counts(source, &self.monitor)?;
-                while let Some(block) = pass.next(&self.description.profile)? {
-                    take(block);
-                }
+                for_each_ahead(|| pass.next(&self.description.profile), take)?;
                 pass.is_stopped().then(|| pass.rows())
             }
             Content::Values(values) => {
@@ -328,9 +327,7 @@ impl SampleStream {
                 let known: Vec<ValueColumn> = columns.iter().map(|of| of.column.clone()).collect();
                 let quantizers: Vec<Option<Quantizer>> = columns.iter().map(|of| of.quantizer).collect();
                 let mut off_step = vec![false; columns.len()];
-                while let Some(rows) = pass.next()? {
-                    take(rows.into_block(&known, &quantizers, &mut off_step));
-                }
+                for_each_ahead(|| pass.next(), |rows| take(rows.into_block(&known, &quantizers, &mut off_step)))?;
                 let stopped_at = pass.is_stopped().then(|| pass.rows());
                 if stopped_at.is_none() && off_step.contains(&true) {
                     for (of, _) in columns.iter_mut().zip(&off_step).filter(|(_, off_step)| **off_step) {

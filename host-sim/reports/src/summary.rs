@@ -294,11 +294,9 @@ pub fn unexplained(report: &Report) -> Option<String> {
                 departure.channels.extend(finding.channels.iter().cloned());
                 departure.excesses.extend(excesses);
             }
-            None => departures.push(Departure {
-                place,
-                channels: finding.channels.clone(),
-                excesses: excesses.collect(),
-            }),
+            None => {
+                departures.push(Departure { place, channels: finding.channels.clone(), excesses: excesses.collect() })
+            }
         }
     }
     let mut text = String::new();

@@ -1,0 +1,161 @@
+//! The next part of a file is made ready on another thread while the caller works on this one.
+
+use std::io::{self, ErrorKind, Read};
+use std::panic::resume_unwind;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::{self, JoinHandle};
+
+/// Bytes of a part.
+const PART_BYTES: usize = 1 << 16;
+/// Parts that wait for the caller.
+const PARTS_AHEAD: usize = 4;
+
+/// Bytes that another thread reads ahead, such as those of a decoder.
+pub(crate) struct ReadAhead {
+    parts: Receiver<io::Result<Vec<u8>>>,
+    /// `None` after the end.
+    thread: Option<JoinHandle<()>>,
+    part: Vec<u8>,
+    /// Bytes of the part that were read.
+    read: usize,
+}
+
+impl ReadAhead {
+    /// Begins to read `input`, until its end, an error, or the end of this reader.
+    ///
+    /// # Errors
+    /// The system has no thread left.
+    pub(crate) fn new(mut input: impl Read + Send + 'static) -> io::Result<Self> {
+        let (send, parts) = sync_channel(PARTS_AHEAD);
+        let read_all = move || {
+            loop {
+                let mut part = vec![0; PART_BYTES];
+                let (count, error) = fill(&mut input, &mut part);
+                part.truncate(count);
+                let is_wanted = send.send(Ok(part)).is_ok();
+                if let Some(error) = error {
+                    // There is nothing to do for a caller that is gone.
+                    let _ = send.send(Err(error));
+                }
+                if count < PART_BYTES || !is_wanted {
+                    return;
+                }
+            }
+        };
+        let thread = Some(thread::Builder::new().spawn(read_all)?);
+        Ok(Self { parts, thread, part: Vec::new(), read: 0 })
+    }
+}
+
+/// Reads until `buffer` is full, the input ends or fails: how many bytes, and the error.
+fn fill(input: &mut impl Read, buffer: &mut [u8]) -> (usize, Option<io::Error>) {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match input.read(&mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return (filled, Some(error)),
+        }
+    }
+    (filled, None)
+}
+
+impl Read for ReadAhead {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while self.read == self.part.len() {
+            match self.parts.recv() {
+                Ok(part) => (self.part, self.read) = (part?, 0),
+                Err(_) => {
+                    // The input has ended. A panic of its reader is passed on to the caller.
+                    self.thread.take().map_or(Ok(()), JoinHandle::join).unwrap_or_else(|panic| resume_unwind(panic));
+                    return Ok(0);
+                }
+            }
+        }
+        let count = (&self.part[self.read..]).read(buffer)?;
+        self.read += count;
+        Ok(count)
+    }
+}
+
+/// Calls `take` with each of the items that `next` gives, while another thread makes the next one.
+pub(crate) fn for_each_ahead<T: Send, E: Send>(
+    mut next: impl FnMut() -> Result<Option<T>, E> + Send,
+    take: impl FnMut(T),
+) -> Result<(), E> {
+    let (send, items) = sync_channel(1);
+    thread::scope(|scope| {
+        let reader = scope.spawn(move || {
+            while let Some(item) = next()? {
+                if send.send(item).is_err() {
+                    break;
+                }
+            }
+            Ok(())
+        });
+        items.into_iter().for_each(take);
+        reader.join().unwrap_or_else(|panic| resume_unwind(panic))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gives `count` bytes, a few at a time, and then an error.
+    struct Damaged {
+        given: usize,
+        count: usize,
+    }
+
+    impl Read for Damaged {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            if self.given == self.count {
+                return Err(ErrorKind::InvalidInput.into());
+            }
+            let count = buffer.len().min(1000).min(self.count - self.given);
+            buffer[..count].iter_mut().zip(self.given..).for_each(|(byte, at)| *byte = at as u8);
+            self.given += count;
+            Ok(count)
+        }
+    }
+
+    #[test]
+    fn all_bytes_before_an_error_are_read_and_then_the_error() {
+        for count in [0, 1, PART_BYTES, 10 * PART_BYTES + 7] {
+            let mut bytes = Vec::new();
+            let error = ReadAhead::new(Damaged { given: 0, count }).unwrap().read_to_end(&mut bytes).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::InvalidInput);
+            assert_eq!(bytes, (0..count).map(|at| at as u8).collect::<Vec<u8>>());
+        }
+    }
+
+    #[test]
+    fn a_reader_that_is_not_read_to_its_end_ends_its_thread() {
+        let (ended, wait) = sync_channel::<()>(1);
+        struct Endless(#[expect(dead_code, reason = "dropped with the thread")] std::sync::mpsc::SyncSender<()>);
+        impl Read for Endless {
+            fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+                Ok(buffer.len())
+            }
+        }
+        let mut reader = ReadAhead::new(Endless(ended)).unwrap();
+        reader.read_exact(&mut [0; 10]).unwrap();
+        drop(reader);
+        // The sender is dropped with the thread's input.
+        assert!(wait.recv().is_err());
+    }
+
+    #[test]
+    fn items_arrive_in_their_order_and_an_error_ends_them() {
+        let mut number = 0;
+        let mut taken = Vec::new();
+        let next = || {
+            number += 1;
+            if number > 100 { Err("damaged") } else { Ok(Some(number)) }
+        };
+        assert_eq!(for_each_ahead(next, |item| taken.push(item)), Err("damaged"));
+        assert_eq!(taken, (1..=100).collect::<Vec<i32>>());
+    }
+}
