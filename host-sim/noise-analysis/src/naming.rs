@@ -3,6 +3,7 @@
 
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES, filter_length_s, line_frequency};
 use crate::detectors::random_telegraph::is_reversible;
+use crate::distributions::quantile;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
@@ -30,10 +31,16 @@ const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
 const WIDEST_BAND: f64 = 2.0;
+/// Least bandwidth of a resonance of few phase changes in the record, in units of its frequency: that of a damping ratio of half a
+/// percent. The speed of the motor in the measured recordings wanders by a third of that.
+const NARROWEST_BAND: f64 = 0.01;
 /// Largest excess kurtosis of a telegraph signal that the curve alone shows, in units of that of two equally frequent levels. A
 /// signal that is at one level for a part `p` of the time has `(1/(p·(1−p)) − 2)/2` times as much at averaging times below its
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
 const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
+/// How many times as likely a Gaussian process is as a telegraph signal, where it is named: a probability of 95 % where the two are as
+/// frequent.
+const TOLD_APART: f64 = 19.0;
 /// Variance of the rounding error, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -146,6 +153,16 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
                 Some(kurtosis) if kurtosis.is_telegraph() => {
                     effects.push(telegraph_effect(term, found, &kurtosis, unit, period_s));
                 }
+                Some(kurtosis) if !is_gaussian(&kurtosis) => {
+                    let what = format!(
+                        "with the spectrum of a process that forgets within {} s: its excess kurtosis, {:.1} ± {:.1} times that of a \
+                         telegraph signal, does not tell whether that has two levels",
+                        seconds(markov.time_constant),
+                        kurtosis.ratio,
+                        kurtosis.error,
+                    );
+                    effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
+                }
                 _ => effects.push(term_effect(term, found, unit, period_s)),
             },
             _ => effects.push(term_effect(term, found, unit, period_s)),
@@ -157,6 +174,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     effects.extend(in_spectrum);
     effects.retain(|effect| is_shown(effect, duration_s));
     effects
+}
+
+/// Whether a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
+fn is_gaussian(kurtosis: &KurtosisRatio) -> bool {
+    (0.5 - kurtosis.ratio) / kurtosis.error.powi(2) > TOLD_APART.ln()
 }
 
 /// Kurtosis of a Markov term of the model. That of the curve of a channel with covariates is theirs as well, such as that of a
@@ -379,16 +401,17 @@ fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &s
     temperature.into_iter().chain(supply).chain(acceleration).collect()
 }
 
-/// Whether a sensitivity of a channel may be one by what is known of the sensor: its interval reaches within the largest
-/// plausible multiple of the data sheet's.
+/// Whether a sensitivity of a channel may be one by what is known of the sensor: that it is within the largest plausible multiple
+/// of the data sheet's has a probability above [`SIGNIFICANCE`].
 fn is_plausible(
     profile: &SensorProfile,
     channel: ChannelProfile,
     regressor: Quantity,
     sensitivity: &Sensitivity,
 ) -> bool {
-    let (low, high) = sensitivity.bounds();
-    let least = if low * high <= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+    // Half of the 95 % interval is 1.96 standard deviations, which Student's distribution has widened.
+    let half = quantile(0.5 * SIGNIFICANCE) * sensitivity.error;
+    let least = (sensitivity.value.abs() - half).max(0.0);
     let typical = channel.sensitivities.to(regressor);
     typical.is_none_or(|typical| least <= profile.largest_sensitivity_multiple * typical)
 }
@@ -429,7 +452,15 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &str) -> Effect {
     if let Some(modulation) = &line.modulation {
         return modulated_line(line, modulation);
     }
-    let (kind, root) = (line.kind(), 2f64.sqrt());
+    // To the curve a line of a few phase changes in the record is a sinusoid; the spectrum tells it from one.
+    let is_band = line.is_resonance && line.width.value > NARROWEST_BAND * line.frequency.value;
+    let kind = match line.kind() {
+        NoiseTerm::Sinusoid(Sinusoid { frequency }) if is_band => {
+            NoiseTerm::Resonance(Resonance { frequency, bandwidth: line.width.value })
+        }
+        kind => kind,
+    };
+    let root = 2f64.sqrt();
     let parameters = match kind {
         NoiseTerm::Resonance(_) => {
             vec![("deviation", normal_bounds(line.deviation, unit)), ("bandwidth", normal_bounds(line.width, "Hz"))]
@@ -557,4 +588,23 @@ fn filter_meaning(filter: &MovingAverageFilter, internal_rate_hz: f64) -> String
         filter.decimation,
         internal_rate_hz / filter.decimation,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_gaussian;
+    use allan_core::telegraph::KurtosisRatio;
+
+    /// The ratio of two normal densities of one deviation, written out.
+    #[test]
+    fn a_gaussian_process_is_named_where_it_is_nineteen_times_as_likely() {
+        let likelihood = |ratio: f64, error: f64, truth: f64| (-0.5 * ((ratio - truth) / error).powi(2)).exp();
+        for error in [0.05, 0.1, 0.3, 1.0, 30.0] {
+            for ratio in [-0.5, 0.0, 0.2, 0.45, 0.5, 1.0] {
+                let (gaussian, telegraph) = (likelihood(ratio, error, 0.0), likelihood(ratio, error, 1.0));
+                let expected = gaussian > 19.0 * telegraph || (gaussian == 0.0 && ratio < 0.5);
+                assert_eq!(is_gaussian(&KurtosisRatio { ratio, error }), expected, "{ratio} {error}");
+            }
+        }
+    }
 }

@@ -63,6 +63,8 @@ pub(crate) struct MergedLine {
     pub shape_p_value: f64,
     /// How the amplitude or the phase of the strongest peak changes to and fro.
     pub modulation: Option<spectra::Modulation>,
+    /// Whether the strongest peak is likelier a resonance than a sinusoid.
+    pub is_resonance: bool,
     duration_s: f64,
 }
 
@@ -246,6 +248,7 @@ impl MergedLine {
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
             modulation: sidebands(peaks, duration_s).or(strongest.modulation),
+            is_resonance: strongest.width.is_some(),
             duration_s,
         }
     }
