@@ -3,7 +3,6 @@
 
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES, filter_length_s, line_frequency};
 use crate::detectors::random_telegraph::is_reversible;
-use crate::distributions::quantile;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
@@ -31,9 +30,6 @@ const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
 const WIDEST_BAND: f64 = 2.0;
-/// Least bandwidth of a resonance of few phase changes in the record, in units of its frequency: that of a damping ratio of half a
-/// percent. The speed of the motor in the measured recordings wanders by a third of that.
-const NARROWEST_BAND: f64 = 0.01;
 /// Largest excess kurtosis of a telegraph signal that the curve alone shows, in units of that of two equally frequent levels. A
 /// signal that is at one level for a part `p` of the time has `(1/(p·(1−p)) − 2)/2` times as much at averaging times below its
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
@@ -401,17 +397,16 @@ fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &s
     temperature.into_iter().chain(supply).chain(acceleration).collect()
 }
 
-/// Whether a sensitivity of a channel may be one by what is known of the sensor: that it is within the largest plausible multiple
-/// of the data sheet's has a probability above [`SIGNIFICANCE`].
+/// Whether a sensitivity of a channel may be one by what is known of the sensor: its interval reaches within the largest
+/// plausible multiple of the data sheet's.
 fn is_plausible(
     profile: &SensorProfile,
     channel: ChannelProfile,
     regressor: Quantity,
     sensitivity: &Sensitivity,
 ) -> bool {
-    // Half of the 95 % interval is 1.96 standard deviations, which Student's distribution has widened.
-    let half = quantile(0.5 * SIGNIFICANCE) * sensitivity.error;
-    let least = (sensitivity.value.abs() - half).max(0.0);
+    let (low, high) = sensitivity.bounds();
+    let least = if low * high <= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
     let typical = channel.sensitivities.to(regressor);
     typical.is_none_or(|typical| least <= profile.largest_sensitivity_multiple * typical)
 }
@@ -453,9 +448,8 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &str) -> Effect {
         return modulated_line(line, modulation);
     }
     // To the curve a line of a few phase changes in the record is a sinusoid; the spectrum tells it from one.
-    let is_band = line.is_resonance && line.width.value > NARROWEST_BAND * line.frequency.value;
     let kind = match line.kind() {
-        NoiseTerm::Sinusoid(Sinusoid { frequency }) if is_band => {
+        NoiseTerm::Sinusoid(Sinusoid { frequency }) if line.is_band() => {
             NoiseTerm::Resonance(Resonance { frequency, bandwidth: line.width.value })
         }
         kind => kind,
