@@ -8,7 +8,7 @@ pub const HOST_CLOCK_ERROR: f64 = 20e-6;
 pub(crate) const SAMPLE_RATE_ERROR: f64 = 5e-5;
 /// The data sheet states what is typical; single parts, and their mounting, are up to ten times worse. Half an order of
 /// magnitude beyond that, √10·10, no such part is known.
-pub(crate) const LARGEST_SENSITIVITY_MULTIPLE: f64 = 30.0;
+pub(crate) const LARGEST_SENSITIVITY_MULTIPLE: f64 = 31.622_776_601_683_79;
 /// Noise of 0.45 counts rounds like white noise.
 pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.2;
 /// Ratio of the sensor's nominal clock to a sample rate up to which both may be the same clock: a crystal-less oscillator is

@@ -34,6 +34,9 @@ const WIDEST_BAND: f64 = 2.0;
 /// signal that is at one level for a part `p` of the time has `(1/(p·(1−p)) − 2)/2` times as much at averaging times below its
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
 const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
+/// How many times as likely a Gaussian process is as a telegraph signal, where it is named: a probability of 95 % where the two are as
+/// frequent.
+const TOLD_APART: f64 = 19.0;
 /// Variance of the rounding error, in squares of the resolution.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -146,6 +149,16 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
                 Some(kurtosis) if kurtosis.is_telegraph() => {
                     effects.push(telegraph_effect(term, found, &kurtosis, unit, period_s));
                 }
+                Some(kurtosis) if !is_gaussian(&kurtosis) => {
+                    let what = format!(
+                        "with the spectrum of a process that forgets within {} s: its excess kurtosis, {:.1} ± {:.1} times that of a \
+                         telegraph signal, does not tell whether that has two levels",
+                        seconds(markov.time_constant),
+                        kurtosis.ratio,
+                        kurtosis.error,
+                    );
+                    effects.push(unexplained_octave(found, &fit.covariates.curve, &what));
+                }
                 _ => effects.push(term_effect(term, found, unit, period_s)),
             },
             _ => effects.push(term_effect(term, found, unit, period_s)),
@@ -157,6 +170,11 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
     effects.extend(in_spectrum);
     effects.retain(|effect| is_shown(effect, duration_s));
     effects
+}
+
+/// Whether a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
+fn is_gaussian(kurtosis: &KurtosisRatio) -> bool {
+    (0.5 - kurtosis.ratio) / kurtosis.error.powi(2) > TOLD_APART.ln()
 }
 
 /// Kurtosis of a Markov term of the model. That of the curve of a channel with covariates is theirs as well, such as that of a
@@ -431,7 +449,14 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &str) -> Effect {
     if let Some(modulation) = &line.modulation {
         return modulated_line(line, modulation);
     }
-    let (kind, root) = (line.kind(), 2f64.sqrt());
+    // To the curve a line of a few phase changes in the record is a sinusoid; the spectrum tells it from one.
+    let kind = match line.kind() {
+        NoiseTerm::Sinusoid(Sinusoid { frequency }) if line.is_band() => {
+            NoiseTerm::Resonance(Resonance { frequency, bandwidth: line.width.value })
+        }
+        kind => kind,
+    };
+    let root = 2f64.sqrt();
     let parameters = match kind {
         NoiseTerm::Resonance(_) => {
             vec![("deviation", normal_bounds(line.deviation, unit)), ("bandwidth", normal_bounds(line.width, "Hz"))]
@@ -559,4 +584,23 @@ fn filter_meaning(filter: &MovingAverageFilter, internal_rate_hz: f64) -> String
         filter.decimation,
         internal_rate_hz / filter.decimation,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_gaussian;
+    use allan_core::telegraph::KurtosisRatio;
+
+    /// The ratio of two normal densities of one deviation, written out.
+    #[test]
+    fn a_gaussian_process_is_named_where_it_is_nineteen_times_as_likely() {
+        let likelihood = |ratio: f64, error: f64, truth: f64| (-0.5 * ((ratio - truth) / error).powi(2)).exp();
+        for error in [0.05, 0.1, 0.3, 1.0, 30.0] {
+            for ratio in [-0.5, 0.0, 0.2, 0.45, 0.5, 1.0] {
+                let (gaussian, telegraph) = (likelihood(ratio, error, 0.0), likelihood(ratio, error, 1.0));
+                let expected = gaussian > 19.0 * telegraph || (gaussian == 0.0 && ratio < 0.5);
+                assert_eq!(is_gaussian(&KurtosisRatio { ratio, error }), expected, "{ratio} {error}");
+            }
+        }
+    }
 }

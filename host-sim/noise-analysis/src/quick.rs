@@ -149,7 +149,7 @@ impl FittedChannel {
                 rest: None,
             };
             let mut effects = name_effects(profile, &findings);
-            effects.extend(unexplained::by_curve(fit, profile, resolution));
+            effects.extend(unexplained::by_curve(fit, profile, resolution, 0.0));
             effects
         };
         (of(&self.fit), of(&self.half))

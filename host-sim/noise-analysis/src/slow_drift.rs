@@ -18,9 +18,14 @@ pub(crate) struct ChannelsInCommon {
     pub drift: MarkovEstimate,
 }
 
-/// The drift that `channels` of one quantity have in common; `samples` are those of each less its covariates.
-pub(crate) fn common_mode(channels: &[ChannelProfile], samples: &[UniformSeries]) -> Option<ChannelsInCommon> {
-    let transforms = CrossSpectra::new(samples)?;
+/// The drift that `channels` of one quantity have in common; `samples` are those of each less its covariates. All have a filter with
+/// an impulse response of `filter_length_s`, or none.
+pub(crate) fn common_mode(
+    channels: &[ChannelProfile],
+    samples: &[UniformSeries],
+    filter_length_s: f64,
+) -> Option<ChannelsInCommon> {
+    let transforms = CrossSpectra::new(samples, filter_length_s)?;
     let (members, gain) = transforms.most_likely_set().filter(|(_, gain)| *gain > MIN_GAIN)?;
     let drift = transforms.fit_markov(&members)?;
     Some(ChannelsInCommon { channels: members.iter().map(|&member| channels[member]).collect(), gain, drift })

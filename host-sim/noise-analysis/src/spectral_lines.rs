@@ -37,6 +37,9 @@ const MIN_NOISE: f64 = 1e-6;
 const BROAD: f64 = 0.1;
 /// A line whose bandwidth times the length of the record is below this is treated as a sinusoid.
 const MIN_PHASE_CHANGES: f64 = 30.0;
+/// Least bandwidth of a resonance of few phase changes in the record, in units of its frequency: that of a damping ratio of half a
+/// percent. The speed of the motor in the measured recordings wanders by a third of that.
+const NARROWEST_BAND: f64 = 0.01;
 /// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
 const MIN_OWN_DEVIATION: f64 = 0.5;
 /// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
@@ -63,6 +66,8 @@ pub(crate) struct MergedLine {
     pub shape_p_value: f64,
     /// How the amplitude or the phase of the strongest peak changes to and fro.
     pub modulation: Option<spectra::Modulation>,
+    /// Whether the strongest peak is likelier a resonance than a sinusoid.
+    is_resonance: bool,
     duration_s: f64,
 }
 
@@ -246,6 +251,7 @@ impl MergedLine {
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
             modulation: sidebands(peaks, duration_s).or(strongest.modulation),
+            is_resonance: strongest.width.is_some(),
             duration_s,
         }
     }
@@ -273,6 +279,14 @@ impl MergedLine {
     /// Whether the record resolves its width: whether that is at least the reciprocal of the length of the record.
     pub(crate) fn is_wider_than_resolution(&self) -> bool {
         self.width.value * self.duration_s >= 1.0
+    }
+
+    /// Whether the spectrum shows a width: the strongest peak is a resonance, and the interval of the width is above the resolution
+    /// and not so narrow as that of a line that wanders.
+    pub(crate) fn is_band(&self) -> bool {
+        let least = self.width.value - NORMAL_975 * self.width.error;
+        let is_broad_enough = self.width.value > NARROWEST_BAND * self.frequency.value;
+        self.is_resonance && is_broad_enough && least * self.duration_s > 1.0
     }
 
     /// The term for the line with its size, frequency and width by the spectrum.

@@ -1,7 +1,7 @@
 //! What all of a recording shows: the effects in the samples of each channel, the noise model of each channel with what its
 //! baseline lacks, and the filter that the part has once.
 
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, filter_length_s};
 use crate::covariates::CovariateFit;
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::random_telegraph;
@@ -23,6 +23,7 @@ use crate::unexplained_signals::UnexplainedSignals;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use allan_core::model::FittedTerm;
+use allan_core::regression::Sensitivity;
 use measurement::{ChannelProfile, Measurement, Quantity};
 
 /// A recording with what was found in all of it.
@@ -193,7 +194,10 @@ impl<'a> TracedRecord<'a> {
         let is_named = |effect: &Effect| effect.kind != NoiseTerm::RateRamp.name() || is_ramp(effect);
         effects.extend(named.into_iter().filter(is_named));
         let resolution = estimators.both.resolution_of(channel);
-        let by_curve = unexplained::by_curve(&trace.fit, &measurement.profile, resolution);
+        let in_steps =
+            |(position, of): (usize, &Sensitivity)| (of.value * estimators.both.resolution(position)).powi(2);
+        let of_covariates = trace.fit.covariates.sensitivities().map(in_steps).sum();
+        let by_curve = unexplained::by_curve(&trace.fit, &measurement.profile, resolution, of_covariates);
         if let Some(unexplained) = &by_curve {
             effects.retain(|effect| !unexplained::is_contradicted(effect, unexplained));
         }
@@ -208,6 +212,13 @@ impl<'a> TracedRecord<'a> {
             effects.retain(|effect| effect.kind != "spikes");
         }
         effects.extend(level);
+        // Jumps to and fro from one sample to the next.
+        let telegraph = effects.iter().find(|effect| effect.kind == "telegraph").cloned();
+        let is_visit = |effect: &Effect| {
+            let explains = |telegraph| random_telegraph::explains_spikes(telegraph, effect, measurement.period_s());
+            effect.kind == "spikes" && telegraph.as_ref().is_some_and(explains)
+        };
+        effects.retain(|effect| !is_visit(effect));
         effects
     }
 }
@@ -309,11 +320,12 @@ pub(crate) fn agree_on_filter<'f>(
 
 /// The drift that the gyroscopes have in common, and that of the accelerometers.
 fn common_modes(channels: &[ChannelTrace]) -> Vec<ChannelsInCommon> {
+    let filter_s = channels.iter().map(|trace| filter_length_s(&trace.fit.trace.after)).fold(0.0, f64::max);
     let of_quantity = |quantity: &Quantity| {
         let members = channels.iter().filter(|trace| trace.channel.quantity == *quantity);
         let (profiles, rests): (Vec<ChannelProfile>, Vec<UniformSeries>) =
             members.filter_map(|trace| Some((trace.channel, trace.rest.clone()?))).unzip();
-        common_mode(&profiles, &rests)
+        common_mode(&profiles, &rests, filter_s)
     };
     in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], of_quantity).into_iter().flatten().collect()
 }

@@ -39,12 +39,20 @@ struct Residual<'a> {
 }
 
 /// The deviation of the curve of a channel of this `resolution` from the model with its added terms that is least likely by
-/// chance, if it is by less than [`SIGNIFICANCE`] anywhere in the curve.
-pub(crate) fn by_curve(fit: &ChannelFit, profile: &SensorProfile, resolution: f64) -> Option<Effect> {
+/// chance, if it is by less than [`SIGNIFICANCE`] anywhere in the curve. `of_covariates` is the square of the resolutions of its
+/// covariates, each times its sensitivity: a temperature is as good as constant between two counts, so that the rounding error of its
+/// share stays the same over long averaging times.
+pub(crate) fn by_curve(
+    fit: &ChannelFit,
+    profile: &SensorProfile,
+    resolution: f64,
+    of_covariates: f64,
+) -> Option<Effect> {
     let (curve, model) = (&fit.covariates.curve, &fit.trace.after);
     // Without dither the rounding error is no white noise.
     let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
-    let rounding = if is_dithered { 0.0 } else { ROUNDING * resolution * resolution };
+    let own = if is_dithered { 0.0 } else { resolution * resolution };
+    let rounding = ROUNDING * (own + of_covariates);
     // Of a point most of whose samples were replaced from their neighbours, the interpolation has made the greater part.
     let measured = curve.points().iter().filter(|point| point.replaced < 0.5);
     let residuals: Vec<Residual> = measured.filter_map(|point| residual(point, model, rounding)).collect();

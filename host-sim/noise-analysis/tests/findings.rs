@@ -149,6 +149,65 @@ fn a_bias_behind_a_lag_and_one_with_a_curvature_are_told_from_a_proportional_one
     assert!(worst.abs() < 4.0, "{worst}");
 }
 
+/// The thermometer rounds to 0.14 °C. The deviation of that, 0.04 °C, is 0.8 mg at this sensitivity, and the noise leaves 0.2 mg of a
+/// mean over 7 s. Behind a lag the rounding is smoothed.
+#[test]
+fn a_proportional_response_is_not_behind_a_lag_because_the_thermometer_rounds() {
+    const SENSITIVITY: f64 = -0.02;
+    for seed in 0..3 {
+        let waveform = |name: &str, time: f64| match name {
+            "temp" => temperature(time),
+            "accl_x" => SENSITIVITY * temperature(time),
+            _ => 0.0,
+        };
+        let report = analyze(&recorded(450.0, seed, &waveform));
+        assert_eq!(kinds(&report), [("temperature", vec!["accl_x"])], "seed {seed}");
+        let found = &report.findings[0].parameters["sensitivity"];
+        // Four standard deviations, and the rounding.
+        let half = 4.0 * (found.high - found.low) / (2.0 * 1.96);
+        assert!((found.value - SENSITIVITY).abs() < half, "seed {seed}: {found:?}");
+        assert!((found.value / SENSITIVITY - 1.0).abs() < 0.05, "seed {seed}: {found:?}");
+    }
+}
+
+/// White noise through a resonance of 0.05 Hz, which the record resolves 22 times, and a sinusoid of the same power.
+#[test]
+fn a_narrow_resonance_is_no_sinusoid() {
+    const SECONDS: f64 = 450.0;
+    const BANDWIDTH_HZ: f64 = 0.05;
+    const FREQUENCY_HZ: f64 = 4.3;
+    const DEVIATION: f64 = 0.2;
+    for seed in 0..3 {
+        // The envelope of a resonance is a pair of Markov processes, which decay with π times its width.
+        let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
+        let kept = (-0.5 * TAU * BANDWIDTH_HZ / RATE_HZ).exp();
+        let mut state = [0.0, 0.0].map(|_: f64| random.sample::<f64, _>(StandardNormal));
+        let mut envelope = Vec::new();
+        for _ in 0..(SECONDS * RATE_HZ) as usize {
+            envelope.push(state);
+            let mut step = || (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+            state = state.map(|value| kept * value + step());
+        }
+        let waveform = |name: &str, time: f64| {
+            let (sine, cosine) = (TAU * FREQUENCY_HZ * time).sin_cos();
+            match name {
+                "gyro_x" => {
+                    let [a, b] = envelope[(time * RATE_HZ).round() as usize];
+                    DEVIATION * (a * cosine + b * sine)
+                }
+                "gyro_z" => DEVIATION * SQRT_2 * sine,
+                _ => 0.0,
+            }
+        };
+        let report = analyze(&recorded(SECONDS, seed, &waveform));
+        let of = |name: &str| {
+            let channel = report.channels.iter().find(|of| of.name == name).expect("recorded");
+            channel.effects.iter().map(|effect| effect.kind.as_str()).collect::<Vec<_>>()
+        };
+        assert_eq!((of("gyro_x"), of("gyro_z")), (vec!["resonance"], vec!["sinusoid"]), "seed {seed}");
+    }
+}
+
 /// An angle from 0 to 2π that looks like chance, by the bits of the sample's number and of `salt`.
 fn scrambled(time: f64, salt: u64) -> f64 {
     let mut bits = ((time * RATE_HZ).round() as u64 + (salt << 40)).wrapping_mul(0x9E37_79B9_7F4A_7C15);

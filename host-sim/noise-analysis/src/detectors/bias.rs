@@ -176,8 +176,8 @@ fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
     means.max() - means.min() >= regressor.resolution
 }
 
-/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step with one below its own limit, the one that explains the data best
-/// beside those accepted before.
+/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step and a curvature with one below [`bias_step::SIGNIFICANCE`], the one
+/// that explains the data best beside those accepted before.
 fn best_candidate(
     series: &Series,
     blocks: &BlockMeans,
@@ -206,20 +206,28 @@ fn best_candidate(
     {
         let regressor = course.squared_regressor(blocks);
         if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate(&regressor)
-            && p_value < SIGNIFICANCE
+            && p_value < bias_step::SIGNIFICANCE
         {
-            rivals.push((deviance, Accepted { candidate: Candidate::Squared, regressor, p_value }));
+            let accepted = Accepted { candidate: Candidate::Squared, regressor, p_value };
+            rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
         }
         // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself.
         let is_followed =
             |(_, rival): &(f64, Accepted)| matches!(rival.candidate, Candidate::Regressor(of) if of == *index);
         if rivals.iter().any(is_followed)
             && let Some(lag) = course.likeliest_lag(blocks, &regression)
+            && let smoothed = course.smoothed_regressor(lag.time_constant, blocks)
+            && let Some(without_lag) = regression.estimate(&smoothed)
         {
-            let regressor = course.lagged_regressor(lag.time_constant, blocks);
-            let RegressionEstimate { p_value, deviance, .. } = lag.estimate;
-            let accepted = Accepted { candidate: Candidate::Lagged(lag), regressor, p_value };
-            rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
+            // Smoothed as it is behind the lag, the temperature has a smaller rounding error: that is no lag.
+            let is_late = lag.estimate.deviance + thermal_response::ADVANTAGE < without_lag.deviance;
+            let (RegressionEstimate { p_value, deviance, .. }, candidate, regressor) = if is_late {
+                let regressor = course.lagged_regressor(lag.time_constant, blocks);
+                (lag.estimate, Candidate::Lagged(lag), regressor)
+            } else {
+                (without_lag, Candidate::Regressor(*index), smoothed)
+            };
+            rivals.push((deviance + thermal_response::ADVANTAGE, Accepted { candidate, regressor, p_value }));
         }
     }
     let is_shaken = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Vibration(_)));

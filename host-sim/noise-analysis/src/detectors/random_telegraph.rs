@@ -73,6 +73,19 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
     sixths <= 0.0 || cubes.abs() < quantile(0.5 * SIGNIFICANCE) * sixths.sqrt()
 }
 
+/// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
+/// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
+/// over the square of the time constant `1/(a + b)`.
+#[must_use]
+pub(crate) fn explains_spikes(telegraph: &Effect, spikes: &Effect, sample_period: f64) -> bool {
+    let bound = |effect: &Effect, name: &str, of: fn(&Parameter) -> f64| effect.parameters.get(name).map(of);
+    let visits = bound(telegraph, "time_constant", |of| of.low)
+        .map(|time_constant| 3600.0 * sample_period / (4.0 * time_constant * time_constant));
+    let is_at_most = |least: Option<f64>, most: Option<f64>| least.zip(most).is_some_and(|(least, most)| least <= most);
+    is_at_most(bound(spikes, "rate", |of| of.low), visits)
+        && is_at_most(bound(spikes, "size", |of| of.low), bound(telegraph, "amplitude", |of| of.high))
+}
+
 /// Means of equal parts of a record, minus the mean of the record; `NaN` where half of the samples or more are missing.
 struct PartMeans {
     means: Vec<f64>,
@@ -217,6 +230,31 @@ mod tests {
             up ^= random.random_bool(0.5 * PERIOD_S / time_s);
             if up { amplitude } else { 0.0 }
         }
+    }
+
+    /// Two levels with a correlation time of 0.1 s: of 40,000 samples `ab·T·40,000` begin a visit of one, 100 with the rates a = b = 5/s.
+    #[test]
+    fn visits_of_a_sample_are_no_spikes() {
+        let parameter = |value: f64| Parameter::new(value, 0.9 * value, 1.1 * value, "");
+        let telegraph =
+            Effect::new("telegraph", [("time_constant", parameter(0.1)), ("amplitude", parameter(5.0))], String::new());
+        let mut up = false;
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let levels: Vec<bool> = (0..SAMPLES)
+            .map(|_| {
+                up ^= random.random_bool(5.0 * PERIOD_S);
+                up
+            })
+            .collect();
+        let visits = levels.windows(3).filter(|of| of[0] == of[2] && of[0] != of[1]).count();
+        assert!((70..130).contains(&visits), "{visits}"); // three standard deviations of 100
+        let hours = SAMPLES as f64 * PERIOD_S / 3600.0;
+        let spikes = |count: f64, size: f64| {
+            Effect::new("spikes", [("rate", parameter(count / hours)), ("size", parameter(size))], String::new())
+        };
+        assert!(explains_spikes(&telegraph, &spikes(visits as f64, 5.0), PERIOD_S));
+        assert!(!explains_spikes(&telegraph, &spikes(2.0 * visits as f64, 5.0), PERIOD_S));
+        assert!(!explains_spikes(&telegraph, &spikes(visits as f64, 8.0), PERIOD_S));
     }
 
     #[test]

@@ -16,8 +16,8 @@ const TIME_CONSTANTS_S: (f64, f64) = (10.0, 600.0);
 const TIME_CONSTANTS: usize = 15;
 /// A lag beyond this part of the record cannot be told from a drift.
 const LONGEST_PART: f64 = 0.25;
-/// By how much −2 ln likelihood must fall against the proportional response: χ² of the one degree of freedom that the time
-/// constant is, at the p-value of 2·10⁻⁴ of the other candidates.
+/// By how much −2 ln likelihood must fall against the other candidates, of which a lag has one more parameter and a curvature one
+/// that the proportional response comes before: χ² of one degree of freedom at the p-value of 2·10⁻⁴ of the other candidates.
 pub(super) const ADVANTAGE: f64 = 13.8;
 
 /// The temperature in averages of a fraction of a block.
@@ -68,6 +68,17 @@ impl TemperatureCourse {
         let mean = self.measured.mean();
         let values = self.measured.values.iter().map(|value| (value - mean).powi(2)).collect();
         Course { width: self.measured.width, values }
+    }
+
+    /// Block means of the mean of the temperature behind a lag and of that ahead by a lag in reversed time. It has no delay, and the
+    /// rounding of the thermometer is smoothed in it as it is behind the lag.
+    pub(super) fn smoothed_regressor(&self, time_constant: f64, blocks: &BlockMeans) -> DVector<f64> {
+        let Course { width, ref values } = self.measured;
+        let reversed = values.iter().rev().copied().collect();
+        let reversed = Self { measured: Course { width, values: reversed }, ..*self };
+        let ahead = reversed.lagged(time_constant).values.into_iter().rev();
+        let values = self.lagged(time_constant).values.into_iter().zip(ahead);
+        Course { width, values: values.map(|(behind, ahead)| 0.5 * (behind + ahead)).collect() }.in_blocks(blocks)
     }
 
     /// Block means of the squared course.

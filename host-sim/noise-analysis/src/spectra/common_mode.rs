@@ -12,8 +12,12 @@ use std::f64::consts::PI;
 
 /// Samples whose means are transformed: up to [`HIGHEST`] the mean over a block lowers a density by 2 % at most.
 const BLOCK: usize = 4;
-/// Highest frequency, as a fraction of the rate of the blocks.
+/// Highest frequency, as a fraction of the rate of the blocks, and over the length of the filter's impulse response: there a Bartlett
+/// window lowers a density by `1 − sinc⁴(1/8)`, a tenth.
 const HIGHEST: f64 = 0.08;
+const HIGHEST_BY_FILTER: f64 = 0.25;
+/// Shortest time constant, in lengths of the filter's impulse response: neighbouring samples of every channel are correlated by it.
+const FILTER_LENGTHS: f64 = 4.0;
 /// Fewest bands for a fit of four densities and a time constant.
 const FEWEST_BANDS: usize = 16;
 /// Time constants that are tried: the shortest in blocks, the longest as a fraction of the record.
@@ -27,13 +31,16 @@ pub(crate) struct CrossSpectra {
     /// Of a block, s.
     period: f64,
     duration: f64,
+    /// Of the impulse response of the filter that the channels have, s.
+    filter_length: f64,
     channels: Vec<SineTapered>,
 }
 
 impl CrossSpectra {
-    /// Transforms the channels; `None` if there are none, or if their lengths differ.
+    /// Transforms the channels, which have a filter with an impulse response of `filter_length` s; `None` if there are none, or if
+    /// their lengths differ.
     #[must_use]
-    pub(crate) fn new(channels: &[UniformSeries]) -> Option<Self> {
+    pub(crate) fn new(channels: &[UniformSeries], filter_length: f64) -> Option<Self> {
         let first = channels.first()?;
         let transformed: Option<Vec<SineTapered>> =
             channels.iter().map(|channel| SineTapered::new(&channel.detrended().averaged(BLOCK))).collect();
@@ -41,6 +48,7 @@ impl CrossSpectra {
         channels.iter().all(|channel| channel.length == channels[0].length).then(|| Self {
             period: BLOCK as f64 * first.sample_period(),
             duration: first.duration(),
+            filter_length,
             channels,
         })
     }
@@ -78,7 +86,8 @@ impl CrossSpectra {
     /// where its bit in `negative` is set.
     fn bands(&self, members: &[usize], negative: usize) -> Option<Vec<SpectralBand>> {
         let resolution = self.channels[0].resolution();
-        let ranges: Vec<_> = low_frequency_bands((HIGHEST / self.period / resolution) as usize).collect();
+        let highest = (HIGHEST / self.period).min(HIGHEST_BY_FILTER / self.filter_length);
+        let ranges: Vec<_> = low_frequency_bands((highest / resolution) as usize).collect();
         let signed: Vec<(&SineTapered, f64)> = members
             .iter()
             .enumerate()
@@ -117,7 +126,8 @@ impl CrossSpectra {
 
     /// Time constants that are tried, s.
     fn time_constants(&self) -> impl Iterator<Item = f64> {
-        time_constants(SHORTEST * self.period, LONGEST * self.duration)
+        let shortest = (SHORTEST * self.period).max(FILTER_LENGTHS * self.filter_length);
+        time_constants(shortest, LONGEST * self.duration)
     }
 
     /// Fits N, B, K and processes with this time constant to the bands of the mean followed by those of the differences.
@@ -176,7 +186,7 @@ mod tests {
                 a.push(process + normal());
                 b.push(process + normal());
             }
-            let transforms = CrossSpectra::new(&[UniformSeries::new(0.1, a), UniformSeries::new(0.1, b)]).unwrap();
+            let transforms = CrossSpectra::new(&[UniformSeries::new(0.1, a), UniformSeries::new(0.1, b)], 0.0).unwrap();
             let shared = transforms.fit_markov(&[0, 1]).unwrap();
             let covers = |of: BoundedEstimate, truth: f64| usize::from((of.low..=of.high).contains(&truth));
             inside += covers(shared.deviation, 0.5) + covers(shared.time_constant, 20.0);
@@ -201,7 +211,7 @@ mod tests {
                     channel.push(weight * process + normal());
                 }
             }
-            CrossSpectra::new(&channels.map(|values| UniformSeries::new(0.1, values))).unwrap()
+            CrossSpectra::new(&channels.map(|values| UniformSeries::new(0.1, values)), 0.0).unwrap()
         };
         let (members, gain) = transforms(1, [1.0, -1.0, 1.0]).most_likely_set().unwrap();
         assert!(members == [0, 1, 2] && gain > 20.0, "{members:?} {gain}");
@@ -211,6 +221,43 @@ mod tests {
         for (seed, weights) in [(3, [0.0; 3]), (4, [5.0, 0.0, 0.0])] {
             let gain = transforms(seed, weights).most_likely_set().unwrap().1;
             assert!(gain < 5.0, "{seed}: {gain}");
+        }
+    }
+    /// Three channels of independent white noise behind two moving averages of 64 samples at 204.8 Hz over 450 s, 0.625 s of noise that
+    /// is correlated by them and shared by none; and with a process of 40 s that all have.
+    #[test]
+    fn a_filter_is_nothing_that_channels_share() {
+        const TAPS: usize = 64;
+        const PERIOD_S: f64 = 1.0 / 204.8;
+        let averaged = |values: Vec<f64>| -> Vec<f64> {
+            let mut sum: f64 = values[..TAPS].iter().sum();
+            let next = |at: usize| {
+                sum += values[at + TAPS] - values[at];
+                sum / TAPS as f64
+            };
+            (0..values.len() - TAPS).map(next).collect()
+        };
+        let gain = |seed: u64, shared: f64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let kept = (-PERIOD_S / 40.0).exp();
+            let mut state = 0.0;
+            let process: Vec<f64> = (0..92_160)
+                .map(|_| {
+                    state = kept * state + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+                    shared * state
+                })
+                .collect();
+            let channels = [0.3, 1.0, 1.1].map(|level| {
+                let white = process.iter().map(|process| process + level * random.sample::<f64, _>(StandardNormal));
+                UniformSeries::new(PERIOD_S, averaged(averaged(white.collect())))
+            });
+            let length = 2.0 * TAPS as f64 * PERIOD_S;
+            CrossSpectra::new(&channels, length).unwrap().most_likely_set().unwrap().1
+        };
+        for seed in 0..4 {
+            // The limits of the other test.
+            let (alone, together) = (gain(seed, 0.0), gain(seed, 0.3));
+            assert!(alone < 5.0 && together > 15.0, "{seed}: {alone} {together}");
         }
     }
 }

@@ -110,7 +110,10 @@ impl CosineSpectrum {
         let without = fit(None).objective;
         let slow = markov_shapes().iter().filter(|shape| shape.time * self.block_s > filter_s);
         let fits: Vec<MarkovFit> = slow.map(|shape| fit(Some(shape))).collect();
-        most_likely(&fits, without).filter(|found| found.gain > LEAST_GAIN)
+        // A process that is likeliest with the shortest time constant is shorter still, or noise that differs from white at the
+        // frequencies of the blocks.
+        let shortest = fits.first()?.time;
+        most_likely(&fits, without).filter(|found| found.gain > LEAST_GAIN && found.time_constant.value > shortest)
     }
 }
 
