@@ -10,6 +10,8 @@
 //! degree of freedom, as those of overdispersed observations are (P. McCullagh and J. Nelder, "Generalized Linear Models",
 //! chapter 9).
 
+mod screen;
+
 use crate::OCTAVES;
 use crate::findings::{BoundedEstimate, SIGNIFICANCE};
 use crate::octave_covariance::relative_covariance;
@@ -94,8 +96,16 @@ pub(crate) fn estimate(
     if curves.is_empty() {
         return Err(Unidentified::NotDithered);
     }
+    let dithered: Vec<(&FilteredChannel, &Curve<OCTAVES>)> = dithered().zip(&curves).collect();
+    // By chance one of the hypotheses, each with an amplitude and a decimation, falls as much in one of 1/SIGNIFICANCE records.
+    let read_slowly = filters.iter().filter(|filter| screen::decimations(**filter).next().is_some());
+    let hypotheses = (filters.len() + read_slowly.count()).max(1);
+    let required = chi_squared_quantile(1.0 - SIGNIFICANCE / hypotheses as f64, 2.0);
+    if screen::largest_fall(&dithered, filters) <= required {
+        return Err(Unidentified::NotCorrelated);
+    }
     let mut joint: Vec<ChannelDeviance> =
-        dithered().zip(&curves).map(|(channel, curve)| ChannelDeviance::new(channel, curve)).collect();
+        dithered.iter().map(|(channel, curve)| ChannelDeviance::new(channel, curve)).collect();
     parallel::for_each(&mut joint, |channel| channel.fit_alone(filters));
     let unfiltered: Vec<f64> = joint.iter_mut().map(|channel| channel.unfiltered()).collect();
     let tried = filters.iter().flat_map(|&filter| [Some(filter), slowest_deviance(&mut joint, filter)]).flatten();
@@ -104,8 +114,6 @@ pub(crate) fn estimate(
     let Some(best) = tried.iter().min_by(|a, b| a.total().total_cmp(&b.total())) else {
         return Err(Unidentified::NotCorrelated);
     };
-    // By chance one of the hypotheses, each with an amplitude and a decimation, falls as much in one of 1/SIGNIFICANCE records.
-    let required = chi_squared_quantile(1.0 - SIGNIFICANCE / tried.len() as f64, 2.0);
     // A scatter is at least 1, and is not needed where the deviances themselves fall by too little.
     if unfiltered.iter().sum::<f64>() - best.total() <= required {
         return Err(Unidentified::NotCorrelated);
@@ -213,11 +221,14 @@ impl<'a> ChannelDeviance<'a> {
                 self.slowest.push(slow);
             }
         }
+        self.dispersion = self.dispersion_by(least);
+    }
+
+    /// The dispersion, if this is the least deviance.
+    fn dispersion_by(&self, least: f64) -> f64 {
         // The white noise, the other terms, and the decimation are fitted.
         let freedom = self.curve.points().len().saturating_sub(self.others.len() + 2).max(1);
-        if least.is_finite() {
-            self.dispersion = (least / freedom as f64).max(1.0);
-        }
+        if least.is_finite() { (least / freedom as f64).max(1.0) } else { 1.0 }
     }
 
     fn unfiltered(&mut self) -> f64 {
@@ -279,25 +290,21 @@ pub(crate) fn is_white(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_))
 }
 
-/// The filter read at the decimation with the least deviance of all channels: from just above 1 to the filter's length, beyond
-/// which no two samples are correlated. `None` for a filter that is shorter than that.
+/// The largest decimation at which a filter is tried: its length, beyond which no two samples are correlated.
+fn longest_decimation(filter: MovingAverageFilter) -> f64 {
+    f64::from(filter.stages) * f64::from(filter.taps)
+}
+
+/// The filter read at the decimation with the least deviance of all channels: from just above 1 to the filter's length. `None` for
+/// a filter that is shorter than that.
 fn slowest_deviance(joint: &mut [ChannelDeviance], filter: MovingAverageFilter) -> Option<MovingAverageFilter> {
     let mut total = |decimation: f64| -> f64 {
         let read = MovingAverageFilter { decimation, ..filter };
         joint.iter_mut().map(|channel| channel.deviance(read)).sum()
     };
-    let longest = f64::from(filter.stages) * f64::from(filter.taps);
-    let mut best: Option<(f64, f64)> = None;
-    let mut decimation = LEAST_DECIMATION;
-    while decimation < longest {
-        let deviance = total(decimation);
-        if best.is_none_or(|(_, least)| deviance < least) {
-            best = Some((decimation, deviance));
-        }
-        decimation *= STEP;
-    }
-    let (start, _) = best?;
-    let (from, to) = ((start / STEP).max(LEAST_DECIMATION), (start * STEP).min(longest));
+    let tried = screen::decimations(filter).map(|decimation| (decimation, total(decimation)));
+    let (start, _) = tried.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
+    let (from, to) = ((start / STEP).max(LEAST_DECIMATION), (start * STEP).min(longest_decimation(filter)));
     Some(MovingAverageFilter { decimation: minimum(from, to, total), ..filter })
 }
 
@@ -386,7 +393,7 @@ fn bounds(joint: &mut [ChannelDeviance], filter: MovingAverageFilter, rises: &[f
         }
         (0.5 * (inside + outside)).exp()
     };
-    let longest = f64::from(filter.stages) * f64::from(filter.taps);
+    let longest = longest_decimation(filter);
     BoundedEstimate { value, low: bound(LEAST_DECIMATION.min(value)), high: bound(longest.max(value)) }
 }
 

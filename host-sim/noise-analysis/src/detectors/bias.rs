@@ -194,9 +194,7 @@ fn best_candidate(
     let single = std::iter::once((Candidate::Ramp, &ramp))
         .chain(regressors.iter().map(|(index, regressor)| (Candidate::Regressor(*index), regressor)));
     for (candidate, regressor) in single {
-        if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate(regressor)
-            && p_value < SIGNIFICANCE
-        {
+        if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate_below(SIGNIFICANCE, regressor) {
             rivals.push((deviance, Accepted { candidate, regressor: regressor.clone(), p_value }));
         }
     }
@@ -205,8 +203,8 @@ fn best_candidate(
         && !accepted.iter().any(is_thermal)
     {
         let regressor = course.squared_regressor(blocks);
-        if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate(&regressor)
-            && p_value < bias_step::SIGNIFICANCE
+        if let Some(RegressionEstimate { p_value, deviance, .. }) =
+            regression.estimate_below(bias_step::SIGNIFICANCE, &regressor)
         {
             let accepted = Accepted { candidate: Candidate::Squared, regressor, p_value };
             rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
@@ -233,8 +231,8 @@ fn best_candidate(
     let is_shaken = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Vibration(_)));
     for (at, vibration) in vibrations.iter().enumerate().filter(|_| !is_shaken) {
         let regressor = vibration.regressor(blocks);
-        if let Some(RegressionEstimate { size, p_value, deviance, .. }) = regression.estimate(&regressor)
-            && p_value < SIGNIFICANCE
+        if let Some(RegressionEstimate { size, p_value, deviance, .. }) =
+            regression.estimate_below(SIGNIFICANCE, &regressor)
             && vibration.is_possible(size)
         {
             rivals.push((deviance, Accepted { candidate: Candidate::Vibration(at), regressor, p_value }));
@@ -242,9 +240,7 @@ fn best_candidate(
     }
     let has_step = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Step(_)));
     let step = if has_step { None } else { bias_step::find(series, blocks, grid, &known, &regression) };
-    if let Some(step) = step
-        && step.p_value < bias_step::SIGNIFICANCE
-    {
+    if let Some(step) = step {
         let accepted =
             Accepted { candidate: Candidate::Step(step.position), regressor: step.regressor, p_value: step.p_value };
         rivals.push((step.deviance + bias_step::ADVANTAGE, accepted));

@@ -49,8 +49,8 @@ pub(super) struct StepPosition {
     high: f64,
 }
 
-/// The likeliest step given the `known` regressors, to which `regression` was fitted; `None` if the bias jumps more than
-/// once.
+/// The likeliest step given the `known` regressors, to which `regression` was fitted, if its p-value is below [`SIGNIFICANCE`];
+/// `None` if the bias jumps more than once.
 pub(super) fn find(
     series: &Series,
     blocks: &BlockMeans,
@@ -58,13 +58,22 @@ pub(super) fn find(
     known: &[DVector<f64>],
     regression: &GlsRegression<'_>,
 ) -> Option<BiasStep> {
-    let scan = StepScan::new(regression)?;
+    let steps = regression.steps();
+    if !regression.any_may_be_below(SIGNIFICANCE, &steps) {
+        return None;
+    }
+    let scan = StepScan::new(regression, &steps)?;
+    let p_value = scan.p_value_anywhere();
+    if p_value >= SIGNIFICANCE {
+        return None;
+    }
     let (sample, error) = locate(series, blocks, scan.at)?;
     let regressor = blocks.step_at(series.slots[sample]);
     let with_step: Vec<DVector<f64>> = known.iter().cloned().chain([regressor.clone()]).collect();
     let with_step = GlsRegression::new(blocks, grid, &with_step);
     let gain = regression.deviance() - scan.deviance;
-    let second = StepScan::new(&with_step).map_or(0.0, |second| with_step.deviance() - second.deviance);
+    let second =
+        StepScan::new(&with_step, &with_step.steps()).map_or(0.0, |second| with_step.deviance() - second.deviance);
     if second > (SECOND * gain).max(2.0 * ADVANTAGE) {
         return None;
     }
@@ -72,12 +81,7 @@ pub(super) fn find(
     let (earliest, latest) = scan.possible(blocks);
     let low = (at - error).min(if scan.is_unique() { at } else { earliest }).max(0.0);
     let high = (at + error).max(if scan.is_unique() { at } else { latest });
-    Some(BiasStep {
-        position: StepPosition { sample, low, high },
-        regressor,
-        deviance: scan.deviance,
-        p_value: scan.p_value_anywhere(),
-    })
+    Some(BiasStep { position: StepPosition { sample, low, high }, regressor, deviance: scan.deviance, p_value })
 }
 
 /// A step with the size of `estimate`, as it is reported.
@@ -125,8 +129,8 @@ struct StepScan {
 }
 
 impl StepScan {
-    fn new(regression: &GlsRegression<'_>) -> Option<Self> {
-        let steps = regression.steps();
+    /// Of the `steps` of `regression`.
+    fn new(regression: &GlsRegression<'_>, steps: &[Option<StepSizes>]) -> Option<Self> {
         let sought = ENDS..steps.len().saturating_sub(ENDS) + 1;
         let tried = |(at, step): (usize, &Option<StepSizes>)| {
             step.as_ref().filter(|_| sought.contains(&at)).and_then(|step| regression.deviance_with(step))

@@ -15,6 +15,9 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 /// A regressor that keeps less than this fraction of its information when the others are fitted too is a combination of them.
 const COLLINEAR: f64 = 1e-6;
 
+/// Halvings that find the least part of the sum of squares that is significant, to a thousandth of it.
+const HALVINGS: usize = 16;
+
 /// Coefficient of a regressor that is fitted together with others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegressionEstimate {
@@ -86,12 +89,17 @@ impl<'a> GlsRegression<'a> {
 
     /// Size of one more regressor; `None` if it is a combination of the known ones.
     pub fn estimate(&self, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
+        self.average(&self.sizes(regressor)?)
+    }
+
+    /// Size of one more regressor under every mixture; `None` if it is a combination of the known ones.
+    fn sizes(&self, regressor: &DVector<f64>) -> Option<Vec<SizeAndInformation>> {
         let of_family = |FamilyFits { family, known, fits }: &FamilyFits<'a>| {
             let regressor = family.coordinates(regressor);
             fits.iter().map(|fit| fit.estimate(&regressor, known)).collect::<Option<Vec<SizeAndInformation>>>()
         };
         let sizes: Option<Vec<Vec<SizeAndInformation>>> = self.families.iter().map(of_family).collect();
-        self.average(&sizes?.concat())
+        Some(sizes?.concat())
     }
 
     /// Sizes of a step at the beginning of each block, every one by itself, under every mixture; `None` where the step is a combination
@@ -101,6 +109,37 @@ impl<'a> GlsRegression<'a> {
             self.families.iter().flat_map(FamilyFits::estimate_steps).collect();
         let step = |at: usize| by_mixture.iter().map(|steps| steps[at]).collect::<Option<_>>().map(StepSizes);
         (0..self.blocks.means.len()).map(step).collect()
+    }
+
+    /// Whether any of such steps may have a p-value below `limit`.
+    pub(super) fn any_may_be_below(&self, limit: f64, steps: &[Option<StepSizes>]) -> bool {
+        let least_part = self.least_part(limit);
+        steps.iter().flatten().any(|StepSizes(sizes)| self.reaches(least_part, sizes))
+    }
+
+    /// As [`estimate`](Self::estimate), if the p-value is below `limit`.
+    pub(super) fn estimate_below(&self, limit: f64, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
+        let sizes = self.sizes(regressor)?;
+        let may_be_below = self.reaches(self.least_part(limit), &sizes);
+        may_be_below.then(|| self.average(&sizes))?.filter(|estimate| estimate.p_value < limit)
+    }
+
+    /// Whether a regressor explains more than this part of the weighted sum of squares under any mixture.
+    fn reaches(&self, part: f64, sizes: &[SizeAndInformation]) -> bool {
+        self.fits().zip(sizes).any(|(fit, at)| at.size * at.size * at.information > part * fit.residual)
+    }
+
+    /// The part of the weighted sum of squares that a regressor has to explain under one mixture at least for a p-value below
+    /// `limit`, which is an average of those under each mixture.
+    fn least_part(&self, limit: f64) -> f64 {
+        let freedom = self.degrees_of_freedom();
+        let p_value = |part: f64| 2.0 * upper_tail(normal_equivalent((freedom * part / (1.0 - part)).sqrt(), freedom));
+        let (mut least, mut most) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (least + most);
+            if p_value(middle) > limit { least = middle } else { most = middle }
+        }
+        least
     }
 
     /// −2 ln likelihood with such a step; `None` where too few blocks are left.
@@ -316,6 +355,32 @@ mod tests {
         // is no flicker noise.
         assert!((70..150).contains(&below[0]) && below[1] < 25, "{below:?}");
         assert!(covered > 900, "{covered}");
+    }
+
+    /// Just above the p-value of a regressor a limit does not leave it out, and just below it does; for every mixture that the walk
+    /// makes likely, and for steps.
+    #[test]
+    fn a_regressor_is_left_out_by_its_p_value_alone() {
+        let grids = NoiseGrids::default();
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for run in 0..40 {
+            let walk = 10f64.powf(random.random_range(-4.5..0.0));
+            let mut series = series(&mut random, walk);
+            // From nothing to ten times the error in white noise.
+            let size = 0.25 * f64::from(run % 4) / 3.0;
+            series.values_mut().iter_mut().skip(2_048).for_each(|value| *value += size);
+            let blocks = BlockMeans::from_series(&series).unwrap();
+            let grid = grids.get(&blocks);
+            let regression = GlsRegression::new(&blocks, &grid, &[]);
+            let regressor = if run % 2 == 0 { blocks.ramp() } else { blocks.step_at(2_048) };
+            let estimate = regression.estimate(&regressor).unwrap();
+            assert_eq!(regression.estimate_below(1.001 * estimate.p_value, &regressor), Some(estimate));
+            assert_eq!(regression.estimate_below(0.999 * estimate.p_value, &regressor), None);
+            let steps = regression.steps();
+            let p_values = steps.iter().flatten().filter_map(|step| Some(regression.estimate_step(step)?.p_value));
+            let least = p_values.fold(1.0, f64::min);
+            assert!(regression.any_may_be_below(1.001 * least, &steps), "{run}: {least}");
+        }
     }
 
     /// Compared with least squares on the samples in white noise; an unknown mixture can only increase the error.

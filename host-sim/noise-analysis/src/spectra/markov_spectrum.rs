@@ -1,7 +1,7 @@
 //! A Markov process in a spectrum: the likeliest time constant and variance beside white, flicker and random-walk noise, by
 //! Whittle's likelihood.
 
-use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density, whittle_objective};
+use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
 use crate::distributions::NORMAL_975;
 use crate::findings::BoundedEstimate;
 
@@ -77,17 +77,10 @@ impl MarkovFit {
     /// process with the time constant `time`.
     pub(super) fn new(bands: &[SpectralBand], bases: &[[f64; TERMS]], time: f64, process: usize) -> Self {
         let mut densities = [0.0; TERMS];
-        fit_mixture(bands, bases, &mut densities);
-        let totals: Vec<f64> = bases.iter().map(|basis| mixture_density(basis, &densities)).collect();
+        let objective = fit_mixture(bands, bases, &mut densities);
         let variance = densities[process];
-        let fraction = |(basis, total): (&[f64; TERMS], &f64)| basis[process] * variance / total;
-        let fractions = bases.iter().zip(&totals).map(fraction);
+        let fractions = bases.iter().map(|basis| basis[process] * variance / mixture_density(basis, &densities));
         let information: f64 = fractions.zip(bands).map(|(fraction, band)| band.ordinates * fraction * fraction).sum();
-        Self {
-            time,
-            variance,
-            error: information.max(LEAST_INFORMATION).sqrt().recip(),
-            objective: whittle_objective(bands, &totals),
-        }
+        Self { time, variance, error: information.max(LEAST_INFORMATION).sqrt().recip(), objective }
     }
 }

@@ -29,7 +29,7 @@ const LEAST_GAIN: f64 = 1e-4;
 /// Shortest part of a step of the scoring that is tried.
 const SHORTEST_STEP: f64 = 1e-3;
 
-/// Fits the densities of `TERMS` shapes whose values in each band are `bases`.
+/// Fits the densities of `TERMS` shapes whose values in each band are `bases`; returns `Σ g·(ln S + P/S)` with them.
 ///
 /// Begins with each shape alone explaining an equal part of the bands. A few rounds multiply the densities by factors
 /// that keep them non-negative and never lower the likelihood (C. Févotte and J. Idier, "Algorithms for nonnegative matrix
@@ -39,7 +39,7 @@ pub(super) fn fit_mixture<const TERMS: usize>(
     bands: &[SpectralBand],
     bases: &[[f64; TERMS]],
     densities: &mut [f64; TERMS],
-) {
+) -> f64 {
     for (term, density) in densities.iter_mut().enumerate() {
         let shown = bands.iter().zip(bases).filter(|(_, basis)| basis[term] > 0.0);
         let (sum, weight) = shown.fold((0.0, 0.0), |(sum, weight), (band, basis)| {
@@ -66,6 +66,7 @@ pub(super) fn fit_mixture<const TERMS: usize>(
             break;
         }
     }
+    objective
 }
 
 /// A round of Fisher's scoring: the densities that are not negative and whose sum is nearest to the bands, each weighted by the
@@ -75,26 +76,31 @@ fn weighted_least_squares<const TERMS: usize>(
     bases: &[[f64; TERMS]],
     densities: &[f64; TERMS],
 ) -> [f64; TERMS] {
-    let (mut information, mut pull) = (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
+    // Of the information, the triangle that the loop below reads: rows up to the diagonal.
+    let (mut information, mut pull) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
     for (band, basis) in bands.iter().zip(bases) {
         let density = mixture_density(basis, densities);
         if density <= 0.0 {
             continue;
         }
-        let relative = SVector::from(basis.map(|value| value / density));
-        information.syger(band.ordinates, &relative, &relative, 1.0);
-        pull.axpy(band.ordinates * band.density / density, &relative, 1.0);
+        let relative: [f64; TERMS] = std::array::from_fn(|term| basis[term] / density);
+        let towards = band.ordinates * band.density / density;
+        for row in 0..TERMS {
+            for column in 0..=row {
+                information[row][column] += band.ordinates * relative[column] * relative[row];
+            }
+            pull[row] += towards * relative[row];
+        }
     }
-    information.fill_upper_triangle_with_lower_triangle();
     // In units in which each term alone is known to 1.
-    let scale: [f64; TERMS] = std::array::from_fn(|term| information[(term, term)].sqrt());
+    let scale: [f64; TERMS] = std::array::from_fn(|term| information[term][term].sqrt());
     let mut is_left_out: [bool; TERMS] = std::array::from_fn(|term| scale[term] == 0.0);
     loop {
         let entry = |row: usize, column: usize| {
             if is_left_out[row] || is_left_out[column] {
                 f64::from(u8::from(row == column))
             } else {
-                information[(row, column)] / (scale[row] * scale[column])
+                information[row.max(column)][row.min(column)] / (scale[row] * scale[column])
             }
         };
         let matrix = SMatrix::<f64, TERMS, TERMS>::from_fn(entry);
@@ -147,17 +153,11 @@ fn mixture_objective<const TERMS: usize>(
     bases: &[[f64; TERMS]],
     densities: &[f64; TERMS],
 ) -> f64 {
-    bands.iter().zip(bases).map(|(band, basis)| band_objective(band, mixture_density(basis, densities))).sum()
-}
-
-/// `Σ g·(ln S + P/S)` over the bands, `S` being the `modelled` densities.
-pub(super) fn whittle_objective(bands: &[SpectralBand], modelled: &[f64]) -> f64 {
-    bands.iter().zip(modelled).map(|(band, modelled)| band_objective(band, *modelled)).sum()
-}
-
-fn band_objective(band: &SpectralBand, modelled: f64) -> f64 {
-    let density = modelled.max(f64::MIN_POSITIVE);
-    band.ordinates * (density.ln() + band.density / density)
+    let of_band = |(band, basis): (&SpectralBand, &[f64; TERMS])| {
+        let density = mixture_density(basis, densities).max(f64::MIN_POSITIVE);
+        band.ordinates * (density.ln() + band.density / density)
+    };
+    bands.iter().zip(bases).map(of_band).sum()
 }
 
 /// Longest filter that is tried: two cascaded averages of `2^6` samples each, the largest setting of the ADIS16405.
@@ -181,8 +181,8 @@ impl SpectralShape {
     #[must_use]
     pub fn fit(bands: &[SpectralBand], sample_period: f64) -> Self {
         let candidates = (0..=LARGEST_TAPS_LOG2).map(|log2| Self::fit_with_taps(bands, sample_period, 1 << log2));
-        let likeliest = candidates.min_by(|a, b| a.objective(bands).total_cmp(&b.objective(bands)));
-        likeliest.unwrap_or(Self { sample_period, taps: 1, densities: [0.0; TERMS] })
+        let likeliest = candidates.min_by(|(_, a), (_, b)| a.total_cmp(b));
+        likeliest.map_or(Self { sample_period, taps: 1, densities: [0.0; TERMS] }, |(shape, _)| shape)
     }
 
     /// Density at `frequency` in Hz, unit²/Hz.
@@ -221,17 +221,13 @@ impl SpectralShape {
         Some(variance.sqrt() / 2.0)
     }
 
-    fn fit_with_taps(bands: &[SpectralBand], sample_period: f64, taps: u32) -> Self {
+    /// The likeliest shape with a filter of this length, and its objective.
+    fn fit_with_taps(bands: &[SpectralBand], sample_period: f64, taps: u32) -> (Self, f64) {
         let basis = |band: &SpectralBand| shape_basis(band.frequency, sample_period, taps);
         let bases: Vec<[f64; TERMS]> = bands.iter().map(basis).collect();
         let mut shape = Self { sample_period, taps, densities: [0.0; TERMS] };
-        fit_mixture(bands, &bases, &mut shape.densities);
-        shape
-    }
-
-    fn objective(&self, bands: &[SpectralBand]) -> f64 {
-        let modelled: Vec<f64> = bands.iter().map(|band| self.density(band.frequency)).collect();
-        whittle_objective(bands, &modelled)
+        let objective = fit_mixture(bands, &bases, &mut shape.densities);
+        (shape, objective)
     }
 }
 
