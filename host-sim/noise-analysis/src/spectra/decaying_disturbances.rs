@@ -113,6 +113,8 @@ struct WhitenedRecord {
     transform: Vec<Complex<f64>>,
     /// One over the density, 0 at lines.
     weights: Vec<f64>,
+    /// What a delay of a block turns each order by.
+    turns: Vec<Complex<f64>>,
 }
 
 impl WhitenedRecord {
@@ -135,21 +137,22 @@ impl WhitenedRecord {
         forward.process(&mut tapered, &mut transform).ok()?;
         let ordinates: Vec<f64> = transform.iter().map(|bin| bin.norm_sqr() / squares).collect();
         forward.process(&mut values, &mut transform).ok()?;
-        Some(Self { length, transform, weights: weights(&ordinates)? })
+        let turns = (0..transform.len()).map(|order| Complex::cis(-TAU * order as f64 / length as f64)).collect();
+        Some(Self { length, transform, weights: weights(&ordinates)?, turns })
     }
 
     /// The response of the filter for a decay of `time` blocks, or for one in reversed time.
     fn response(&self, time: usize, is_reversed: bool) -> Option<Response> {
         let inverse = transforms::inverse(self.length);
         let kept = (-1.0 / time as f64).exp();
-        let decay = |order: usize| 1.0 / (1.0 - kept * Complex::cis(-TAU * order as f64 / self.length as f64));
+        let decays: Vec<Complex<f64>> = self.turns.iter().map(|turn| 1.0 / (1.0 - kept * turn)).collect();
         let last = self.transform.len() - 1;
         let real_end = |order: usize, bin: Complex<f64>| if order == last { bin.re.into() } else { bin };
         let filter = |(order, (bin, weight)): (usize, (&Complex<f64>, &f64))| {
-            let decay = if is_reversed { decay(order) } else { decay(order).conj() };
+            let decay = if is_reversed { decays[order] } else { decays[order].conj() };
             real_end(order, *weight * bin * decay)
         };
-        let spectrum = self.weights.iter().enumerate().map(|(order, weight)| (weight * decay(order).norm_sqr()).into());
+        let spectrum = self.weights.iter().zip(&decays).map(|(weight, decay)| (weight * decay.norm_sqr()).into());
         let (mut filtered, mut spectrum): (Vec<Complex<f64>>, Vec<Complex<f64>>) =
             (self.transform.iter().zip(&self.weights).enumerate().map(filter).collect(), spectrum.collect());
         let (mut output, mut correlation) = (inverse.make_output_vec(), inverse.make_output_vec());

@@ -24,19 +24,19 @@ impl Sine {
     /// length of the series or less.
     pub(super) fn fit_near(series: &UniformSeries, frequency: f64, spacing: f64) -> Self {
         let sums = PhaseSums::new(series, frequency);
-        let mut best = sums.fit_at(frequency);
+        let (mut frequency, mut power) = (frequency, sums.power_at(frequency));
         // Maximum of the parabola through three points of decreasing distance.
         for step in [0.3 * spacing, 0.1 * spacing, 0.03 * spacing] {
-            let [left, right] = [-step, step].map(|offset| sums.fit_at(best.frequency + offset).power);
-            let curvature = 2.0 * best.power - left - right;
+            let [left, right] = [-step, step].map(|offset| sums.power_at(frequency + offset));
+            let curvature = 2.0 * power - left - right;
             let shift =
                 if curvature > 0.0 { (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { 0.0 };
-            let summit = sums.fit_at(best.frequency + shift);
-            if summit.power > best.power {
-                best = summit;
+            let summit = sums.power_at(frequency + shift);
+            if summit > power {
+                (frequency, power) = (frequency + shift, summit);
             }
         }
-        best
+        sums.fit_at(frequency)
     }
 
     /// The same sinusoid `delay` s later.
@@ -125,20 +125,34 @@ impl PhaseSums {
         Self { frequency, first_s, block_s, squared_weights, blocks }
     }
 
-    /// The least-squares sinusoid of one frequency, in Hz.
-    fn fit_at(&self, frequency: f64) -> Sine {
-        let (mut weight, mut double, mut product) = (0.0, Complex::<f64>::ZERO, Complex::<f64>::ZERO);
+    /// Calls `visit` with every block and the phasor by which the phase of `frequency`, in Hz, differs there from that of the sums.
+    fn for_each_block(&self, frequency: f64, mut visit: impl FnMut(&BlockSums, Complex<f64>)) {
         let offset = -TAU * (frequency - self.frequency);
         let turn = Complex::cis(offset * self.block_s);
         for (number, blocks) in self.blocks.chunks(STEPS).enumerate() {
             let mut turned = Complex::cis(offset * (self.first_s + (number * STEPS) as f64 * self.block_s));
             for block in blocks {
-                weight += block.weight;
-                double += block.double * turned * turned;
-                product += block.product * turned;
+                visit(block, turned);
                 turned *= turn;
             }
         }
+    }
+
+    /// `|Σwye^(−iωt)|²/Σw²` at one frequency, in Hz.
+    fn power_at(&self, frequency: f64) -> f64 {
+        let mut product = Complex::<f64>::ZERO;
+        self.for_each_block(frequency, |block, turned| product += block.product * turned);
+        product.norm_sqr() / self.squared_weights
+    }
+
+    /// The least-squares sinusoid of one frequency, in Hz.
+    fn fit_at(&self, frequency: f64) -> Sine {
+        let (mut weight, mut double, mut product) = (0.0, Complex::<f64>::ZERO, Complex::<f64>::ZERO);
+        self.for_each_block(frequency, |block, turned| {
+            weight += block.weight;
+            double += block.double * turned * turned;
+            product += block.product * turned;
+        });
         // cos² = (1 + cos 2ωt)/2, sin² = (1 − cos 2ωt)/2, cos·sin = sin(2ωt)/2.
         let (cc, ss, cs) = (0.5 * (weight + double.re), 0.5 * (weight - double.re), -0.5 * double.im);
         let (yc, ys) = (product.re, -product.im);
@@ -152,10 +166,21 @@ impl PhaseSums {
 }
 
 /// Calls `visit` with position, value, cosine and sine of every sample.
-pub(super) fn for_each_phase(series: &UniformSeries, frequency: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
-    let turn = frequency * series.sample_period();
+pub(super) fn for_each_phase(series: &UniformSeries, frequency: f64, visit: impl FnMut(usize, f64, f64, f64)) {
+    for_each_turn(series.values(), frequency * series.sample_period(), visit);
+}
+
+/// `Σye^(−iωt)` of some values with a phase of `turn` turns from one to the next.
+pub(super) fn transform_at(values: &[f64], turn: f64) -> Complex<f64> {
+    let mut sum = Complex::ZERO;
+    for_each_turn(values, turn, |_, value, cosine, sine| sum += value * Complex::new(cosine, -sine));
+    sum
+}
+
+/// As [`for_each_phase`], with a phase of `turn` turns from one value to the next.
+fn for_each_turn(values: &[f64], turn: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
     let (step_sine, step_cosine) = (TAU * turn).sin_cos();
-    for (block, values) in series.values().chunks(STEPS).enumerate() {
+    for (block, values) in values.chunks(STEPS).enumerate() {
         // Whole turns are dropped before the multiplication by 2π, which would cost them digits.
         let (mut sine, mut cosine) = (TAU * (turn * (block * STEPS) as f64).fract()).sin_cos();
         for (at, value) in values.iter().enumerate() {
@@ -317,21 +342,45 @@ fn groups(ordinates: &[f64], first: usize, looks: f64) -> Vec<Group> {
     ordinates.chunks(size).enumerate().map(group).collect()
 }
 
-/// Modelled density of a group and its derivatives by `ln level`, `ln height`, `centre` and `ln width`.
-fn modelled(group: &Group, parameters: &Vector4<f64>) -> (f64, Vector4<f64>) {
-    let (level, height, width) = (parameters[0].exp(), parameters[1].exp(), parameters[3].exp());
-    let offset = 2.0 * (group.position - parameters[2]) / width;
-    let near = 1.0 / (1.0 + offset * offset);
-    let line = level * height * bell(group.position, parameters[2], width);
-    let density = level + line;
-    // The derivatives neglect the line at the negative frequency, which hardly changes with the parameters.
-    let slope = level * height * near * near * offset;
-    (density, Vector4::new(density, line, 4.0 * slope / width, 2.0 * slope * offset))
+/// A Lorentz curve by its parameters: `ln level`, `ln height`, `centre` and `ln width`.
+struct LorentzCurve {
+    level: f64,
+    height: f64,
+    centre: f64,
+    width: f64,
+}
+
+impl LorentzCurve {
+    fn new(parameters: &Vector4<f64>) -> Self {
+        let [level, height, width] = [0, 1, 3].map(|at| parameters[at].exp());
+        Self { level, height, centre: parameters[2], width }
+    }
+
+    /// What the line adds to the level in a group.
+    fn line(&self, group: &Group) -> f64 {
+        self.level * self.height * bell(group.position, self.centre, self.width)
+    }
+
+    fn density(&self, group: &Group) -> f64 {
+        self.level + self.line(group)
+    }
+
+    /// Density in a group and its derivatives by the parameters.
+    fn slopes(&self, group: &Group) -> (f64, Vector4<f64>) {
+        let offset = 2.0 * (group.position - self.centre) / self.width;
+        let near = 1.0 / (1.0 + offset * offset);
+        let line = self.line(group);
+        let density = self.level + line;
+        // The derivatives neglect the line at the negative frequency, which hardly changes with the parameters.
+        let slope = self.level * self.height * near * near * offset;
+        (density, Vector4::new(density, line, 4.0 * slope / self.width, 2.0 * slope * offset))
+    }
 }
 
 fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
+    let curve = LorentzCurve::new(parameters);
     let of_group = |group: &Group| {
-        let (density, _) = modelled(group, parameters);
+        let density = curve.density(group);
         -group.ordinates * (density.ln() + group.density / density)
     };
     groups.iter().map(of_group).sum()
@@ -343,7 +392,8 @@ fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
 /// ordered values of uniform ones, so that the largest distance from a straight line has Kolmogorov's distribution (M.
 /// Bartlett, "An introduction to stochastic processes", 1955). That the parameters were fitted lowers the distance.
 fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
-    let ratio = |group: &Group| group.ordinates * group.density / modelled(group, parameters).0;
+    let curve = LorentzCurve::new(parameters);
+    let ratio = |group: &Group| group.ordinates * group.density / curve.density(group);
     let (total, count) =
         groups.iter().fold((0.0, 0.0), |(total, count), group| (total + ratio(group), count + group.ordinates));
     let (mut sum, mut position, mut largest) = (0.0, 0.0, 0.0_f64);
@@ -359,8 +409,9 @@ fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
 /// Fisher's information and the score.
 fn normal_equations(groups: &[Group], parameters: &Vector4<f64>) -> (Matrix4<f64>, Vector4<f64>) {
     let (mut information, mut score) = (Matrix4::zeros(), Vector4::zeros());
+    let curve = LorentzCurve::new(parameters);
     for group in groups {
-        let (density, slope) = modelled(group, parameters);
+        let (density, slope) = curve.slopes(group);
         let weight = group.ordinates / (density * density);
         information += weight * slope * slope.transpose();
         score += weight * (group.density - density) * slope;

@@ -34,6 +34,10 @@ const SLOW_LEFT: f64 = 0.5;
 const MOST_SLOW: usize = 2;
 /// Blocks of the record in whose means they are sought, at least.
 const SLOW_BLOCKS: usize = 4096;
+/// Blocks in whose means the first fit is tried before, at least. Of a sinusoid that is all but a thousandth of the slow variation they
+/// lose `(π·8/1024)²/6`, 10⁻⁴, of what is faster than the blocks all but `(8/1024)²` of its power: the first fit leaves a third of
+/// [`SLOW_LEFT`] there too.
+const COARSE_BLOCKS: usize = 1024;
 const SLOW_ROUNDS: usize = 6;
 
 /// The lines of a series with a p-value below 2·10⁻⁴, the strongest first; at most 6.
@@ -88,9 +92,14 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
 /// The series without sinusoids of fewer periods than are searched, each of which is nearly all of the slow variation beside a
 /// straight line; and these sinusoids. Their leakage would be taken for lines, and they themselves for ramps and steps.
 ///
-/// They are sought in block means, which such a sinusoid passes with a loss of `(π·8/4096)²/6`, 6·10⁻⁶, or less.
+/// They are sought in block means, which such a sinusoid passes with a loss of `(π·8/4096)²/6`, 6·10⁻⁶, or less, where means of longer
+/// blocks may have one.
 pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, Vec<SpectralLine>) {
-    let size = (series.values().len() / SLOW_BLOCKS).max(1);
+    let block = |blocks: usize| (series.values().len() / blocks).max(1);
+    let (coarse, size) = (block(COARSE_BLOCKS), block(SLOW_BLOCKS));
+    if coarse > size && SlowSine::first_fit(&series.averaged(coarse)).is_none() {
+        return (series, Vec::new());
+    }
     let found = slow_sines(series.averaged(size));
     // A block's mean belongs to its middle.
     let delay = 0.5 * (size as f64 - 1.0) * series.sample_period();
@@ -103,24 +112,8 @@ pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, V
 /// The sinusoids of [`without_slow_sines`], with time counted from the first sample of `series`.
 fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
     let mut found = Vec::new();
-    let slow = |spectrum: &Periodogram| spectrum.independent()[1..=FEWEST_PERIODS].iter().sum::<f64>();
     while found.len() < MOST_SLOW {
-        let level = series.detrended();
-        let Some(spectrum) = Periodogram::new(&level).filter(|of| of.padded().len() > 2 * PADDING * FEWEST_PERIODS)
-        else {
-            break;
-        };
-        let searched = PADDING * FEWEST_SLOW_PERIODS..=PADDING * FEWEST_PERIODS;
-        let Some(at) = searched.max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b])) else { break };
-        let spacing = spectrum.resolution() / PADDING as f64;
-        let mut sine = Sine::fit_near(&level, at as f64 * spacing, spacing);
-        let part_left = |sine: &Sine| {
-            let left = Periodogram::new(&sine.subtracted_from(&series).detrended())?;
-            Some(slow(&left) / slow(&spectrum))
-        };
-        if part_left(&sine).is_none_or(|part| part.is_nan() || part > SLOW_LEFT) {
-            break;
-        }
+        let Some(SlowSine { level, slow, spacing, mut sine }) = SlowSine::first_fit(&series) else { break };
         for _ in 0..SLOW_ROUNDS {
             let without = sine.subtracted_from(&series);
             let lines =
@@ -128,8 +121,8 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
             let lineless = series.values().iter().zip(lines).map(|(value, line)| value - line).collect();
             sine = Sine::fit_near(&series.with_values(lineless), sine.frequency, 0.3 * spacing);
         }
-        let Some(part) = part_left(&sine).filter(|part| part * SLOW_GAIN <= 1.0) else { break };
-        let left = part * slow(&spectrum) / FEWEST_PERIODS as f64;
+        let Some(part) = part_left(&series, &sine, slow).filter(|part| part * SLOW_GAIN <= 1.0) else { break };
+        let left = part * slow / FEWEST_PERIODS as f64;
         let ratio = sine.density(&level) / left.max(series.rounding_density());
         // What is left has two degrees of freedom an ordinate, less the sinusoid's and the line's.
         let p_value = part.powi(FEWEST_PERIODS as i32 - 2);
@@ -137,6 +130,42 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
         series = sine.subtracted_from(&series);
     }
     found
+}
+
+/// A sinusoid that may be nearly all of the slow variation of a series.
+struct SlowSine {
+    /// The series without its straight line.
+    level: UniformSeries,
+    /// The sum of the ordinates of its slow variation.
+    slow: f64,
+    /// Of the padded ordinates, Hz.
+    spacing: f64,
+    sine: Sine,
+}
+
+impl SlowSine {
+    /// The fit to the series without its straight line; `None` where it leaves too much of the slow variation.
+    fn first_fit(series: &UniformSeries) -> Option<Self> {
+        let level = series.detrended();
+        let spectrum = Periodogram::new(&level).filter(|of| of.padded().len() > 2 * PADDING * FEWEST_PERIODS)?;
+        let searched = PADDING * FEWEST_SLOW_PERIODS..=PADDING * FEWEST_PERIODS;
+        let at = searched.max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b]))?;
+        let spacing = spectrum.resolution() / PADDING as f64;
+        let sine = Sine::fit_near(&level, at as f64 * spacing, spacing);
+        let slow = slow_variation(&spectrum);
+        let part = part_left(series, &sine, slow).filter(|part| *part <= SLOW_LEFT);
+        part.map(|_| Self { level, slow, spacing, sine })
+    }
+}
+
+/// The sum of the ordinates from one period a record up to those that are searched for lines.
+fn slow_variation(spectrum: &Periodogram) -> f64 {
+    spectrum.independent()[1..=FEWEST_PERIODS].iter().sum()
+}
+
+/// The part of the slow variation `slow` of a series that it has without a sinusoid and the straight line beside it.
+fn part_left(series: &UniformSeries, sine: &Sine, slow: f64) -> Option<f64> {
+    Some(slow_variation(&Periodogram::new(&sine.subtracted_from(series).detrended())?) / slow)
 }
 
 /// Whether `line` is what the fit of a far stronger resonance has left on its skirts.
