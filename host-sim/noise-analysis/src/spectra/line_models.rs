@@ -343,14 +343,14 @@ fn groups(ordinates: &[f64], first: usize, looks: f64) -> Vec<Group> {
 }
 
 /// A Lorentz curve by its parameters: `ln level`, `ln height`, `centre` and `ln width`.
-struct Curve {
+struct LorentzCurve {
     level: f64,
     height: f64,
     centre: f64,
     width: f64,
 }
 
-impl Curve {
+impl LorentzCurve {
     fn new(parameters: &Vector4<f64>) -> Self {
         let [level, height, width] = [0, 1, 3].map(|at| parameters[at].exp());
         Self { level, height, centre: parameters[2], width }
@@ -378,7 +378,7 @@ impl Curve {
 }
 
 fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
-    let curve = Curve::new(parameters);
+    let curve = LorentzCurve::new(parameters);
     let of_group = |group: &Group| {
         let density = curve.density(group);
         -group.ordinates * (density.ln() + group.density / density)
@@ -392,7 +392,7 @@ fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
 /// ordered values of uniform ones, so that the largest distance from a straight line has Kolmogorov's distribution (M.
 /// Bartlett, "An introduction to stochastic processes", 1955). That the parameters were fitted lowers the distance.
 fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
-    let curve = Curve::new(parameters);
+    let curve = LorentzCurve::new(parameters);
     let ratio = |group: &Group| group.ordinates * group.density / curve.density(group);
     let (total, count) =
         groups.iter().fold((0.0, 0.0), |(total, count), group| (total + ratio(group), count + group.ordinates));
@@ -409,7 +409,7 @@ fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
 /// Fisher's information and the score.
 fn normal_equations(groups: &[Group], parameters: &Vector4<f64>) -> (Matrix4<f64>, Vector4<f64>) {
     let (mut information, mut score) = (Matrix4::zeros(), Vector4::zeros());
-    let curve = Curve::new(parameters);
+    let curve = LorentzCurve::new(parameters);
     for group in groups {
         let (density, slope) = curve.slopes(group);
         let weight = group.ordinates / (density * density);
