@@ -612,6 +612,7 @@ mod tests {
         // The same records: what the line takes off is known much better than either.
         assert!(without - with > 0.002, "{without} {with}");
     }
+
     /// The curve of white noise of [`DEVIATION`] counts, a sinusoid of this amplitude at a third of the sample rate, and a quantization
     /// of `quantum` counts·s: the differences of independent errors of the angle over the sample period.
     fn with_quantization(seed: u64, amplitude: f64, quantum: f64) -> Curve<{ crate::OCTAVES }> {

@@ -3,7 +3,7 @@
 //! Most records of white noise show none. There, the deviances at few decimations of each filter spare the search for the best one and
 //! the dispersion of each channel, which needs that search too.
 
-use super::{ChannelDeviance, FilteredChannel, LEAST_DECIMATION, STEP, longest_decimation};
+use super::channel_deviance::{ChannelDeviance, FilteredChannel, decimations};
 use crate::OCTAVES;
 use crate::parallel::in_parallel;
 use allan_core::Curve;
@@ -22,13 +22,6 @@ struct TriedFilters {
     own_rate: Vec<f64>,
     /// With each filter at each of the [`decimations`].
     slow: Vec<Vec<f64>>,
-}
-
-/// The decimations at which a filter that is read slowly is tried, from just above 1 to its length.
-pub(super) fn decimations(filter: MovingAverageFilter) -> impl Iterator<Item = f64> {
-    let longest = longest_decimation(filter);
-    std::iter::successors(Some(LEAST_DECIMATION), |decimation| Some(decimation * STEP))
-        .take_while(move |decimation| *decimation < longest)
 }
 
 /// The most by which the sum of the deviances of channels, each with its curve, falls with one of `filters`, whatever their

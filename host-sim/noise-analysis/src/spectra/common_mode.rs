@@ -223,6 +223,7 @@ mod tests {
             assert!(gain < 5.0, "{seed}: {gain}");
         }
     }
+
     /// Three channels of independent white noise behind two moving averages of 64 samples at 204.8 Hz over 450 s, 0.625 s of noise that
     /// is correlated by them and shared by none; and with a process of 40 s that all have.
     #[test]
