@@ -24,7 +24,7 @@ use measurement::SensorProfile;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Kinds that the sensor, its bus or its surroundings have once: whatever channels show one of them show the same cause.
+/// Kinds that the sensor, its bus or its environment have once: whatever channels show one of them show the same cause.
 const ONCE: [&str; 10] = [
     "dropped_samples",
     "repeated_samples",

@@ -1,7 +1,7 @@
 //! Lines that are the harmonics of one periodic signal, and the sidebands of these.
 
 use super::line::{Frequency, NORMAL_995};
-use super::waveform::{Multiple, SQUARE_BY_CHANCE, has_amplitudes_of_square};
+use super::waveform::{Multiple, SQUARE_BY_CHANCE, by_channel, is_square};
 
 /// Probability of chance below which lines at multiples of a frequency are its harmonics.
 pub(super) const BY_CHANCE: f64 = 0.01;
@@ -52,7 +52,8 @@ struct Tooth {
     number: usize,
     /// The multiple at which, or nearest to which, the line lies.
     harmonic: u32,
-    is_sideband: bool,
+    /// What the line is to the fundamental: that multiple, or a sideband of it.
+    multiple: Multiple,
     /// How far from the comb's frequency it could lie, Hz.
     within: f64,
 }
@@ -76,7 +77,7 @@ impl Comb<'_> {
         let own_width = frequencies[fundamental].width();
         // Where the frequency wanders, harmonic k shows it k times as well as the fundamental.
         let lowest = teeth(own_width)
-            .filter(|tooth| !tooth.is_sideband && covered(tooth.within) < 1.0)
+            .filter(|tooth| tooth.multiple != Multiple::Sideband && covered(tooth.within) < 1.0)
             .min_by_key(|tooth| tooth.harmonic);
         let width = lowest
             .map_or(own_width, |tooth| own_width.max(frequencies[tooth.number].width() / f64::from(tooth.harmonic)));
@@ -100,10 +101,9 @@ impl Comb<'_> {
         let count = teeth.len() as f64;
         let mut members = vec![(fundamental, Multiple::Harmonic(1))];
         members.extend(sideband.map(|sideband| (sideband, Multiple::Sideband)));
-        members.extend(teeth.iter().map(|tooth| {
-            (tooth.number, if tooth.is_sideband { Multiple::Sideband } else { Multiple::Harmonic(tooth.harmonic) })
-        }));
-        let by_amplitude = if has_amplitudes_of_square(frequencies, &members) { SQUARE_BY_CHANCE } else { 1.0 };
+        members.extend(teeth.iter().map(|tooth| (tooth.number, tooth.multiple)));
+        let lines = by_channel(members.iter().map(|&(number, multiple)| (multiple, &frequencies[number])));
+        let by_amplitude = if lines.values().any(|lines| is_square(lines)) { SQUARE_BY_CHANCE } else { 1.0 };
         Some(HarmonicSeries { members, p_value: (least * count * by_amplitude).min(1.0) })
     }
 
@@ -116,21 +116,22 @@ impl Comb<'_> {
         let modulation = sideband.map(|sideband| (sideband.frequency - carrier).abs());
         let offsets = [Some(0.0), modulation, modulation.map(|of| -of)];
         let at = |offset: f64| {
-            let multiple = ((frequency - offset) / carrier).round();
-            let is_sideband = offset != 0.0;
-            let error_of_modulation =
-                sideband.filter(|_| is_sideband).map_or(0.0, |sideband| sideband.error.hypot(first.best().error));
-            let error = (multiple * first.best().error).hypot(line.best().error).hypot(error_of_modulation);
-            let width = 0.5 * (multiple * width_of_first).max(line.width());
+            let times = ((frequency - offset) / carrier).round();
+            let harmonic = times as u32;
+            let (error_of_modulation, multiple) = match sideband.filter(|_| offset != 0.0) {
+                Some(sideband) => (sideband.error.hypot(first.best().error), Multiple::Sideband),
+                None => (0.0, Multiple::Harmonic(harmonic)),
+            };
+            let error = (times * first.best().error).hypot(line.best().error).hypot(error_of_modulation);
+            let width = 0.5 * (times * width_of_first).max(line.width());
             let within = NORMAL_995 * error + width + 1.0 / self.duration_s;
-            let distance = (frequency - multiple * carrier - offset).abs();
+            let distance = (frequency - times * carrier - offset).abs();
             // The fundamental itself, in another channel, is a member already.
-            let is_other = multiple >= if is_sideband { 1.0 } else { 2.0 };
-            (is_other && distance < within).then_some((distance / within, multiple as u32, is_sideband, within))
+            let is_other = harmonic >= 1 && multiple != Multiple::Harmonic(1);
+            (is_other && distance < within).then_some((distance / within, Tooth { number, harmonic, multiple, within }))
         };
-        let nearest = offsets.into_iter().flatten().filter_map(at).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let (_, harmonic, is_sideband, within) = nearest;
-        Some(Tooth { number, harmonic, is_sideband, within })
+        let places = offsets.into_iter().flatten().filter_map(at);
+        places.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, tooth)| tooth)
     }
 }
 

@@ -9,8 +9,8 @@ use super::cause::{Cause, Shown};
 use super::harmonic_series::{BY_CHANCE, most_certain};
 use super::line::{Frequency, Line, NORMAL_995};
 use super::waveform::{
-    Multiple, SQUARE_BY_CHANCE, SQUARE_SIGMAS, SQUARE_TOLERANCE, is_sawtooth, is_square, periodic, sawtooth,
-    square_wave,
+    Multiple, SQUARE_BY_CHANCE, SQUARE_SIGMAS, SQUARE_TOLERANCE, by_channel, is_sawtooth, is_square, periodic,
+    sawtooth, square_wave,
 };
 use crate::distributions::NORMAL_975;
 use crate::findings::{Effect, Parameter};
@@ -32,7 +32,7 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
                 None => others.push(frequency),
             }
         }
-        causes.push(harmonic_cause(members));
+        causes.push(harmonic_cause(&members));
         frequencies = others;
     }
     while let Some(places) = modulated_line(&frequencies, duration_s) {
@@ -41,7 +41,7 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
         causes.push(modulated_cause(modulated.into_iter().map(|(_, frequency)| frequency).collect()));
         frequencies = others.into_iter().map(|(_, frequency)| frequency).collect();
     }
-    causes.extend(frequencies.into_iter().map(|frequency| harmonic_cause(vec![(Multiple::Harmonic(1), frequency)])));
+    causes.extend(frequencies.into_iter().map(|frequency| harmonic_cause(&[(Multiple::Harmonic(1), frequency)])));
     causes
 }
 
@@ -120,13 +120,8 @@ fn modulated_cause(lines: Vec<Frequency>) -> Cause {
 
 /// The cause with these frequencies: a square wave if the amplitudes of a channel say so, else its fundamental line with the
 /// number of its harmonics.
-fn harmonic_cause(members: Vec<(Multiple, Frequency)>) -> Cause {
-    let mut by_channel: BTreeMap<usize, Vec<(Multiple, Line)>> = BTreeMap::new();
-    for (multiple, frequency) in members {
-        for line in frequency.lines {
-            by_channel.entry(line.channel).or_default().push((multiple, line));
-        }
-    }
+fn harmonic_cause(members: &[(Multiple, Frequency)]) -> Cause {
+    let by_channel = by_channel(members.iter().map(|(multiple, frequency)| (*multiple, frequency)));
     let is_square = by_channel.values().any(|lines| is_square(lines));
     let is_sawtooth = by_channel.values().any(|lines| is_sawtooth(lines));
     let shown = by_channel.into_iter().map(|(channel, mut lines)| {

@@ -24,15 +24,17 @@ pub(super) enum Multiple {
     Sideband,
 }
 
-/// Whether the lines of any channel have the amplitudes of a square wave.
-pub(super) fn has_amplitudes_of_square(frequencies: &[Frequency], members: &[(usize, Multiple)]) -> bool {
-    let mut by_channel: BTreeMap<usize, Vec<(Multiple, Line)>> = BTreeMap::new();
-    for &(number, multiple) in members {
-        for line in &frequencies[number].lines {
-            by_channel.entry(line.channel).or_default().push((multiple, line.clone()));
+/// The lines of each channel among these frequencies.
+pub(super) fn by_channel<'f>(
+    members: impl IntoIterator<Item = (Multiple, &'f Frequency)>,
+) -> BTreeMap<usize, Vec<(Multiple, Line)>> {
+    let mut channels: BTreeMap<usize, Vec<(Multiple, Line)>> = BTreeMap::new();
+    for (multiple, frequency) in members {
+        for line in &frequency.lines {
+            channels.entry(line.channel).or_default().push((multiple, line.clone()));
         }
     }
-    by_channel.values().any(|lines| is_square(lines))
+    channels
 }
 
 fn amplitude_of(lines: &[(Multiple, Line)], harmonic: u32) -> Option<Parameter> {
