@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long]
+# Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long | --recordings]
 #
 # Needs rustup with its default toolchain, a C compiler and Python 3.11 or later. Installs, with a message, what else is
 # missing: by rustup, by apt-get (as root, or with sudo), and from PyPI into the target folder: the packages of
 # tests/requirements.txt, and Node.js with npm, for the emulator of the Pico.
 # With --long it also runs the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
+# Tests on measured recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/recordings.md). With
+# --recordings only those that the last run skipped for that reason are run; none may be skipped again.
 # The last line says how many tests passed, failed and were skipped.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -13,6 +15,7 @@ MCU=thumbv7em-none-eabihf # Cortex-M4F: the firmware
 SMALL=thumbv6m-none-eabi  # Cortex-M0+: the Pico's firmware, the two libraries
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
+WITHOUT_RECORDINGS=$TARGET/tests-without-recordings # names of tests, one a line
 STEPS=(
     "tools:install what is missing"
     "format:formatting"
@@ -28,7 +31,13 @@ STEPS=(
 case "${1-}" in
     "") chosen=() ;;
     --long) chosen=(--include-ignored) ;;
-    *) echo "usage: $0 [--long]" >&2; exit 2 ;;
+    --recordings)
+        [ -n "${ADIS_RECORDINGS-}" ] || { echo "ADIS_RECORDINGS names no folder of recordings" >&2; exit 2; }
+        [ -s "$WITHOUT_RECORDINGS" ] || { echo "no test waits for recordings: run $0 without them first" >&2; exit 2; }
+        mapfile -t chosen <"$WITHOUT_RECORDINGS"
+        STEPS=("tools:install what is missing" "build:build for the tests" "recordings:tests on measured recordings")
+        ;;
+    *) echo "usage: $0 [--long | --recordings]" >&2; exit 2 ;;
 esac
 
 run() { printf '+ %s\n' "$*"; "$@"; }
@@ -124,7 +133,15 @@ build() {
     host test --no-run
     export HOST_SIM=$TARGET/debug/host-sim # the program as just built
 }
-tests() { host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"; }
+tests() {
+    host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
+    sed -n 's/: .* ADIS_RECORDINGS names$//p' "$SKIPPED_TESTS" | sort -u >"$WITHOUT_RECORDINGS"
+}
+recordings() {
+    host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
+    # What was skipped again is printed at the end. Each name has to be that of a test.
+    [ ! -s "$SKIPPED_TESTS" ] && [ "$(awk '/^test result: / { sum += $4 } END { print sum + 0 }' "$log")" -ge ${#chosen[@]} ]
+}
 
 clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
 row() { table+=$(printf '%5d s  %s' $((SECONDS - began)) "$title$1")$'\n'; }
@@ -141,10 +158,6 @@ conclude() {
     rm -f "$log" "$SKIPPED_TESTS"
 }
 
-if [ -z "${ADIS_RECORDINGS-}" ] && [ -d ../shared/data ]; then
-    ADIS_RECORDINGS=$(realpath ../shared/data)
-    export ADIS_RECORDINGS
-fi
 log=$(mktemp) title="" table="" began=0
 SKIPPED_TESTS=$(mktemp) # tests append "NAME: REASON"
 export SKIPPED_TESTS

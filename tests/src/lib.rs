@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 /// The path of a measured recording in the folder that `ADIS_RECORDINGS` names. If it is absent, the test is reported as
-/// skipped, and should return.
+/// skipped, and should return. Nothing else reads the variable, which a test of the architecture checks.
 pub fn recording(test: &str, file: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("ADIS_RECORDINGS").map(PathBuf::from);
     let path = folder.map(|folder| folder.join(file)).filter(|path| path.exists());

@@ -11,7 +11,6 @@ use recordings::time_base::measurement;
 use simulation::Simulation;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
-use std::path::PathBuf;
 
 /// A 95 % interval is 1.96 standard deviations to either side.
 const NORMAL_975: f64 = 1.96;
@@ -341,21 +340,20 @@ fn reports_of_a_hundred_simulated_recordings_do_not_contradict_themselves() {
 
 #[test]
 fn reports_of_measured_recordings_do_not_contradict_themselves() {
-    let folder = std::env::var_os("ADIS_RECORDINGS").map(PathBuf::from).expect("the folder of the recordings");
-    let mut files: Vec<PathBuf> = ["adis16405-static", "adis16405-burst"]
-        .iter()
-        .flat_map(|name| std::fs::read_dir(folder.join(name)).expect("a folder"))
-        .map(|entry| entry.expect("an entry").path())
-        .filter(|path| path.to_string_lossy().ends_with(".csv.gz"))
-        .collect();
-    files.sort();
+    let test = "reports_of_measured_recordings_do_not_contradict_themselves";
+    // The static recordings have no time stamps; their authors give the rate.
+    let files = [
+        ("adis16405-static/run1.csv.gz", Some(100.0)),
+        ("adis16405-static/run2.csv.gz", Some(100.0)),
+        ("adis16405-static/run3.csv.gz", Some(100.0)),
+        ("adis16405-burst/launch10.csv.gz", None),
+    ];
     let mut found = Vec::new();
-    for file in files {
-        let recording = count_table::read(&file, GyroRange::Dps300).expect("a recording");
-        // The static recordings have no time stamps; their authors give the rate.
-        let rate_hz = file.to_string_lossy().contains("static").then_some(100.0);
+    for (file, rate_hz) in files {
+        let Some(path) = system_tests::recording(test, file) else { return };
+        let recording = count_table::read(&path, GyroRange::Dps300).expect("a recording");
         let report = analyze(&measurement(&recording, rate_hz).expect("a time base"));
-        found.extend(contradictions(&report).into_iter().map(|of| format!("{}: {of}", file.display())));
+        found.extend(contradictions(&report).into_iter().map(|of| format!("{file}: {of}")));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
 }

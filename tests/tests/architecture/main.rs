@@ -1,5 +1,5 @@
 //! The architecture of the workspace: crates depend on those that a table allows, modules form no circle, and no two
-//! public types have the same name.
+//! public types have the same name; tests reach the measured recordings through one function.
 //!
 //! `WORKSPACE_ROOT` names another checkout to check.
 
@@ -41,6 +41,9 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("instruction-counts", "allan-core"),
     ("peers-accuracy", "allan-core noise-analysis virtual-sensor"),
 ];
+
+/// The variable that names the folder of the measured recordings.
+const RECORDINGS: &str = concat!("ADIS_", "RECORDINGS");
 
 struct Package {
     name: String,
@@ -141,6 +144,20 @@ fn describe_circles(uses: &Uses, root: &Path) -> String {
     text
 }
 
+/// Sources of the repository, in Rust or Python, that read the variable `ADIS_RECORDINGS`, but for the function that skips a
+/// test where a recording is absent.
+fn readers_of_recordings(root: &Path) -> Vec<String> {
+    let output = Command::new("git").args(["ls-files", "-z", "--", "*.rs", "*.py"]).current_dir(root).output();
+    let output = output.expect("git starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let files = String::from_utf8(output.stdout).expect("names in UTF-8");
+    let reads = |file: &&str| {
+        let text = std::fs::read_to_string(root.join(file)).unwrap_or_default();
+        text.contains(&format!("\"{RECORDINGS}\"")) || text.contains(&format!("'{RECORDINGS}'"))
+    };
+    files.split('\0').filter(reads).map(str::to_owned).collect()
+}
+
 /// Names of public types that are defined more than once, each with its files.
 fn describe_double_names(types: &[(String, PathBuf)], root: &Path) -> String {
     let mut places: BTreeMap<&str, Vec<String>> = BTreeMap::new();
@@ -186,4 +203,9 @@ fn no_two_public_types_of_the_workspace_share_a_name() {
 fn crates_depend_only_on_what_the_design_allows() {
     let refused = describe_dependencies(&packages());
     assert!(refused.is_empty(), "\n{refused}");
+}
+
+#[test]
+fn tests_reach_the_measured_recordings_through_the_function_that_skips() {
+    assert_eq!(readers_of_recordings(&workspace()), ["tests/src/lib.rs"]);
 }

@@ -2,11 +2,11 @@
 //! `adis16405_log.txt-example`; psas/Launch-10).
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
-use std::path::PathBuf;
+use std::io::{BufRead, BufReader};
 
 use adis16405_driver::{Burst, BurstValidator, Channel, Faults, GyroRange, OutputWord};
 use flate2::read::GzDecoder;
+use system_tests::recording;
 
 /// Columns of the recording after the time stamp.
 const COLUMNS: [Channel; 9] = [
@@ -20,21 +20,6 @@ const COLUMNS: [Channel; 9] = [
     Channel::MagnY,
     Channel::MagnZ,
 ];
-
-/// The path of the recording; `None`, with a message, where it is absent.
-fn recording(test: &str, file: &str) -> Option<PathBuf> {
-    let recordings = match std::env::var_os("ADIS_RECORDINGS") {
-        Some(folder) => PathBuf::from(folder),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
-    };
-    let path = recordings.join(file);
-    if !path.exists() {
-        // Not by eprintln!, whose output the test harness hides.
-        writeln!(std::io::stderr(), "skipped {test}: {} is absent", path.display()).expect("stderr");
-        return None;
-    }
-    Some(path)
-}
 
 #[test]
 fn recorded_words_are_those_of_a_sensor_at_rest() {
