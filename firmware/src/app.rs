@@ -8,7 +8,7 @@ use crate::device::{
 };
 use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
-use crate::report::{ReportPart, ReportProgress, running_sums, send};
+use crate::report_frames::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;

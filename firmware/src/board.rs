@@ -2,7 +2,7 @@
 //! resources and interrupt locks.
 
 use crate::acquisition::{Sampler, SamplingActivity};
-use crate::estimators::Estimators;
+use crate::sample_intake::Estimators;
 use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};

@@ -4,7 +4,7 @@ use crate::board::Board;
 use crate::command::HELP;
 use crate::device::DeviceState;
 use crate::number_text::Decimal;
-use crate::table::{self, AnswerLine};
+use crate::report_text::{self, AnswerLine};
 use core::fmt::Arguments;
 use heapless::Deque;
 use link::{ClockSource, Health, TextLine, text_line};
@@ -90,7 +90,7 @@ impl Console {
             Answer::Help => {
                 HELP.get(index).map_or(AnswerLine::End, |text| AnswerLine::Text(text_line(format_args!("{text}"))))
             }
-            Answer::Table => table::line(state, board, index),
+            Answer::Table => report_text::line(state, board, index),
             Answer::Counters => counter_line(&state.health(board), index),
             Answer::Status => status_line(state, board, index),
         };

@@ -2,10 +2,10 @@
 //! trouble, and its status register is read when it reports an error.
 
 use crate::board::Board;
-use crate::estimators::SensorTrouble;
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
 use crate::retained::RetainedSettings;
+use crate::sample_intake::SensorTrouble;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, probe, read_diagnosis};
 use crate::status_flags::StatusFlags;
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};

@@ -4,7 +4,7 @@
 //! `r` learned in the epoch before. Its Allan variance follows from the curves and covariances of the epoch,
 //! `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`, so that no second estimator is needed.
 
-use crate::estimators::Estimators;
+use crate::sample_intake::Estimators;
 use crate::statistics::{
     AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
 };

@@ -2,7 +2,8 @@
 //! one, which the fit has not seen.
 
 use crate::epoch::{FinishedEpoch, Regressor, Regressors, mean_shift, rebuild_compensated_curve};
-use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL, model_error, reported_term};
+use crate::report_messages::{model_error, reported_term};
+use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL};
 use adis16405_driver::Config;
 use allan_core::confidence::NORMAL_975;
 use allan_core::fit::fit;

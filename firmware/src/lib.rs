@@ -11,16 +11,17 @@
 //! | `board`, `microcontroller` | what the application needs of a board; what the images of all boards share |
 //! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
 //! | [`sensor`] | serial clock, probing, auto-null |
-//! | `estimators` | the path of every sample into the statistics, health counters |
+//! | `sample_intake` | the path of every sample into the statistics, health counters |
 //! | `channel_validity` | which channels of a burst are refused, by its faults |
-//! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve, baseline model and report made of them |
+//! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve and baseline model made of them |
 //! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
 //! | `device` | state of the device, supervision of the sensor |
 //! | `recovery`, `status_flags` | steps by which a sensor in trouble is recovered; what its status register has shown |
 //! | `task_monitor` | proof that every task is alive, for the watchdog |
-//! | `report` | reports in frames |
-//! | [`console`], `table`, [`number_text`] | answers in text, among them the report as a table; numbers in it |
+//! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
+//! | `report_text`, [`number_text`] | the report as a table that people read; numbers in it |
+//! | [`console`] | answers in text |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
 //! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
@@ -43,19 +44,20 @@ mod cross_sums;
 mod device;
 pub mod epoch;
 mod epoch_record;
-mod estimators;
 pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 #[allow(unsafe_code, reason = "registers, and memory that is not initialised at the start")]
 pub mod microcontroller;
 pub mod number_text;
 mod recovery;
-mod report;
+mod report_frames;
+mod report_messages;
+mod report_text;
 pub mod retained;
+mod sample_intake;
 pub mod sensor;
 mod statistics;
 mod status_flags;
-mod table;
 mod task_monitor;
 mod transmit;
 
@@ -65,7 +67,7 @@ pub use board::{Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, Sensor
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;
-pub use estimators::{Estimators, estimate};
 pub use retained::RetainedRam;
+pub use sample_intake::{Estimators, estimate};
 pub use statistics::{CHANNELS, ChannelEstimator, ChannelSums, OCTAVES, OVERLAP, Statistics};
 pub use transmit::{TransmitBuffer, TransmitQueue};

@@ -1,4 +1,5 @@
-//! The report in frames: device and settings, every channel, health. A report is sent message by message; one that ends an epoch also has the validation and the learned model of every inertial channel.
+//! The report in frames: device and settings, every channel, health. A report is sent message by message; one that ends an
+//! epoch also has the validation and the learned model of every inertial channel.
 
 use crate::board::Board;
 use crate::device::DeviceState;

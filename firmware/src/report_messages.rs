@@ -1,0 +1,73 @@
+//! The messages of a report that are made of one channel's sums: octaves and coefficients, and the error of a model.
+
+use crate::channels::{ChannelEstimator, OCTAVES};
+use crate::statistics::ChannelSums;
+use adis16405_driver::{Channel, Config};
+use allan_core::{Curve, Model, NoiseTerm, model};
+use heapless::Vec;
+use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
+
+impl ChannelSums {
+    /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
+    #[must_use]
+    pub(crate) fn error_of(&self, model: &Model, channel: Channel, config: Config) -> Option<ReportedModelError> {
+        let mut curve = Curve::empty();
+        self.rebuild_curve(&mut curve, channel, config);
+        model_error(model, &curve)
+    }
+
+    /// The report on one channel, without losses; `unseen_error` is that of the previous epoch's model.
+    #[must_use]
+    pub fn report(
+        &self,
+        channel: Channel,
+        baseline: Option<&Model>,
+        unseen_error: Option<ReportedModelError>,
+    ) -> ChannelMessage {
+        let mut report = ChannelMessage {
+            channel: channel as u8,
+            samples: self.samples,
+            missing: self.missing,
+            octaves: Vec::new(),
+            coefficients: Vec::new(),
+            unseen_error,
+            lost: 0,
+            refused: 0,
+            replaced: self.gaps.iter().map(|gaps| u64::from(gaps.replaced())).sum(),
+        };
+        let mut curve = Curve::empty();
+        ChannelEstimator::rebuild_curve(&mut curve, 1.0, self.samples, |octave| self.octave(octave));
+        let octaves = curve.points().iter().map(|point| {
+            let (sum, count) = self.octaves[point.n.trailing_zeros() as usize];
+            ReportedOctave { n: point.n, sum, count, interpolation: point.interpolation as f32 }
+        });
+        report.octaves.extend(octaves.take(link::MAX_OCTAVES));
+        let coefficient = |term: &model::FittedTerm| {
+            let (value, low, high) = (term.value, term.low, term.high);
+            ReportedCoefficient { term: reported_term(term.kind), value, low, high }
+        };
+        let coefficients = baseline.into_iter().flat_map(Model::terms).map(coefficient);
+        report.coefficients.extend(coefficients.take(link::MAX_COEFFICIENTS));
+        report
+    }
+}
+
+/// Error of a model on a curve; `None` if no octave can be compared.
+pub(crate) fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> Option<ReportedModelError> {
+    let error = allan_core::model::Discrepancy::between(model, curve)?;
+    Some(ReportedModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent })
+}
+
+pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
+    match kind {
+        NoiseTerm::Quantization => ReportedTerm::Quantization,
+        NoiseTerm::AngleRandomWalk => ReportedTerm::AngleRandomWalk,
+        NoiseTerm::BiasInstability => ReportedTerm::BiasInstability,
+        NoiseTerm::RateRandomWalk => ReportedTerm::RateRandomWalk,
+        NoiseTerm::RateRamp => ReportedTerm::RateRamp,
+        NoiseTerm::Filtered(_) => ReportedTerm::Filtered,
+        NoiseTerm::Markov(_) => ReportedTerm::Markov,
+        NoiseTerm::Resonance(_) => ReportedTerm::Resonance,
+        NoiseTerm::Sinusoid(_) => ReportedTerm::Sinusoid,
+    }
+}
