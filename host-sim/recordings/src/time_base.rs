@@ -3,20 +3,30 @@
 //! A sample that was read late is not a lost sample, and stamps that are coarser than the sample period are no losses:
 //! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
 
-use crate::lateness_track::COARSE;
-use crate::recording::{RecordedSample, Recording};
-use crate::sample_slots::{MAX_REPEATED_READ_INTERVAL, contradiction, slots, usual_interval};
-use crate::stamp_alignment::StampAlignment;
-use crate::time_base_error::MIN_SAMPLES;
+mod indexed_clock;
+mod lateness_track;
+mod lower_envelope;
+pub(crate) mod sample_slots;
+mod stamp_alignment;
+pub(crate) mod stamp_quality;
+mod stamp_tick;
+pub(crate) mod stream_clock;
+pub(crate) mod time_base_error;
+
+use crate::counts::recording::{RecordedSample, Recording};
+use crate::time_base::lateness_track::COARSE;
+use crate::time_base::sample_slots::{MAX_REPEATED_READ_INTERVAL, contradiction, slots, usual_interval};
+use crate::time_base::stamp_alignment::StampAlignment;
+use crate::time_base::time_base_error::MIN_SAMPLES;
 use adis16405_driver::{Channel, Faults};
 use measurement::{MeasuredChannel, Measurement, RecordingDescription, SensorProfile, adis16405};
 use std::collections::BTreeMap;
 
-pub use crate::indexed_clock::ClockStep;
-pub use crate::lateness_track::LostStretch;
-pub use crate::stamp_alignment::RateEstimate;
-pub use crate::stamp_quality::StampQuality;
-pub use crate::time_base_error::TimeBaseError;
+pub use crate::time_base::indexed_clock::ClockStep;
+pub use crate::time_base::lateness_track::LostStretch;
+pub use crate::time_base::stamp_alignment::RateEstimate;
+pub use crate::time_base::stamp_quality::StampQuality;
+pub use crate::time_base::time_base_error::TimeBaseError;
 
 /// Faults of one channel's word: the sample is left out in this channel alone.
 pub(crate) const REFUSED_IN_A_CHANNEL: Faults = Faults::IMPOSSIBLE_RATE.union(Faults::X_SIGN);

@@ -1,0 +1,4 @@
+//! Columns of a recording of any sensor: how the user names and chooses them, and their units.
+
+pub(crate) mod column_selection;
+pub(crate) mod unit;

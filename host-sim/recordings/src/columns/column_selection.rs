@@ -1,0 +1,441 @@
+//! Which columns of a file hold the channels, the time and the index, and in which units: as the user says it, else by the
+//! names of the columns.
+
+use crate::columns::unit::{COUNT, SECOND, Unit};
+use measurement::{ChannelProfile, SensorProfile};
+
+/// What a column is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Role {
+    /// Time stamps.
+    Time,
+    /// Running number of the sample.
+    Index,
+    /// A channel of the sensor.
+    Channel(ChannelProfile),
+}
+
+/// A column that a file has.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct AvailableColumn {
+    /// Its name in the file; its number, from 0, where the file names none.
+    pub(crate) name: String,
+    /// Its unit, where the file says it.
+    pub(crate) unit: Option<Unit>,
+}
+
+/// A column that is read.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ChosenColumn {
+    /// Position among the available columns.
+    pub(crate) position: usize,
+    pub(crate) role: Role,
+    /// As the file names it.
+    pub(crate) label: String,
+    /// Its unit; `None` for times that are stated without one.
+    pub(crate) unit: Option<Unit>,
+    /// Size of 1 in the unit of the channel.
+    pub(crate) factor: f64,
+}
+
+/// Why columns cannot be chosen.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SelectionError {
+    /// An argument that is no assignment.
+    #[error("--columns {0}: expected CHANNEL=COLUMN, such as gyro_x=wx")]
+    NoAssignment(String),
+    /// A channel that the sensor does not have.
+    #[error("--columns {name}=…: no such channel; {sensor} has {known}, and there are time and sample")]
+    UnknownChannel {
+        /// As given.
+        name: String,
+        /// Name of the sensor.
+        sensor: String,
+        /// Its channels.
+        known: String,
+    },
+    /// A channel that is assigned twice, or two columns that look like it.
+    #[error("{channel} is both {one} and {other}: say which with --columns")]
+    Ambiguous {
+        /// The channel.
+        channel: String,
+        /// A column.
+        one: String,
+        /// Another column.
+        other: String,
+    },
+    /// A column that the file does not have.
+    #[error("no column {wanted}; the file has {available}")]
+    NoColumn {
+        /// As given.
+        wanted: String,
+        /// Names of the columns.
+        available: String,
+    },
+    /// No column looks like a channel.
+    #[error("no column is named like a channel; say which is which, as in --columns gyro_x=NAME; the file has {0}")]
+    NoChannel(String),
+    /// A unit that is not known.
+    #[error("--units {unit}: not a known unit; known are {known}")]
+    UnknownUnit {
+        /// As given.
+        unit: String,
+        /// The known ones.
+        known: String,
+    },
+    /// Two units for one quantity.
+    #[error("--units {0} and {1} are of one quantity")]
+    TwoUnits(&'static str, &'static str),
+    /// A column without a stated unit.
+    #[error("column {column}: no unit of {channel}; give one, as in --units {example}")]
+    NoUnit {
+        /// The column.
+        column: String,
+        /// Its channel.
+        channel: String,
+        /// A unit of the channel.
+        example: &'static str,
+    },
+    /// Counts of a sensor whose scale is not known.
+    #[error("column {0}: counts of which sensor? give its profile with --sensor")]
+    CountsOfAny(String),
+}
+
+/// What the user says of the columns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ColumnSelection {
+    /// Channel and column.
+    assignments: Vec<(String, String)>,
+    units: Vec<Unit>,
+}
+
+impl ColumnSelection {
+    /// From assignments such as `gyro_x=wx` and names of units, each of which is that of all columns of its quantity.
+    ///
+    /// # Errors
+    /// A text that is no assignment, or an unknown or a second unit of a quantity.
+    pub fn parse(columns: &[String], units: &[String]) -> Result<Self, SelectionError> {
+        let assignment = |text: &String| match text.split_once('=') {
+            Some((channel, column)) if !channel.trim().is_empty() && !column.trim().is_empty() => {
+                Ok((channel.trim().to_owned(), column.trim().to_owned()))
+            }
+            _ => Err(SelectionError::NoAssignment(text.clone())),
+        };
+        let assignments: Vec<(String, String)> = columns.iter().map(assignment).collect::<Result<_, _>>()?;
+        let mut known: Vec<Unit> = Vec::new();
+        for text in units {
+            let unit = Unit::parse(text).ok_or_else(|| SelectionError::UnknownUnit {
+                unit: text.clone(),
+                known: Unit::names().collect::<Vec<_>>().join(", "),
+            })?;
+            if let Some(other) = known.iter().find(|other| other.base == unit.base) {
+                return Err(SelectionError::TwoUnits(other.name, unit.name));
+            }
+            known.push(unit);
+        }
+        Ok(Self { assignments, units: known })
+    }
+
+    /// Whether the user says nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.assignments.is_empty() && self.units.is_empty()
+    }
+
+    /// The columns to read of `available`: time, index, and the channels in the order of `sensor`.
+    pub(crate) fn choose(
+        &self,
+        available: &[AvailableColumn],
+        sensor: &SensorProfile,
+    ) -> Result<Vec<ChosenColumn>, SelectionError> {
+        let mut chosen = if self.assignments.is_empty() {
+            by_name(available, sensor)?
+        } else {
+            let mut assigned = self.assigned(available, sensor)?;
+            if !assigned.iter().any(|(role, _)| *role == Role::Time) {
+                // The time is seldom named, and a file has rarely two.
+                assigned.extend(by_name(available, sensor).ok().and_then(|named| {
+                    named.into_iter().find(|(role, column)| {
+                        *role == Role::Time && !assigned.iter().any(|(_, other)| other == column)
+                    })
+                }));
+            }
+            assigned
+        };
+        if !chosen.iter().any(|(role, _)| matches!(role, Role::Channel(_))) {
+            return Err(SelectionError::NoChannel(names(available)));
+        }
+        chosen.sort_by_key(|(role, _)| match role {
+            Role::Time => 0,
+            Role::Index => 1,
+            Role::Channel(profile) => {
+                2 + sensor.channels.iter().position(|channel| channel.name == profile.name).unwrap_or(0)
+            }
+        });
+        chosen.into_iter().map(|(role, position)| self.with_unit(role, position, &available[position])).collect()
+    }
+
+    fn assigned(
+        &self,
+        available: &[AvailableColumn],
+        sensor: &SensorProfile,
+    ) -> Result<Vec<(Role, usize)>, SelectionError> {
+        let mut assigned: Vec<(Role, usize)> = Vec::new();
+        for (name, wanted) in &self.assignments {
+            let role = match name.as_str() {
+                "time" => Role::Time,
+                "sample" => Role::Index,
+                _ => sensor.channel(name).map(Role::Channel).ok_or_else(|| SelectionError::UnknownChannel {
+                    name: name.clone(),
+                    sensor: sensor.name.to_owned(),
+                    known: sensor.channels.iter().map(|channel| channel.name).collect::<Vec<_>>().join(", "),
+                })?,
+            };
+            let position = available.iter().position(|column| column.name == *wanted);
+            let position = position
+                .ok_or_else(|| SelectionError::NoColumn { wanted: wanted.clone(), available: names(available) })?;
+            if let Some((_, other)) = assigned.iter().find(|(known, _)| *known == role) {
+                let (one, other) = (available[*other].name.clone(), wanted.clone());
+                return Err(SelectionError::Ambiguous { channel: name.clone(), one, other });
+            }
+            assigned.push((role, position));
+        }
+        Ok(assigned)
+    }
+
+    fn with_unit(&self, role: Role, position: usize, column: &AvailableColumn) -> Result<ChosenColumn, SelectionError> {
+        let stated = |base: &str| self.units.iter().copied().find(|unit| unit.base == base);
+        let (unit, factor) = match role {
+            Role::Index => (None, 1.0),
+            Role::Time => (stated(SECOND).or(column.unit.filter(|unit| unit.base == SECOND)), 1.0),
+            Role::Channel(profile) => {
+                let own = column.unit.filter(|unit| unit.measures(profile.quantity) || unit.base == COUNT);
+                let unit = stated(profile.quantity.unit()).or(own).or_else(|| stated(COUNT)).ok_or_else(|| {
+                    SelectionError::NoUnit {
+                        column: column.name.clone(),
+                        channel: profile.name.to_owned(),
+                        example: profile.quantity.unit(),
+                    }
+                })?;
+                let is_known = profile != ChannelProfile::generic(profile.name, profile.quantity);
+                match unit.base {
+                    COUNT if is_known => (Some(unit), profile.lsb),
+                    COUNT => return Err(SelectionError::CountsOfAny(column.name.clone())),
+                    _ => (Some(unit), unit.factor),
+                }
+            }
+        };
+        Ok(ChosenColumn { position, role, label: column.name.clone(), unit, factor })
+    }
+}
+
+impl AvailableColumn {
+    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro_x_deg_s`, `time_us`, `gyro_x_counts`.
+    pub(crate) fn from_heading(heading: &str) -> Self {
+        let heading = heading.trim().trim_start_matches(['#', '%']).trim();
+        for (open, close) in [('[', ']'), ('(', ')')] {
+            let bracketed = heading.strip_suffix(close).and_then(|text| text.rsplit_once(open));
+            if let Some((name, unit)) = bracketed
+                && let Some(unit) = Unit::parse(unit)
+            {
+                return Self { name: name.trim().to_owned(), unit: Some(unit) };
+            }
+        }
+        // The longest ending that is a unit: `deg_s`, not `s`.
+        let ends = heading.char_indices().filter(|(_, letter)| *letter == '_').map(|(at, _)| at);
+        let named = ends.filter(|at| *at > 0).find_map(|at| {
+            Unit::parse(&heading[at + 1..]).map(|unit| Self { name: heading[..at].to_owned(), unit: Some(unit) })
+        });
+        named
+            .filter(|column| role_of(&column.name).is_some())
+            .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
+    }
+
+    /// A column of a format that says what it is.
+    pub(crate) fn known(name: &str, unit: &str) -> Self {
+        Self { name: name.to_owned(), unit: Unit::parse(unit) }
+    }
+}
+
+/// The names of columns in a message; of many the first.
+fn names(available: &[AvailableColumn]) -> String {
+    const SHOWN: usize = 24;
+    let shown: Vec<&str> = available.iter().take(SHOWN).map(|column| column.name.as_str()).collect();
+    let more = if available.len() > SHOWN { ", …" } else { "" };
+    format!("{}{more}", shown.join(", "))
+}
+
+/// The columns whose names say what they are.
+fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<(Role, usize)>, SelectionError> {
+    let mut named: Vec<(Role, usize)> = Vec::new();
+    for (position, column) in available.iter().enumerate() {
+        let own = sensor.channel(&column.name).map(Role::Channel);
+        let role = own.or_else(|| match role_of(&column.name)? {
+            NamedRole::Time => Some(Role::Time),
+            NamedRole::Index => Some(Role::Index),
+            NamedRole::Channel(name) => sensor.channel(name).map(Role::Channel),
+        });
+        let Some(role) = role else { continue };
+        if let Some((_, other)) = named.iter().find(|(known, _)| *known == role) {
+            if role == Role::Time {
+                // When the sample was taken, rather than when it was published or written.
+                if is_time_of_sample(&column.name) {
+                    named.retain(|(known, _)| *known != Role::Time);
+                    named.push((role, position));
+                }
+                continue;
+            }
+            let channel = match role {
+                Role::Channel(profile) => profile.name,
+                _ => "sample",
+            };
+            let (one, other) = (available[*other].name.clone(), column.name.clone());
+            return Err(SelectionError::Ambiguous { channel: channel.to_owned(), one, other });
+        }
+        named.push((role, position));
+    }
+    Ok(named)
+}
+
+/// What the name of a column says.
+enum NamedRole {
+    Time,
+    Index,
+    Channel(&'static str),
+}
+
+/// The usual names, in small letters with `_` for other signs and without the axis.
+const GYROSCOPE: [&str; 11] =
+    ["gyro", "gyr", "gyroscope", "w", "g", "omega", "rate", "angular_velocity", "angular_rate", "w_rs_s", "gyro_rad"];
+const ACCELEROMETER: [&str; 11] = [
+    "accl",
+    "acc",
+    "accel",
+    "accelerometer",
+    "a",
+    "acceleration",
+    "linear_acceleration",
+    "specific_force",
+    "a_rs_s",
+    "accelerometer_m_s2",
+    "force",
+];
+const MAGNETOMETER: [&str; 6] = ["magn", "mag", "magnetometer", "m", "b", "magnetic_field"];
+const AXES: [(&str, [&str; 3]); 3] = [
+    ("gyro", ["gyro_x", "gyro_y", "gyro_z"]),
+    ("accl", ["accl_x", "accl_y", "accl_z"]),
+    ("magn", ["magn_x", "magn_y", "magn_z"]),
+];
+
+/// Whether a time column has the times of the samples by its name, where a file has several.
+fn is_time_of_sample(name: &str) -> bool {
+    let name = name.to_lowercase();
+    name.ends_with("stamp_sample") || name.ends_with("header.stamp")
+}
+
+fn role_of(name: &str) -> Option<NamedRole> {
+    let plain: String =
+        name.to_lowercase().chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
+    let plain = plain.trim_matches('_');
+    match plain {
+        "time" | "t" | "timestamp" | "stamp" | "timestamp_sample" | "timeus" => return Some(NamedRole::Time),
+        _ if plain.ends_with("header_stamp") => return Some(NamedRole::Time),
+        "sample" => return Some(NamedRole::Index),
+        "temp" | "temperature" => return Some(NamedRole::Channel("temp")),
+        "supply" | "vdd" => return Some(NamedRole::Channel("supply")),
+        "aux_adc" => return Some(NamedRole::Channel("aux_adc")),
+        _ => {}
+    }
+    let axis = plain.chars().last().and_then(|axis| "xyz".find(axis).or_else(|| "012".find(axis)))?;
+    let base = plain[..plain.len() - 1].trim_end_matches('_');
+    // A longer name may stand before the usual one: `imu0_gyro`, `field_angular_velocity`. Single letters stand alone.
+    let matches = |known: &str| base == known || known.len() > 2 && base.ends_with(&format!("_{known}"));
+    let groups = [&GYROSCOPE[..], &ACCELEROMETER[..], &MAGNETOMETER[..]];
+    let group = groups.iter().position(|group| group.iter().any(|known| matches(known)))?;
+    Some(NamedRole::Channel(AXES[group].1[axis]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
+    use measurement::SensorProfile;
+
+    /// The roles, factors and units of a header.
+    fn chosen(headings: &[&str], columns: &[&str], units: &[&str]) -> Result<Vec<(String, f64)>, SelectionError> {
+        let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
+        let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
+        let selection = ColumnSelection::parse(&owned(columns), &owned(units))?;
+        let describe = |column: super::ChosenColumn| {
+            let role = match column.role {
+                Role::Time => format!("time {}", column.unit.map_or("?", |unit| unit.name)),
+                Role::Index => "sample".to_owned(),
+                Role::Channel(profile) => profile.name.to_owned(),
+            };
+            (format!("{role}={}", column.position), column.factor)
+        };
+        Ok(selection.choose(&available, &SensorProfile::generic())?.into_iter().map(describe).collect())
+    }
+
+    #[test]
+    fn headings_of_well_known_files_need_no_arguments() {
+        const RAD: f64 = 180.0 / std::f64::consts::PI;
+        const M_S2: f64 = 1.0 / 9.80665;
+        for (headings, expected) in [
+            // EuRoC: imu0/data.csv.
+            (
+                &[
+                    "#timestamp [ns]",
+                    "w_RS_S_x [rad s^-1]",
+                    "w_RS_S_y [rad s^-1]",
+                    "w_RS_S_z [rad s^-1]",
+                    "a_RS_S_x [m s^-2]",
+                ][..],
+                &[("time ns=0", 1.0), ("gyro_x=1", RAD), ("gyro_y=2", RAD), ("gyro_z=3", RAD), ("accl_x=4", M_S2)][..],
+            ),
+            (&["time_us", "ax [g]", "gyro_z_deg_s"], &[("time us=0", 1.0), ("gyro_z=2", 1.0), ("accl_x=1", 1.0)]),
+            // ulog2csv writes vectors so.
+            (&["timestamp", "gyro_rad[0]", "gyro_rad[1]"], &[("time ?=0", 1.0)]),
+        ] {
+            let found = chosen(headings, &[], &["rad/s"]).expect("columns");
+            for (at, (name, factor)) in expected.iter().enumerate() {
+                if *name == "gyro_z=2" {
+                    continue; // --units overrides the heading; covered below.
+                }
+                assert_eq!(found[at].0, *name);
+                assert!((found[at].1 - factor).abs() < 1e-12, "{name}: {}", found[at].1);
+            }
+        }
+        let plain = chosen(&["time_us", "ax [g]", "gyro_z_deg_s"], &[], &[]).expect("columns");
+        assert_eq!(plain[1], ("gyro_z=2".to_owned(), 1.0));
+    }
+
+    #[test]
+    fn of_several_times_that_of_the_sample_is_taken() {
+        // As `rostopic echo -p` and ulog2csv write them.
+        let ros =
+            ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id", "field.angular_velocity.x"];
+        let expected = vec![("time ?=2".to_owned(), 1.0), ("gyro_x=4".to_owned(), 1.0)];
+        assert_eq!(chosen(&ros, &[], &["deg/s"]).expect("columns"), expected);
+        let px4 = ["timestamp", "timestamp_sample", "x"];
+        let expected = vec![("time us=1".to_owned(), 1.0), ("gyro_x=2".to_owned(), 1.0)];
+        assert_eq!(chosen(&px4, &["gyro_x=x"], &["deg/s", "us"]).expect("columns"), expected);
+    }
+
+    #[test]
+    fn faults_of_the_selection_are_named() {
+        for (headings, columns, units, expected) in [
+            (&["wx"][..], &[][..], &[][..], "no unit of gyro_x"),
+            (&["wx", "gyro_x"], &[], &["deg/s"], "gyro_x is both wx and gyro_x"),
+            (&["p", "q"], &[], &[], "no column is named like a channel"),
+            (&["p", "q"], &["gyro_x=r"], &["deg/s"], "no column r; the file has p, q"),
+            (&["p"], &["gyro_w=p"], &["deg/s"], "gyro_w"),
+            (&["p"], &["gyro_x"], &["deg/s"], "expected CHANNEL=COLUMN"),
+            (&["p"], &["gyro_x=p"], &["furlong"], "not a known unit"),
+            (&["p"], &["gyro_x=p"], &["deg/s", "rad/s"], "are of one quantity"),
+            (&["gyro_x_counts"], &[], &[], "counts of which sensor"),
+        ] {
+            let error = chosen(headings, columns, units).expect_err(expected).to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Recordings written as a table of register counts, which [`count_table`](crate::counts::count_table) reads back.
+
+use crate::counts::recording::Recording;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Writes the samples of `recording` as a table, gzip if the name of `file` ends in `.gz`.
+///
+/// The columns are `sample` and `time_s`, where every sample has them, and the counts of the recorded channels. A table has no
+/// flags: samples with a fault are rows like the others, and neither the gyroscopes' range nor the reason of a refusal is in it.
+///
+/// # Errors
+/// The file cannot be created or written.
+pub fn write(recording: &Recording, file: &Path) -> io::Result<()> {
+    write_text(file, |out| write_rows(recording, out))
+}
+
+/// Writes a text, gzip if the name of `file` ends in `.gz`.
+pub(crate) fn write_text(file: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
+    if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz")) {
+        let mut out = GzEncoder::new(out, Compression::default());
+        write(&mut out)?;
+        out.finish()?.flush()
+    } else {
+        write(&mut out)?;
+        out.flush()
+    }
+}
+
+fn write_rows(recording: &Recording, out: &mut dyn Write) -> io::Result<()> {
+    let has_index = recording.samples.iter().all(|sample| sample.time_stamp.index.is_some());
+    let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
+    let counts = recording.channels.iter().map(|channel| format!("{}_counts", channel.name()));
+    let stamps = [("sample", has_index), ("time_s", has_time)];
+    let stamps = stamps.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned());
+    writeln!(out, "{}", stamps.chain(counts).collect::<Vec<_>>().join(","))?;
+    let mut row = String::new();
+    for sample in &recording.samples {
+        row.clear();
+        // `{}` of a float is the shortest text that reads back to the same value.
+        let index = sample.time_stamp.index.filter(|_| has_index).map(|index| index.to_string());
+        let time = sample.time_stamp.time_s.filter(|_| has_time).map(|time| time.to_string());
+        let counts = recording.channels.iter().map(|channel| sample.counts.get(*channel).to_string());
+        for field in index.into_iter().chain(time).chain(counts) {
+            if !row.is_empty() {
+                row.push(',');
+            }
+            row.push_str(&field);
+        }
+        writeln!(out, "{row}")?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::write;
+    use crate::counts::count_table;
+    use crate::counts::recording::{Recorder, TimeStamp};
+    use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+
+    #[test]
+    fn a_table_is_read_back_as_it_was() {
+        let dir = tempfile::tempdir().expect("a folder");
+        for (name, stamp) in [
+            ("indexed.csv", (|row| TimeStamp { index: Some(row), time_s: None }) as fn(u64) -> TimeStamp),
+            // A third is not a decimal fraction.
+            ("timed.csv.gz", |row| TimeStamp::from_time(row as f64 / 3.0)),
+            ("neither.csv", |_| TimeStamp::default()),
+        ] {
+            let mut recorder = Recorder::new(vec![Channel::GyroZ, Channel::Supply], GyroRange::Dps300);
+            for row in 0..50_u64 {
+                let mut counts = crate::counts::recording::NOT_RECORDED;
+                counts[Channel::GyroZ as usize] = 37 * row as i16 - 900;
+                recorder.push(stamp(row), &Burst::from_counts(&Counts::new(counts)));
+            }
+            let recording = recorder.finish();
+            let file = dir.path().join(name);
+            write(&recording, &file).expect("written");
+            assert_eq!(count_table::read(&file, GyroRange::Dps300).expect(name), recording, "{name}");
+        }
+    }
+}

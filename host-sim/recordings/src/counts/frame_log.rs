@@ -1,0 +1,189 @@
+//! Logs of the SPI bus: one line a transaction (chip select low), `time_s,mosi,miso`, bytes in hexadecimal.
+//!
+//! Times are written with as many digits as they need to be read back exactly.
+
+use crate::input::delimited_text::{self, Lines};
+use crate::input::input_error::{InputError, Reason};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// First line of every log.
+pub const HEADER: &str = "time_s,mosi,miso";
+
+/// Longest time that a line stays in memory while others follow, and most bytes of them.
+const MAX_DELAY: Duration = Duration::from_secs(1);
+const MAX_BUFFERED: usize = 1 << 22;
+/// Bytes between two looks at the clock.
+const CLOCK_BYTES: usize = 1 << 12;
+
+const TIME: &str = "time_s";
+const MOSI: &str = "mosi";
+const MISO: &str = "miso";
+
+/// Bytes of one SPI transaction, chip select low.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame {
+    /// When chip select went low, s.
+    pub time_s: f64,
+    /// Bytes to the part; an even number.
+    pub mosi: Vec<u8>,
+    /// Bytes from the part; as many.
+    pub miso: Vec<u8>,
+}
+
+/// An open log, read frame by frame.
+pub struct FrameLogReader {
+    file: PathBuf,
+    lines: Lines,
+    line: u64,
+    last_s: f64,
+}
+
+impl FrameLogReader {
+    /// Opens a log, plain or gzip.
+    ///
+    /// # Errors
+    /// The file cannot be read or does not start with [`HEADER`].
+    pub fn open(file: &Path) -> Result<Self, InputError> {
+        Self::new(file, Lines::open(file)?)
+    }
+
+    /// As [`open`](Self::open), of a file that was opened before.
+    pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
+        match lines.next()? {
+            None => Err(InputError::file(file, Reason::Empty)),
+            Some((_, HEADER)) => Ok(Self { file: file.to_owned(), lines, line: 1, last_s: f64::NEG_INFINITY }),
+            Some((line, _)) => Err(InputError::line(file, line, Reason::NotFrameLog)),
+        }
+    }
+
+    /// Line of the frame that was read last, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// The next frame; `None` at the end of the log.
+    ///
+    /// # Errors
+    /// A line does not have a finite time, not before that of the last line, and two equally long rows of 16-bit words.
+    #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
+    pub fn next(&mut self) -> Result<Option<Frame>, InputError> {
+        let Some((line, text)) = self.lines.next()? else {
+            return Ok(None);
+        };
+        let frame = parse(text, self.last_s).map_err(|(column, reason)| match column {
+            Some(column) => InputError::field(&self.file, line, column, reason),
+            None => InputError::line(&self.file, line, reason),
+        })?;
+        self.line = line;
+        self.last_s = frame.time_s;
+        Ok(Some(frame))
+    }
+}
+
+fn parse(text: &str, last_s: f64) -> Result<Frame, (Option<&'static str>, Reason)> {
+    let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
+    let &[time, mosi, miso] = fields.as_slice() else {
+        return Err((None, Reason::FieldCount { found: fields.len(), expected: 3 }));
+    };
+    let time_s = delimited_text::time(time).map_err(|reason| (Some(TIME), reason))?;
+    if time_s < last_s {
+        return Err((Some(TIME), Reason::TimeBackwards { before: last_s, now: time_s }));
+    }
+    let mosi = bytes(mosi).map_err(|reason| (Some(MOSI), reason))?;
+    let miso = bytes(miso).map_err(|reason| (Some(MISO), reason))?;
+    if mosi.len() != miso.len() {
+        return Err((None, Reason::UnequalLengths { mosi: mosi.len(), miso: miso.len() }));
+    }
+    if mosi.is_empty() || mosi.len() % 2 == 1 {
+        return Err((None, Reason::OddBytes(mosi.len())));
+    }
+    Ok(Frame { time_s, mosi, miso })
+}
+
+pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
+    let nibble = |digit: u8| (digit as char).to_digit(16).map(|value| value as u8);
+    if text.len() % 2 == 1 {
+        return Err(Reason::NotHex(delimited_text::quote(text)));
+    }
+    text.as_bytes()
+        .chunks_exact(2)
+        .map(|pair| Some(nibble(pair[0])? << 4 | nibble(pair[1])?))
+        .collect::<Option<Vec<u8>>>()
+        .ok_or_else(|| Reason::NotHex(delimited_text::quote(text)))
+}
+
+/// A log that is being written; gzip if the name ends in `.gz`.
+///
+/// What was written before the last second is in the file, also where the program ends without [`finish`](Self::finish): a
+/// gzip log is a row of members, each of which is written at once.
+#[derive(Debug)]
+pub struct FrameLogWriter {
+    file: File,
+    is_gzip: bool,
+    /// Lines that are not in the file yet.
+    text: String,
+    written: Instant,
+}
+
+impl FrameLogWriter {
+    /// Creates `file` and writes the header.
+    ///
+    /// # Errors
+    /// The file cannot be created or written.
+    pub fn create(file: &Path) -> io::Result<Self> {
+        let is_gzip = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
+        let text = format!("{HEADER}\n");
+        Ok(Self { file: File::create(file)?, is_gzip, text, written: Instant::now() })
+    }
+
+    /// Adds one frame.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
+        let (before, text) = (self.text.len(), &mut self.text);
+        // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
+        let _ = write!(text, "{},", frame.time_s);
+        for byte in &frame.mosi {
+            let _ = write!(text, "{byte:02X}");
+        }
+        text.push(',');
+        for byte in &frame.miso {
+            let _ = write!(text, "{byte:02X}");
+        }
+        text.push('\n');
+        let looks = before / CLOCK_BYTES != self.text.len() / CLOCK_BYTES;
+        if self.text.len() >= MAX_BUFFERED || looks && self.written.elapsed() >= MAX_DELAY {
+            self.flush()
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Writes what is buffered and closes the file.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.flush()
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        if self.is_gzip {
+            let mut member = GzEncoder::new(Vec::new(), Compression::default());
+            member.write_all(self.text.as_bytes())?;
+            self.file.write_all(&member.finish()?)?;
+        } else {
+            self.file.write_all(self.text.as_bytes())?;
+        }
+        self.text.clear();
+        self.written = Instant::now();
+        Ok(())
+    }
+}

@@ -1,0 +1,101 @@
+//! Recordings written as a NumPy array of doubles in SI units, for programs that know no register counts.
+
+use crate::counts::recording::Recording;
+use npyz::WriterBuilder;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Standard gravity, m/s².
+const GRAVITY: f64 = 9.806_65;
+
+/// Writes `recording` as a matrix: a row a sample; its time in s, where every sample has one, then the recorded channels in the
+/// order of the burst. Angular rates are in rad/s, accelerations in m/s², other channels in their own unit. Returns the names
+/// of the columns.
+///
+/// # Errors
+/// The file cannot be created or written.
+pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
+    let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
+    let units: Vec<SiUnit> = recording.channels.iter().map(|channel| SiUnit::of(channel.unit())).collect();
+    let mut names: Vec<String> = if has_time { vec!["time_s".to_owned()] } else { Vec::new() };
+    names.extend(
+        recording.channels.iter().zip(&units).map(|(channel, unit)| format!("{}_{}", channel.name(), unit.suffix)),
+    );
+    let values = recording.samples.iter().flat_map(|sample| {
+        let channels = recording.channels.iter().zip(&units).map(|(&channel, unit)| {
+            let count = f64::from(sample.counts.get(channel));
+            (count * channel.lsb(recording.range) + channel.offset()) * unit.factor
+        });
+        sample.time_stamp.time_s.filter(|_| has_time).into_iter().chain(channels)
+    });
+    write_matrix(file, recording.samples.len(), names.len(), values)?;
+    Ok(names)
+}
+
+/// Writes doubles in the order of the rows.
+pub(crate) fn write_matrix(
+    file: &Path,
+    rows: usize,
+    columns: usize,
+    values: impl Iterator<Item = f64>,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
+    let shape = [rows as u64, columns as u64];
+    let mut matrix = npyz::WriteOptions::<f64>::new().default_dtype().shape(&shape).writer(&mut out).begin_nd()?;
+    matrix.extend(values)?;
+    matrix.finish()?;
+    out.flush()
+}
+
+/// The unit of a column in SI.
+pub(crate) struct SiUnit {
+    /// End of the name of the column.
+    pub(crate) suffix: &'static str,
+    /// From the channel's unit.
+    pub(crate) factor: f64,
+}
+
+impl SiUnit {
+    /// For a channel in `unit`; rates and specific forces alone have another unit in SI.
+    pub(crate) fn of(unit: &'static str) -> Self {
+        let (suffix, factor) = match unit {
+            "deg/s" => ("rad_s", std::f64::consts::PI / 180.0),
+            "g" => ("m_s2", GRAVITY),
+            unit => (unit, 1.0),
+        };
+        Self { suffix, factor }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::write;
+    use crate::counts::recording::{NOT_RECORDED, Recorder, TimeStamp};
+    use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+
+    #[test]
+    fn the_matrix_is_in_si_units() {
+        let mut recorder = Recorder::new(vec![Channel::GyroX, Channel::AcclZ, Channel::Temp], GyroRange::Dps150);
+        for row in 0..3 {
+            let mut counts = NOT_RECORDED;
+            counts[Channel::GyroX as usize] = 100 * row;
+            counts[Channel::AcclZ as usize] = -300;
+            counts[Channel::Temp as usize] = 10;
+            recorder.push(TimeStamp::from_time(f64::from(row) / 100.0), &Burst::from_counts(&Counts::new(counts)));
+        }
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("x.npy");
+        let names = write(&recorder.finish(), &file).expect("written");
+        assert_eq!(names, ["time_s", "gyro_x_rad_s", "accl_z_m_s2", "temp_degC"]);
+        let bytes = std::fs::read(&file).expect("a file");
+        let read = npyz::NpyFile::new(&bytes[..]).expect("an array");
+        assert_eq!(read.shape(), [3, 4]);
+        let values: Vec<f64> = read.into_vec().expect("doubles");
+        // Data sheet: 0.025 °/s, 3.33 mg and 0.14 °C per count; 25 °C at 0 counts.
+        let expected = [0.02, (200.0 * 0.025_f64).to_radians(), -300.0 * 3.33e-3 * 9.806_65, 25.0 + 10.0 * 0.14];
+        for (found, expected) in values[8..].iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found}, not {expected}");
+        }
+    }
+}

@@ -1,0 +1,372 @@
+//! The serial link to a device that runs the firmware, and the recording of its raw bursts as a frame log.
+
+use crate::counts::frame_log::{Frame, FrameLogWriter};
+use adis16405_driver::{BURST_REQUEST, Register};
+use link::{Decoder, DecoderCounters, Message, RawMessage, Received};
+use std::collections::VecDeque;
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Baud rate of the firmware's boards, Bd.
+pub const BAUD: u32 = 460_800;
+
+/// Longest time that a read waits for bytes. Deadlines are checked as often.
+const READ_TIMEOUT: Duration = Duration::from_millis(50);
+
+/// Longest time without a burst during a recording.
+const MAX_SILENCE: Duration = Duration::from_secs(10);
+
+/// Silence during a recording after which the device is asked again for its raw stream.
+const ASK_AGAIN: Duration = Duration::from_secs(2);
+
+/// Opens the serial port `port`, a device file or a pseudo-terminal, at `baud` Bd.
+///
+/// # Errors
+/// There is no such port, or it cannot be set up.
+pub fn open(port: &str, baud: u32) -> io::Result<Box<dyn serialport::SerialPort>> {
+    serialport::new(port, baud).timeout(READ_TIMEOUT).open().map_err(io::Error::from)
+}
+
+/// Receives the messages and text lines of a device and sends it commands.
+pub struct SerialLink<P> {
+    port: P,
+    decoder: Decoder,
+    received: VecDeque<Received>,
+    disconnected: bool,
+}
+
+impl<P: Read + Write> SerialLink<P> {
+    /// A link over `port`. Its reads must time out, or [`next`](Self::next) does not return at its deadline.
+    pub fn new(port: P) -> Self {
+        Self { port, decoder: Decoder::new(), received: VecDeque::new(), disconnected: false }
+    }
+
+    /// Sends a command line, ended by a carriage return.
+    ///
+    /// # Errors
+    /// The port cannot be written.
+    pub fn send_command(&mut self, text: &str) -> io::Result<()> {
+        self.port.write_all(format!("{text}\r").as_bytes())?;
+        self.port.flush()
+    }
+
+    /// The next message or text line; `None` when the device has disconnected, or at `deadline`.
+    ///
+    /// # Errors
+    /// The port fails.
+    pub fn next(&mut self, deadline: Option<Instant>) -> io::Result<Option<Received>> {
+        let mut bytes = [0; 4096];
+        while self.received.is_empty() {
+            if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                return Ok(None);
+            }
+            match self.port.read(&mut bytes) {
+                Ok(0) => {
+                    self.disconnected = true;
+                    return Ok(None);
+                }
+                Ok(count) => self.received.extend(bytes[..count].iter().filter_map(|&byte| self.decoder.push(byte))),
+                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+                Err(error) if is_hang_up(&error) => {
+                    self.disconnected = true;
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(self.received.pop_front())
+    }
+
+    /// Whether the device has closed the port.
+    pub fn is_disconnected(&self) -> bool {
+        self.disconnected
+    }
+
+    /// Numbers of messages received, missing and damaged so far.
+    pub fn counters(&self) -> DecoderCounters {
+        self.decoder.counters()
+    }
+}
+
+/// Whether the other end has closed the port: a pseudo-terminal then answers EIO.
+fn is_hang_up(error: &io::Error) -> bool {
+    const EIO: i32 = 5;
+    error.kind() == ErrorKind::BrokenPipe || error.raw_os_error() == Some(EIO)
+}
+
+/// Why a device gave no recording.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SerialRecordingError {
+    /// The port failed.
+    #[error("serial port: {0}")]
+    Port(io::Error),
+    /// The log could not be written.
+    #[error("recording: {0}")]
+    Log(io::Error),
+    /// No burst came for 10 s.
+    #[error("the device sent no bursts for 10 s, after {0} of them")]
+    Silent(u64),
+    /// The device closed the port.
+    #[error("the device hung up, after {0} bursts")]
+    Disconnected(u64),
+    /// The length of the recording is not positive and finite.
+    #[error("a duration of {0} s: it must be positive and finite")]
+    Duration(f64),
+}
+
+/// Counts of a recording over the serial link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SerialRecordingSummary {
+    /// Bursts in the log.
+    pub bursts: u64,
+    /// Sample periods between the first and the last burst of which no burst came: lost on the device or on the link. While
+    /// the device restarted none are counted.
+    pub missing: u64,
+    /// Restarts of the device.
+    pub restarts: u64,
+    /// Whether the recording was ended before its time.
+    pub interrupted: bool,
+    /// Of the link.
+    pub counters: DecoderCounters,
+}
+
+/// Turns the raw stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off. It ends
+/// early, with what came until then, as soon as `is_interrupted` returns true. The file is created at the first burst.
+///
+/// # Errors
+/// The device is silent or hangs up, or the port or the file fails. The bursts that came until then are in the file.
+pub fn record<P: Read + Write>(
+    link: &mut SerialLink<P>,
+    file: &Path,
+    seconds: f64,
+    is_interrupted: impl Fn() -> bool,
+) -> Result<SerialRecordingSummary, SerialRecordingError> {
+    if !(seconds.is_finite() && seconds > 0.0) {
+        return Err(SerialRecordingError::Duration(seconds));
+    }
+    let mut recorder: Option<RawStreamRecorder> = None;
+    let bursts = |recorder: &Option<RawStreamRecorder>| recorder.as_ref().map_or(0, RawStreamRecorder::bursts);
+    link.send_command("w 1").map_err(SerialRecordingError::Port)?;
+    let mut silent_since = Instant::now();
+    let mut asked = silent_since;
+    let outcome = loop {
+        if recorder.as_ref().is_some_and(|recorder| recorder.seconds() >= seconds) {
+            break Ok(false);
+        }
+        if is_interrupted() {
+            break Ok(true);
+        }
+        match next_raw(link, Instant::now() + READ_TIMEOUT) {
+            Ok(Some(raw)) => {
+                silent_since = Instant::now();
+                if let Err(error) = write(&mut recorder, file, &raw) {
+                    break Err(SerialRecordingError::Log(error));
+                }
+            }
+            Ok(None) if link.is_disconnected() => break Err(SerialRecordingError::Disconnected(bursts(&recorder))),
+            Ok(None) if silent_since.elapsed() >= MAX_SILENCE => {
+                break Err(SerialRecordingError::Silent(bursts(&recorder)));
+            }
+            Ok(None) => {
+                // A device that has restarted has forgotten the command; if it cannot be sent, the silence is reported.
+                if asked.elapsed() >= ASK_AGAIN && silent_since.elapsed() >= ASK_AGAIN {
+                    let _ = link.send_command("w 1");
+                    asked = Instant::now();
+                }
+            }
+            Err(error) => break Err(SerialRecordingError::Port(error)),
+        }
+    };
+    // A device that has disconnected cannot be told; the outcome says so already.
+    let _ = link.send_command("w 0");
+    let mut summary =
+        SerialRecordingSummary { bursts: 0, missing: 0, restarts: 0, interrupted: false, counters: link.counters() };
+    let mut finished = Ok(());
+    if let Some(recorder) = recorder {
+        (summary.bursts, summary.missing, summary.restarts) =
+            (recorder.bursts(), recorder.missing(), recorder.restarts());
+        finished = recorder.finish().map_err(SerialRecordingError::Log);
+    }
+    summary.interrupted = outcome?;
+    finished?;
+    Ok(summary)
+}
+
+/// Whether `start`, the first bytes of a file, has a message of the raw stream of a device.
+pub(crate) fn is_capture(start: &[u8]) -> bool {
+    let mut decoder = Decoder::new();
+    start.iter().any(|&byte| matches!(decoder.push(byte), Some(Received::Message { message: Message::Raw(_), .. })))
+}
+
+/// Writes the bursts of `capture`, the bytes that a device sent while its raw stream was on, to the frame log `file`. A
+/// restart of the device takes no time: how long it lasted is not known.
+///
+/// # Errors
+/// The capture cannot be read or the log cannot be written.
+pub(crate) fn log_of_capture(mut capture: impl Read, file: &Path) -> io::Result<()> {
+    let mut recorder = RawStreamRecorder::create(file)?;
+    let (mut decoder, received) = (Decoder::new(), Instant::now());
+    let mut bytes = [0; 4096];
+    loop {
+        let count = match capture.read(&mut bytes) {
+            Ok(0) => return recorder.finish(),
+            Ok(count) => count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error),
+        };
+        for &byte in &bytes[..count] {
+            if let Some(Received::Message { message: Message::Raw(raw), .. }) = decoder.push(byte) {
+                recorder.write_received(&raw, received)?;
+            }
+        }
+    }
+}
+
+/// Adds a message to the log, which is created before the first burst.
+fn write(recorder: &mut Option<RawStreamRecorder>, file: &Path, raw: &RawMessage) -> io::Result<()> {
+    if recorder.is_none() && !raw.bursts.is_empty() {
+        *recorder = Some(RawStreamRecorder::create(file)?);
+    }
+    recorder.as_mut().map_or(Ok(()), |recorder| recorder.write(raw))
+}
+
+fn next_raw<P: Read + Write>(link: &mut SerialLink<P>, deadline: Instant) -> io::Result<Option<RawMessage>> {
+    while let Some(received) = link.next(Some(deadline))? {
+        if let Received::Message { message: Message::Raw(raw), .. } = received {
+            return Ok(Some(raw));
+        }
+    }
+    Ok(None)
+}
+
+/// Writes the raw stream of a device to a frame log.
+///
+/// Time goes on where the device restarts and its clock begins at 0 again: by as much as has passed on the host since the last
+/// message.
+pub struct RawStreamRecorder {
+    log: FrameLogWriter,
+    /// Register SENS_AVG as last written to the log.
+    sens_avg: Option<u16>,
+    bursts: u64,
+    missing: u64,
+    restarts: u64,
+    /// Time in the log of the first burst, µs.
+    first_us: Option<u64>,
+    /// The newest burst.
+    last: Option<LastBurst>,
+    /// Time in the log less the device's time, µs.
+    offset_us: i128,
+}
+
+/// The newest burst in a log.
+struct LastBurst {
+    /// By the device's counter and clock.
+    number: u64,
+    at_us: u64,
+    /// In the log, µs.
+    logged_us: u64,
+    /// By the host.
+    received: Instant,
+}
+
+impl RawStreamRecorder {
+    /// Creates the log.
+    ///
+    /// # Errors
+    /// The file cannot be created.
+    pub fn create(file: &Path) -> io::Result<Self> {
+        Ok(Self {
+            log: FrameLogWriter::create(file)?,
+            sens_avg: None,
+            bursts: 0,
+            missing: 0,
+            restarts: 0,
+            first_us: None,
+            last: None,
+            offset_us: 0,
+        })
+    }
+
+    /// Adds the bursts of one message, each at the time of its data-ready edge. At the start and where SENS_AVG changes, a
+    /// frame that writes it comes first, from which a replay takes the gyroscopes' range.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
+        self.write_received(raw, Instant::now())
+    }
+
+    /// As [`write`](Self::write), of a message that the host received at another time than now.
+    fn write_received(&mut self, raw: &RawMessage, received: Instant) -> io::Result<()> {
+        if raw.bursts.is_empty() {
+            return Ok(());
+        }
+        let (mut number, mut at_us) = (raw.first, raw.at_us);
+        // With new settings the device counts from the start, without a restart.
+        if let Some(last) = self.last.as_mut().filter(|last| number < last.number) {
+            last.number = number.saturating_sub(1);
+        }
+        if let Some(last) = self.last.take_if(|last| at_us < last.at_us) {
+            self.restarts += 1;
+            let passed_us = (received - last.received).as_micros().max(1) as i128;
+            self.offset_us = i128::from(last.logged_us) + passed_us - i128::from(at_us);
+        }
+        let logged = |at_us: u64, offset_us: i128| u64::try_from(i128::from(at_us) + offset_us).unwrap_or(u64::MAX);
+        if self.sens_avg.replace(raw.sens_avg) != Some(raw.sens_avg) {
+            let mosi = Register::SensAvg.write_high_frame(raw.sens_avg).to_vec();
+            self.log.write(&Frame {
+                time_s: seconds(logged(at_us, self.offset_us)),
+                miso: vec![0; mosi.len()],
+                mosi,
+            })?;
+        }
+        for burst in &raw.bursts {
+            number = number.saturating_add(u64::from(burst.periods));
+            at_us = at_us.saturating_add(u64::from(burst.after_us));
+            let logged_us = logged(at_us, self.offset_us);
+            let mut miso = vec![0; 2];
+            miso.extend_from_slice(burst.words.as_flattened());
+            self.log.write(&Frame { time_s: seconds(logged_us), mosi: BURST_REQUEST.to_vec(), miso })?;
+            self.bursts += 1;
+            self.first_us.get_or_insert(logged_us);
+            let before = self.last.replace(LastBurst { number, at_us, logged_us, received });
+            self.missing += before.map_or(0, |before| number.saturating_sub(before.number).saturating_sub(1));
+        }
+        Ok(())
+    }
+
+    /// Writes what is buffered and closes the log.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn finish(self) -> io::Result<()> {
+        self.log.finish()
+    }
+
+    /// Time from the first burst to the last, s.
+    pub fn seconds(&self) -> f64 {
+        let last_us = self.last.as_ref().map(|last| last.logged_us);
+        self.first_us.zip(last_us).map_or(0.0, |(first, last)| seconds(last.saturating_sub(first)))
+    }
+
+    /// Bursts in the log.
+    pub fn bursts(&self) -> u64 {
+        self.bursts
+    }
+
+    /// Sample periods between the first and the last burst of which no burst came, those of restarts left out.
+    pub fn missing(&self) -> u64 {
+        self.missing
+    }
+
+    /// Restarts of the device.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}
+
+fn seconds(us: u64) -> f64 {
+    us as f64 / 1e6
+}

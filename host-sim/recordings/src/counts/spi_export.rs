@@ -1,0 +1,249 @@
+//! Exports of logic analyzers' SPI decoders: what was on the bus, transaction by transaction, with its times.
+//!
+//! - Saleae Logic 2, data table: `name,type,start_time,duration,…,mosi,miso` with rows of type `enable`, `result` and `disable`.
+//! - Saleae, analyzer export: `Time [s],Packet ID,MOSI,MISO`, one row a word.
+//! - sigrok-cli: `-A spi=mosi-transfer:miso-transfer --protocol-decoder-jsontrace`, one line an event.
+
+use crate::counts::frame_log::Frame;
+use crate::input::delimited_text::{self, Lines};
+use crate::input::input_error::{InputError, Reason};
+use serde_json::Value;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+/// Times of the events of sigrok, s.
+const MICROSECOND: f64 = 1e-6;
+
+/// A transaction on the bus.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CapturedFrame {
+    /// The bytes, and when chip select went low.
+    pub frame: Frame,
+    /// When chip select went high, s; `None` where the export does not say.
+    pub end_s: Option<f64>,
+}
+
+/// How an export is laid out.
+#[derive(Debug, Clone, PartialEq)]
+enum Layout {
+    /// Positions of type, start, duration, MOSI and MISO.
+    SaleaeTable {
+        kind: usize,
+        start: usize,
+        duration: usize,
+        mosi: usize,
+        miso: usize,
+    },
+    SaleaeWords,
+    SigrokTrace,
+}
+
+impl Layout {
+    /// The layout whose first line is `header`.
+    fn of_header(header: &str) -> Option<Self> {
+        let names: Vec<String> = header.split(',').map(|name| delimited_text::field(name).to_lowercase()).collect();
+        let position = |wanted: &str| names.iter().position(|name| name == wanted);
+        if names.iter().map(String::as_str).eq(["time [s]", "packet id", "mosi", "miso"]) {
+            return Some(Self::SaleaeWords);
+        }
+        if header.starts_with("{\"traceEvents\"") {
+            return Some(Self::SigrokTrace);
+        }
+        Some(Self::SaleaeTable {
+            kind: position("type")?,
+            start: position("start_time")?,
+            duration: position("duration")?,
+            mosi: position("mosi")?,
+            miso: position("miso")?,
+        })
+    }
+}
+
+/// Whether a first line is that of an export.
+pub(crate) fn is_header(header: &str) -> bool {
+    Layout::of_header(header).is_some()
+}
+
+/// An open export, read transaction by transaction.
+pub struct SpiExportReader {
+    file: PathBuf,
+    lines: Lines,
+    layout: Layout,
+    line: u64,
+    last_s: f64,
+    /// The transaction that is being read, and the packet that its words belong to.
+    open: Option<CapturedFrame>,
+    packet: String,
+    /// Transactions of sigrok whose other line has not come yet.
+    waiting: VecDeque<(bool, CapturedFrame)>,
+}
+
+impl SpiExportReader {
+    /// Over a file that was opened before.
+    pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
+        let header = lines.next()?.and_then(|(line, header)| Some((line, Layout::of_header(header)?)));
+        let (line, layout) = header.ok_or_else(|| InputError::file(file, Reason::NotFrameLog))?;
+        Ok(Self {
+            file: file.to_owned(),
+            lines,
+            layout,
+            line,
+            last_s: f64::NEG_INFINITY,
+            open: None,
+            packet: String::new(),
+            waiting: VecDeque::new(),
+        })
+    }
+
+    /// Line of the file that was read last, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// The next transaction; `None` at the end.
+    ///
+    /// # Errors
+    /// A line has a time that is no number or decreases, or words that are no hexadecimal bytes of both lines of the bus.
+    #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
+    pub fn next(&mut self) -> Result<Option<CapturedFrame>, InputError> {
+        loop {
+            let Some((line, text)) = self.lines.next()? else {
+                return match self.open.take() {
+                    Some(last) => self.checked(last).map(Some),
+                    None => Ok(None),
+                };
+            };
+            self.line = line;
+            let text = text.to_owned();
+            let step = match self.layout.clone() {
+                Layout::SaleaeTable { kind, start, duration, mosi, miso } => {
+                    self.table_row(&text, [kind, start, duration, mosi, miso])
+                }
+                Layout::SaleaeWords => self.word_row(&text),
+                Layout::SigrokTrace => self.event(&text),
+            };
+            match step {
+                Ok(Some(frame)) if frame.frame.mosi.is_empty() => {}
+                Ok(Some(frame)) => return self.checked(frame).map(Some),
+                Ok(None) => {}
+                Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
+            }
+        }
+    }
+
+    fn checked(&mut self, frame: CapturedFrame) -> Result<CapturedFrame, InputError> {
+        let Frame { time_s, mosi, miso } = &frame.frame;
+        let reason = if *time_s < self.last_s {
+            Reason::TimeBackwards { before: self.last_s, now: *time_s }
+        } else if mosi.len() != miso.len() {
+            Reason::UnequalLengths { mosi: mosi.len(), miso: miso.len() }
+        } else if mosi.len() % 2 == 1 {
+            Reason::OddBytes(mosi.len())
+        } else {
+            self.last_s = *time_s;
+            return Ok(frame);
+        };
+        Err(InputError::line(&self.file, self.line, reason))
+    }
+
+    /// A row of Saleae's data table: a transaction goes from `enable` to `disable`.
+    fn table_row(&mut self, text: &str, positions: [usize; 5]) -> Result<Option<CapturedFrame>, Reason> {
+        let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
+        let expected = positions.into_iter().max().unwrap_or(0) + 1;
+        if fields.len() < expected {
+            return Err(Reason::FieldCount { found: fields.len(), expected });
+        }
+        let [kind, start, duration, mosi, miso] = positions.map(|position| fields[position]);
+        let start_s = delimited_text::time(start)?;
+        match kind {
+            "enable" => {
+                let before = self.open.replace(starting_at(start_s));
+                Ok(before)
+            }
+            "result" => {
+                let end_s = start_s + delimited_text::time(duration)?;
+                let frame = self.open.get_or_insert_with(|| starting_at(start_s));
+                frame.frame.mosi.extend(word(mosi)?);
+                frame.frame.miso.extend(word(miso)?);
+                frame.end_s = Some(end_s);
+                Ok(None)
+            }
+            "disable" => Ok(self.open.take().map(|frame| CapturedFrame { end_s: Some(start_s), ..frame })),
+            _ => Ok(None),
+        }
+    }
+
+    /// A row of Saleae's analyzer export: words of one packet belong to one transaction.
+    fn word_row(&mut self, text: &str) -> Result<Option<CapturedFrame>, Reason> {
+        let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
+        let [time, packet, mosi, miso] = fields[..] else {
+            return Err(Reason::FieldCount { found: fields.len(), expected: 4 });
+        };
+        let (time_s, mosi, miso) = (delimited_text::time(time)?, word(mosi)?, word(miso)?);
+        let is_next = self.open.is_some() && packet != self.packet;
+        let done = if is_next { self.open.take() } else { None };
+        packet.clone_into(&mut self.packet);
+        let frame = self.open.get_or_insert_with(|| starting_at(time_s));
+        frame.frame.mosi.extend(mosi);
+        frame.frame.miso.extend(miso);
+        Ok(done)
+    }
+
+    /// An event of sigrok: the begin and the end of the bytes of one line; MISO and MOSI of a transaction begin together.
+    fn event(&mut self, text: &str) -> Result<Option<CapturedFrame>, Reason> {
+        let text = text.trim_end_matches(',');
+        if !text.starts_with("{\"ph\"") {
+            return Ok(None);
+        }
+        let damaged =
+            |error: serde_json::Error| Reason::Format { format: "sigrok trace", error: error.to_string().into() };
+        let event: Value = serde_json::from_str(text).map_err(damaged)?;
+        let (Some(phase), Some(ticks), Some(row), Some(bytes)) =
+            (event["ph"].as_str(), event["ts"].as_f64(), event["tid"].as_str(), event["name"].as_str())
+        else {
+            return Ok(None);
+        };
+        let is_mosi = match row {
+            "MOSI transfer" => true,
+            "MISO transfer" => false,
+            _ => return Ok(None),
+        };
+        let time_s = ticks * MICROSECOND;
+        if phase == "B" {
+            let bytes = bytes.split_ascii_whitespace().map(word).collect::<Result<Vec<_>, _>>()?.concat();
+            let mut captured = starting_at(time_s);
+            *if is_mosi { &mut captured.frame.mosi } else { &mut captured.frame.miso } = bytes;
+            self.waiting.push_back((is_mosi, captured));
+            return Ok(None);
+        }
+        // The end of the second line ends the transaction.
+        match (self.waiting.pop_front(), self.waiting.pop_front()) {
+            (Some((first_is_mosi, first)), Some((second_is_mosi, second)))
+                if first_is_mosi != second_is_mosi && first.frame.time_s == second.frame.time_s =>
+            {
+                let (mosi, miso) = if first_is_mosi { (first, second) } else { (second, first) };
+                let frame = Frame { miso: miso.frame.miso, ..mosi.frame };
+                Ok(Some(CapturedFrame { frame, end_s: Some(time_s) }))
+            }
+            (Some(first), second) => {
+                self.waiting.extend(second);
+                self.waiting.push_front(first);
+                Ok(None)
+            }
+            (None, _) => Ok(None),
+        }
+    }
+}
+
+fn starting_at(time_s: f64) -> CapturedFrame {
+    CapturedFrame { frame: Frame { time_s, ..Frame::default() }, end_s: None }
+}
+
+/// The bytes of a word in hexadecimal: `0x3E`, `0x3E00` or `3E`.
+fn word(text: &str) -> Result<Vec<u8>, Reason> {
+    let digits = text.strip_prefix("0x").unwrap_or(text);
+    if digits.is_empty() {
+        return Err(Reason::NotHex(delimited_text::quote(text)));
+    }
+    crate::counts::frame_log::bytes(digits)
+}

@@ -1,0 +1,261 @@
+//! Which format a file has, by its content; and the reading of any of them.
+
+use crate::counts::count_table;
+use crate::counts::frame_log;
+use crate::counts::{serial, spi_export};
+use crate::formats::{ardupilot_log, matlab, numpy, ros_bag, text_table, ulog};
+use crate::input::delimited_text::Lines;
+use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::tables::any_sensor::{ReadOptions, SensorRecording};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
+use tempfile::NamedTempFile;
+
+/// Bytes that tell a format: several messages of the raw stream.
+const HEAD_BYTES: u64 = 1 << 14;
+
+/// The format of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileFormat {
+    /// Register counts of an ADIS16405 in CSV, plain or gzip.
+    CountTable,
+    /// A log of the SPI bus: `time_s,mosi,miso`.
+    FrameLog,
+    /// An export of a logic analyzer's SPI decoder.
+    SpiExport,
+    /// A table of numbers in any units.
+    TextTable,
+    /// One array of NumPy.
+    Npy,
+    /// An archive of arrays of NumPy.
+    Npz,
+    /// MATLAB, level 5.
+    Mat,
+    /// A bag of ROS 1.
+    RosBag,
+    /// MCAP, of ROS 2 or Foxglove.
+    Mcap,
+    /// A bag of ROS 2 in SQLite.
+    Sqlite,
+    /// A log of PX4.
+    Ulog,
+    /// A DataFlash log of ArduPilot.
+    ArduPilot,
+}
+
+impl FileFormat {
+    /// Whether the file is text: a table or a log that may be replayed.
+    pub fn is_text(self) -> bool {
+        matches!(self, Self::CountTable | Self::FrameLog | Self::SpiExport | Self::TextTable)
+    }
+}
+
+/// First bytes of the binary formats.
+const MAGICS: [(&[u8], FileFormat); 8] = [
+    (b"\x93NUMPY", FileFormat::Npy),
+    (b"PK\x03\x04", FileFormat::Npz),
+    (b"MATLAB 5.0 MAT-file", FileFormat::Mat),
+    (b"#ROSBAG V2.0", FileFormat::RosBag),
+    (b"\x89MCAP0\r\n", FileFormat::Mcap),
+    (b"SQLite format 3\0", FileFormat::Sqlite),
+    (b"ULog\x01\x12\x35", FileFormat::Ulog),
+    (&ardupilot_log::MAGIC, FileFormat::ArduPilot),
+];
+
+/// An input that can be read more than once: a file, or a copy of what came through a pipe or was compressed.
+#[derive(Debug)]
+pub struct InputFile {
+    /// As the user named it.
+    name: PathBuf,
+    copy: Option<NamedTempFile>,
+    format: FileFormat,
+    monitor: ReadMonitor,
+}
+
+impl InputFile {
+    /// Opens `name`, `-` for standard input, and recognises its format. A pipe is copied to a temporary file, and so is a
+    /// compressed file of a binary format. Bytes that a device sent while its raw stream was on become a frame log.
+    ///
+    /// # Errors
+    /// The file cannot be read or copied, or it has none of the formats.
+    pub fn open(name: &Path) -> Result<Self, InputError> {
+        Self::open_monitored(name, &ReadMonitor::default())
+    }
+
+    /// As [`open`](Self::open); `monitor` counts the bytes that are read of the recording, and may stop the reading of a pipe, of
+    /// text and of an array.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_monitored(name: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |error| InputError::file(name, Reason::Io(error));
+        let mut copy = None;
+        if name == Path::new("-") {
+            copy = Some(copied_pipe(io::stdin(), monitor).map_err(fail)?);
+        } else {
+            let metadata = name.metadata().map_err(fail)?;
+            if metadata.is_dir() {
+                return Err(InputError::file(name, Reason::Directory));
+            }
+            if !metadata.is_file() {
+                copy = Some(copied_pipe(File::open(name).map_err(fail)?, monitor).map_err(fail)?);
+            }
+        }
+        let mut head = head(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
+        if head.starts_with(&GZIP_MAGIC) {
+            let compressed = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
+            let mut inner = GzipMembers::new(BufReader::new(compressed));
+            let mut start = Vec::new();
+            // Damage is reported with its line where the whole is read.
+            let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
+            if binary_format(&start).is_some() {
+                copy = Some(copied(start.as_slice().chain(inner)).map_err(fail)?);
+                head = start;
+            }
+        }
+        let format = match binary_format(&head) {
+            Some(format) => format,
+            None if serial::is_capture(&head) => {
+                let log = NamedTempFile::new().map_err(fail)?;
+                let capture = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
+                serial::log_of_capture(BufReader::new(capture), log.path()).map_err(fail)?;
+                copy = Some(log);
+                FileFormat::FrameLog
+            }
+            None => {
+                text_format(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(|error| renamed(error, name))?
+            }
+        };
+        Ok(Self { name: name.to_owned(), copy, format, monitor: monitor.clone() })
+    }
+
+    /// What was recognised.
+    pub fn format(&self) -> FileFormat {
+        self.format
+    }
+
+    /// Who watches the reading.
+    pub fn monitor(&self) -> &ReadMonitor {
+        &self.monitor
+    }
+
+    /// Where the bytes are.
+    pub fn path(&self) -> &Path {
+        self.copy.as_ref().map_or(&self.name, NamedTempFile::path)
+    }
+
+    /// An error of [`path`](Self::path) under the name by which the user knows the file.
+    pub fn rename(&self, error: InputError) -> InputError {
+        renamed(error, &self.name)
+    }
+
+    /// Reads the recording of any sensor.
+    ///
+    /// # Errors
+    /// The file is damaged, its columns cannot be chosen, or it is a log of the SPI bus.
+    pub fn read(&self, options: &ReadOptions) -> Result<SensorRecording, InputError> {
+        let path = self.path();
+        let table = match self.format {
+            FileFormat::CountTable | FileFormat::TextTable => text_table::read(path, options, &self.monitor),
+            FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(path, Reason::FrameLog)),
+            FileFormat::Npy => numpy::read_npy(path, options),
+            FileFormat::Npz => numpy::read_npz(path, options),
+            FileFormat::Mat => matlab::read(path, options),
+            FileFormat::RosBag => ros_bag::read_ros1(path, options),
+            FileFormat::Mcap => ros_bag::read_mcap(path, options),
+            FileFormat::Sqlite => ros_bag::read_sqlite(path, options),
+            FileFormat::Ulog => ulog::read(path, options),
+            FileFormat::ArduPilot => ardupilot_log::read(path, options),
+        };
+        table.map(|table| SensorRecording::new(table, &options.sensor)).map_err(|error| self.rename(error))
+    }
+}
+
+fn renamed(error: InputError, name: &Path) -> InputError {
+    InputError { file: name.to_owned(), ..error }
+}
+
+/// A temporary file with all that `input` has.
+fn copied(mut input: impl Read) -> io::Result<NamedTempFile> {
+    let mut copy = NamedTempFile::new()?;
+    io::copy(&mut input, &mut copy)?;
+    copy.flush()?;
+    copy.seek(SeekFrom::Start(0))?;
+    Ok(copy)
+}
+
+/// How often a pipe that sends nothing is left for a request to stop.
+const STOP_INTERVAL: Duration = Duration::from_millis(50);
+/// Parts of a pipe that wait to be written.
+const PARTS: usize = 4;
+/// Bytes of a part.
+const PART_BYTES: usize = 1 << 16;
+
+/// A temporary file with all that comes through a pipe, until it ends or `monitor` stops the reading.
+///
+/// A thread reads the pipe, because a read waits until something comes. After a stop it waits for the end of the process.
+fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::Result<NamedTempFile> {
+    monitor.begin();
+    let (sender, parts) = mpsc::sync_channel::<io::Result<Vec<u8>>>(PARTS);
+    let mut input = Counted::new(input, monitor);
+    thread::spawn(move || {
+        loop {
+            let mut part = vec![0; PART_BYTES];
+            let read = match input.read(&mut part) {
+                Ok(0) => break,
+                Ok(count) => {
+                    part.truncate(count);
+                    Ok(part)
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => Err(error),
+            };
+            let is_failed = read.is_err();
+            if sender.send(read).is_err() || is_failed {
+                break;
+            }
+        }
+    });
+    let mut copy = NamedTempFile::new()?;
+    loop {
+        if monitor.take_stop() {
+            monitor.cut();
+            break;
+        }
+        match parts.recv_timeout(STOP_INTERVAL) {
+            Ok(part) => copy.write_all(&part?)?,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    copy.flush()?;
+    monitor.end();
+    Ok(copy)
+}
+
+fn head(file: &Path) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    File::open(file)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+fn binary_format(head: &[u8]) -> Option<FileFormat> {
+    MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)
+}
+
+fn text_format(file: &Path) -> Result<FileFormat, InputError> {
+    let mut lines = Lines::open(file)?;
+    Ok(match lines.header()? {
+        None => return Err(InputError::file(file, Reason::Empty)),
+        Some(frame_log::HEADER) => FileFormat::FrameLog,
+        Some(header) if spi_export::is_header(header) => FileFormat::SpiExport,
+        Some(header) if count_table::is_header(header) => FileFormat::CountTable,
+        Some(_) => FileFormat::TextTable,
+    })
+}

@@ -1,0 +1,255 @@
+//! Records of an MCAP file, those in chunks included, in the memory of one record.
+//!
+//! The crate `mcap` decompresses the chunks. Its own reader is not used for the rest because damaged lengths make it allocate gigabytes
+//! before it reads a byte, and overflow where a record ends after its chunk.
+
+use crate::input::input_error::{InputError, Reason};
+use mcap::records::op;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+pub(crate) const FORMAT: &str = "MCAP";
+
+/// Largest record or chunk, compressed or not, bytes: images are larger than a message of an IMU, but not so large.
+const MAX_RECORD: usize = 1 << 28;
+/// First bytes of a file.
+const MAGIC_BYTES: u64 = 8;
+/// Type and length before each record.
+const HEADER_BYTES: usize = 1 + 8;
+/// Position of the name of the compression in a chunk: after its times, its uncompressed size and its CRC.
+const COMPRESSION_AT: usize = 8 + 8 + 8 + 4;
+
+/// The records that tell what messages there are, and the messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum McapRecord<'a> {
+    Schema { id: u16, name: &'a str },
+    Channel { id: u16, schema: u16, topic: &'a str, encoding: &'a str },
+    Message { channel: u16, data: &'a [u8] },
+}
+
+impl<'a> McapRecord<'a> {
+    /// From the bytes of a record; `None` for other types. An error if it is cut off.
+    fn decode(opcode: u8, bytes: &'a [u8]) -> Result<Option<Self>, Reason> {
+        let mut fields = Fields(bytes);
+        let record = match opcode {
+            op::SCHEMA => fields.number().zip(fields.text()).map(|(id, name)| Self::Schema { id, name }),
+            op::CHANNEL => {
+                let numbers = fields.number().zip(fields.number());
+                let texts = fields.text().zip(fields.text());
+                numbers.zip(texts).map(|((id, schema), (topic, encoding))| Self::Channel {
+                    id,
+                    schema,
+                    topic,
+                    encoding,
+                })
+            }
+            op::MESSAGE => {
+                // Its number, and the times at which it was logged and published.
+                let channel = fields.number();
+                channel.zip(fields.take(4 + 8 + 8)).map(|(channel, _)| Self::Message { channel, data: fields.0 })
+            }
+            _ => return Ok(None),
+        };
+        record.map(Some).ok_or_else(|| damaged("a record is cut off"))
+    }
+}
+
+/// Fields of a record, one after the other.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, bytes: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(bytes)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn number(&mut self) -> Option<u16> {
+        Some(u16::from_le_bytes(*self.take(2)?.first_chunk()?))
+    }
+
+    fn text(&mut self) -> Option<&'a str> {
+        let length = u32::from_le_bytes(*self.take(4)?.first_chunk()?);
+        std::str::from_utf8(self.take(length as usize)?).ok()
+    }
+}
+
+fn damaged(error: &str) -> Reason {
+    Reason::Format { format: FORMAT, error: error.to_owned().into() }
+}
+
+/// Type and length of the record that begins with `header`.
+fn type_and_length(header: [u8; HEADER_BYTES]) -> Result<(u8, usize), Reason> {
+    let [opcode, length @ ..] = header;
+    let length = usize::try_from(u64::from_le_bytes(length)).ok().filter(|length| *length <= MAX_RECORD);
+    Ok((opcode, length.ok_or_else(|| damaged("a record is longer than 268435456 bytes"))?))
+}
+
+/// Why reading ends: the file is damaged here, or `each` refused a record.
+enum Stop {
+    Damage(Reason),
+    Refusal(InputError),
+}
+
+impl From<Reason> for Stop {
+    fn from(reason: Reason) -> Self {
+        Self::Damage(reason)
+    }
+}
+
+/// Gives every record to `each`; and why there are no more where the file is damaged or ends early.
+pub(crate) fn for_each_record(
+    file: &Path,
+    mut each: impl FnMut(McapRecord) -> Result<(), InputError>,
+) -> Result<Option<Reason>, InputError> {
+    let mut each = |opcode: u8, bytes: &[u8]| match McapRecord::decode(opcode, bytes) {
+        Ok(record) => record.map_or(Ok(()), |record| each(record).map_err(Stop::Refusal)),
+        Err(reason) => Err(Stop::Damage(reason)),
+    };
+    match read(file, &mut each) {
+        Ok(()) => Ok(None),
+        Err(Stop::Damage(reason)) => Ok(Some(reason)),
+        Err(Stop::Refusal(error)) => Err(error),
+    }
+}
+
+/// Takes the operation code and the content of a record.
+type EachRecord<'a> = dyn FnMut(u8, &[u8]) -> Result<(), Stop> + 'a;
+
+fn read(file: &Path, each: &mut EachRecord) -> Result<(), Stop> {
+    let fail = |error| Stop::Refusal(InputError::file(file, Reason::Io(error)));
+    let mut input = BufReader::new(File::open(file).map_err(fail)?);
+    let mut data = Vec::new();
+    let mut next = |bytes: u64, data: &mut Vec<u8>| {
+        data.clear();
+        input.by_ref().take(bytes).read_to_end(data).map_err(fail)
+    };
+    next(MAGIC_BYTES, &mut data)?;
+    loop {
+        next(HEADER_BYTES as u64, &mut data)?;
+        let Some(&header) = data.first_chunk() else {
+            return Err(Reason::Truncated { format: FORMAT }.into());
+        };
+        let (opcode, length) = type_and_length(header)?;
+        next(length as u64, &mut data)?;
+        let is_whole = data.len() == length;
+        match opcode {
+            op::CHUNK => chunk(header, &data, each)?,
+            op::FOOTER => return Ok(()),
+            _ if is_whole => each(opcode, &data)?,
+            _ => {}
+        }
+        if !is_whole {
+            return Err(Reason::Truncated { format: FORMAT }.into());
+        }
+    }
+}
+
+/// The records of a chunk, which may be cut off, with the header of its own record.
+fn chunk(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
+    let cut_off = || damaged("a chunk is cut off");
+    let length_of_name = data.get(COMPRESSION_AT..).and_then(|rest| rest.first_chunk()).ok_or_else(cut_off)?;
+    if u32::from_le_bytes(*length_of_name) != 0 {
+        return compressed(header, data, each);
+    }
+    // An empty name, then the length of the records.
+    let mut rest = data.get(COMPRESSION_AT + 4 + 8..).ok_or_else(cut_off)?;
+    while let Some((header, after)) = rest.split_first_chunk() {
+        let (opcode, length) = type_and_length(*header)?;
+        let (record, after) = after.split_at_checked(length).ok_or_else(cut_off)?;
+        each(opcode, record)?;
+        rest = after;
+    }
+    if rest.is_empty() { Ok(()) } else { Err(cut_off().into()) }
+}
+
+/// The records of a compressed chunk.
+fn compressed(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_validate_chunk_crcs(true)
+        .with_record_length_limit(MAX_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut input = header.as_slice().chain(data);
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|error| damaged(&error.to_string()))? {
+            LinearReadEvent::ReadRequest(bytes) => {
+                let bytes = bytes.min(HEADER_BYTES + data.len());
+                let read = input.read(reader.insert(bytes)).map_err(|error| damaged(&error.to_string()))?;
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { data, opcode } => each(opcode, data)?,
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{McapRecord, for_each_record};
+    use std::io::Write;
+
+    fn record(opcode: u8, parts: &[&[u8]]) -> Vec<u8> {
+        let body = parts.concat();
+        [&[opcode][..], &(body.len() as u64).to_le_bytes(), &body].concat()
+    }
+
+    fn text(text: &str) -> Vec<u8> {
+        [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
+    }
+
+    /// What is read of a file of these records, and whether it is called damaged.
+    fn read(records: &[Vec<u8>]) -> (Vec<String>, Option<String>) {
+        let mut file = tempfile::NamedTempFile::new().expect("a file");
+        file.write_all(b"\x89MCAP0\r\n").expect("written");
+        file.write_all(&records.concat()).expect("written");
+        let mut found = Vec::new();
+        let damage = for_each_record(file.path(), |record: McapRecord| {
+            found.push(format!("{record:?}"));
+            Ok(())
+        });
+        (found, damage.expect("a file that can be read").map(|reason| reason.to_string()))
+    }
+
+    /// Lengths that lie: of a text (4 GiB), of a record (beyond its chunk, beyond the file, 16 EiB).
+    #[test]
+    fn lengths_that_lie_are_damage_after_what_came_before() {
+        let schema = record(3, &[&1u16.to_le_bytes(), &text("sensor_msgs/msg/Imu")]);
+        let message = record(5, &[&7u16.to_le_bytes(), &[0; 20], b"data"]);
+        let chunk = |records: &[u8]| record(6, &[&[0; 28], &text(""), &(records.len() as u64).to_le_bytes(), records]);
+        let footer = record(2, &[&[0; 20]]);
+        let whole =
+            ["Schema { id: 1, name: \"sensor_msgs/msg/Imu\" }", "Message { channel: 7, data: [100, 97, 116, 97] }"];
+        let (found, damage) = read(&[schema.clone(), chunk(&message), footer.clone()]);
+        assert_eq!((found.as_slice(), damage), (whole.map(str::to_owned).as_slice(), None));
+        let long_text = record(3, &[&2u16.to_le_bytes(), &u32::MAX.to_le_bytes(), b"short"]);
+        let mut beyond_chunk = message.clone();
+        beyond_chunk[1..9].copy_from_slice(&1000u64.to_le_bytes());
+        let mut endless = message.clone();
+        endless[1..9].copy_from_slice(&u64::MAX.to_le_bytes());
+        for (name, last) in [
+            ("text", long_text.clone()),
+            ("text in a chunk", chunk(&long_text)),
+            ("record in a chunk", chunk(&beyond_chunk)),
+            ("record", endless.clone()),
+            ("record of a chunk", chunk(&endless)),
+            ("end of the file", message[..20].to_vec()),
+            ("no footer", Vec::new()),
+        ] {
+            let mut records = vec![schema.clone(), chunk(&message), last];
+            if name == "text" {
+                records.push(footer.clone());
+            }
+            let (found, damage) = read(&records);
+            assert_eq!(found, whole, "{name}");
+            assert!(damage.is_some(), "{name}");
+        }
+        // A chunk that is cut off has its records up to there.
+        let two = chunk(&[message.clone(), message.clone()].concat());
+        let (found, damage) = read(&[schema, two[..two.len() - 3].to_vec()]);
+        assert_eq!((found.as_slice(), damage.is_some()), (whole.map(str::to_owned).as_slice(), true));
+    }
+}

@@ -1,0 +1,289 @@
+//! Arrays of NumPy: `.npy` and `.npz`.
+
+use crate::columns::column_selection::ChosenColumn;
+use crate::columns::unit::Unit;
+use crate::counts::recording::MAX_SAMPLES;
+use crate::formats::named_arrays::{self, NamedArray};
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::tables::any_sensor::ReadOptions;
+use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
+use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use zip::ZipArchive;
+
+/// Columns of a matrix beyond which it is no recording.
+const MAX_COLUMNS: u64 = 1024;
+
+/// Reads an `.npy` file.
+pub(crate) fn read_npy(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
+    let fail = |reason| InputError::file(file, reason);
+    let mut input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+    let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+    named_arrays::read(file, &[layout.array()], options, |_, columns| layout.columns(&mut input, columns))
+}
+
+/// Rows of an array that are read at once.
+const ROWS_AT_ONCE: usize = 4096;
+
+/// An open `.npy` file, read row by row.
+pub(crate) struct NpyRows {
+    file: PathBuf,
+    input: Counted<File>,
+    monitor: ReadMonitor,
+    layout: ArrayLayout,
+    chosen: Vec<ChosenColumn>,
+    /// Where the numbers begin, bytes.
+    start: u64,
+    next: usize,
+    /// Bytes of the rows that were read at once: of each chosen column, or of whole rows.
+    buffers: Vec<Vec<u8>>,
+    row: Vec<Number>,
+    is_stopped: bool,
+}
+
+impl NpyRows {
+    /// Opens a file and chooses its columns.
+    pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let io = |error| fail(Reason::Io(error));
+        monitor.begin();
+        let mut input = Counted::new(File::open(file).map_err(io)?, monitor);
+        let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+        let chosen = named_arrays::choose(&layout.array(), options).map_err(fail)?;
+        let start = input.stream_position().map_err(io)?;
+        let buffers = vec![Vec::new(); if layout.by_column { chosen.len() } else { 1 }];
+        let (file, monitor, row) = (file.to_owned(), monitor.clone(), Vec::with_capacity(chosen.len()));
+        Ok(Self { file, input, monitor, layout, chosen, start, next: 0, buffers, row, is_stopped: false })
+    }
+
+    /// The columns that are read.
+    pub(crate) fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    /// Whether the reading was stopped before the end of the array.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
+    /// Adds the next row to `builder`; false at the end.
+    pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
+        self.is_stopped |= self.monitor.take_stop();
+        if self.is_stopped || self.next == self.layout.rows {
+            self.monitor.end();
+            return Ok(false);
+        }
+        let at = self.next % ROWS_AT_ONCE;
+        if at == 0 {
+            self.fill().map_err(|reason| InputError::file(&self.file, reason))?;
+        }
+        let Self { layout, buffers, row, chosen, .. } = self;
+        row.clear();
+        row.extend(chosen.iter().enumerate().map(|(number, column)| {
+            let field = &layout.fields[column.position];
+            let (buffer, offset) = if layout.by_column { (number, 0) } else { (0, field.offset) };
+            decode(&field.encoding, &buffers[buffer][at * layout.stride + offset..])
+        }));
+        self.next += 1;
+        builder.push(&self.row).map(|()| true).map_err(|(column, reason)| {
+            let label = self.chosen.get(column).map_or("", |column| column.label.as_str());
+            InputError::row(&self.file, self.next as u64, label, reason)
+        })
+    }
+
+    /// Reads the rows from the next one on.
+    fn fill(&mut self) -> Result<(), Reason> {
+        let Self { layout, buffers, chosen, input, .. } = self;
+        let bytes = ROWS_AT_ONCE.min(layout.rows - self.next) * layout.stride;
+        for (buffer, column) in buffers.iter_mut().zip(chosen) {
+            if layout.by_column {
+                let first = (column.position * layout.rows + self.next) as u64;
+                input.seek(SeekFrom::Start(self.start + first * layout.stride as u64)).map_err(Reason::Io)?;
+            }
+            buffer.resize(bytes, 0);
+            input.read_exact(buffer).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::Io(error),
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads an `.npz` file.
+pub(crate) fn read_npz(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
+    let fail = |reason| InputError::file(file, reason);
+    let input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+    let mut archive = ZipArchive::new(input).map_err(|error| fail(damaged(error)))?;
+    let mut layouts: Vec<(usize, ArrayLayout)> = Vec::new();
+    for number in 0..archive.len() {
+        if let Some(layout) = entry_layout(&mut archive, number).map_err(fail)? {
+            layouts.push((number, layout));
+        }
+    }
+    let mut arrays: Vec<NamedArray> = layouts.iter().map(|(_, layout)| layout.array()).collect();
+    // An only array needs no name.
+    if let [array] = arrays.as_mut_slice() {
+        array.name.clear();
+    }
+    named_arrays::read(file, &arrays, options, |array, columns| {
+        let (number, layout) = &layouts[array];
+        let mut entry = archive.by_index(*number).map_err(damaged)?;
+        ArrayLayout::read(&mut entry, &layout.name)?;
+        layout.columns(&mut BufReader::new(entry), columns)
+    })
+}
+
+/// The layout of an entry of an archive; `None` for what is no array of numbers: text and objects are left out.
+fn entry_layout<R: Read + Seek>(archive: &mut ZipArchive<R>, number: usize) -> Result<Option<ArrayLayout>, Reason> {
+    let mut entry = archive.by_index(number).map_err(damaged)?;
+    let path = entry.name().map_err(damaged)?.into_owned();
+    let Some(name) = path.strip_suffix(".npy") else { return Ok(None) };
+    match ArrayLayout::read(&mut entry, name) {
+        Ok(layout) => Ok(Some(layout)),
+        Err(Reason::Array(_)) => Ok(None),
+        Err(other) => Err(other),
+    }
+}
+
+fn damaged(error: zip::result::ZipError) -> Reason {
+    Reason::Format { format: "NumPy .npz", error: error.to_string().into() }
+}
+
+/// A field of a row: where it lies and how it is encoded.
+#[derive(Debug, Clone, PartialEq)]
+struct FieldLayout {
+    name: String,
+    offset: usize,
+    encoding: TypeStr,
+}
+
+/// How an array lies in its file.
+#[derive(Debug, Clone, PartialEq)]
+struct ArrayLayout {
+    name: String,
+    rows: usize,
+    fields: Vec<FieldLayout>,
+    /// Bytes of a row; of an element where columns are contiguous.
+    stride: usize,
+    /// Whether each column lies in one piece.
+    by_column: bool,
+    unit: Option<Unit>,
+}
+
+impl ArrayLayout {
+    /// Reads the header; the numbers follow in `input`.
+    fn read(input: &mut impl Read, name: &str) -> Result<Self, Reason> {
+        let damaged = |error: io::Error| Reason::Format { format: "NumPy array", error: error.to_string().into() };
+        let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
+        let header = NpyHeader::from_reader(input).map_err(damaged)?;
+        let (outer, inner, first_is_time) = match *header.shape() {
+            [rows] => (rows, 1, true),
+            [rows, columns] => (rows.max(columns), rows.min(columns), rows >= columns),
+            ref shape => return Err(unusable(format!("has {} dimensions; a recording has 1 or 2", shape.len()))),
+        };
+        if inner > MAX_COLUMNS {
+            return Err(unusable(format!("has {inner} columns, more than {MAX_COLUMNS}")));
+        }
+        let mut unit = None;
+        let mut fields = Vec::new();
+        let mut stride = 0usize;
+        let mut add = |name: String, dtype: &DType| -> Result<(), Reason> {
+            let DType::Plain(encoding) = dtype else { return Err(unusable("has rows within rows".to_owned())) };
+            let bytes = encoding.num_bytes().filter(|_| is_number(encoding));
+            let bytes = bytes.ok_or_else(|| unusable(format!("holds no numbers but {encoding}")))?;
+            let units = encoding.time_units().map(npyz::TimeUnits::to_str);
+            unit = unit.or_else(|| units.and_then(Unit::parse));
+            fields.push(FieldLayout { name, offset: stride, encoding: encoding.clone() });
+            stride += bytes;
+            Ok(())
+        };
+        let is_plain = match header.dtype() {
+            DType::Record(named) => {
+                if inner > 1 {
+                    return Err(unusable("is a matrix of records".to_owned()));
+                }
+                named.iter().try_for_each(|field| add(field.name.clone(), &field.dtype))?;
+                false
+            }
+            plain => {
+                (0..inner).try_for_each(|number| add(number.to_string(), &plain))?;
+                true
+            }
+        };
+        let by_column = is_plain && inner > 1 && (header.order() == Order::C) != first_is_time;
+        let stride = if by_column { stride / fields.len().max(1) } else { stride };
+        Ok(Self { name: name.to_owned(), rows: outer as usize, fields, stride, by_column, unit })
+    }
+
+    fn array(&self) -> NamedArray {
+        let columns = self.fields.iter().map(|field| field.name.clone()).collect();
+        NamedArray { name: self.name.clone(), rows: self.rows, columns, unit: self.unit }
+    }
+
+    /// The numbers of `columns`, from the end of the header on.
+    fn columns(&self, input: &mut impl Read, columns: &[usize]) -> Result<Vec<Vec<Number>>, Reason> {
+        if self.rows as u64 > MAX_SAMPLES {
+            return Err(Reason::TooManySamples);
+        }
+        let mut values: Vec<Vec<Number>> = columns.iter().map(|_| Vec::new()).collect();
+        let mut bytes = vec![0; self.stride];
+        let mut read = |bytes: &mut [u8]| {
+            input.read_exact(bytes).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::Io(error),
+            })
+        };
+        if self.by_column {
+            for number in 0..self.fields.len() {
+                let at = columns.iter().position(|column| *column == number);
+                for _ in 0..self.rows {
+                    read(&mut bytes)?;
+                    if let Some(at) = at {
+                        values[at].push(decode(&self.fields[number].encoding, &bytes));
+                    }
+                }
+            }
+        } else {
+            for _ in 0..self.rows {
+                read(&mut bytes)?;
+                for (values, &column) in values.iter_mut().zip(columns) {
+                    let field = &self.fields[column];
+                    values.push(decode(&field.encoding, &bytes[field.offset..]));
+                }
+            }
+        }
+        Ok(values)
+    }
+}
+
+/// Whether [`decode`] knows the encoding.
+fn is_number(encoding: &TypeStr) -> bool {
+    match encoding.type_char() {
+        TypeChar::Int | TypeChar::Uint | TypeChar::Bool => matches!(encoding.num_bytes(), Some(1 | 2 | 4 | 8)),
+        TypeChar::Float => matches!(encoding.num_bytes(), Some(4 | 8)),
+        TypeChar::TimeDelta | TypeChar::DateTime => encoding.num_bytes() == Some(8),
+        _ => false,
+    }
+}
+
+/// The number at the start of `bytes`; NaN where they are too few.
+fn decode(encoding: &TypeStr, bytes: &[u8]) -> Number {
+    let size = encoding.num_bytes().unwrap_or(0);
+    let Some(own) = bytes.get(..size).filter(|own| own.len() <= 8) else { return Number::Real(f64::NAN) };
+    let mut word = [0; 8];
+    for (at, &byte) in own.iter().enumerate() {
+        word[if encoding.endianness() == Endianness::Big { size - 1 - at } else { at }] = byte;
+    }
+    let bits = u64::from_le_bytes(word);
+    let unused = 64 - 8 * size as u32;
+    match (encoding.type_char(), size) {
+        (TypeChar::Float, 4) => Number::Real(f64::from(f32::from_bits(bits as u32))),
+        (TypeChar::Float, _) => Number::Real(f64::from_bits(bits)),
+        (TypeChar::Uint | TypeChar::Bool, _) => i64::try_from(bits).map_or(Number::Real(bits as f64), Number::Integer),
+        _ => Number::Integer((bits << unused).cast_signed() >> unused),
+    }
+}

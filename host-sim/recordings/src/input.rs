@@ -1,0 +1,7 @@
+//! Bytes and lines of a recording as they are read, and what is wrong with them.
+
+pub(crate) mod delimited_text;
+pub(crate) mod gzip_members;
+pub(crate) mod input_error;
+pub(crate) mod read_ahead;
+pub(crate) mod read_monitor;

@@ -1,0 +1,175 @@
+//! Comma-separated text from a plain or gzip file, line by line, with the number of every line as an editor shows it.
+//!
+//! The crate `csv` is not used because the line number that it reports is wrong after a blank line and in files with CR LF
+//! line ends.
+
+use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_ahead::ReadAhead;
+use crate::input::read_monitor::{Counted, ReadMonitor};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+/// Longest line that is read, bytes.
+const MAX_LINE_BYTES: u64 = 1 << 16;
+
+/// Size of each read buffer, bytes.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// An open file, read one line at a time.
+pub(crate) struct Lines {
+    file: PathBuf,
+    input: BufReader<Box<dyn Read + Send>>,
+    line: u64,
+    bytes: Vec<u8>,
+    /// Whether the line in `bytes` is read once more.
+    again: bool,
+    monitor: ReadMonitor,
+    /// Whether the reading was stopped before the end of the file.
+    is_stopped: bool,
+}
+
+impl Lines {
+    /// Opens `file`. Whether it is compressed is told by its first bytes, not by its name.
+    ///
+    /// # Errors
+    /// The file is missing, unreadable, a directory or empty.
+    pub(crate) fn open(file: &Path) -> Result<Self, InputError> {
+        Self::open_monitored(file, &ReadMonitor::default())
+    }
+
+    /// As [`open`](Self::open); `monitor` counts the bytes and may stop the reading.
+    pub(crate) fn open_monitored(file: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let mut raw = File::open(file).map_err(|e| fail(Reason::Io(e)))?;
+        if raw.metadata().map_err(|e| fail(Reason::Io(e)))?.is_dir() {
+            return Err(fail(Reason::Directory));
+        }
+        // The first bytes are chained in front again instead of seeking: the file may be a pipe.
+        let mut start = Vec::with_capacity(2);
+        raw.by_ref().take(2).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
+        if start.is_empty() {
+            return Err(fail(Reason::Empty));
+        }
+        let compressed = start == GZIP_MAGIC;
+        monitor.begin();
+        let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
+        let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
+        let bytes: Box<dyn Read + Send> = if compressed {
+            Box::new(ReadAhead::new(GzipMembers::new(whole)).map_err(|e| fail(Reason::Io(e)))?)
+        } else {
+            Box::new(whole)
+        };
+        let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
+        Ok(Self {
+            file: file.to_owned(),
+            input,
+            line: 0,
+            bytes: Vec::new(),
+            again: false,
+            monitor: monitor.clone(),
+            is_stopped: false,
+        })
+    }
+
+    /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file.
+    ///
+    /// # Errors
+    /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or not UTF-8.
+    pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
+        while !std::mem::take(&mut self.again) {
+            self.is_stopped |= self.monitor.take_stop();
+            if self.is_stopped {
+                return Ok(None);
+            }
+            self.line += 1;
+            self.bytes.clear();
+            let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
+            let read = match read.map_err(read_failure) {
+                Ok(read) => read,
+                Err(Reason::TruncatedGzip) if self.monitor.is_cut() => 0,
+                Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
+            };
+            // The copy of a pipe that was stopped may end within a line.
+            if read == 0 || (self.monitor.is_cut() && self.bytes.last() != Some(&b'\n')) {
+                self.monitor.end();
+                return Ok(None);
+            }
+            if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
+                return Err(InputError::line(&self.file, self.line, Reason::LongLine));
+            }
+            if !self.bytes.trim_ascii().is_empty() {
+                break;
+            }
+        }
+        match text(&self.bytes) {
+            Ok(text) => Ok(Some((self.line, text))),
+            Err(_) => Err(InputError::line(&self.file, self.line, Reason::NotText)),
+        }
+    }
+
+    /// Whether the reading was stopped before the end of the file.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
+    /// The header without consuming it: what [`next`](Self::next) returns now, and will return once more. `None` for a file of
+    /// blank lines.
+    ///
+    /// # Errors
+    /// As [`next`](Self::next).
+    pub(crate) fn header(&mut self) -> Result<Option<&str>, InputError> {
+        let found = self.next()?.is_some();
+        self.again = found;
+        Ok(found.then(|| text(&self.bytes)).and_then(Result::ok))
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        self.monitor.end();
+    }
+}
+
+/// The text of a line without the blanks around it.
+fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
+    let plain = bytes.trim_ascii();
+    if let [first, .., last] = plain
+        && first.is_ascii_graphic()
+        && last.is_ascii_graphic()
+    {
+        return std::str::from_utf8(plain);
+    }
+    std::str::from_utf8(bytes).map(|text| text.trim_start_matches('\u{feff}').trim())
+}
+
+/// Tells damaged compression from a failing disk.
+fn read_failure(error: io::Error) -> Reason {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
+        io::ErrorKind::InvalidInput => Reason::DamagedGzip(error),
+        io::ErrorKind::InvalidData => Reason::TrailingBytes,
+        _ => Reason::Io(error),
+    }
+}
+
+/// A field without the blanks and the quotation marks around it.
+pub(crate) fn field(raw: &str) -> &str {
+    let trimmed = raw.trim();
+    trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed)
+}
+
+/// The first 32 characters of a field, for an error message.
+pub(crate) fn quote(text: &str) -> String {
+    text.chars().take(32).collect()
+}
+
+/// A finite time in seconds.
+pub(crate) fn time(text: &str) -> Result<f64, Reason> {
+    match text.parse::<f64>() {
+        Ok(time) if time.is_finite() => Ok(time),
+        Ok(_) => Err(Reason::NotFinite(quote(text))),
+        Err(_) => Err(Reason::NotNumber(quote(text))),
+    }
+}

@@ -1,0 +1,267 @@
+//! Errors of an input file: which file, line and column, and the reason.
+
+use crate::columns::column_selection::SelectionError;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file that cannot be used. Its `Display` is one line: file, line, column, reason.
+#[derive(Debug)]
+pub struct InputError {
+    /// As the user named it.
+    pub file: PathBuf,
+    /// Counted from 1, the header included; absent when the file as a whole is at fault.
+    pub line: Option<u64>,
+    /// Row of an array or message of a log, counted from 1, in files without lines.
+    pub row: Option<u64>,
+    /// Name of the column, where one column is at fault.
+    pub column: Option<String>,
+    /// Why it is refused.
+    pub reason: Reason,
+}
+
+/// Why a file, a line or a field is refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The file cannot be read.
+    #[error("{0}")]
+    Io(io::Error),
+    /// A folder where a file is expected.
+    #[error("is a directory, not a file; of a ROS 2 bag, give the .mcap or .db3 file in it")]
+    Directory,
+    /// A folder without a table in it.
+    #[error("no file in it ends in .csv or .csv.gz")]
+    NoTables,
+    /// No byte, or only blank lines.
+    #[error("the file is empty")]
+    Empty,
+    /// A header without a row after it.
+    #[error("no data after the header")]
+    NoData,
+    /// The gzip stream ends before its trailer.
+    #[error("truncated gzip: the compressed data end early")]
+    TruncatedGzip,
+    /// The gzip stream is damaged.
+    #[error("damaged gzip: {0}")]
+    DamagedGzip(io::Error),
+    /// Bytes after a gzip stream that are none.
+    #[error("bytes after the end of the gzip data that are no gzip data")]
+    TrailingBytes,
+    /// More samples than are held in memory.
+    #[error("more than 33554432 samples: give the recording in parts")]
+    TooManySamples,
+    /// Bytes that are not UTF-8.
+    #[error("not UTF-8 text")]
+    NotText,
+    /// More than 65536 bytes without a line end.
+    #[error("the line is longer than 65536 bytes")]
+    LongLine,
+    /// The header names no channel of the part.
+    #[error("no known column; expected names such as gyro_x_counts")]
+    NoChannel,
+    /// Columns that are not separated by commas.
+    #[error("the columns are separated by {0:?}; expected commas")]
+    Separator(char),
+    /// A comma after the last name.
+    #[error("a comma after the last column; leave it out, here and in every row")]
+    TrailingComma,
+    /// A frame log where a table of counts is expected.
+    #[error("this is an SPI frame log; read it with `replay`")]
+    FrameLog,
+    /// A column that is neither a channel nor a time stamp.
+    #[error("unknown column; known are sample, time_s and <channel>_counts")]
+    UnknownColumn,
+    /// A name that occurs twice in the header.
+    #[error("the column occurs twice")]
+    DuplicateColumn,
+    /// More or fewer fields than the header has.
+    #[error("{found} fields, the header has {expected}")]
+    FieldCount {
+        /// Fields of this line.
+        found: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// Text, or a fraction, where an integer belongs.
+    #[error("{0:?} is not a whole number")]
+    NotInteger(String),
+    /// Text where a number belongs.
+    #[error("{0:?} is not a number")]
+    NotNumber(String),
+    /// Infinity or NaN.
+    #[error("{0:?} is not a finite time")]
+    NotFinite(String),
+    /// A count that the register's field cannot hold.
+    #[error("{value} is outside {low}..={high}")]
+    OutOfField {
+        /// As read.
+        value: i64,
+        /// Smallest count of the field.
+        low: i16,
+        /// Largest count of the field.
+        high: i16,
+    },
+    /// A time that decreases.
+    #[error("time {now} s is before {before} s of the row above")]
+    TimeBackwards {
+        /// Of the row above, s.
+        before: f64,
+        /// Of this row, s.
+        now: f64,
+    },
+    /// An index that repeats or decreases.
+    #[error("sample {now} does not follow {before}")]
+    IndexBackwards {
+        /// Of the row above.
+        before: u64,
+        /// Of this row.
+        now: u64,
+    },
+    /// A byte that is not written as two hexadecimal digits.
+    #[error("{0:?} is not a row of hexadecimal bytes")]
+    NotHex(String),
+    /// Bytes that do not form 16-bit words.
+    #[error("{0} bytes are no whole number of 16-bit words")]
+    OddBytes(usize),
+    /// The two lines of a full-duplex bus always carry the same number of bytes.
+    #[error("{mosi} bytes out but {miso} bytes in")]
+    UnequalLengths {
+        /// Bytes from the host.
+        mosi: usize,
+        /// Bytes from the part.
+        miso: usize,
+    },
+    /// A first line that is not that of a frame log.
+    #[error("not an SPI frame log: the first line must be `time_s,mosi,miso`")]
+    NotFrameLog,
+    /// A frame log without one burst in it.
+    #[error("no burst transaction (26 bytes that start with 3E00)")]
+    NoBurst,
+    /// A burst that was taken in another range of the gyroscopes than those before it.
+    #[error("the gyro range changes from {before} to {now} deg/s between bursts; give each range its own log")]
+    MixedRange {
+        /// Of the bursts above, deg/s.
+        before: u16,
+        /// Of this burst, deg/s.
+        now: u16,
+    },
+    /// No row of numbers near the beginning.
+    #[error("no row of numbers: neither a table nor another known format")]
+    NoNumbers,
+    /// Columns, units or channels that cannot be chosen.
+    #[error("{0}")]
+    Selection(Box<SelectionError>),
+    /// A time column without a stated unit, whose values show none.
+    #[error("column {0}: no unit of the time; give one, as in --units us")]
+    NoTimeUnit(String),
+    /// A clock that was set back so that many rows are out of order.
+    #[error(
+        "the time goes back before row {row} by {by} of its units, and {rows} rows are earlier than one before them"
+    )]
+    ClockSetBack {
+        /// The first such row, from 1.
+        row: u64,
+        /// In the unit of the column.
+        by: f64,
+        /// Such rows.
+        rows: u64,
+    },
+    /// A log without a message that this program reads.
+    #[error("no message of an inertial sensor in this {format}")]
+    NoTopic {
+        /// Name of the format.
+        format: &'static str,
+    },
+    /// A topic that the log does not have: as given, and the names of the topics.
+    #[error("--topic {}: not in the file; it has {}", .0.0, .0.1)]
+    UnknownTopic(Box<(String, String)>),
+    /// Several topics of which the user names none.
+    #[error("several topics: choose one with --topic: {0}")]
+    SeveralTopics(String),
+    /// A ROS 1 bag of a recording that was interrupted.
+    #[error("the bag has no index, as after an interrupted recording; make one with `rosbag reindex`")]
+    NoIndex,
+    /// An array that is no column or matrix of numbers.
+    #[error("{0}")]
+    Array(String),
+    /// A file that its format's reader refuses.
+    #[error("damaged {format} file: {error}")]
+    Format {
+        /// Name of the format.
+        format: &'static str,
+        /// What its reader says.
+        error: Box<str>,
+    },
+    /// A file that ends early.
+    #[error("truncated {format}: the data end early")]
+    Truncated {
+        /// Name of the format.
+        format: &'static str,
+    },
+    /// The driver refused the replayed transaction.
+    #[error("replay over the bus: {0}")]
+    Bus(String),
+}
+
+impl InputError {
+    /// A fault of the file as a whole.
+    pub fn file(file: &Path, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: None, row: None, column: None, reason }
+    }
+
+    /// A fault of one line.
+    pub fn line(file: &Path, line: u64, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: Some(line), row: None, column: None, reason }
+    }
+
+    /// A fault of one field.
+    pub fn field(file: &Path, line: u64, column: &str, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: Some(line), row: None, column: Some(column.to_owned()), reason }
+    }
+}
+
+impl InputError {
+    /// A fault of one row of an array or one message of a log.
+    pub fn row(file: &Path, row: u64, column: &str, reason: Reason) -> Self {
+        Self { file: file.to_owned(), line: None, row: Some(row), column: Some(column.to_owned()), reason }
+    }
+}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", Printable(&self.file.display().to_string()))?;
+        if let Some(line) = self.line {
+            write!(f, ": line {line}")?;
+        }
+        if let Some(row) = self.row {
+            write!(f, ": row {row}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, ": column {}", Printable(column))?;
+        }
+        // Some readers of formats describe a fault in several lines.
+        let reason = self.reason.to_string();
+        let lines: Vec<&str> = reason.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        write!(f, ": {}", lines.join(" "))
+    }
+}
+
+impl std::error::Error for InputError {}
+
+/// Text from outside, with its control characters escaped so that a terminal does not obey them.
+#[derive(Debug, Clone, Copy)]
+pub struct Printable<'a>(pub &'a str);
+
+impl fmt::Display for Printable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars() {
+            if c.is_control() {
+                write!(f, "{}", c.escape_default())?;
+            } else {
+                write!(f, "{c}")?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,160 @@
+//! From the rows of any sensor to the [`Measurement`] that is analysed: time base, counts, and what the channels show.
+
+use crate::tables::channel_health::ChannelHealth;
+use crate::tables::quantizer::Quantizer;
+use crate::tables::sensor_table::{SensorTable, TableColumn};
+use crate::time_base::EstimatedTimeBase;
+use crate::time_base::sample_slots::{MAX_REPEATED_READ_INTERVAL, SampleSlots, usual_interval};
+use crate::time_base::stamp_quality::StampQuality;
+use crate::time_base::time_base_error::TimeBaseError;
+use measurement::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Fewest channels whose equal rows are one sample that was read twice; fewer are equal by chance.
+pub(crate) const MIN_CHANNELS_OF_REPEAT: usize = 3;
+
+/// How often a range of the data sheet a value may be before it is no measurement.
+const MAX_RANGES: f64 = 2.0;
+
+/// The rows of `table`, which `sensor` measured, on their time base; and what the user should know, one sentence each.
+pub(crate) fn time_base(
+    mut table: SensorTable,
+    sensor: &SensorProfile,
+    stated_hz: Option<f64>,
+) -> Result<(EstimatedTimeBase, Vec<String>), TimeBaseError> {
+    let repeated = leave_out_repeated(&mut table, stated_hz);
+    let SensorTable { times_s, indices, columns, mut dropped, mut notes } = table;
+    let rows = columns.first().map_or(0, |column| column.values.len());
+    let base = SampleSlots::new(rows, times_s.as_deref(), indices.as_deref(), stated_hz)?;
+    dropped.extend(Some(("repeated", repeated)).filter(|_| repeated > 0));
+    // The rows that were left out are between the others and are missing there.
+    let left_out = dropped.get("time_backwards").copied().unwrap_or(0);
+    dropped.insert("gap", base.never_arrived.saturating_sub(left_out));
+    let mut health = BTreeMap::from([("saturated", BTreeSet::new()), ("stuck", BTreeSet::new())]);
+    let mut channels = Vec::with_capacity(columns.len());
+    for column in columns {
+        let unusable = format!("{} ({}) has no usable value and is left out", column.profile.name, column.label);
+        match channel(column, &mut health, &mut notes) {
+            Some(channel) => channels.push(channel),
+            None => notes.push(unusable),
+        }
+    }
+    if channels.is_empty() {
+        return Err(TimeBaseError::TooShort { used: 0, dropped });
+    }
+    let mut flagged: BTreeMap<&'static str, u64> =
+        health.into_iter().map(|(cause, rows)| (cause, rows.len() as u64)).filter(|(_, count)| *count > 0).collect();
+    flagged.extend(base.stamps.iter().flat_map(StampQuality::warnings));
+    let measurement = Measurement {
+        profile: sensor.clone(),
+        sample_rate_hz: base.sample_rate_hz,
+        stated_rate_hz: stated_hz,
+        slots: base.slots,
+        times_s,
+        channels,
+        dropped,
+        flagged,
+    };
+    Ok((EstimatedTimeBase { measurement, stamps: base.stamps }, notes))
+}
+
+/// Takes rows out that equal the one before in all of three channels or more and come sooner than 0.75 periods after it: one
+/// sample that was read or published twice.
+fn leave_out_repeated(table: &mut SensorTable, stated_hz: Option<f64>) -> u64 {
+    let Some(times) = table.times_s.as_ref().filter(|_| table.columns.len() >= MIN_CHANNELS_OF_REPEAT) else {
+        return 0;
+    };
+    let Some(period_s) = stated_hz.map(f64::recip).or_else(|| usual_interval(times)) else { return 0 };
+    let is_repeat = |row: usize| {
+        row > 0
+            && times[row] - times[row - 1] < MAX_REPEATED_READ_INTERVAL * period_s
+            && table.columns.iter().all(|column| column.values[row] == column.values[row - 1])
+    };
+    let kept: Vec<bool> = (0..times.len()).map(|row| !is_repeat(row)).collect();
+    let repeated = kept.iter().filter(|kept| !**kept).count() as u64;
+    if repeated > 0 {
+        for column in &mut table.columns {
+            retain(&mut column.values, &kept);
+        }
+        table.times_s.iter_mut().for_each(|times| retain(times, &kept));
+        table.indices.iter_mut().for_each(|indices| retain(indices, &kept));
+    }
+    repeated
+}
+
+/// The elements whose flag is set.
+fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    values.retain(|_| kept.next().copied().unwrap_or(true));
+}
+
+/// Why a value of a channel is no measurement, if so: 1 in it is `factor` in the channel's unit, in which it is `limit` at most.
+pub(crate) fn refusal(value: f64, factor: f64, limit: f64) -> Option<&'static str> {
+    match value {
+        value if value.is_nan() => Some("missing"),
+        value if value.is_infinite() => Some("not_finite"),
+        value if (value * factor).abs() > limit => Some("out_of_range"),
+        _ => None,
+    }
+}
+
+/// The largest value of a channel that is a measurement, in its unit.
+pub(crate) fn largest_value(profile: &ChannelProfile) -> f64 {
+    profile.range.map_or(f64::INFINITY, |range| MAX_RANGES * range)
+}
+
+/// What the user should know of the counts of a channel, which are `lsb` large.
+pub(crate) fn quantizer_note(profile: &ChannelProfile, quantizer: &Quantizer, lsb: f64) -> String {
+    let ChannelProfile { name, unit, .. } = profile;
+    match quantizer.cost {
+        None => format!("{name}: counts of {lsb:.6e} {unit}, as in the file"),
+        Some(cost) => {
+            format!("{name}: rounded to counts of {lsb:.6e} {unit}, which adds {cost:.1e} to the variance of its noise")
+        }
+    }
+}
+
+/// One channel as counts; `None` where no value is usable.
+fn channel(
+    column: TableColumn,
+    health: &mut BTreeMap<&'static str, BTreeSet<usize>>,
+    notes: &mut Vec<String>,
+) -> Option<MeasuredChannel> {
+    let TableColumn { profile, factor, mut values, .. } = column;
+    let limit = largest_value(&profile);
+    let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
+    for (position, value) in values.iter_mut().enumerate() {
+        let Some(cause) = refusal(*value, factor, limit) else { continue };
+        refused.entry(cause).or_default().push(position);
+        *value = f64::NAN;
+    }
+    let quantizer = Quantizer::new(&values);
+    let lsb = quantizer.lsb * factor;
+    let counts: Vec<Option<i32>> = values.iter().map(|&value| quantizer.count(value)).collect();
+    if counts.iter().all(Option::is_none) {
+        return None;
+    }
+    let beyond = |position: &usize| counts[*position].is_none() && values[*position].is_finite();
+    let beyond: Vec<usize> = (0..values.len()).filter(beyond).collect();
+    if !beyond.is_empty() {
+        refused.entry("out_of_range").or_default().extend(beyond);
+        refused.values_mut().for_each(|positions| positions.sort_unstable());
+    }
+    notes.push(quantizer_note(&profile, &quantizer, lsb));
+    let mut seen = ChannelHealth::examine(&counts, profile.range.map(|range| range / lsb));
+    if !profile.quantity.is_inertial() {
+        // A temperature or a supply may well stay where it is.
+        seen.stuck.clear();
+    }
+    for (cause, positions, what) in [
+        ("saturated", seen.saturated, "samples at full scale"),
+        ("stuck", seen.stuck, "samples in runs of equal values that chance does not make: a stuck output"),
+    ] {
+        if let Some(first) = positions.first() {
+            notes.push(format!("{}: {} {what}, the first of them row {}", profile.name, positions.len(), first + 1));
+        }
+        health.entry(cause).or_default().extend(positions);
+    }
+    let counts = counts.into_iter().map(Option::unwrap_or_default).collect();
+    Some(MeasuredChannel { profile: ChannelProfile { lsb, ..profile }, counts, refused })
+}

@@ -1,0 +1,236 @@
+//! The lateness of the samples against periods of a given length: its lower envelope, the losses that lift it, and how short
+//! a description of the time stamps they are.
+
+use crate::time_base::lower_envelope::{MinimumBehind, minimum_ahead};
+
+/// Samples over which the lower envelope is sought while the period is: a period that is wrong by a part in 200 hides a loss in a window of 200 samples.
+pub(crate) const SEARCH_QUEUE: usize = 64;
+/// Samples whose least envelope a rise of the envelope is measured from: a period that is wrong by a part in 32 causes no
+/// false loss.
+pub(crate) const MEMORY: usize = 16;
+/// The same where stamps are coarse, in widths of the lateness: so many ticks tell where the envelope is.
+const TICKS_IN_MEMORY: f64 = 12.0;
+/// Width of the lateness, in periods, from which stamps count as coarse.
+pub(crate) const COARSE: f64 = 0.6;
+/// Rise of the envelope, in periods, that is a loss. Coarse stamps move the envelope by up to half a period, where two
+/// ticks are nearly an odd number of periods.
+pub(crate) const LOSS: f64 = 0.5;
+const COARSE_LOSS: f64 = 0.7;
+/// Distance of a rise from a whole number of periods below which nothing but a loss explains it.
+pub(crate) const CERTAIN: f64 = 0.3;
+/// Times that an estimate of the period is improved by the alignment that it gives.
+const MAX_REFINEMENTS: usize = 12;
+/// Relative change of the period with which it is good enough to align by: a tenth of a period in a queue of 256 would be 4e-4.
+const CONVERGED: f64 = 2e-5;
+/// Cost of a loss beside that of the scatter, natural units of information. More than a position and a length take, because
+/// losses are rare.
+const LOSS_COST: f64 = 9.0;
+/// Samples over which the scatter of the lateness is measured: a clock that drifts by 100 ppm moves by a fifth of a period.
+const COST_BLOCK: usize = 2048;
+/// Median scatter of the lateness, in periods, below which more order is no evidence.
+const ORDER: f64 = 0.1;
+/// The median deviation from the median of a uniform distribution, in widths.
+const UNIFORM_MEDIAN_DEVIATION: f64 = 0.25;
+/// Blocks of the record whose mean residuals give the interval of the rate.
+const BLOCKS: usize = 16;
+/// Smallest relative half-width of the interval of a rate: the rounding of a time in f64 over a record of some samples.
+const MIN_RATE_ERROR: f64 = 1e-9;
+
+/// Samples that were lost between two samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LostStretch {
+    /// Position in the recording of the sample after the loss. With coarse stamps the loss may be some ticks before.
+    pub before: usize,
+    /// Sample periods without a sample.
+    pub missing: u64,
+    /// Whether nothing but a loss explains the stamps.
+    pub certain: bool,
+}
+
+/// An alignment to periods of a given length.
+pub(crate) struct Track {
+    pub(crate) period_s: f64,
+    pub(crate) periods: Vec<u64>,
+    /// Lateness above the envelope's phase, periods.
+    above: Vec<f64>,
+    pub(crate) losses: Vec<LostStretch>,
+    pub(crate) width: f64,
+}
+
+impl Track {
+    /// Aligns with a period, and again with the period that the alignment shows, until the period stays. Of these alignments
+    /// the one with the shortest description; with its cost.
+    pub(crate) fn refined(times: &[f64], period_s: f64, tick_s: Option<f64>, queue: usize) -> (f64, Self) {
+        let track = Self::new(times, period_s, tick_s, queue);
+        let (mut period_s, mut slope_s) = (period_s, track.slope_s(times));
+        let mut best = (track.cost(times, tick_s), track);
+        for _ in 0..MAX_REFINEMENTS {
+            let Some(next_s) = slope_s.filter(|slope_s| (slope_s / period_s - 1.0).abs() >= CONVERGED) else { break };
+            let track = Self::new(times, next_s, tick_s, queue);
+            (period_s, slope_s) = (next_s, track.slope_s(times));
+            let cost = track.cost(times, tick_s);
+            if cost < best.0 {
+                best = (cost, track);
+            }
+        }
+        best
+    }
+
+    /// Aligns `times` to periods of `period_s`.
+    pub(crate) fn new(times: &[f64], period_s: f64, tick_s: Option<f64>, queue: usize) -> Self {
+        let lateness = lateness(times, period_s);
+        let near = minimum_ahead(&lateness, SEARCH_QUEUE);
+        let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
+        // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
+        let quartile = quantile(&mut above, 3, 4) * 4.0 / 3.0;
+        drop(above);
+        let width = tick_s.map_or(quartile, |tick| quartile.max((tick / period_s).min(quartile * 2.0)));
+        let is_coarse = width >= COARSE;
+        let (memory, threshold) = if is_coarse {
+            (((TICKS_IN_MEMORY * width) as usize).clamp(MEMORY, times.len().max(MEMORY)), COARSE_LOSS)
+        } else {
+            (MEMORY, LOSS)
+        };
+        let envelope = if queue.max(memory) == SEARCH_QUEUE {
+            near
+        } else {
+            drop(near);
+            minimum_ahead(&lateness, queue.max(memory))
+        };
+        // In the last ticks no later sample tells how far the envelope is: no loss is found there.
+        let undecided = if is_coarse { (2.0 * width).ceil() as usize + 1 } else { 0 };
+        let last = times.len().saturating_sub(undecided + 1);
+        let periods = Vec::with_capacity(times.len());
+        let mut track = Self { period_s, periods, above: lateness, losses: Vec::new(), width };
+        let mut level = MinimumBehind::new(memory);
+        let mut missing = 0u64;
+        for at in 0..times.len() {
+            let least = envelope[at.min(last)];
+            let excess = level.minimum().map_or(0.0, |level| least - missing as f64 - level);
+            // Towards the end the envelope is that of fewer ticks, and may rise by a period without a loss.
+            let threshold = if is_coarse && at + memory > times.len() { threshold + 1.0 } else { threshold };
+            if excess >= threshold {
+                // A float beyond the range of u64 saturates.
+                let lost = (excess.round() as u64).max(1);
+                missing = missing.saturating_add(lost);
+                let certain = (excess - excess.round()).abs() < CERTAIN;
+                // Stamps within a tick or two do not tell one loss from two.
+                match track.losses.last_mut().filter(|last| at - last.before <= undecided) {
+                    Some(last) => {
+                        *last = LostStretch { missing: last.missing.saturating_add(lost), certain: true, ..*last };
+                    }
+                    None => track.losses.push(LostStretch { before: at, missing: lost, certain }),
+                }
+            }
+            level.push(least - missing as f64);
+            track.periods.push(missing.saturating_add(at as u64));
+            track.above[at] -= missing as f64;
+            track.above[at] -= level.minimum().unwrap_or(0.0);
+        }
+        track
+    }
+
+    /// The samples of `other` without a loss between them.
+    pub(crate) fn complete(times: &[f64], other: &Self) -> Self {
+        let periods: Vec<u64> = (0..times.len() as u64).collect();
+        let slope_s = slope(&periods, times, |_| true).unwrap_or(other.period_s);
+        let above = lateness(times, slope_s);
+        Self {
+            period_s: slope_s,
+            periods,
+            above: vec![0.0; above.len()],
+            losses: Vec::new(),
+            width: other.width.max(1.0),
+        }
+    }
+
+    pub(crate) fn is_late(&self, at: usize) -> bool {
+        self.above[at] >= 1.0 + if self.width < COARSE { 0.0 } else { self.width }
+    }
+
+    /// Period by the samples that are not late, s.
+    pub(crate) fn slope_s(&self, times: &[f64]) -> Option<f64> {
+        slope(&self.periods, times, |at| !self.is_late(at))
+    }
+
+    /// Description length of the stamps by this alignment, natural units of information.
+    ///
+    /// It is that of the samples which are stamped first after they were taken, one a tick. Their scatter is measured around
+    /// the middle of each block of the record and not around the envelope, which follows a wrong period.
+    pub(crate) fn cost(&self, times: &[f64], tick_s: Option<f64>) -> f64 {
+        let mut residuals = lateness(times, self.period_s);
+        for ((at, residual), period) in residuals.iter_mut().enumerate().zip(&self.periods) {
+            *residual -= (period - at as u64) as f64;
+        }
+        let tick = self.width.max(1.0);
+        let mut residuals = minimum_ahead(&residuals, tick.ceil() as usize);
+        let mut scratch = Vec::new();
+        for block in residuals.chunks_mut(COST_BLOCK) {
+            scratch.clear();
+            scratch.extend_from_slice(block);
+            let middle = quantile(&mut scratch, 1, 2);
+            block.iter_mut().for_each(|residual| *residual = (*residual - middle).abs());
+        }
+        let scatter = quantile(&mut residuals, 1, 2);
+        let rounding = tick_s.map_or(0.0, |tick| UNIFORM_MEDIAN_DEVIATION * (tick / self.period_s).min(1.0));
+        times.len() as f64 / tick * scatter.max(rounding).max(ORDER).ln() + LOSS_COST * self.losses.len() as f64
+    }
+
+    /// Relative error of the slope: the range of the mean residuals of 16 blocks, over the length of the record. Four standard
+    /// errors where the residuals are independent; a clock that drifts widens it by its drift.
+    pub(crate) fn slope_error(&self, times: &[f64], slope_s: f64) -> f64 {
+        let on_time: Vec<usize> = (0..times.len()).filter(|at| !self.is_late(*at)).collect();
+        let length = (on_time.len() / BLOCKS).max(1);
+        let mean = |block: &[usize]| {
+            block.iter().map(|&at| (times[at] - times[0]) / slope_s - self.periods[at] as f64).sum::<f64>()
+                / block.len() as f64
+        };
+        let (low, high) = on_time
+            .chunks_exact(length)
+            .map(mean)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (mean.min(low), mean.max(high)));
+        let span = self.periods.last().map_or(1.0, |&last| (last as f64).max(1.0));
+        // Ticks that are no fraction of the period fall evenly over it; those that nearly are move the line by up to one.
+        let rounding = if self.width < COARSE { self.width } else { self.width / (on_time.len() as f64).sqrt() };
+        (high - low).max(rounding) / span + MIN_RATE_ERROR
+    }
+}
+
+/// How many periods after its turn each sample was stamped, from the first sample.
+fn lateness(times: &[f64], period_s: f64) -> Vec<f64> {
+    let origin = times.first().copied().unwrap_or(0.0);
+    times.iter().enumerate().map(|(at, time)| (time - origin) / period_s - at as f64).collect()
+}
+
+/// The value below which `parts` of `of` of the values lie; 0 without values.
+pub(crate) fn quantile(values: &mut [f64], parts: usize, of: usize) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = ((values.len() - 1) as u64 * parts as u64 / of as u64) as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// Slope in s of the least-squares line of time over period, for the samples that `admitted` selects. `None` if they span
+/// no time.
+pub(crate) fn slope(periods: &[u64], times: &[f64], admitted: impl Fn(usize) -> bool) -> Option<f64> {
+    let (&first_period, &first_time) = (periods.first()?, times.first()?);
+    // Relative to the first sample: a late origin would cost digits.
+    let points = || {
+        periods
+            .iter()
+            .zip(times)
+            .enumerate()
+            .filter(|(at, _)| admitted(*at))
+            .map(|(_, (period, time))| ((period - first_period) as f64, time - first_time))
+    };
+    let n = points().count() as f64;
+    let (sum_x, sum_y) = points().fold((0.0, 0.0), |(x, y), (period, time)| (x + period, y + time));
+    let (mean_x, mean_y) = (sum_x / n, sum_y / n);
+    let (xx, xy) = points().fold((0.0, 0.0), |(xx, xy), (period, time)| {
+        let x = period - mean_x;
+        (xx + x * x, xy + x * (time - mean_y))
+    });
+    let slope_s = xy / xx;
+    (slope_s.is_finite() && slope_s > 0.0).then_some(slope_s)
+}

@@ -1,0 +1,78 @@
+//! What the time stamps of a recording show, and what they cannot show.
+
+use crate::time_base::indexed_clock::{ClockStep, IndexedClock};
+use crate::time_base::lateness_track::{COARSE, LostStretch};
+use crate::time_base::stamp_alignment::{RateEstimate, uncertain};
+
+/// What the time stamps of a recording show, and what they cannot show.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StampQuality {
+    /// The rate by the clock that stamped the samples, whatever rate was stated.
+    pub rate: Option<RateEstimate>,
+    /// Tick of that clock, s: the step that all stamps are multiples of. `None` where it is less than a twentieth of a period.
+    pub tick_s: Option<f64>,
+    /// Width of the lateness of ordinary samples, sample periods: the tick and the jitter. 0 where the samples have an index.
+    pub width: f64,
+    /// Losses that the stamps show, refused samples included; none where the samples have an index.
+    pub losses: Vec<LostStretch>,
+    /// Whether losses of single samples are told from the rounding of the stamps.
+    pub resolved: bool,
+    /// Samples that were read at least a period later than the others.
+    pub late: u64,
+    /// Where the index and the stamps contradict each other.
+    pub clock_steps: Vec<ClockStep>,
+}
+
+impl StampQuality {
+    /// Of samples that have an index and time stamps, s.
+    pub(crate) fn of_index(indices: &[u64], times: &[f64]) -> Self {
+        let IndexedClock { rate, steps } = IndexedClock::new(indices, times);
+        Self { rate, clock_steps: steps, resolved: true, ..Self::default() }
+    }
+
+    /// Warnings that a report counts, by cause; those that do not occur are absent.
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        let counts = [
+            ("late_delivery", self.late),
+            ("uncertain_loss", self.uncertain_losses()),
+            ("clock_step", self.clock_steps.len() as u64),
+        ];
+        counts.into_iter().filter(|(_, count)| *count > 0)
+    }
+
+    /// What a reader of the analysis has to know, one sentence each; none for stamps that leave no doubt.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let (Some(rate), true) = (self.rate, self.width >= COARSE) {
+            let tick = self.tick_s.map_or_else(String::new, |tick| format!(", ticks of {:.4} ms", 1e3 * tick));
+            notes.push(format!(
+                "the time stamps are coarser than the sample period ({:.2} periods{tick}): {:.4} Hz ({:.4} to {:.4}); a loss \
+                 is located to {:.0} samples",
+                self.width, rate.hz, rate.low_hz, rate.high_hz, self.width.ceil(),
+            ));
+        }
+        let uncertain: u64 = self.uncertain_losses();
+        if uncertain > 0 {
+            notes.push(format!(
+                "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
+            ));
+        }
+        if !self.resolved {
+            notes.push("losses of single samples cannot be told from the rounding of the time stamps".to_owned());
+        }
+        if let Some(step) = self.clock_steps.first() {
+            notes.push(format!(
+                "index and time contradict each other at {} places, first before sample {} by {:+.3} s; the index is believed",
+                self.clock_steps.len(),
+                step.before,
+                step.seconds
+            ));
+        }
+        notes
+    }
+
+    /// Samples in losses that something else may explain.
+    pub fn uncertain_losses(&self) -> u64 {
+        uncertain(&self.losses, self.resolved)
+    }
+}

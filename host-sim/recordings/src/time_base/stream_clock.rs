@@ -1,0 +1,234 @@
+//! The sample periods of rows that are read in blocks, in memory that does not grow with their number.
+//!
+//! With time stamps alone, the rule is that of [`lateness_track`](crate::time_base::lateness_track) for stamps that are finer than the sample
+//! period: a lost sample lifts the lower envelope of the lateness for good, a late delivery for as long as the queue is. The
+//! period is that of the first rows, and the envelope is sought over as many rows as there, so that a row is placed when those
+//! of the queue behind it are known.
+
+use crate::time_base::indexed_clock::{STEP_PERIODS, STEP_S};
+use crate::time_base::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY};
+use crate::time_base::lower_envelope::{MinimumBehind, minimum_ahead};
+use crate::time_base::sample_slots::is_too_sparse;
+use crate::time_base::stamp_alignment::MAX_QUEUE;
+use crate::time_base::stamp_quality::StampQuality;
+use crate::time_base::time_base_error::{MIN_SAMPLES, TimeBaseError};
+use std::collections::BTreeMap;
+
+/// Rows of a block.
+pub(crate) const BLOCK: usize = 1 << 14;
+
+/// What tells the sample periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Source {
+    /// The number of the row.
+    Rows,
+    /// Its index; beside it there may be stamps with this period, s.
+    Index(Option<f64>),
+    /// Its time stamp, with the period of the first rows, s.
+    Stamps(f64),
+}
+
+/// When a row arrived, as far as the file says it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Stamp {
+    pub(crate) time_s: Option<f64>,
+    pub(crate) index: Option<u64>,
+}
+
+/// The sample period of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Placed {
+    /// Counted from any origin.
+    pub(crate) period: u64,
+    /// Periods without a row between all rows so far.
+    pub(crate) missing: u64,
+}
+
+/// Places rows in the order in which they arrived.
+pub(crate) struct StreamClock {
+    source: Source,
+    /// Rows that were placed.
+    placed: u64,
+    missing: u64,
+    /// Time of the first row, s.
+    origin_s: Option<f64>,
+    last: Stamp,
+    /// Lateness of the rows that are not placed yet, and their times, s.
+    ahead: Vec<f64>,
+    times_s: Vec<f64>,
+    level: MinimumBehind,
+    line: Line,
+    late: u64,
+    uncertain: u64,
+    /// Smallest step of the index.
+    least_step: u64,
+}
+
+impl StreamClock {
+    /// Of rows that have an index and time stamps, if so; `head` is what the stamps of the first rows show.
+    ///
+    /// # Errors
+    /// The stamps are coarser than the sample period, or show none.
+    pub(crate) fn new(has_index: bool, head: Option<&StampQuality>) -> Result<Self, TimeBaseError> {
+        let period_s = head.and_then(|head| head.rate).map(|rate| rate.hz.recip());
+        let source = match (has_index, head) {
+            (true, _) => Source::Index(period_s),
+            (false, None) => Source::Rows,
+            (false, Some(head)) if head.width >= COARSE || !head.resolved => {
+                let reason = format!("they are {:.1} sample periods wide", head.width);
+                return Err(TimeBaseError::Irregular(reason));
+            }
+            (false, Some(_)) => Source::Stamps(period_s.ok_or(TimeBaseError::NoPeriod)?),
+        };
+        Ok(Self {
+            source,
+            placed: 0,
+            missing: 0,
+            origin_s: None,
+            last: Stamp::default(),
+            ahead: Vec::new(),
+            times_s: Vec::new(),
+            level: MinimumBehind::new(MEMORY),
+            line: Line::default(),
+            late: 0,
+            uncertain: 0,
+            least_step: u64::MAX,
+        })
+    }
+
+    /// Takes the next rows and returns the periods of those that can be placed now: of all with `is_last`.
+    ///
+    /// # Errors
+    /// The time leaps against the index.
+    pub(crate) fn place(
+        &mut self,
+        rows: impl Iterator<Item = Stamp>,
+        is_last: bool,
+    ) -> Result<Vec<Placed>, TimeBaseError> {
+        match self.source {
+            Source::Rows => Ok(rows
+                .map(|_| {
+                    self.placed += 1;
+                    Placed { period: self.placed - 1, missing: 0 }
+                })
+                .collect()),
+            Source::Index(period_s) => rows.map(|row| self.by_index(row, period_s)).collect(),
+            Source::Stamps(period_s) => {
+                for row in rows {
+                    let time_s = row.time_s.unwrap_or_default();
+                    let origin_s = *self.origin_s.get_or_insert(time_s);
+                    let number = self.placed + self.ahead.len() as u64;
+                    self.ahead.push((time_s - origin_s) / period_s - number as f64);
+                    self.times_s.push(time_s - origin_s);
+                }
+                Ok(self.by_stamps(is_last))
+            }
+        }
+    }
+
+    fn by_index(&mut self, row: Stamp, period_s: Option<f64>) -> Result<Placed, TimeBaseError> {
+        let index = row.index.unwrap_or_default();
+        if let Some(before) = self.last.index {
+            let step = index - before;
+            self.least_step = self.least_step.min(step);
+            self.missing = self.missing.saturating_add(step - 1);
+            if let (Some(period_s), Some(before), Some(now)) = (period_s, self.last.time_s, row.time_s) {
+                let excess = (now - before) / period_s - step as f64;
+                if excess.abs() >= STEP_PERIODS.max(STEP_S / period_s) {
+                    let reason = format!("before sample {index} the time leaps against the index");
+                    return Err(TimeBaseError::Irregular(reason));
+                }
+            }
+        }
+        if let Some(time_s) = row.time_s {
+            let origin_s = *self.origin_s.get_or_insert(time_s);
+            self.line.add(index as f64, time_s - origin_s);
+        }
+        self.last = row;
+        self.placed += 1;
+        Ok(Placed { period: index, missing: self.missing })
+    }
+
+    fn by_stamps(&mut self, is_last: bool) -> Vec<Placed> {
+        let ready = if is_last { self.ahead.len() } else { (self.ahead.len() + 1).saturating_sub(MAX_QUEUE) };
+        let envelope = minimum_ahead(&self.ahead, MAX_QUEUE);
+        let mut placed = Vec::with_capacity(ready);
+        for ((&late, &least), &time_s) in self.ahead.iter().zip(&envelope).zip(&self.times_s).take(ready) {
+            let excess = self.level.minimum().map_or(0.0, |level| least - self.missing as f64 - level);
+            if excess >= LOSS {
+                // A float beyond the range of u64 saturates.
+                self.missing = self.missing.saturating_add((excess.round() as u64).max(1));
+                self.uncertain += u64::from((excess - excess.round()).abs() >= CERTAIN);
+            }
+            self.level.push(least - self.missing as f64);
+            let period = self.missing.saturating_add(self.placed);
+            self.placed += 1;
+            if late - self.missing as f64 - self.level.minimum().unwrap_or(0.0) < 1.0 {
+                self.line.add(period as f64, time_s);
+            } else {
+                self.late += 1;
+            }
+            placed.push(Placed { period, missing: self.missing });
+        }
+        self.ahead.drain(..ready);
+        self.times_s.drain(..ready);
+        placed
+    }
+
+    /// The sample rate by the stamps of the rows that were placed, Hz.
+    pub(crate) fn rate_hz(&self) -> Option<f64> {
+        self.line.slope().map(f64::recip).filter(|hz| hz.is_finite() && *hz > 0.0)
+    }
+
+    /// Warnings that a report counts, by cause, as those of [`StampQuality::warnings`].
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        [("late_delivery", self.late), ("uncertain_loss", self.uncertain)].into_iter().filter(|(_, count)| *count > 0)
+    }
+
+    /// Checks a recording of `samples` usable samples over `periods` periods.
+    ///
+    /// # Errors
+    /// It has fewer than 4 samples, no two neighbours, or gaps that are more than 64 times as long as the samples.
+    pub(crate) fn check(
+        &self,
+        samples: u64,
+        periods: u64,
+        dropped: &BTreeMap<&'static str, u64>,
+    ) -> Result<(), TimeBaseError> {
+        if samples < MIN_SAMPLES {
+            return Err(TimeBaseError::TooShort { used: samples, dropped: dropped.clone() });
+        }
+        if matches!(self.source, Source::Index(_)) && self.least_step > 1 {
+            return Err(TimeBaseError::NoNeighbours(self.least_step));
+        }
+        if is_too_sparse(samples, periods - 1) {
+            return Err(TimeBaseError::TooSparse { samples, periods });
+        }
+        Ok(())
+    }
+}
+
+/// The least-squares line through points that come one after the other, by their means and central moments.
+#[derive(Debug, Clone, Copy, Default)]
+struct Line {
+    count: f64,
+    mean: (f64, f64),
+    xx: f64,
+    xy: f64,
+}
+
+impl Line {
+    fn add(&mut self, x: f64, y: f64) {
+        self.count += 1.0;
+        let (from_x, from_y) = (x - self.mean.0, y - self.mean.1);
+        self.mean.0 += from_x / self.count;
+        self.mean.1 += from_y / self.count;
+        self.xx += from_x * (x - self.mean.0);
+        self.xy += from_x * (y - self.mean.1);
+    }
+
+    fn slope(&self) -> Option<f64> {
+        let slope = self.xy / self.xx;
+        (slope.is_finite() && slope > 0.0).then_some(slope)
+    }
+}
