@@ -36,12 +36,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         match imu.read() {
             Ok(sample) => {
                 println!("{:8.3?} °/s {:7.4?} g {:.1} °C", sample.gyro_dps(), sample.accl_g(), sample.temp_degc());
+                if sample.warnings().contains(Faults::ERROR_ALARM) {
+                    println!("{:?}", imu.diagnosis()?);
+                }
             }
             Err(Error::Unusable(faults)) => {
                 println!("not usable: {}", faults.causes().collect::<Vec<_>>().join(", "));
-                if faults.contains(Faults::ERROR_ALARM) {
-                    println!("{:?}", imu.diagnosis()?);
-                }
             }
             Err(error) => return Err(error.into()),
         }

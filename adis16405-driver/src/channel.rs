@@ -193,3 +193,34 @@ impl Channel {
         }
     }
 }
+
+/// A set of output channels, the bit n for the channel whose discriminant is n.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ChannelMask(u16);
+
+impl ChannelMask {
+    /// No channel.
+    pub const EMPTY: Self = Self(0);
+    /// All twelve channels.
+    pub const ALL: Self = Self(0b1111_1111_1111);
+    /// The channels of [`Channel::INERTIAL`].
+    pub const INERTIAL: Self = Self(0b0000_0111_1110);
+
+    /// The set with `channel` as well.
+    #[must_use]
+    pub const fn with(self, channel: Channel) -> Self {
+        Self(self.0 | 1 << channel as u8)
+    }
+
+    /// Whether `channel` is in the set.
+    pub const fn contains(self, channel: Channel) -> bool {
+        self.0 >> channel as u8 & 1 != 0
+    }
+
+    /// Whether no channel is in the set.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}

@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::protocol::DriverState;
 use crate::sample::ImuSample;
 use crate::spacing::SensorBus;
-use crate::validity::{BurstValidator, FaultCounters, Faults};
+use crate::validity::{BurstValidator, FaultCounters, Faults, Validity};
 
 /// Type parameter of a driver over a blocking [`SpiDevice`](embedded_hal::spi::SpiDevice).
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +63,15 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         self
     }
 
+    /// Sets with which faults [`read`](Self::read) refuses a sample. The default is [`Faults::REFUSED`]: all but a supply
+    /// outside its window, an error or alarm flag, and inertial words that equal those before, which are
+    /// [warnings](ImuSample::warnings) of the sample.
+    #[must_use]
+    pub fn with_refused_faults(mut self, faults: Faults) -> Self {
+        self.validator = self.validator.with_refused_faults(faults);
+        self
+    }
+
     /// The configuration that [`init`](Self::init) writes, or the one that was set since.
     pub fn config(&self) -> Config {
         self.state.config
@@ -103,7 +112,8 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
     pub(crate) fn checked_sample(&mut self, burst: Burst) -> Result<ImuSample, Faults> {
         self.validator = self.validator.with_x_sign_at_risk(self.state.x_sign_at_risk);
         let validity = self.validator.validate(&burst);
-        if validity.usable { Ok(self.sample_from(burst)) } else { Err(validity.faults) }
+        let Validity { faults, .. } = validity;
+        if validity.is_usable() { Ok(self.sample_from(burst).with_warnings(faults)) } else { Err(faults) }
     }
 
     /// Returns the SPI device and the delay.

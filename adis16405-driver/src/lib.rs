@@ -21,10 +21,10 @@
 //!         Ok(sample) => {
 //!             let [x, y, z] = sample.gyro_dps();
 //!             # let _ = (healthy, x, y, z);
-//!         }
-//!         Err(Error::Unusable(faults)) if faults.contains(adis16405_driver::Faults::ERROR_ALARM) => {
-//!             let reason = imu.diagnosis()?; // Clears DIAG_STAT, which else keeps the flag set.
-//!             # let _ = reason;
+//!             if sample.warnings().contains(adis16405_driver::Faults::ERROR_ALARM) {
+//!                 let reason = imu.diagnosis()?; // Clears DIAG_STAT.
+//!                 # let _ = reason;
+//!             }
 //!         }
 //!         Err(Error::Unusable(_)) => (), // Left out.
 //!         Err(error) => return Err(error),
@@ -89,17 +89,22 @@
 //! The part has no checksum and no sample counter. [`BurstValidator`] derives the validity of a burst from the flags of
 //! its words, from their values, and from the bursts before:
 //!
-//! | fault | condition | usable | remedy |
+//! | fault | condition | refuses | remedy |
 //! |---|---|---|---|
-//! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0, or all bits 1 | no | check wiring and power; then [`start_up`](Adis16405::start_up) |
-//! | [`SHIFTED`](Faults::SHIFTED) | a valid burst, shifted by 1 to 15 bits | no | check SCK; the next transaction is aligned again |
-//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | the new-data flag of an inertial word is clear | no | wait for data ready |
-//! | [`FROZEN`](Faults::FROZEN) | twelve words equal for 512 bursts | no | [`software_reset`](Adis16405::software_reset) |
-//! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | no | a damaged word, or the sign erratum |
-//! | [`X_SIGN`](Faults::X_SIGN) | an x rate that may lack its sign bit | no | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
-//! | [`ERROR_ALARM`](Faults::ERROR_ALARM) | an error/alarm flag is set | no | [`diagnosis`](Adis16405::diagnosis), which clears it |
-//! | [`SUPPLY`](Faults::SUPPLY) | supply outside 4.75 to 5.25 V | no | check power |
-//! | [`REPEATED`](Faults::REPEATED) | inertial words equal those of the burst before | yes | none: mostly chance, and leaving them out would bias the noise estimate |
+//! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0, or all bits 1 | all | check wiring and power; then [`start_up`](Adis16405::start_up) |
+//! | [`SHIFTED`](Faults::SHIFTED) | a valid burst, shifted by 1 to 15 bits | all | check SCK; the next transaction is aligned again |
+//! | [`IMPLAUSIBLE_SUPPLY`](Faults::IMPLAUSIBLE_SUPPLY) | supply below 3.0 V or above 6.0 V | all | check SCK and wiring |
+//! | [`FROZEN`](Faults::FROZEN) | twelve words equal for 512 bursts | all | [`software_reset`](Adis16405::software_reset) |
+//! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | the new-data flag of an inertial word is clear | the channel; all if no inertial word is new | wait for data ready |
+//! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | the channel | a damaged word, or the sign erratum |
+//! | [`X_SIGN`](Faults::X_SIGN) | an x rate that may lack its sign bit | gyro x | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
+//! | [`ERROR_ALARM`](Faults::ERROR_ALARM) | an error/alarm flag is set | none | [`diagnosis`](Adis16405::diagnosis), which clears it |
+//! | [`SUPPLY`](Faults::SUPPLY) | supply outside 4.75 to 5.25 V | none | check power |
+//! | [`REPEATED`](Faults::REPEATED) | inertial words equal those of the burst before | none | none: mostly chance, and leaving them out would bias the noise estimate |
+//!
+//! [`read`](Adis16405::read) returns a sample if no channel is refused, with the other faults as
+//! [warnings](ImuSample::warnings); [`fault_counters`](Adis16405::fault_counters) counts
+//! every fault. [`with_refused_faults`](Adis16405::with_refused_faults) sets which faults refuse.
 //!
 //! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor. All were a full sample
 //! period apart, and 37 of them differed in another word. A sample that was read twice is distinguished from one that
@@ -180,7 +185,7 @@ mod validity;
 pub use alarms::{Alarm, AlarmNumber, AlarmThreshold, AlarmWatch};
 pub use burst::{BURST_BYTES, BURST_REQUEST, Burst, Counts, OutputWord};
 pub use calibration::{FactoryRestore, GyroBias, OnChipCompensation};
-pub use channel::{Channel, GyroRange};
+pub use channel::{Channel, ChannelMask, GyroRange};
 pub use clock::{ClockMode, ConfigError, PerClockMode, SampleClock, SamplePeriod, TimeBase, Timing};
 pub use commands::{Product, Sleep};
 pub use config::{BartlettFilter, Config};

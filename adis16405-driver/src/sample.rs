@@ -2,6 +2,7 @@
 
 use crate::burst::Counts;
 use crate::channel::{Channel, GyroRange};
+use crate::validity::Faults;
 
 /// The counts of one sample with the gyro range they were taken in, and their values in physical units.
 ///
@@ -14,6 +15,7 @@ pub struct ImuSample {
     counts: Counts,
     range: GyroRange,
     host_bias_x: i16,
+    warnings: Faults,
 }
 
 /// One count of XGYRO_OFF, 0.0125 °/s, in 10⁻⁶ °/s.
@@ -22,7 +24,7 @@ const BIAS_UDPS: i32 = 12_500;
 impl ImuSample {
     /// From counts that were taken in `range`, without a host-side bias correction.
     pub const fn new(counts: Counts, range: GyroRange) -> Self {
-        Self { counts, range, host_bias_x: 0 }
+        Self { counts, range, host_bias_x: 0, warnings: Faults::empty() }
     }
 
     /// Sets the bias correction, in counts of 0.0125 °/s, that is added to the x rate: see
@@ -31,6 +33,19 @@ impl ImuSample {
     pub const fn with_host_bias_x(mut self, host_bias_x: i16) -> Self {
         self.host_bias_x = host_bias_x;
         self
+    }
+
+    /// Sets the faults that the burst shows and that did not refuse it.
+    #[must_use]
+    pub(crate) const fn with_warnings(mut self, warnings: Faults) -> Self {
+        self.warnings = warnings;
+        self
+    }
+
+    /// The faults that the burst shows and that did not refuse it, [`Faults::WARNINGS`] unless
+    /// [`with_refused_faults`](crate::Adis16405::with_refused_faults) was set; none for a sample that was not validated.
+    pub const fn warnings(&self) -> Faults {
+        self.warnings
     }
 
     /// The counts as the part sent them, without the host-side bias correction.

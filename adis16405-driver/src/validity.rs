@@ -1,10 +1,10 @@
-//! Validity of a burst: which faults it shows, whether its data are usable, and how often each fault has occurred.
+//! Validity of a burst: which faults it shows, which channels they refuse, and how often each fault has occurred.
 //!
 //! The part has no checksum and no sample counter, so the checks use the flags of the words, their plausibility and
 //! their change from burst to burst.
 
 use crate::burst::{Burst, OutputWord};
-use crate::channel::Channel;
+use crate::channel::{Channel, ChannelMask};
 
 bitflags::bitflags! {
     /// The faults that a burst can show.
@@ -17,7 +17,8 @@ bitflags::bitflags! {
         const NO_NEW_DATA = 1 << 0;
         /// The error/alarm flag of at least one word is set; DIAG_STAT holds the reason.
         const ERROR_ALARM = 1 << 1;
-        /// Supply outside 4.75…5.25 V, the limits of DIAG_STAT bits 0 and 1.
+        /// Supply outside 4.75…5.25 V, the limits of DIAG_STAT bits 0 and 1 (data sheet Rev. B, Table 23). The part goes on
+        /// measuring.
         const SUPPLY = 1 << 2;
         /// All words are 0x0000: the data line is held low, or no part is connected.
         const STUCK_LOW = 1 << 3;
@@ -38,6 +39,10 @@ bitflags::bitflags! {
         /// more, which is what the sign erratum makes of −7000 and more. Detected only with
         /// [`BurstValidator::with_x_sign_at_risk`].
         const X_SIGN = 1 << 9;
+        /// A supply below 3.0 V or above 6.0 V, which a running part does not measure: above 6.0 V is beyond its absolute
+        /// maximum ratings (data sheet Rev. B, Table 3). The word was not sent by a part, nor were the others. Not set for
+        /// a burst that is stuck or shifted, of which it is no surprise.
+        const IMPLAUSIBLE_SUPPLY = 1 << 10;
     }
 }
 
@@ -46,11 +51,24 @@ impl Faults {
     /// every range, and a part may exceed it somewhat.
     pub const LARGEST_RATE: i16 = 7000;
 
-    /// Every fault with its name in reports. Where several are present, the one nearest to the root cause comes first.
-    pub const CAUSES: [(Faults, &'static str); 10] = [
+    /// Faults with which samples are used: neighbours that are equal by chance, which to leave out would bias the noise
+    /// estimate upwards; a supply outside its window; and flags in DIAG_STAT, an alarm among them.
+    pub const WARNINGS: Faults = Faults::REPEATED.union(Faults::SUPPLY).union(Faults::ERROR_ALARM);
+
+    /// Faults of single inertial words, which refuse the channel of the word alone.
+    pub const OF_CHANNELS: Faults = Faults::NO_NEW_DATA.union(Faults::IMPOSSIBLE_RATE).union(Faults::X_SIGN);
+
+    /// The faults that refuse data unless [`BurstValidator::with_refused_faults`] says otherwise: all but the
+    /// [`WARNINGS`](Self::WARNINGS).
+    pub const REFUSED: Faults = Faults::all().difference(Faults::WARNINGS);
+
+    /// Every fault with its name in reports. Where several are present, the one nearest to the root cause comes first, and
+    /// the [`WARNINGS`](Self::WARNINGS) last.
+    pub const CAUSES: [(Faults, &'static str); 11] = [
         (Faults::STUCK_LOW, "stuck_low"),
         (Faults::STUCK_HIGH, "stuck_high"),
         (Faults::SHIFTED, "shifted"),
+        (Faults::IMPLAUSIBLE_SUPPLY, "implausible_supply"),
         (Faults::NO_NEW_DATA, "no_new_data"),
         (Faults::FROZEN, "frozen"),
         (Faults::IMPOSSIBLE_RATE, "impossible_rate"),
@@ -70,11 +88,6 @@ impl Faults {
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
         Self::CAUSES.into_iter().filter(move |(fault, _)| self.contains(*fault)).map(|(_, name)| name)
     }
-
-    /// True if none but [`REPEATED`](Self::REPEATED) is present.
-    fn leave_data_usable(self) -> bool {
-        Self::REPEATED.contains(self)
-    }
 }
 
 #[cfg(feature = "defmt")]
@@ -86,6 +99,8 @@ impl defmt::Format for Faults {
 
 /// Supply counts of 2.418 mV inside 4.75…5.25 V.
 const SUPPLY_COUNTS: core::ops::RangeInclusive<i16> = 1965..=2171;
+/// Supply counts of 2.418 mV from 3.0 V to 6.0 V.
+const PLAUSIBLE_SUPPLY_COUNTS: core::ops::RangeInclusive<i16> = 1241..=2481;
 
 impl Burst {
     /// The faults that this burst shows without knowledge of others. [`Faults::REPEATED`], [`Faults::FROZEN`] and
@@ -95,9 +110,7 @@ impl Burst {
         let all = words.iter().fold(u16::MAX, |all, word| all & word.0);
         let any = words.iter().fold(0, |any, word| any | word.0);
         let inertial = words[INERTIAL_WORDS].iter().fold(u16::MAX, |all, word| all & word.0);
-        let possible =
-            |channel| (-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&words[channel as usize].counts(channel));
-        let rates_are_possible = possible(Channel::GyroX) && possible(Channel::GyroY) && possible(Channel::GyroZ);
+        let rates_are_possible = GYROS.into_iter().all(|channel| self.rate_is_possible(channel));
 
         let mut faults = Faults::empty();
         faults.set(Faults::NO_NEW_DATA, !OutputWord(inertial).new_data());
@@ -111,9 +124,43 @@ impl Burst {
         if faults.contains(Faults::SUPPLY) && !OutputWord(all).new_data() && !stuck {
             faults.set(Faults::SHIFTED, is_shifted(words));
         }
+        if faults.contains(Faults::SUPPLY) && !stuck && !faults.contains(Faults::SHIFTED) {
+            let counts = words[Channel::Supply as usize].counts(Channel::Supply);
+            faults.set(Faults::IMPLAUSIBLE_SUPPLY, !PLAUSIBLE_SUPPLY_COUNTS.contains(&counts));
+        }
         faults
     }
+
+    fn rate_is_possible(&self, gyro: Channel) -> bool {
+        (-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&self.words[gyro as usize].counts(gyro))
+    }
+
+    /// The channels that `faults`, which this burst shows, refuse: a fault of a word that of the word, any other fault all.
+    ///
+    /// The channels that are not inertial are refused only with all others: no source at hand confirms that they are
+    /// refreshed with every sample. Without a new inertial word a burst has no new sample.
+    fn refused_channels(&self, faults: Faults) -> ChannelMask {
+        if faults.is_empty() {
+            return ChannelMask::EMPTY;
+        }
+        if !Faults::OF_CHANNELS.contains(faults) {
+            return ChannelMask::ALL;
+        }
+        let mut refused = ChannelMask::EMPTY;
+        for channel in Channel::INERTIAL {
+            let is_old = faults.contains(Faults::NO_NEW_DATA) && !self.words[channel as usize].new_data();
+            let is_impossible =
+                faults.contains(Faults::IMPOSSIBLE_RATE) && GYROS.contains(&channel) && !self.rate_is_possible(channel);
+            let may_lack_sign = faults.contains(Faults::X_SIGN) && channel == Channel::GyroX;
+            if is_old || is_impossible || may_lack_sign {
+                refused = refused.with(channel);
+            }
+        }
+        if refused == ChannelMask::INERTIAL { ChannelMask::ALL } else { refused }
+    }
 }
+
+const GYROS: [Channel; 3] = [Channel::GyroX, Channel::GyroY, Channel::GyroZ];
 
 fn supply_in_range(word: OutputWord) -> bool {
     SUPPLY_COUNTS.contains(&word.counts(Channel::Supply))
@@ -139,16 +186,26 @@ fn may_have_lost_its_sign(x: i16) -> bool {
     x >= (1 << 13) - Faults::LARGEST_RATE
 }
 
-/// Whether the data of a burst are usable, and the faults that it shows.
+/// The faults that a burst shows, and the channels that they refuse.
+///
+/// This is the one rule of validity: a driver's [`read`](crate::Adis16405::read), a device that samples and a program that
+/// reads a recording use or leave out the same words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Validity {
     /// The faults found.
     pub faults: Faults,
-    /// True if there is no fault other than [`Faults::REPEATED`]: leaving out equal neighbours would bias the noise
-    /// estimate upwards.
-    pub usable: bool,
+    /// The channels whose words are not to be used: of a fault of single words ([`Faults::OF_CHANNELS`]) those channels, of
+    /// any other fault that is not a [warning](Faults::WARNINGS) all.
+    pub refused: ChannelMask,
+}
+
+impl Validity {
+    /// True if no channel is refused.
+    pub const fn is_usable(self) -> bool {
+        self.refused.is_empty()
+    }
 }
 
 /// Number of bursts that showed each fault. All counts saturate.
@@ -158,7 +215,7 @@ pub struct Validity {
 pub struct FaultCounters {
     /// Bursts validated.
     pub bursts: u32,
-    /// Bursts that were not [usable](Validity::usable).
+    /// Bursts of which at least one channel was refused.
     pub unusable: u32,
     by_cause: [u32; Faults::CAUSES.len()],
 }
@@ -178,9 +235,9 @@ impl FaultCounters {
             .fold(0, |sum: u32, (_, count)| sum.saturating_add(count))
     }
 
-    fn add(&mut self, faults: Faults) {
+    fn add(&mut self, Validity { faults, refused }: Validity) {
         self.bursts = self.bursts.saturating_add(1);
-        self.unusable = self.unusable.saturating_add(u32::from(!faults.leave_data_usable()));
+        self.unusable = self.unusable.saturating_add(u32::from(!refused.is_empty()));
         if !faults.is_empty() {
             for ((fault, _), count) in Faults::CAUSES.into_iter().zip(&mut self.by_cause) {
                 *count = count.saturating_add(u32::from(faults.contains(fault)));
@@ -199,13 +256,26 @@ const INERTIAL: u16 = 0b0000_0111_1110;
 const ALL: u16 = 0b1111_1111_1111;
 
 /// Validates the bursts of one part in the order in which they were read, and counts their faults.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct BurstValidator {
     previous: Option<[OutputWord; 12]>,
     /// Number of consecutive earlier bursts that equal the latest one.
     equal: u16,
     x_sign_at_risk: bool,
+    refused_faults: Faults,
     counters: FaultCounters,
+}
+
+impl Default for BurstValidator {
+    fn default() -> Self {
+        Self {
+            previous: None,
+            equal: 0,
+            x_sign_at_risk: false,
+            refused_faults: Faults::REFUSED,
+            counters: FaultCounters::default(),
+        }
+    }
 }
 
 impl BurstValidator {
@@ -217,6 +287,14 @@ impl BurstValidator {
     #[must_use]
     pub const fn with_x_sign_at_risk(mut self, at_risk: bool) -> Self {
         self.x_sign_at_risk = at_risk;
+        self
+    }
+
+    /// Sets which faults refuse data. The default is [`Faults::REFUSED`]; `Faults::REFUSED | Faults::SUPPLY` for example
+    /// refuses a sample that was taken at 4.7 V too. A fault that is not among them is reported and counted alone.
+    #[must_use]
+    pub const fn with_refused_faults(mut self, faults: Faults) -> Self {
+        self.refused_faults = faults;
         self
     }
 
@@ -241,8 +319,9 @@ impl BurstValidator {
         faults.set(Faults::FROZEN, self.equal >= Self::FROZEN_AFTER);
         let x = burst.words[Channel::GyroX as usize].counts(Channel::GyroX);
         faults.set(Faults::X_SIGN, self.x_sign_at_risk && may_have_lost_its_sign(x));
-        self.counters.add(faults);
-        Validity { faults, usable: faults.leave_data_usable() }
+        let validity = Validity { faults, refused: burst.refused_channels(faults & self.refused_faults) };
+        self.counters.add(validity);
+        validity
     }
 
     /// The number of bursts validated so far, and of their faults.

@@ -129,7 +129,7 @@ proptest! {
         for bytes in [&first, &second] {
             let burst = Burst::from_bytes(bytes);
             let validity = validator.validate(&burst);
-            prop_assert_eq!(validity.usable, (validity.faults - Faults::REPEATED).is_empty());
+            prop_assert_eq!(validity.is_usable(), (validity.faults - Faults::WARNINGS).is_empty());
             for channel in Channel::ALL {
                 let (low, high) = channel.limits();
                 prop_assert!((low..=high).contains(&burst.counts().get(channel)));

@@ -1,6 +1,6 @@
 //! The faults that bursts show, which of them leave the data usable, and how they are counted.
 
-use adis16405_driver::{Burst, BurstValidator, Channel, Counts, Faults, OutputWord};
+use adis16405_driver::{Burst, BurstValidator, Channel, ChannelMask, Counts, Faults, OutputWord};
 
 /// A still, level sensor at 5 V (count 2068).
 const STILL: [i16; 12] = [2068, 3, -2, 1, 4, -5, 300, 120, -40, 500, 20, 1000];
@@ -14,7 +14,7 @@ fn burst(change: impl FnOnce(&mut [i16; 12])) -> Burst {
 #[test]
 fn a_burst_without_faults_is_usable() {
     let validity = BurstValidator::default().validate(&burst(|_| ()));
-    assert!(validity.usable);
+    assert!(validity.is_usable());
     assert_eq!(validity.faults.cause(), None);
 }
 
@@ -25,6 +25,80 @@ fn a_supply_outside_4_75_to_5_25_v_is_a_fault() {
         let faults = burst(|counts| counts[0] = supply).faults();
         assert_eq!(faults.contains(Faults::SUPPLY), !inside, "{supply}");
     }
+}
+
+fn refused(change: impl FnOnce(&mut Burst)) -> ChannelMask {
+    let mut burst = burst(|_| ());
+    change(&mut burst);
+    BurstValidator::default().validate(&burst).refused
+}
+
+#[test]
+fn a_fault_of_one_word_refuses_that_channel() {
+    let only = |channel| ChannelMask::EMPTY.with(channel);
+    assert_eq!(refused(|_| ()), ChannelMask::EMPTY);
+    assert_eq!(refused(|burst| burst.words[2] = OutputWord::from_counts(Channel::GyroY, -7001)), only(Channel::GyroY));
+    for channel in Channel::ALL {
+        // Words other than the inertial ones may be refreshed slowly.
+        let expected = if Channel::INERTIAL.contains(&channel) { only(channel) } else { ChannelMask::EMPTY };
+        assert_eq!(refused(|burst| burst.words[channel as usize].0 &= 0x7FFF), expected, "{channel:?}");
+    }
+    let x = burst(|counts| counts[1] = 1192);
+    let at_risk = BurstValidator::default().with_x_sign_at_risk(true).validate(&x);
+    assert_eq!(at_risk.refused, only(Channel::GyroX));
+    let two = refused(|burst| {
+        burst.words[1].0 &= 0x7FFF;
+        burst.words[3] = OutputWord::from_counts(Channel::GyroZ, 7001);
+    });
+    assert_eq!(two, only(Channel::GyroX).with(Channel::GyroZ));
+    let every_inertial = Channel::INERTIAL.into_iter().fold(ChannelMask::EMPTY, ChannelMask::with);
+    assert_eq!(ChannelMask::INERTIAL, every_inertial);
+    assert_eq!(ChannelMask::ALL, Channel::ALL.into_iter().fold(ChannelMask::EMPTY, ChannelMask::with));
+}
+
+#[test]
+fn a_fault_of_the_burst_refuses_every_channel() {
+    assert_eq!(refused(|burst| burst.words = [OutputWord(0); 12]), ChannelMask::ALL);
+    assert_eq!(refused(|burst| burst.words = [OutputWord(0xFFFF); 12]), ChannelMask::ALL);
+    let old = |burst: &mut Burst| burst.words.iter_mut().for_each(|word| word.0 &= 0x7FFF);
+    assert_eq!(refused(old), ChannelMask::ALL, "an old sample");
+    let old_inertial = |burst: &mut Burst| burst.words[1..7].iter_mut().for_each(|word| word.0 &= 0x7FFF);
+    assert_eq!(refused(old_inertial), ChannelMask::ALL, "no new sample");
+    assert_eq!(refused(|burst| *burst = out_of_step(burst, 3)), ChannelMask::ALL);
+    let all_flags = |burst: &mut Burst| burst.words.iter_mut().for_each(|word| word.0 |= 0x4000);
+    assert_eq!(refused(all_flags), ChannelMask::EMPTY, "an error flag is a warning");
+}
+
+/// 4.70 V, as from a USB port, and 5.40 V are warnings. A part measures no 1 V and no 8 V; 6.0 V is its absolute maximum
+/// rating (data sheet Rev. B, page 7).
+#[test]
+fn a_supply_outside_its_window_is_a_warning_and_an_implausible_one_no_word_of_a_part() {
+    for (volts, refuses) in [(4.70, false), (5.40, false), (4.3, false), (1.0, true), (8.0, true), (0.0, true)] {
+        let burst = burst(|counts| counts[0] = (volts / 2.418e-3_f64) as i16);
+        let validity = BurstValidator::default().validate(&burst);
+        assert_eq!(validity.refused, if refuses { ChannelMask::ALL } else { ChannelMask::EMPTY }, "{volts} V");
+        assert_eq!(validity.faults.cause(), Some(if refuses { "implausible_supply" } else { "supply" }), "{volts} V");
+    }
+    assert!(!Burst::from_bytes(&[0; 26]).faults().contains(Faults::IMPLAUSIBLE_SUPPLY), "the line is stuck");
+}
+
+#[test]
+fn the_faults_that_refuse_can_be_chosen() {
+    let low = burst(|counts| counts[0] = 1900);
+    let strict = Faults::REFUSED | Faults::SUPPLY;
+    assert_eq!(BurstValidator::default().with_refused_faults(strict).validate(&low).refused, ChannelMask::ALL);
+    let mut old = burst(|_| ());
+    old.words.iter_mut().for_each(|word| word.0 &= 0x7FFF);
+    let mut lenient = BurstValidator::default().with_refused_faults(Faults::REFUSED - Faults::NO_NEW_DATA);
+    assert_eq!(lenient.validate(&old).refused, ChannelMask::EMPTY);
+    assert_eq!(lenient.counters().get(Faults::NO_NEW_DATA), 1, "it is counted in either case");
+}
+
+/// The name of a burst that is refused is that of a fault that refuses it.
+#[test]
+fn warnings_are_the_last_causes() {
+    let refusing = Faults::CAUSES.iter().take_while(|(fault, _)| Faults::REFUSED.contains(*fault)).count();
+    assert!(Faults::CAUSES[refusing..].iter().all(|(fault, _)| Faults::WARNINGS.contains(*fault)));
 }
 
 #[test]
@@ -50,11 +124,11 @@ fn bursts_of_zeros_or_ones_have_the_cause_of_a_stuck_line() {
 #[test]
 fn six_equal_inertial_words_are_a_repetition_and_usable() {
     let mut validator = BurstValidator::default();
-    assert!(validator.validate(&burst(|_| ())).usable);
+    assert!(validator.validate(&burst(|_| ())).is_usable());
     let repeated = validator.validate(&burst(|counts| counts[10] = 21));
     assert_eq!(repeated.faults, Faults::REPEATED);
-    assert!(repeated.usable, "a new sample may equal the last by chance");
-    assert!(validator.validate(&burst(|counts| counts[6] += 1)).usable);
+    assert!(repeated.is_usable(), "a new sample may equal the last by chance");
+    assert!(validator.validate(&burst(|counts| counts[6] += 1)).is_usable());
 
     let mut stale = burst(|counts| counts[6] += 1);
     stale.words[1] = OutputWord(stale.words[1].0 & 0x7FFF);
@@ -140,7 +214,7 @@ fn a_lost_sign_is_reported_only_where_it_is_at_risk() {
         assert_eq!(BurstValidator::default().validate(&burst).faults, Faults::empty());
         let validity = BurstValidator::default().with_x_sign_at_risk(true).validate(&burst);
         assert_eq!(validity.faults, if suspect { Faults::X_SIGN } else { Faults::empty() }, "{x}");
-        assert_eq!(validity.usable, !suspect);
+        assert_eq!(validity.is_usable(), !suspect);
     }
 }
 
@@ -148,11 +222,14 @@ fn a_lost_sign_is_reported_only_where_it_is_at_risk() {
 fn twelve_words_equal_for_512_bursts_are_frozen() {
     let mut validator = BurstValidator::default();
     let same = burst(|_| ());
-    let usable = (0..1000).take_while(|_| validator.validate(&same).usable).count();
+    let usable = (0..1000).take_while(|_| validator.validate(&same).is_usable()).count();
     assert_eq!(usable, 512, "the first and 511 that repeat it");
     assert_eq!(validator.validate(&same).faults, Faults::REPEATED | Faults::FROZEN);
     assert_eq!(validator.validate(&same).faults.cause(), Some("frozen"));
-    assert!(validator.validate(&burst(|counts| counts[11] += 1)).usable, "a change of any of the twelve words ends it");
+    assert!(
+        validator.validate(&burst(|counts| counts[11] += 1)).is_usable(),
+        "a change of any of the twelve words ends it"
+    );
     assert_eq!(validator.counters().get(Faults::FROZEN), 3);
 }
 

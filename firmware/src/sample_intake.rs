@@ -1,11 +1,11 @@
 //! The path of every sample: data-ready monitor, burst validation, statistics; and the counters of samples not used.
 
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
-use crate::channel_validity::{is_marked, refused_channels, supply_is_plausible};
+use crate::channel_validity::{is_marked, refused_channels};
 use crate::channels::ChannelSet;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
-use adis16405_driver::{Burst, BurstValidator, Config, Faults};
+use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults};
 use heapless::spsc;
 use link::{Health, MessageRef};
 
@@ -237,6 +237,7 @@ impl<'m> Estimators<'m> {
             impossible_rate: counters.get(Faults::IMPOSSIBLE_RATE),
             x_sign: counters.get(Faults::X_SIGN),
             repeated: counters.get(Faults::REPEATED),
+            implausible_supply: counters.get(Faults::IMPLAUSIBLE_SUPPLY),
             ..self.health
         }
     }
@@ -253,19 +254,18 @@ impl<'m> Estimators<'m> {
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
             return;
         }
-        let mut faults = self.validator.validate(burst).faults;
+        let mut validity = self.validator.validate(burst);
+        let faults = &mut validity.faults;
         self.repeated = if faults.contains(Faults::REPEATED) { self.repeated.saturating_add(1) } else { 0 };
         if self.repeated >= self.frozen_after() && !faults.contains(Faults::FROZEN) {
-            faults |= Faults::FROZEN;
+            *faults |= Faults::FROZEN;
+            validity.refused = ChannelMask::ALL;
             add(&mut self.health.frozen, 1);
         }
-        let refused = refused_channels(burst, faults);
+        let (faults, refused) = (validity.faults, refused_channels(validity));
         let counts = burst.counts();
         self.statistics.push(CHANNELS.map(|channel| i32::from(counts.get(channel))), refused);
         if refused.has_all_inertial() {
-            let damaged = Faults::STUCK_LOW | Faults::STUCK_HIGH | Faults::SHIFTED | Faults::NO_NEW_DATA;
-            let implausible = !supply_is_plausible(burst) && !faults.intersects(damaged);
-            add(&mut self.health.implausible_supply, u32::from(implausible));
             return self.mark_unusable(faults.cause().unwrap_or_default());
         }
         self.unusable = self.unusable.saturating_sub(1);

@@ -92,7 +92,11 @@ fn recorded_bursts_are_decoded_and_their_repetitions_are_usable() {
         assert!(burst.counts().as_array().iter().map(|count| i32::from(*count)).eq(counts));
 
         let validity = validator.validate(&burst);
-        assert!(validity.usable && (validity.faults - Faults::REPEATED).is_empty(), "{line}: {:?}", validity.faults);
+        assert!(
+            validity.is_usable() && (validity.faults - Faults::REPEATED).is_empty(),
+            "{line}: {:?}",
+            validity.faults
+        );
         if validity.faults.contains(Faults::REPEATED) {
             other_words += u32::from(burst != previous);
         }

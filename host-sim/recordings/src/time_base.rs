@@ -28,16 +28,6 @@ pub use crate::time_base::stamp_alignment::RateEstimate;
 pub use crate::time_base::stamp_quality::StampQuality;
 pub use crate::time_base::time_base_error::TimeBaseError;
 
-/// Faults of one channel's word: the sample is left out in this channel alone.
-pub(crate) const REFUSED_IN_A_CHANNEL: Faults = Faults::IMPOSSIBLE_RATE.union(Faults::X_SIGN);
-
-/// Faults for which a sample is left out in every channel. The others are warnings; their samples are used.
-pub(crate) const REFUSED: Faults = Faults::all()
-    .difference(REFUSED_IN_A_CHANNEL)
-    .difference(Faults::REPEATED)
-    .difference(Faults::ERROR_ALARM)
-    .difference(Faults::SUPPLY);
-
 /// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
 const SEARCHED_WIDTHS: f64 = 4.0;
 
@@ -165,18 +155,8 @@ fn refused_positions(
     samples: impl Iterator<Item = RecordedSample>,
 ) -> BTreeMap<&'static str, Vec<usize>> {
     let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
-    if ![Channel::GyroX, Channel::GyroY, Channel::GyroZ].contains(&channel) {
-        return refused;
-    }
-    for (position, sample) in samples.enumerate().filter(|(_, sample)| sample.faults.intersects(REFUSED_IN_A_CHANNEL)) {
-        let own = if sample.counts.get(channel).unsigned_abs() > Faults::LARGEST_RATE.unsigned_abs() {
-            Faults::IMPOSSIBLE_RATE
-        } else if channel == Channel::GyroX {
-            sample.faults & Faults::X_SIGN
-        } else {
-            Faults::empty()
-        };
-        if let Some(cause) = own.cause() {
+    for (position, sample) in samples.enumerate().filter(|(_, sample)| !sample.refused.is_empty()) {
+        if let Some(cause) = sample.cause_of_refusal(channel) {
             refused.entry(cause).or_default().push(position);
         }
     }
@@ -213,18 +193,15 @@ impl Usable {
             read_twice: Vec::new(),
         };
         for (position, sample) in samples.iter().enumerate() {
-            let refused = if read_twice(position) { REFUSED | Faults::REPEATED } else { REFUSED };
-            let faults = sample.faults & refused;
-            match faults.cause() {
-                Some(cause) => {
-                    *usable.dropped.entry(cause).or_insert(0) += 1;
-                    if faults.contains(Faults::REPEATED) {
-                        usable.read_twice.push(position);
-                    }
-                }
+            let read_twice = read_twice(position) && sample.faults.contains(Faults::REPEATED);
+            if read_twice {
+                usable.read_twice.push(position);
+            }
+            match sample.cause_of_loss(read_twice) {
+                Some(cause) => *usable.dropped.entry(cause).or_insert(0) += 1,
                 None => {
                     usable.positions.push(position);
-                    for cause in sample.faults.difference(REFUSED_IN_A_CHANNEL).causes() {
+                    for cause in (sample.faults & Faults::WARNINGS).causes() {
                         *usable.flagged.entry(cause).or_insert(0) += 1;
                     }
                 }
@@ -258,13 +235,12 @@ impl Usable {
         }
         self.read_twice.retain(|position| taken.binary_search(position).is_err());
         for &position in &taken {
-            let faults = samples[position].faults;
             // It stays left out for another fault.
-            if (faults & REFUSED).cause().is_none() {
+            if samples[position].cause_of_loss(false).is_none() {
                 if let Some(count) = Faults::REPEATED.cause().and_then(|cause| self.dropped.get_mut(cause)) {
                     *count -= 1;
                 }
-                for cause in faults.difference(REFUSED_IN_A_CHANNEL).causes() {
+                for cause in (samples[position].faults & Faults::WARNINGS).causes() {
                     *self.flagged.entry(cause).or_insert(0) += 1;
                 }
                 self.positions.push(position);

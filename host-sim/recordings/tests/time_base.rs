@@ -183,7 +183,7 @@ fn invalid_bursts_are_dropped_by_cause_and_those_with_warnings_are_used() {
         match at {
             3 => bytes = [0; 26],
             4 => bytes = [0xFF; 26],
-            5 => bytes[4] &= 0x7F,
+            5 => bytes[2..].iter_mut().step_by(2).for_each(|upper| *upper &= 0x7F),
             _ => {}
         }
         recorder.push(TimeStamp::from_time(f64::from(at) * PERIOD), &Burst::from_bytes(&bytes));
@@ -192,6 +192,32 @@ fn invalid_bursts_are_dropped_by_cause_and_those_with_warnings_are_used() {
     assert_eq!(measured.dropped, [("gap", 0), ("no_new_data", 1), ("stuck_high", 1), ("stuck_low", 1)].into());
     assert_eq!(measured.flagged, [("error_alarm", 1)].into());
     assert_eq!(gaps(&measured), [(2, 3)]);
+}
+
+/// As on the device: one old word refuses its channel, a burst of old words every channel.
+#[test]
+fn old_data_in_one_word_is_missing_in_that_channel_alone() {
+    let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
+    for at in 0..100_i16 {
+        let mut counts = [at; 12];
+        counts[Channel::Supply as usize] = 2068;
+        let mut burst = Burst::from_counts(&Counts::new(counts));
+        match at {
+            20 | 60 => burst.words[Channel::AcclZ as usize].0 &= 0x7FFF,
+            40 => burst.words.iter_mut().for_each(|word| word.0 &= 0x7FFF),
+            _ => {}
+        }
+        recorder.push(TimeStamp::from_time(f64::from(at) * PERIOD), &burst);
+    }
+    let measured = measurement(&recorder.finish(), None).expect("a time base");
+    assert_eq!(measured.dropped, [("gap", 0), ("no_new_data", 1)].into());
+    assert_eq!(gaps(&measured), [(39, 1)]);
+    for channel in &measured.channels {
+        // Position 59: the sample of row 40 is dropped.
+        let expected = if channel.profile.name == "accl_z" { vec![20, 59] } else { Vec::new() };
+        let refused = channel.refused.get("no_new_data").cloned().unwrap_or_default();
+        assert_eq!(refused, expected, "{}", channel.profile.name);
+    }
 }
 
 #[test]

@@ -86,7 +86,7 @@ const BUGS: [Bug; 24] = [
         "samples_are_usable_although_the_slow_words_refresh_slowly"),
     bug("the error/alarm flag is ignored", "validity.rs",
         "OutputWord(any).error_alarm()", "false",
-        "each_latched_flag_refuses_samples_until_its_diagnosis_is_read"),
+        "each_latched_flag_is_a_warning_until_its_diagnosis_is_read"),
     bug("gyro x has the flag of gyro y", "error.rs",
         "const GYRO_X = 1 << 10;", "const GYRO_X = 1 << 11;",
         "self_tests_name_the_failed_sensor_and_keep_the_configuration"),

@@ -15,7 +15,8 @@ use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal_async::delay::DelayNs;
 
 use virtual_sensor::{
-    Activity, BusyAnswers, DiagnosisFlag, EmulatedBus, NoiseModel, ViolationKind, VirtualAdis16405, VirtualDelay,
+    Activity, BusyAnswers, DiagnosisFlag, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405,
+    VirtualDelay,
 };
 
 fn driver(bus: &EmulatedBus) -> Adis16405<EmulatedBus, VirtualDelay> {
@@ -143,22 +144,39 @@ fn a_cold_part_is_left_alone_until_it_has_started_up() {
 }
 
 #[test]
-fn each_latched_flag_refuses_samples_until_its_diagnosis_is_read() {
+fn each_latched_flag_is_a_warning_until_its_diagnosis_is_read() {
     for flag in DiagnosisFlag::ALL {
         let bus = strict(1_000);
         let mut imu = driver(&bus);
         imu.start_up().unwrap();
         bus.part_mut().latch_flag(flag);
-        for _ in 0..3 {
+        // Without noise all samples are equal.
+        let mut warnings = || {
             bus.wait_for_data();
-            let error = imu.read().unwrap_err();
-            // Without noise all samples are equal.
-            let expected = |faults: Faults| faults - Faults::REPEATED == Faults::ERROR_ALARM;
-            assert!(matches!(error, Error::Unusable(faults) if expected(faults)), "{flag:?}: {error:?}");
-        }
+            imu.read().unwrap().warnings() - Faults::REPEATED
+        };
+        assert_eq!([warnings(), warnings(), warnings()], [Faults::ERROR_ALARM; 3], "{flag:?}");
         assert_eq!(imu.diagnosis(), Ok(Diagnosis::from_bits_retain(flag.bit())));
         bus.wait_for_data();
-        assert!(imu.read().is_ok(), "{flag:?}");
+        assert_eq!(imu.read().unwrap().warnings() - Faults::REPEATED, Faults::empty(), "{flag:?}");
+    }
+}
+
+/// A part at 4.70 V, as from a USB port, goes on measuring.
+#[test]
+fn a_supply_outside_its_window_refuses_a_sample_only_if_that_is_asked_for() {
+    for (volts, refused) in [(4.7, Faults::REFUSED), (5.3, Faults::REFUSED), (4.7, Faults::REFUSED | Faults::SUPPLY)] {
+        let mut model = NoiseModel::noiseless();
+        model.channel_mut(OutputRegister::Supply).bias = volts;
+        let bus = EmulatedBus::new(VirtualAdis16405::new(model, 1));
+        let mut imu = driver(&bus).with_refused_faults(refused);
+        imu.start_up().unwrap();
+        bus.wait_for_data();
+        let faults = Faults::SUPPLY | Faults::ERROR_ALARM;
+        match imu.read() {
+            Ok(sample) if refused == Faults::REFUSED => assert_eq!(sample.warnings(), faults),
+            result => assert_eq!(result, Err(Error::Unusable(faults))),
+        }
     }
 }
 

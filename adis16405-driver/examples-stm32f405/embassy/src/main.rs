@@ -11,7 +11,7 @@
 #![no_std]
 #![no_main]
 
-use adis16405_driver::{Adis16405, Async, Config, Error, Faults};
+use adis16405_driver::{Adis16405, Async, Config, Faults};
 use defmt_rtt as _;
 use embassy_embedded_hal::shared_bus::asynch::spi::SpiDevice;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -90,9 +90,11 @@ async fn sample(spi: Device, mut data_ready: ExtiInput<'static, ByDma>, mut rese
         })
         .await
         {
-            Ok(Ok(sample)) => defmt::trace!("{} °/s", sample.gyro_dps()),
-            Ok(Err(Error::Unusable(faults))) if faults.contains(Faults::ERROR_ALARM) => {
-                defmt::warn!("{}", defmt::Debug2Format(&imu.diagnosis().await)); // and cleared
+            Ok(Ok(sample)) => {
+                defmt::trace!("{} °/s", sample.gyro_dps());
+                if sample.warnings().contains(Faults::ERROR_ALARM) {
+                    defmt::warn!("{}", defmt::Debug2Format(&imu.diagnosis().await)); // and cleared
+                }
             }
             Ok(Err(error)) => defmt::warn!("{}", defmt::Debug2Format(&error)),
             Err(_) => {

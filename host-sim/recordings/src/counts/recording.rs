@@ -3,7 +3,7 @@
 //! [`Recorder`] takes the rows of a table and the bursts from the bus alike and checks both with the driver's
 //! [`BurstValidator`], so that the same words give the same recording either way.
 
-use adis16405_driver::{Burst, BurstValidator, Channel, Counts, Faults, GyroRange};
+use adis16405_driver::{Burst, BurstValidator, Channel, ChannelMask, Counts, Faults, GyroRange};
 
 /// Counts that stand for the channels that a table lacks: 0, and a supply of 5 V (2068 counts of 2.418 mV).
 pub const NOT_RECORDED: [i16; 12] = {
@@ -40,6 +40,30 @@ pub struct RecordedSample {
     pub counts: Counts,
     /// Faults that the burst and the bursts before it show.
     pub faults: Faults,
+    /// Channels whose words are not to be used for these faults.
+    pub refused: ChannelMask,
+}
+
+impl RecordedSample {
+    /// Why no channel of the sample is used: its faults, or that it was `read_twice`. `None` if there is a channel to use.
+    pub(crate) fn cause_of_loss(&self, read_twice: bool) -> Option<&'static str> {
+        if self.refused == ChannelMask::ALL {
+            (self.faults - Faults::WARNINGS).cause()
+        } else {
+            (self.faults & Faults::REPEATED).cause().filter(|_| read_twice)
+        }
+    }
+
+    /// Why the word of `channel` is not used; `None` if it is.
+    pub(crate) fn cause_of_refusal(&self, channel: Channel) -> Option<&'static str> {
+        let is_impossible = self.counts.get(channel).unsigned_abs() > Faults::LARGEST_RATE.unsigned_abs();
+        let fault = match channel {
+            Channel::GyroX | Channel::GyroY | Channel::GyroZ if is_impossible => Faults::IMPOSSIBLE_RATE,
+            Channel::GyroX if self.faults.contains(Faults::X_SIGN) => Faults::X_SIGN,
+            _ => Faults::NO_NEW_DATA,
+        };
+        fault.cause().filter(|_| self.refused.contains(channel))
+    }
 }
 
 /// Samples in the order in which they were read.
@@ -75,7 +99,7 @@ impl Recorder {
         };
         Self {
             recording: Recording { channels, range, samples: Vec::new() },
-            validator: BurstValidator::default(),
+            validator: BurstValidator::default().with_refused_faults(detectable & Faults::REFUSED),
             detectable,
         }
     }
@@ -90,8 +114,10 @@ impl Recorder {
 
     /// Adds a burst.
     pub fn push(&mut self, time_stamp: TimeStamp, burst: &Burst) {
-        let faults = self.validator.validate(burst).faults & self.detectable;
-        self.recording.samples.push(RecordedSample { time_stamp, counts: burst.counts(), faults });
+        let validity = self.validator.validate(burst);
+        let faults = validity.faults & self.detectable;
+        let sample = RecordedSample { time_stamp, counts: burst.counts(), faults, refused: validity.refused };
+        self.recording.samples.push(sample);
     }
 
     /// Sets the gyroscopes' range of the whole recording, bursts that were added before included.

@@ -5,10 +5,10 @@ use crate::counts::recording::{RecordedSample, Recorder, Recording};
 use crate::input::delimited_text::Lines;
 use crate::input::input_error::InputError;
 use crate::input::read_monitor::ReadMonitor;
+use crate::time_base::channels;
 use crate::time_base::sample_slots::MAX_REPEATED_READ_INTERVAL;
 use crate::time_base::stream_clock::{BLOCK, Placed, Stamp, StreamClock};
 use crate::time_base::time_base_error::StreamError;
-use crate::time_base::{REFUSED, REFUSED_IN_A_CHANNEL, channels};
 use adis16405_driver::{Burst, Faults, GyroRange};
 use measurement::{SampleBlock, SensorProfile};
 use std::collections::BTreeMap;
@@ -128,8 +128,7 @@ impl CountStream {
                 matches!((self.before_s, time_s), (Some(before), Some(now)) if now - before < self.shortest_s);
             self.before_s = time_s;
             if is_short && sample.faults.contains(Faults::REPEATED) {
-                let cause = (sample.faults & (REFUSED | Faults::REPEATED)).cause();
-                *self.dropped.entry(cause.unwrap_or_default()).or_insert(0) += 1;
+                *self.dropped.entry(sample.cause_of_loss(true).unwrap_or_default()).or_insert(0) += 1;
                 self.left_out += 1;
                 continue;
             }
@@ -145,12 +144,12 @@ impl CountStream {
 
     /// Counts a sample, and tells whether it can be used.
     fn is_usable(&mut self, placed: Placed, sample: &RecordedSample) -> bool {
-        if let Some(cause) = (sample.faults & REFUSED).cause() {
+        if let Some(cause) = sample.cause_of_loss(false) {
             *self.dropped.entry(cause).or_insert(0) += 1;
             self.left_out += 1;
             return false;
         }
-        for cause in sample.faults.difference(REFUSED_IN_A_CHANNEL).causes() {
+        for cause in (sample.faults & Faults::WARNINGS).causes() {
             *self.flagged.entry(cause).or_insert(0) += 1;
         }
         let lost = match self.first {

@@ -6,7 +6,7 @@
 use crate::counts::recording::{RecordedSample, Recording, TimeStamp};
 use crate::time_base::stream_clock::BLOCK;
 use crate::time_base::{UsableSamples, channels};
-use adis16405_driver::{Channel, Counts, Faults};
+use adis16405_driver::{Channel, ChannelMask, Counts, Faults};
 use measurement::{SampleBlock, SensorProfile};
 use std::collections::VecDeque;
 
@@ -24,14 +24,15 @@ pub(crate) struct RecordedBlocks {
 struct Outputs {
     counts: Counts,
     faults: Faults,
+    refused: ChannelMask,
 }
 
 impl RecordedBlocks {
     /// The samples of `recording` that can be used.
     pub(crate) fn new(recording: Recording, usable: UsableSamples) -> Self {
         let outputs = |&position: &usize| {
-            let RecordedSample { counts, faults, .. } = recording.samples[position];
-            Outputs { counts, faults }
+            let RecordedSample { counts, faults, refused, .. } = recording.samples[position];
+            Outputs { counts, faults, refused }
         };
         let blocks = usable.positions.chunks(BLOCK).map(|positions| positions.iter().map(outputs).collect());
         Self {
@@ -51,8 +52,12 @@ impl Iterator for RecordedBlocks {
         let block = self.blocks.pop_front()?;
         let slots = self.slots[self.taken..self.taken + block.len()].to_vec();
         self.taken += block.len();
-        let sample =
-            |&Outputs { counts, faults }: &Outputs| RecordedSample { time_stamp: TimeStamp::default(), counts, faults };
+        let sample = |&Outputs { counts, faults, refused }: &Outputs| RecordedSample {
+            time_stamp: TimeStamp::default(),
+            counts,
+            faults,
+            refused,
+        };
         Some(SampleBlock { slots, channels: channels(&self.channels, &self.profile, block.iter().map(sample)) })
     }
 }

@@ -65,13 +65,15 @@ fn main() -> ! {
                 Ok(sample) => {
                     latest = DWT::cycle_count();
                     defmt::println!("{} °/s, {} g", sample.gyro_dps(), sample.accl_g());
+                    if sample.warnings().contains(Faults::ERROR_ALARM) {
+                        match imu.diagnosis() {
+                            Ok(diagnosis) => defmt::warn!("{}", diagnosis), // and cleared
+                            Err(error) => defmt::error!("{}", defmt::Debug2Format(&error)),
+                        }
+                    }
                 }
                 // Already read during this pulse of data ready.
                 Err(Error::Unusable(faults)) if faults.contains(Faults::NO_NEW_DATA) => {}
-                Err(Error::Unusable(faults)) if faults.contains(Faults::ERROR_ALARM) => match imu.diagnosis() {
-                    Ok(diagnosis) => defmt::warn!("{}", diagnosis), // and cleared
-                    Err(error) => defmt::error!("{}", defmt::Debug2Format(&error)),
-                },
                 Err(error) => defmt::error!("{}", defmt::Debug2Format(&error)),
             }
         }

@@ -9,7 +9,7 @@ use panic_probe as _;
 
 #[rtic::app(device = stm32f4xx_hal::pac, dispatchers = [CAN1_TX])]
 mod app {
-    use adis16405_driver::{Adis16405, Config, Error, Faults};
+    use adis16405_driver::{Adis16405, Config, Faults};
     use embedded_hal::spi::MODE_3;
     use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
     use stm32f4xx_hal::gpio::{Edge, Input, Output, PA4, PB0, PinState};
@@ -69,10 +69,10 @@ mod app {
                     // An error says that the task is still running: the mean then is over more samples.
                     let _ = report::spawn();
                 }
-            }
-            Err(Error::Unusable(faults)) if faults.contains(Faults::ERROR_ALARM) => {
-                // Reading the reason clears the flag, which would refuse all later samples.
-                defmt::warn!("{}", defmt::Debug2Format(&context.local.imu.diagnosis()));
+                if sample.warnings().contains(Faults::ERROR_ALARM) {
+                    // Reading the reason clears the flag.
+                    defmt::warn!("{}", defmt::Debug2Format(&context.local.imu.diagnosis()));
+                }
             }
             Err(error) => defmt::warn!("{}", defmt::Debug2Format(&error)),
         }
