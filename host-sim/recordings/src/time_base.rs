@@ -3,6 +3,7 @@
 //! A sample that was read late is not a lost sample, and stamps that are coarser than the sample period are no losses:
 //! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
 
+mod clock_rate;
 mod indexed_clock;
 mod lateness_track;
 mod lower_envelope;
@@ -308,7 +309,8 @@ fn sample_periods(
     }
     drop(times);
     let arrived = usable.arrived(samples.len());
-    let StampAlignment { periods, late, mut losses, rate, tick_s, width, resolved } = alignment;
+    let StampAlignment { periods, late, mut losses, rate, tick_s, width, resolved, least_loss, is_rate_changing } =
+        alignment;
     losses.iter_mut().for_each(|loss| loss.before = arrived[loss.before]);
     let usable_range = usable.positions.first().zip(usable.positions.last());
     let between =
@@ -323,6 +325,16 @@ fn sample_periods(
         .filter(|(position, _)| usable_positions.next_if(|usable| usable == position).is_some())
         .map(|(_, period)| period)
         .collect();
-    let stamps = StampQuality { rate, tick_s, width, losses, resolved, late, clock_steps: Vec::new() };
+    let stamps = StampQuality {
+        rate,
+        tick_s,
+        width,
+        losses,
+        resolved,
+        least_loss,
+        is_rate_changing,
+        late,
+        clock_steps: Vec::new(),
+    };
     Ok(SamplePeriods { periods, never_arrived, stamps: Some(stamps) })
 }

@@ -22,9 +22,14 @@ pub(crate) const CERTAIN: f64 = 0.3;
 const MAX_REFINEMENTS: usize = 12;
 /// Relative change of the period with which it is good enough to align by: a tenth of a period in a queue of 256 would be 4e-4.
 const CONVERGED: f64 = 2e-5;
-/// Cost of a loss beside that of the scatter, natural units of information. More than a position and a length take, because
-/// losses are rare.
-const LOSS_COST: f64 = 9.0;
+/// Fewest losses whose lengths and distances are compared with those of independent ones.
+const MIN_COMPARED: usize = 8;
+/// Largest variance that losses add to the duration of many samples, in that which this duration has and which 32 windows or more tell to
+/// a quarter.
+const INDEPENDENT: f64 = 2.0;
+/// Parts of the record, and most samples, of a window whose duration tells what the samples in it have in common.
+const WINDOWS: usize = 32;
+const LONGEST_WINDOW: usize = 512;
 /// Samples over which the scatter of the lateness is measured: a clock that drifts by 100 ppm moves by a fifth of a period.
 const COST_BLOCK: usize = 2048;
 /// Median scatter of the lateness, in periods, below which more order is no evidence.
@@ -59,14 +64,20 @@ pub(crate) struct Track {
 
 impl Track {
     /// Aligns with a period, and again with the period that the alignment shows, until the period stays. Of these alignments
-    /// the one with the shortest description; with its cost.
-    pub(crate) fn refined(times: &[f64], period_s: f64, tick_s: Option<f64>, queue: usize) -> (f64, Self) {
-        let track = Self::new(times, period_s, tick_s, queue);
+    /// the one with the shortest description; with its cost. The envelope is sought over `queue` samples, and losses of fewer than `least`
+    /// samples are none.
+    pub(crate) fn refined(
+        times: &[f64],
+        period_s: f64,
+        tick_s: Option<f64>,
+        (queue, least): (usize, u64),
+    ) -> (f64, Self) {
+        let track = Self::new(times, period_s, tick_s, (queue, least));
         let (mut period_s, mut slope_s) = (period_s, track.slope_s(times));
         let mut best = (track.cost(times, tick_s), track);
         for _ in 0..MAX_REFINEMENTS {
             let Some(next_s) = slope_s.filter(|slope_s| (slope_s / period_s - 1.0).abs() >= CONVERGED) else { break };
-            let track = Self::new(times, next_s, tick_s, queue);
+            let track = Self::new(times, next_s, tick_s, (queue, least));
             (period_s, slope_s) = (next_s, track.slope_s(times));
             let cost = track.cost(times, tick_s);
             if cost < best.0 {
@@ -76,9 +87,24 @@ impl Track {
         best
     }
 
-    /// Aligns `times` to periods of `period_s`.
-    pub(crate) fn new(times: &[f64], period_s: f64, tick_s: Option<f64>, queue: usize) -> Self {
-        let lateness = lateness(times, period_s);
+    /// Aligns `times` to periods of `period_s`, as [`refined`](Self::refined) does.
+    pub(crate) fn new(times: &[f64], period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
+        Self::of_lateness(lateness(times, period_s), period_s, tick_s, (queue, least))
+    }
+
+    /// What would be losses if the samples of this alignment came in the opposite order. A loss lifts the lateness for good and nothing lowers
+    /// it for good, so that these are late deliveries; as many rises of the envelope are late deliveries too.
+    pub(crate) fn falls(&self, times: &[f64], queue: usize) -> Vec<LostStretch> {
+        let mut opposite = lateness(times, self.period_s);
+        for ((at, late), period) in opposite.iter_mut().enumerate().zip(&self.periods) {
+            *late -= (period - at as u64) as f64;
+        }
+        opposite.reverse();
+        Self::of_lateness(opposite, self.period_s, None, (queue, 1)).losses
+    }
+
+    fn of_lateness(lateness: Vec<f64>, period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
+        let samples = lateness.len();
         let near = minimum_ahead(&lateness, SEARCH_QUEUE);
         let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
         // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
@@ -87,10 +113,11 @@ impl Track {
         let width = tick_s.map_or(quartile, |tick| quartile.max((tick / period_s).min(quartile * 2.0)));
         let is_coarse = width >= COARSE;
         let (memory, threshold) = if is_coarse {
-            (((TICKS_IN_MEMORY * width) as usize).clamp(MEMORY, times.len().max(MEMORY)), COARSE_LOSS)
+            (((TICKS_IN_MEMORY * width) as usize).clamp(MEMORY, samples.max(MEMORY)), COARSE_LOSS)
         } else {
             (MEMORY, LOSS)
         };
+        let threshold = threshold + least.saturating_sub(1) as f64;
         let envelope = if queue.max(memory) == SEARCH_QUEUE {
             near
         } else {
@@ -99,16 +126,16 @@ impl Track {
         };
         // In the last ticks no later sample tells how far the envelope is: no loss is found there.
         let undecided = if is_coarse { (2.0 * width).ceil() as usize + 1 } else { 0 };
-        let last = times.len().saturating_sub(undecided + 1);
-        let periods = Vec::with_capacity(times.len());
+        let last = samples.saturating_sub(undecided + 1);
+        let periods = Vec::with_capacity(samples);
         let mut track = Self { period_s, periods, above: lateness, losses: Vec::new(), width };
         let mut level = MinimumBehind::new(memory);
         let mut missing = 0u64;
-        for at in 0..times.len() {
-            let least = envelope[at.min(last)];
-            let excess = level.minimum().map_or(0.0, |level| least - missing as f64 - level);
+        for at in 0..samples {
+            let lowest = envelope[at.min(last)];
+            let excess = level.minimum().map_or(0.0, |level| lowest - missing as f64 - level);
             // Towards the end the envelope is that of fewer ticks, and may rise by a period without a loss.
-            let threshold = if is_coarse && at + memory > times.len() { threshold + 1.0 } else { threshold };
+            let threshold = if is_coarse && at + memory > samples { threshold + 1.0 } else { threshold };
             if excess >= threshold {
                 // A float beyond the range of u64 saturates.
                 let lost = (excess.round() as u64).max(1);
@@ -122,12 +149,25 @@ impl Track {
                     None => track.losses.push(LostStretch { before: at, missing: lost, certain }),
                 }
             }
-            level.push(least - missing as f64);
+            level.push(lowest - missing as f64);
             track.periods.push(missing.saturating_add(at as u64));
             track.above[at] -= missing as f64;
             track.above[at] -= level.minimum().unwrap_or(0.0);
         }
         track
+    }
+
+    /// Whether the losses are as independent of each other as the durations of many samples let them be, which gain `persistent` s² of
+    /// variance a sample. Samples that wait and then come together, and stamps that beat, look like losses at distances that make up for
+    /// each other.
+    pub(crate) fn are_losses_independent(&self, persistent: f64) -> bool {
+        let samples = self.periods.len() as f64;
+        let (sum, squares) = self.losses.iter().fold((0.0, 0.0), |(sum, squares): (f64, f64), loss| {
+            let missing = loss.missing as f64;
+            (sum + missing, squares + missing * missing)
+        });
+        let variance = (squares - sum * sum / samples) / samples * self.period_s * self.period_s;
+        self.losses.len() < MIN_COMPARED || variance <= INDEPENDENT * persistent
     }
 
     /// The samples of `other` without a loss between them.
@@ -153,7 +193,8 @@ impl Track {
         slope(&self.periods, times, |at| !self.is_late(at))
     }
 
-    /// Description length of the stamps by this alignment, natural units of information.
+    /// Description length of the stamps by this alignment, natural units of information, less that of a stamp without a clock, to within
+    /// 1 s.
     ///
     /// It is that of the samples which are stamped first after they were taken, one a tick. Their scatter is measured around
     /// the middle of each block of the record and not around the envelope, which follows a wrong period.
@@ -162,8 +203,8 @@ impl Track {
         for ((at, residual), period) in residuals.iter_mut().enumerate().zip(&self.periods) {
             *residual -= (period - at as u64) as f64;
         }
-        let tick = self.width.max(1.0);
-        let mut residuals = minimum_ahead(&residuals, tick.ceil() as usize);
+        let tick = tick_s.map_or(1.0, |tick| tick / self.period_s).max(1.0);
+        let mut residuals = minimum_ahead(&residuals, (tick.ceil() as usize).min(times.len()));
         let mut scratch = Vec::new();
         for block in residuals.chunks_mut(COST_BLOCK) {
             scratch.clear();
@@ -173,7 +214,8 @@ impl Track {
         }
         let scatter = quantile(&mut residuals, 1, 2);
         let rounding = tick_s.map_or(0.0, |tick| UNIFORM_MEDIAN_DEVIATION * (tick / self.period_s).min(1.0));
-        times.len() as f64 / tick * scatter.max(rounding).max(ORDER).ln() + LOSS_COST * self.losses.len() as f64
+        let samples = times.len() as f64;
+        samples / tick * (scatter.max(rounding).max(ORDER) * self.period_s).ln() + cost_of(&self.losses, samples)
     }
 
     /// Relative error of the slope: the range of the mean residuals of 16 blocks, over the length of the record. Four standard
@@ -194,6 +236,27 @@ impl Track {
         let rounding = if self.width < COARSE { self.width } else { self.width / (on_time.len() as f64).sqrt() };
         (high - low).max(rounding) / span + MIN_RATE_ERROR
     }
+}
+
+/// Description length of losses among so many samples: before which samples they are, and their lengths, of a geometric distribution
+/// with their mean.
+fn cost_of(losses: &[LostStretch], samples: f64) -> f64 {
+    let entropy = |part: f64| {
+        let terms = [part, 1.0 - part].map(|part| if part > 0.0 { -part * part.ln() } else { 0.0 });
+        terms[0] + terms[1]
+    };
+    let count = losses.len() as f64;
+    let missing: f64 = losses.iter().map(|loss| loss.missing as f64).sum();
+    if missing > 0.0 { samples * entropy((count / samples).min(1.0)) + missing * entropy(count / missing) } else { 0.0 }
+}
+
+/// The variance in s² that a sample adds to the duration of many: that of the durations of long windows, over their length.
+pub(crate) fn persistent_variance(times: &[f64]) -> f64 {
+    let window = (times.len() / WINDOWS).clamp(1, LONGEST_WINDOW);
+    let durations = || times.windows(window + 1).map(|row| row[window] - row[0]);
+    let count = durations().count().max(1) as f64;
+    let mean = durations().sum::<f64>() / count;
+    durations().map(|duration| (duration - mean) * (duration - mean)).sum::<f64>() / count / window as f64
 }
 
 /// How many periods after its turn each sample was stamped, from the first sample.

@@ -73,10 +73,30 @@ impl SampleSlots {
                     None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
                     None => {}
                 }
-                let StampAlignment { periods, late, losses, rate, tick_s, width, resolved } = alignment;
+                let StampAlignment {
+                    periods,
+                    late,
+                    losses,
+                    rate,
+                    tick_s,
+                    width,
+                    resolved,
+                    least_loss,
+                    is_rate_changing,
+                } = alignment;
                 let missing = losses.iter().fold(0, |sum: u64, loss| sum.saturating_add(loss.missing));
                 let late = late.into_iter().filter(|late| *late).count() as u64;
-                let stamps = StampQuality { rate, tick_s, width, losses, resolved, late, clock_steps: Vec::new() };
+                let stamps = StampQuality {
+                    rate,
+                    tick_s,
+                    width,
+                    losses,
+                    resolved,
+                    least_loss,
+                    is_rate_changing,
+                    late,
+                    clock_steps: Vec::new(),
+                };
                 (periods, missing, Some(stamps))
             }
             (None, None) => ((0..rows as u64).collect(), 0, None),

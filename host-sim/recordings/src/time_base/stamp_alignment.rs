@@ -10,7 +10,8 @@
 //! one that needs the shortest description wins: the scatter of the lateness, no part of it below the tick of the stamps
 //! being worth anything, and the losses.
 
-use crate::time_base::lateness_track::{COARSE, LostStretch, SEARCH_QUEUE, Track, quantile};
+use crate::time_base::clock_rate::{SteadiedStamps, steadied};
+use crate::time_base::lateness_track::{COARSE, LostStretch, SEARCH_QUEUE, Track, persistent_variance, quantile};
 use crate::time_base::stamp_tick::tick;
 
 /// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is distinguished
@@ -31,6 +32,11 @@ const SCAN_STEPS: u32 = 80;
 
 /// Largest relative difference of a period from the stated one.
 const MAX_CLOCK_ERROR: f64 = 0.1;
+
+/// Rises of the envelope, in its falls, that are losses and not late deliveries; and fewest of them where there is no fall.
+const TELLING: usize = 8;
+/// Probability that the longest rise by chance is taken for a loss.
+const FALSE_ALARM: f64 = 1e-3;
 
 /// Share of losses up to which an alignment of fine stamps is taken without looking for a better one.
 const CLEAR: f64 = 0.02;
@@ -75,6 +81,10 @@ pub(crate) struct StampAlignment {
     pub(crate) width: f64,
     /// Whether single losses are told from the rounding of the stamps.
     pub(crate) resolved: bool,
+    /// The shortest loss that is told from late delivery, samples.
+    pub(crate) least_loss: u64,
+    /// Whether the rate changes by more than a track follows; its interval is then the range that it takes.
+    pub(crate) is_rate_changing: bool,
 }
 
 impl StampAlignment {
@@ -82,11 +92,33 @@ impl StampAlignment {
     ///
     /// `None` where no period in this range can be seen in them.
     pub(crate) fn new(times: &[f64], stated_hz: Option<f64>) -> Option<Self> {
+        let Some(SteadiedStamps { times: steady, shortest_s, longest_s }) = steadied(times) else {
+            return Self::of_steady(times, stated_hz);
+        };
+        let mut alignment = Self::of_steady(&steady, stated_hz)?;
+        let hz = *alignment.periods.last()? as f64 / (times.last()? - times.first()?);
+        let changing = RateEstimate { hz, low_hz: longest_s.recip(), high_hz: shortest_s.recip() };
+        alignment.rate = alignment.rate.filter(|_| hz.is_finite() && hz > 0.0).map(|_| changing);
+        alignment.is_rate_changing = true;
+        Some(alignment)
+    }
+
+    /// The same for the stamps of a clock whose rate is constant.
+    fn of_steady(times: &[f64], stated_hz: Option<f64>) -> Option<Self> {
         let tick_s = tick(times);
         let stated_s = stated_hz.map(f64::recip);
+        let persistent = persistent_variance(times);
         let period_s = search(times, stated_s, tick_s)?;
-        let (_, mut track) = Track::refined(times, period_s, tick_s, MAX_QUEUE);
+        let (_, mut track) = Track::refined(times, period_s, tick_s, (MAX_QUEUE, 1));
         let ticks_per_period = tick_s.map(|tick| tick / track.period_s);
+        let mut least_loss = 1;
+        if !track.losses.is_empty() && track.width >= COARSE + 2.0 * ticks_per_period.unwrap_or(0.0) {
+            least_loss = least_telling(times, &track);
+            if least_loss > 1 {
+                let complete = Track::complete(times, &track).period_s;
+                (_, track) = Track::refined(times, complete, tick_s, (MAX_QUEUE, least_loss));
+            }
+        }
         // Whether the tick is near a whole number of periods, at least one.
         let beats = match ticks_per_period {
             Some(periods) => periods > 0.5 && (periods - periods.round()).abs() < BEAT,
@@ -99,7 +131,12 @@ impl StampAlignment {
                 loss.certain &= loss.missing > 1;
             }
         }
-        Some(Self::from_track(track, times, tick_s))
+        // Of single samples no more can have been lost than make the durations as different as they are.
+        let hidden = if least_loss > 1 { persistent / (track.period_s * track.period_s) } else { 0.0 };
+        let mut alignment = Self::from_track(track, times, tick_s);
+        alignment.rate.iter_mut().for_each(|rate| rate.high_hz *= 1.0 + hidden);
+        alignment.least_loss = least_loss;
+        Some(alignment)
     }
 
     /// What an alignment shows.
@@ -126,7 +163,8 @@ impl StampAlignment {
         });
         let late = (0..times.len()).map(|at| track.is_late(at)).collect();
         let Track { periods, losses, width, .. } = track;
-        Self { periods, late, losses, rate, tick_s, width, resolved }
+        let (least_loss, is_rate_changing) = (1, false);
+        Self { periods, late, losses, rate, tick_s, width, resolved, least_loss, is_rate_changing }
     }
 }
 
@@ -143,16 +181,21 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
         let is_near = stated_s.is_none_or(|stated| (period_s / stated - 1.0).abs() <= MAX_CLOCK_ERROR);
         is_near && period_s.is_finite() && period_s > 0.0
     };
+    let persistent = persistent_variance(first);
     let mut tried: Vec<f64> = Vec::new();
     let mut best: Option<(f64, Track)> = None;
     let estimates = period_estimates(first, tick_s);
-    for period_s in stated_s.into_iter().chain(estimates.iter().copied()) {
+    // The tick is the period of stamps that are whole numbers of it with samples lost between them.
+    for period_s in stated_s.into_iter().chain(estimates.iter().copied()).chain(tick_s) {
         if !is_plausible(period_s) || tried.iter().any(|other| (period_s / other - 1.0).abs() < 1e-4) {
             continue;
         }
         tried.push(period_s);
-        let refined = Track::refined(first, period_s, tick_s, SEARCH_QUEUE);
-        if is_plausible(refined.1.period_s) && best.as_ref().is_none_or(|(least, _)| refined.0 < *least) {
+        let refined = Track::refined(first, period_s, tick_s, (SEARCH_QUEUE, 1));
+        if is_plausible(refined.1.period_s)
+            && refined.1.are_losses_independent(persistent)
+            && best.as_ref().is_none_or(|(least, _)| refined.0 < *least)
+        {
             best = Some(refined);
         }
         // Fine stamps with few losses leave no doubt.
@@ -163,7 +206,8 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
         }
     }
     let Some((_, found)) = best else { return stated_s.or_else(|| tried.first().copied()) };
-    if found.width < COARSE || found.losses.is_empty() {
+    let is_fine = found.width < COARSE && (tick_s.is_none() || found.losses.len() as f64 <= CLEAR * first.len() as f64);
+    if is_fine || found.losses.is_empty() {
         return Some(found.period_s);
     }
     // With many losses most windows are longer than their samples: shorter periods are tried, one after the other.
@@ -171,16 +215,35 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
     let longest_s = estimates.last().copied().filter(|period_s| is_plausible(*period_s)).unwrap_or(found.period_s);
     let starts = (0..SCAN_STEPS).map(|step| longest_s * (1.0 - SCAN_STEP * f64::from(step)));
     let once_refined = |period_s: f64| {
-        let track = Track::new(scanned, period_s, tick_s, SEARCH_QUEUE);
+        let track = Track::new(scanned, period_s, tick_s, (SEARCH_QUEUE, 1));
         let slope_s = track.slope_s(scanned).filter(|slope_s| is_plausible(*slope_s))?;
-        Some((Track::new(scanned, slope_s, tick_s, SEARCH_QUEUE).cost(scanned, tick_s), slope_s))
+        Some((Track::new(scanned, slope_s, tick_s, (SEARCH_QUEUE, 1)).cost(scanned, tick_s), slope_s))
     };
     let least = starts.filter_map(once_refined).min_by(|a, b| a.0.total_cmp(&b.0));
     let found_cost = found.cost(first, tick_s);
-    let better = least
-        .map(|(_, period_s)| Track::refined(first, period_s, tick_s, SEARCH_QUEUE))
-        .filter(|(cost, track)| *cost < found_cost && is_plausible(track.period_s));
+    let better = least.map(|(_, period_s)| Track::refined(first, period_s, tick_s, (SEARCH_QUEUE, 1))).filter(
+        |(cost, track)| *cost < found_cost && is_plausible(track.period_s) && track.are_losses_independent(persistent),
+    );
     Some(better.map_or(found.period_s, |(_, track)| track.period_s))
+}
+
+/// The shortest loss that stamps which come in bursts tell from late delivery, which lifts the envelope of an alignment without losses as
+/// often as it lowers it: eight rises or more are so long, and eight times as many as the falls; or it is longer than the longest of `n`
+/// rises by chance, whose lengths are distributed exponentially, is with a probability of a thousandth, if the longest of the falls is `ln
+/// n` mean lengths long.
+fn least_telling(times: &[f64], track: &Track) -> u64 {
+    let complete = Track::complete(times, track);
+    let rises = Track::new(times, complete.period_s, None, (MAX_QUEUE, 1)).losses;
+    let falls = complete.falls(times, MAX_QUEUE);
+    let of_length = |of: &[LostStretch], least: u64| of.iter().filter(|loss| loss.missing >= least).count();
+    let longest = falls.iter().map(|fall| fall.missing).max().unwrap_or(0);
+    let is_telling = |&least: &u64| {
+        let rises = of_length(&rises, least);
+        rises >= TELLING && rises >= TELLING * of_length(&falls, least)
+    };
+    let mean = longest as f64 / (falls.len().max(2) as f64).ln();
+    let by_length = longest + (mean * FALSE_ALARM.recip().ln()).ceil().max(1.0) as u64;
+    (1..by_length.max(2)).find(is_telling).unwrap_or(by_length.max(2))
 }
 
 /// Estimates of the sample period, s, the best where stamps are fine and most intervals are one period first.

@@ -17,6 +17,10 @@ pub struct StampQuality {
     pub losses: Vec<LostStretch>,
     /// Whether losses of single samples are told from the rounding of the stamps.
     pub resolved: bool,
+    /// The shortest loss that is told from late delivery, samples: more than 1 where samples come in bursts that differ by as much.
+    pub least_loss: u64,
+    /// Whether the rate changes in the course of the record; the interval of [`rate`](Self::rate) is then the range that it takes.
+    pub is_rate_changing: bool,
     /// Samples that were read at least a period later than the others.
     pub late: u64,
     /// Where the index and the stamps contradict each other.
@@ -27,7 +31,7 @@ impl StampQuality {
     /// Of samples that have an index and time stamps, s.
     pub(crate) fn of_index(indices: &[u64], times: &[f64]) -> Self {
         let IndexedClock { rate, steps } = IndexedClock::new(indices, times);
-        Self { rate, clock_steps: steps, resolved: true, ..Self::default() }
+        Self { rate, clock_steps: steps, resolved: true, least_loss: 1, ..Self::default() }
     }
 
     /// Warnings that a report counts, by cause; those that do not occur are absent.
@@ -57,7 +61,19 @@ impl StampQuality {
                 "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
             ));
         }
-        if !self.resolved {
+        if let (Some(rate), true) = (self.rate, self.is_rate_changing) {
+            notes.push(format!(
+                "the rate of the samples, or of the clock that stamped them, changes from {:.4} to {:.4} Hz; {:.4} Hz is the mean",
+                rate.low_hz, rate.high_hz, rate.hz
+            ));
+        }
+        if let (Some(rate), true) = (self.rate, self.least_loss > 1) {
+            notes.push(format!(
+                "samples come in bursts: losses of fewer than {} samples cannot be told from late delivery, and none is counted; the \
+                 rate is {:.4} Hz without such losses and {:.4} Hz at most",
+                self.least_loss, rate.hz, rate.high_hz
+            ));
+        } else if !self.resolved {
             notes.push("losses of single samples cannot be told from the rounding of the time stamps".to_owned());
         }
         if let Some(step) = self.clock_steps.first() {

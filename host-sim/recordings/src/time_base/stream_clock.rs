@@ -78,6 +78,10 @@ impl StreamClock {
                 let reason = format!("they are {:.1} sample periods wide", head.width);
                 return Err(TimeBaseError::Irregular(reason));
             }
+            (false, Some(head)) if head.is_rate_changing || head.least_loss > 1 => {
+                let reason = if head.is_rate_changing { "their rate changes" } else { "they come in bursts" };
+                return Err(TimeBaseError::Irregular(reason.to_owned()));
+            }
             (false, Some(_)) => Source::Stamps(period_s.ok_or(TimeBaseError::NoPeriod)?),
         };
         Ok(Self {

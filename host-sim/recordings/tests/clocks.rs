@@ -1,0 +1,180 @@
+//! Clocks that jump, wander or change their rate, stamps that are whole periods with samples lost between them, and samples that
+//! come in bursts: the rate and the losses that are found, on records whose truth is known.
+
+use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+use measurement::SensorProfile;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use recordings::ColumnSelection;
+use recordings::any_sensor::ReadOptions;
+use recordings::file_format::InputFile;
+use recordings::recording::{Recorder, TimeStamp};
+use recordings::time_base::{EstimatedTimeBase, TimeBaseError, time_base};
+
+fn base(times: impl IntoIterator<Item = f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
+    let mut recorder = Recorder::new(vec![Channel::GyroX], GyroRange::Dps300);
+    for (at, time) in times.into_iter().enumerate() {
+        let mut counts = [(at % 100) as i16; 12];
+        counts[Channel::Supply as usize] = 2068;
+        recorder.push(TimeStamp::from_time(time), &Burst::from_counts(&Counts::new(counts)));
+    }
+    time_base(&recorder.finish(), None)
+}
+
+/// Rate, samples that are missing, and those of them that are uncertain.
+fn found(times: impl IntoIterator<Item = f64>) -> (f64, u64, u64) {
+    let EstimatedTimeBase { measurement, stamps } = base(times).expect("a time base");
+    (measurement.sample_rate_hz, measurement.dropped["gap"], stamps.expect("stamps").uncertain_losses())
+}
+
+/// `index` at 100 Hz, written with two decimals.
+fn at(index: u64) -> f64 {
+    format!("{:.2}", index as f64 / 100.0).parse().expect("a number")
+}
+
+#[test]
+fn a_clock_that_was_set_far_ahead_is_no_lower_rate() {
+    const YEAR_S: f64 = 31_536_000.0;
+    for (name, rows, first, jump_s) in [
+        ("a year after the first row", 3000, 1, YEAR_S),
+        ("a day", 3000, 1500, 86_400.0),
+        ("ten days", 20_000, 10_000, 864_000.0),
+    ] {
+        let times = (0..rows).map(|row| at(row) + if row >= first { jump_s } else { 0.0 });
+        let error = base(times).expect_err(name);
+        assert!(matches!(error, TimeBaseError::TooSparse { .. }), "{name}: {error}");
+    }
+    // Ten minutes are an outage.
+    let (rate_hz, missing, _) = found((0..60_000).map(|row| at(row) + if row >= 30_000 { 600.0 } else { 0.0 }));
+    assert_eq!(missing, 60_000);
+    assert!((rate_hz / 100.0 - 1.0).abs() < 1e-9, "{rate_hz}");
+}
+
+/// The number of lost samples is known exactly: every stamp is that of its sample.
+#[test]
+fn stamps_of_whole_periods_show_every_random_loss() {
+    for loss in [0.03, 0.1, 0.15, 0.22, 0.25, 0.4, 0.5, 0.7, 0.9] {
+        for seed in 0..3 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let rows: Vec<u64> = (0..30_000).filter(|_| rng.random::<f64>() >= loss).collect();
+            let lost = rows[rows.len() - 1] - rows[0] + 1 - rows.len() as u64;
+            let (rate_hz, missing, _) = found(rows.iter().map(|&row| at(row)));
+            assert!((rate_hz / 100.0 - 1.0).abs() < 1e-6, "{loss}, seed {seed}: {rate_hz} Hz");
+            assert_eq!(missing, lost, "{loss}, seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_wanders_loses_nothing() {
+    for part in [0.003, 0.01, 0.03, 0.05] {
+        for period_s in [20.0, 60.0, 200.0] {
+            let mut time = 0.0f64;
+            let times: Vec<f64> = (0..40_000)
+                .map(|row| {
+                    let now = (time * 1e6).round() / 1e6;
+                    time += 0.01 * (1.0 + part * (std::f64::consts::TAU * f64::from(row) / 100.0 / period_s).sin());
+                    now
+                })
+                .collect();
+            let span = times[times.len() - 1];
+            let EstimatedTimeBase { measurement, stamps } = base(times).expect("a time base");
+            let stamps = stamps.expect("stamps");
+            let name = format!("{part} in {period_s} s");
+            assert_eq!((measurement.dropped["gap"], stamps.late), (0, 0), "{name}");
+            // The stamps are microseconds, a ten-thousandth of a period.
+            assert_eq!(stamps.tick_s, None, "{name}");
+            assert!((measurement.sample_rate_hz * span / 39_999.0 - 1.0).abs() < 1e-5, "{name}");
+            if part > 0.02 {
+                assert!(
+                    stamps.notes().iter().any(|note| note.contains("changes from")),
+                    "{name}: {:?}",
+                    stamps.notes()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rate_that_changes_is_no_loss() {
+    for part in [0.02, 0.05, 0.1, -0.05, -0.1] {
+        let mut time = 0.0f64;
+        let times: Vec<f64> = (0..72_720)
+            .map(|row| {
+                let now = (time * 1e6).round() / 1e6;
+                time += 0.01 * if row < 36_360 { 1.0 } else { 1.0 + part };
+                now
+            })
+            .collect();
+        let EstimatedTimeBase { measurement, stamps } = base(times).expect("a time base");
+        assert_eq!(measurement.dropped["gap"], 0, "{part}");
+        let stamps = stamps.expect("stamps");
+        let rate = stamps.rate.expect("a rate");
+        let mut ends = [100.0, 100.0 / (1.0 + part)];
+        ends.sort_by(f64::total_cmp);
+        assert!((rate.low_hz / ends[0] - 1.0).abs() < 1e-3 && (rate.high_hz / ends[1] - 1.0).abs() < 1e-3, "{rate:?}");
+        assert!(stamps.notes().iter().any(|note| note.contains("changes from")), "{part}: {:?}", stamps.notes());
+    }
+    // Losses beside a change of the rate are still found.
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let kept: Vec<u32> = (0..60_000).filter(|row| row % 59_999 == 0 || rng.random_range(0..1000) > 0).collect();
+    let time = |&row: &u32| {
+        let row = f64::from(row);
+        if row < 30_000.0 { row / 100.0 } else { 300.0 + (row - 30_000.0) / 95.0 }
+    };
+    assert_eq!(found(kept.iter().map(time)).1, 60_000 - kept.len() as u64);
+}
+
+/// A host that empties a queue at irregular times, now and then late by tenths of a second: the stamps are those of the reading.
+fn bursts(seed: u64, lost: impl Fn(u32) -> bool) -> Vec<f64> {
+    const RATE_HZ: f64 = 99.3;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (mut poll, mut now) = (0.0f64, 0.0f64);
+    let mut times = Vec::new();
+    // The polls wander by some periods in minutes, as those of a busy host do.
+    let mut lag = 0.0f64;
+    for sample in 0..65_000 {
+        let taken = f64::from(sample) / RATE_HZ;
+        while poll < taken {
+            poll += match rng.random_range(0..20) {
+                0..12 => rng.random_range(0.035..0.05),
+                12..19 => rng.random_range(0.07..0.085),
+                _ => rng.random_range(0.1..0.3),
+            };
+            lag = (lag * 0.995 + rng.random_range(-0.012..0.012)).clamp(-0.08, 0.08);
+        }
+        now = (now + rng.random_range(0.0012..0.0024)).max(poll + 0.08 + lag);
+        if !lost(sample) {
+            times.push(now);
+        }
+    }
+    times
+}
+
+#[test]
+fn samples_in_bursts_are_late_and_not_lost() {
+    for seed in 0..4 {
+        let (rate_hz, missing, _) = found(bursts(seed, |_| false));
+        assert!((rate_hz / 99.3 - 1.0).abs() < 1e-3, "seed {seed}: {rate_hz} Hz");
+        assert_eq!(missing, 0, "seed {seed}, {rate_hz}");
+        // An outage is longer than the bursts differ.
+        let (rate_hz, missing, _) = found(bursts(seed, |sample| (30_000..30_300).contains(&sample)));
+        assert!((rate_hz / 99.3 - 1.0).abs() < 1e-3, "seed {seed}: {rate_hz} Hz");
+        assert!(missing.abs_diff(300) <= 8, "seed {seed}: {missing}");
+    }
+}
+
+/// 400 Hz by its source, stamped in whole ms, with 45 % of the stamps equal to the one before: 11,999 periods in 30.004 s are 399.91 Hz.
+#[test]
+fn measured_bursts_show_the_rate() {
+    let test = "measured_bursts_show_the_rate";
+    let Some(file) = system_tests::recording(test, "others/stampfly_fft_20260114T115628.csv") else { return };
+    let selection = ColumnSelection::parse(&[], &["rad/s", "m/s^2"].map(str::to_owned)).expect("units");
+    let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: None };
+    let recording = InputFile::open(&file).expect("a table").read(&options).expect("rows");
+    let (base, _) = recording.time_base(None).expect("a time base");
+    let rate_hz = base.measurement.sample_rate_hz;
+    assert!((rate_hz / 399.91 - 1.0).abs() < 1e-3, "{rate_hz} Hz");
+    assert_eq!(base.measurement.dropped["gap"], 0);
+}
