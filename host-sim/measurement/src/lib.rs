@@ -7,10 +7,12 @@
 
 pub mod adis16405;
 mod block;
+mod channel_id;
 mod profile;
 pub mod profile_file;
 
 pub use block::{RecordingDescription, SampleBlock};
+pub use channel_id::{ChannelId, PerChannel};
 pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity, SensorProfile};
 
 use std::collections::BTreeMap;
@@ -180,11 +182,6 @@ impl Measurement {
     /// The recorded channels' profiles, in the order of [`Measurement::channels`].
     pub fn profiles(&self) -> impl Iterator<Item = ChannelProfile> {
         self.channels.iter().map(|channel| channel.profile)
-    }
-
-    /// The recorded channels of one quantity.
-    pub fn of_quantity(&self, quantity: Quantity) -> impl Iterator<Item = ChannelProfile> {
-        self.profiles().filter(move |profile| profile.quantity == quantity)
     }
 
     /// The samples of a recorded channel; `None` where it was not recorded.

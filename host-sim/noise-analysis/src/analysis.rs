@@ -17,7 +17,7 @@ use crate::figure_data;
 use crate::first_half::{FirstHalf, FirstHalfFit};
 use crate::long_record::LongRecord;
 use crate::nonstationarity::CommonModeRegression;
-use crate::parallel::in_parallel;
+use crate::parallel::per_channel;
 use crate::part_report;
 use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelReport, Report, SCHEMA, SlopeMethodReport, by_cause,
@@ -25,10 +25,10 @@ use crate::report::{
 };
 use crate::series::Series;
 use crate::spectra::allan_deviations_by_spectrum;
-use crate::traced_record::{ChannelTrace, Condensed, TracedRecord};
+use crate::traced_record::{Condensed, TracedRecord};
 use crate::uniform_series::UniformSeries;
-use allan_core::{AllanPoint, Curve};
-use measurement::{ChannelProfile, Measurement, RecordingDescription};
+use allan_core::AllanPoint;
+use measurement::{ChannelId, Measurement, RecordingDescription};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -126,7 +126,7 @@ impl<'a> Recorded<'a> {
         let mut effects = record.effects();
         // What the first half shows by itself, to compare with what the whole record shows.
         let mut effects_of_half = if effects.iter().all(Vec::is_empty) {
-            vec![Vec::new(); effects.len()]
+            effects.clone()
         } else {
             let half = measurement.before(measurement.middle());
             let shorter = condensed.map(|condensed| condensed.shorter.of_first_half());
@@ -145,7 +145,13 @@ impl<'a> Recorded<'a> {
         watch(Stage::Assessment);
         let mut channels = self.channel_reports(&record, &first_half);
         let duration_s = description.periods as f64 * description.period_s();
-        let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
+        let findings = causes::find(
+            &mut channels,
+            &effects.into_vec(),
+            &effects_of_half.into_vec(),
+            &description.profile,
+            duration_s,
+        );
         let part = part_report::report(first, description.samples, &record.filter);
         // The samples are transformed once more for the figures: what is not needed then is released.
         drop((record, first_half));
@@ -167,67 +173,64 @@ impl<'a> Recorded<'a> {
 
     /// The report of every channel, in the order of the channels, without its effects.
     fn channel_reports(&self, record: &TracedRecord, first_half: &FirstHalf) -> Vec<ChannelReport> {
-        let TracedRecord { estimators, traced, .. } = record;
-        let models: Vec<(&ChannelTrace, &FirstHalfFit)> = record.channels.iter().zip(&first_half.channels).collect();
-        let assessments = in_parallel(&models, |(trace, half)| Assessed::new(record, trace, half));
+        let TracedRecord { estimators, measurement, .. } = record;
+        let assessments =
+            per_channel(measurement.ids(), |channel| Assessed::new(record, channel, &first_half.channels[channel]));
         let nonstationarities = first_half.nonstationarities(record);
         let at_rest = record.at_rest();
-        let avar_of = |of: ChannelProfile, n: u64| {
-            let position = record.channels.iter().position(|trace| trace.channel == of)?;
-            estimators.measured[position].points().iter().find(|point| point.n == n).map(|point| point.avar)
+        let avar_of = |of: ChannelId, n: u64| {
+            estimators.measured[of].points().iter().find(|point| point.n == n).map(|point| point.avar)
         };
-        let report = |((trace, half), measured): (&(&ChannelTrace, &FirstHalfFit), &Curve<OCTAVES>),
-                      assessed: Assessed| {
-            let channel = trace.channel;
-            let whole = measured.clone().with_confidence(|point| half.fit.trace.before.variance_fractions(point.n));
+        let report = |(channel, assessed): (ChannelId, Assessed)| {
+            let profile = &measurement[channel].profile;
+            let (trace, half) = (&record.channels[channel], &first_half.channels[channel]);
+            let whole = estimators.measured[channel]
+                .clone()
+                .with_confidence(|point| half.fit.trace.before.variance_fractions(point.n));
             let after = half.after(record, channel, &whole, avar_of);
             // The model with the added terms, fitted to the whole record, with the errors of `after`.
-            let position = estimators.both.position(channel).unwrap_or_default();
             let refitted = ModelReport {
-                terms: term_reports(&trace.fit.trace.after, channel.unit),
-                adev: trace.fit.deviations(&estimators.both, position, &whole, avar_of),
+                terms: term_reports(&trace.fit.trace.after, profile.unit),
+                adev: trace.fit.deviations(&estimators.both, channel, &whole, avar_of),
                 ..after.clone()
             };
-            let nonstationarity = traced.iter().position(|of| *of == channel);
             let points = whole.points().iter();
             ChannelReport {
-                name: channel.name.to_owned(),
-                unit: channel.unit.to_owned(),
+                name: profile.name.to_owned(),
+                unit: profile.unit.to_owned(),
                 samples: self.description.samples,
                 missing: self.missing_samples(record, channel),
                 curve: points.map(|point| curve_point(point, whole.samples(), &assessed.by_spectrum)).collect(),
-                read_off: SlopeMethodReport::from_curve(&whole, channel.unit),
+                read_off: SlopeMethodReport::from_curve(&whole, profile.unit),
                 before: half.before(record, channel, &whole),
                 first_half_curve: half.curve_error(record, channel),
                 after,
                 refitted,
-                nonstationarity: nonstationarity.and_then(|position| nonstationarities.get(position)?.clone()),
+                nonstationarity: nonstationarities[channel].clone(),
                 at_rest: at_rest.clone(),
                 effects: Vec::new(),
                 assessment: assessed.assessment,
                 figure_data: FigureData::default(),
             }
         };
-        let channels = models.iter().zip(&estimators.measured).zip(assessments);
-        channels.map(|(models, assessed)| report(models, assessed)).collect()
+        measurement.ids().zip(assessments).map(report).collect()
     }
 
     /// Samples of a channel that are missing in its model.
-    fn missing_samples(&self, record: &TracedRecord, channel: ChannelProfile) -> MissingSamples {
+    fn missing_samples(&self, record: &TracedRecord, channel: ChannelId) -> MissingSamples {
         let TracedRecord { measurement, preprocessing, estimators, .. } = record;
         let dropped = &self.description.dropped;
         let of_all = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
-        let position = measurement.channels.iter().position(|of| of.profile == channel).unwrap_or_default();
         let own: Vec<(&str, u64)> = match self.long {
             // Of means, a knock has all of their samples.
             Some(long) => {
                 let samples = |(cause, means)| (cause, means * long.shorter.samples_per_mean);
                 let of_means = preprocessing.refused(channel).map(samples);
-                long.refused[position].iter().map(|(&cause, &count)| (cause, count)).chain(of_means).collect()
+                long.refused[channel].iter().map(|(&cause, &count)| (cause, count)).chain(of_means).collect()
             }
             None => {
-                let refused = measurement.channels.get(position).into_iter().flat_map(|channel| &channel.refused);
-                let refused = refused.map(|(&cause, positions)| (cause, positions.len() as u64));
+                let refused =
+                    measurement[channel].refused.iter().map(|(&cause, positions)| (cause, positions.len() as u64));
                 refused.chain(preprocessing.refused(channel)).collect()
             }
         };
@@ -236,31 +239,25 @@ impl<'a> Recorded<'a> {
             *refused.entry(cause.to_owned()).or_insert(0) += count;
         }
         let lost = dropped.get("gap").copied().unwrap_or(0);
-        let replaced = estimators.both.position(channel).map_or(0, |position| estimators.both.replaced(position));
-        MissingSamples { lost, refused, replaced }
+        MissingSamples { lost, refused, replaced: estimators.both.replaced(channel) }
     }
 }
 
 /// The drift that the channels whose noise was followed have in common.
 fn common_mode_regression(measurement: &Measurement, channels: &[ChannelReport]) -> Option<CommonModeRegression> {
-    let is_followed =
-        |profile: &ChannelProfile| channels.iter().any(|of| of.name == profile.name && of.nonstationarity.is_some());
-    let followed: Vec<ChannelProfile> = measurement.profiles().filter(is_followed).collect();
+    let all = measurement.ids().zip(channels);
+    let followed: Vec<ChannelId> =
+        all.filter(|(_, of)| of.nonstationarity.is_some()).map(|(channel, _)| channel).collect();
     CommonModeRegression::estimate(measurement, &followed)
 }
 
 /// Makes the terms of the first half's model those of the whole record's where the second half does not contradict it.
 fn keep_terms_that_held(record: &mut TracedRecord, first_half: &FirstHalf) {
-    let held: Vec<bool> = record
-        .channels
-        .iter()
-        .zip(&first_half.channels)
-        .map(|(trace, half)| record.traced.contains(&trace.channel) && half.held(record, trace.channel))
-        .collect();
-    let filter = record.filter.as_ref().ok();
-    let fits = record.channels.iter_mut().zip(&first_half.channels).zip(held).filter(|(_, held)| *held);
-    for ((trace, half), _) in fits {
-        trace.fit.take_terms_that_held(&half.fit.trace, filter);
+    let filter = record.filter.clone().ok();
+    for (channel, half) in first_half.channels.with_ids() {
+        if record.is_traced(channel) && half.held(record, channel) {
+            record.channels[channel].fit.take_terms_that_held(&half.fit.trace, filter.as_ref());
+        }
     }
 }
 
@@ -272,11 +269,10 @@ struct Assessed {
 }
 
 impl Assessed {
-    fn new(record: &TracedRecord, trace: &ChannelTrace, half: &FirstHalfFit) -> Self {
-        let channel = trace.channel;
-        let recorded = Series::from_measurement(record.measurement, &channel);
-        let is_traced = record.traced.contains(&channel);
-        let own = record.series_of(channel).filter(|_| is_traced).unwrap_or(&recorded);
+    fn new(record: &TracedRecord, channel: ChannelId, half: &FirstHalfFit) -> Self {
+        let trace = &record.channels[channel];
+        let recorded = Series::from_measurement(record.measurement, channel);
+        let own = if record.is_traced(channel) { &record.series[channel] } else { &recorded };
         // Models that are assessed by samples that still have the share of the covariates.
         let models = AssessedModels {
             refitted: &trace.fit.trace.after,
@@ -289,7 +285,7 @@ impl Assessed {
         // Means tell nothing of the averaging times that are shorter than they are.
         let shorter = record.condensed.map_or(0, |condensed| condensed.shorter.samples_per_mean.ilog2() as usize);
         by_spectrum.splice(0..0, vec![None; shorter]);
-        let of_channel = record.condensed.and_then(|condensed| condensed.shorter.of(channel));
+        let of_channel = record.condensed.map(|condensed| &condensed.shorter.channels[channel]);
         let samples = of_channel.and_then(|of| Some((of.spectrum_within(0..u64::MAX)?, of.resolution)));
         let samples = samples.as_ref().map(|(spectrum, resolution)| (spectrum, *resolution));
         Self { assessment: Assessment::new(own, samples, models), by_spectrum }

@@ -13,7 +13,7 @@ use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter};
 use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
-use measurement::{ChannelProfile, SensorProfile};
+use measurement::{ChannelId, SensorProfile};
 
 /// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
 /// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times.
@@ -151,12 +151,12 @@ impl ChannelFit {
     pub(crate) fn deviations(
         &self,
         both: &RecordPart,
-        position: usize,
+        channel: ChannelId,
         whole: &Curve<OCTAVES>,
-        avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
+        avar_of: impl Fn(ChannelId, u64) -> Option<f64>,
     ) -> Vec<f64> {
         let factors = || whole.points().iter().map(|point| point.n);
-        let shares = self.covariates.shares(both, position, factors(), avar_of);
+        let shares = self.covariates.shares(both, channel, factors(), avar_of);
         factors().zip(shares).map(|(n, share)| (self.trace.after.avar(n) + share).sqrt()).collect()
     }
 

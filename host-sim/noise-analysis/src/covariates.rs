@@ -7,7 +7,7 @@ use crate::estimators::RecordPart;
 use crate::series::Series;
 use allan_core::Curve;
 use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
-use measurement::{ChannelProfile, Quantity};
+use measurement::{ChannelId, PerChannel, Quantity};
 
 /// Degrees of freedom of a sensitivity that was estimated from block means: about the number of blocks of a record.
 const BLOCK_DEGREES_OF_FREEDOM: f64 = BLOCKS as f64;
@@ -15,8 +15,8 @@ const BLOCK_DEGREES_OF_FREEDOM: f64 = BLOCKS as f64;
 /// The curves of a channel and of its covariates in one part of a recording, and their covariances.
 struct RegressionData {
     channel: Curve<OCTAVES>,
-    /// Positions of the covariates in the part.
-    positions: Vec<usize>,
+    /// The covariates.
+    channels: Vec<ChannelId>,
     covariates: Vec<Covariate<OCTAVES>>,
     with_channel: Vec<CovarianceCurve<OCTAVES>>,
     /// Of covariate `i` with covariate `j < i`, at index `i·(i−1)/2 + j`.
@@ -34,19 +34,19 @@ pub(crate) struct CovariateFit {
 
 impl RegressionData {
     /// With `known`, the measurement noise of the covariates is taken from there instead of being estimated.
-    fn new(part: &RecordPart, channel: usize, known: Option<&Self>) -> Self {
-        let positions: Vec<usize> = regressors(part.channels[channel], part).collect();
-        let covariate = |(index, &position): (usize, &usize)| match known {
-            Some(known) => known.covariates[index].continued(&part.curve(position), part.coupled_from()),
-            None => Covariate::new(&part.curve(position), part.resolution(position), part.coupled_from()),
+    fn new(part: &RecordPart, channel: ChannelId, known: Option<&Self>) -> Self {
+        let channels: Vec<ChannelId> = regressors(channel, part).collect();
+        let covariate = |(index, &of): (usize, &ChannelId)| match known {
+            Some(known) => known.covariates[index].continued(&part.curve(of), part.coupled_from()),
+            None => Covariate::new(&part.curve(of), part.resolution(of), part.coupled_from()),
         };
-        let pairs = positions.iter().enumerate().flat_map(|(i, &a)| positions[..i].iter().map(move |&b| (a, b)));
+        let pairs = channels.iter().enumerate().flat_map(|(i, &a)| channels[..i].iter().map(move |&b| (a, b)));
         Self {
             channel: part.curve(channel),
-            covariates: positions.iter().enumerate().map(covariate).collect(),
-            with_channel: positions.iter().map(|&position| part.covariance(channel, position)).collect(),
+            covariates: channels.iter().enumerate().map(covariate).collect(),
+            with_channel: channels.iter().map(|&of| part.covariance(channel, of)).collect(),
             mutual: pairs.map(|(a, b)| part.covariance(a, b)).collect(),
-            positions,
+            channels,
         }
     }
 
@@ -67,24 +67,23 @@ impl RegressionData {
 }
 
 impl CovariateFit {
-    /// Estimates the sensitivities of the channel at position `channel` from the second differences in `part`, and takes
+    /// Estimates the sensitivities of `channel` from the second differences in `part`, and takes
     /// those to temperature and supply from `by_block_means` where these have the smaller error.
     ///
     /// With a ramp (`has_ramp`) the sensitivities to temperature and supply come from the block means alone: the second
     /// differences of a ramp correlate with those of anything else that drifts.
     pub(crate) fn estimate(
         part: &RecordPart,
-        channel: usize,
+        channel: ChannelId,
         has_ramp: bool,
-        by_block_means: impl Fn(ChannelProfile) -> Option<BiasSensitivity>,
+        by_block_means: impl Fn(ChannelId) -> Option<BiasSensitivity>,
     ) -> Self {
         let data = RegressionData::new(part, channel, None);
         let mut sensitivities: Vec<Sensitivity> =
             data.regress(|regression| regression.sensitivities()).into_iter().collect();
-        for (covariate, &position) in data.positions.iter().enumerate() {
-            let regressor = part.channels[position];
+        for (covariate, &regressor) in data.channels.iter().enumerate() {
             let Some(BiasSensitivity { sensitivity: value, error }) = by_block_means(regressor) else {
-                let is_dropped = has_ramp && regressor.quantity.is_environment();
+                let is_dropped = has_ramp && part.channels[regressor].quantity.is_environment();
                 sensitivities.retain(|known| known.covariate != covariate || !is_dropped);
                 continue;
             };
@@ -105,7 +104,7 @@ impl CovariateFit {
     }
 
     /// The curve of the same channel in another part, compensated with the sensitivities of this one.
-    pub(crate) fn compensated(&self, part: &RecordPart, channel: usize) -> Curve<OCTAVES> {
+    pub(crate) fn compensated(&self, part: &RecordPart, channel: ChannelId) -> Curve<OCTAVES> {
         RegressionData::new(part, channel, Some(&self.data))
             .regress(|regression| regression.compensated(&self.sensitivities))
     }
@@ -119,9 +118,9 @@ impl CovariateFit {
     pub(crate) fn shares(
         &self,
         part: &RecordPart,
-        channel: usize,
+        channel: ChannelId,
         factors: impl Iterator<Item = u64>,
-        avar: impl Fn(ChannelProfile, u64) -> Option<f64>,
+        avar: impl Fn(ChannelId, u64) -> Option<f64>,
     ) -> Vec<f64> {
         let data = RegressionData::new(part, channel, Some(&self.data));
         let rest = data.regress(|regression| regression.compensated(&self.sensitivities));
@@ -131,9 +130,8 @@ impl CovariateFit {
             self.sensitivities.iter().all(of)
         };
         let variation = |n: u64| -> Option<f64> {
-            let of = |(position, known): (usize, &Sensitivity)| {
-                Some(known.value * known.value * avar(part.channels[position], n)?)
-            };
+            let of =
+                |(covariate, known): (ChannelId, &Sensitivity)| Some(known.value * known.value * avar(covariate, n)?);
             self.sensitivities().map(of).sum()
         };
         let mut last: Option<(f64, f64)> = None;
@@ -148,19 +146,19 @@ impl CovariateFit {
         factors.map(share).collect()
     }
 
-    /// Each covariate's position in the part, with the sensitivity to it.
-    pub(crate) fn sensitivities(&self) -> impl Iterator<Item = (usize, &Sensitivity)> {
-        self.sensitivities.iter().map(|sensitivity| (self.data.positions[sensitivity.covariate], sensitivity))
+    /// The covariates that the channel depends on, with the sensitivity to each.
+    pub(crate) fn sensitivities(&self) -> impl Iterator<Item = (ChannelId, &Sensitivity)> {
+        self.sensitivities.iter().map(|sensitivity| (self.data.channels[sensitivity.covariate], sensitivity))
     }
 
-    /// `series` less the covariates times their sensitivities; `of_part` are the series of the part's channels.
+    /// `series` less the covariates times their sensitivities; `of_part` are the series of the same part's channels.
     ///
     /// The covariates' own noise is added by this. Samples that a covariate lacks are missing in the result. `None` where
     /// the channel depends on no covariate.
-    pub(crate) fn compensated_series(&self, series: &Series, of_part: &[Series]) -> Option<Series> {
+    pub(crate) fn compensated_series(&self, series: &Series, of_part: &PerChannel<Series>) -> Option<Series> {
         let mut rest = series.clone();
-        for (position, sensitivity) in self.sensitivities() {
-            let covariate = &of_part[position];
+        for (covariate, sensitivity) in self.sensitivities() {
+            let covariate = &of_part[covariate];
             if covariate.slots == rest.slots {
                 subtract(&mut rest, sensitivity.value, covariate);
             } else {
@@ -181,15 +179,15 @@ fn subtract(series: &mut Series, sensitivity: f64, covariate: &Series) {
     }
 }
 
-/// Positions of the channels of `part` that `channel` may depend on.
-fn regressors(channel: ChannelProfile, part: &RecordPart) -> impl Iterator<Item = usize> {
-    let quantities: &[Quantity] = match channel.quantity {
+/// The channels of `part` that `channel` may depend on.
+fn regressors(channel: ChannelId, part: &RecordPart) -> impl Iterator<Item = ChannelId> {
+    let quantities: &[Quantity] = match part.channels[channel].quantity {
         Quantity::AngularRate => &[Quantity::Temperature, Quantity::SupplyVoltage, Quantity::SpecificForce],
         Quantity::SpecificForce => &[Quantity::Temperature, Quantity::SupplyVoltage],
         _ => &[],
     };
     let of = move |&quantity: &Quantity| {
-        (0..part.channels.len()).filter(move |&position| part.channels[position].quantity == quantity)
+        part.coupled_with(channel).filter(move |&other| part.channels[other].quantity == quantity)
     };
     quantities.iter().flat_map(of)
 }

@@ -4,14 +4,14 @@
 //! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
 //! channels are taken where both have a sample.
 
-use crate::parallel::in_parallel;
+use crate::parallel::{in_parallel, per_channel};
 use crate::preprocessing::{Exclusion, Preprocessing};
 use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::streamed_curves::STEPS_PER_COUNT;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
 use allan_core::{Cascade, Coupling, Covariance, Curve};
-use measurement::{ChannelProfile, MeasuredChannel, Measurement};
+use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel};
 use nalgebra::DMatrix;
 
 /// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
@@ -20,17 +20,24 @@ pub(crate) struct CoupledEstimators {
     cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
     /// Samples that are missing in each channel since its last one.
     missing: Vec<u32>,
-    /// Of channel `i` with channel `j < i`, at index `i·(i−1)/2 + j`.
-    couplings: Vec<Coupling<OCTAVES>>,
+    couplings: Vec<CoupledPair>,
+}
+
+/// The covariance of two channels, by their positions.
+#[derive(Clone)]
+struct CoupledPair {
+    channels: [usize; 2],
+    coupling: Coupling<OCTAVES>,
 }
 
 impl CoupledEstimators {
-    /// Estimators of so many channels, of which the first `coupled` have a covariance with each other.
-    pub(crate) fn new(channels: usize, coupled: usize) -> Self {
+    /// Estimators of so many channels, of which those at the positions `coupled` have a covariance with each other.
+    pub(crate) fn new(channels: usize, coupled: &[usize]) -> Self {
+        let pairs = coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]));
         Self {
             cascades: vec![Cascade::new(); channels],
             missing: vec![0; channels],
-            couplings: vec![Coupling::new(); coupled * coupled.saturating_sub(1) / 2],
+            couplings: pairs.map(|channels| CoupledPair { channels, coupling: Coupling::new() }).collect(),
         }
     }
 
@@ -45,13 +52,10 @@ impl CoupledEstimators {
                 None => *missing = missing.saturating_add(1),
             }
         }
-        let mut couplings = self.couplings.iter_mut();
-        for (at, a) in self.cascades.iter().enumerate() {
-            for ((b, other), coupling) in self.cascades[..at].iter().zip(&self.missing).zip(&mut couplings) {
-                // Products are taken where both channels have a sample.
-                if self.missing[at] == 0 && *other == 0 {
-                    coupling.observe(a, b);
-                }
+        for CoupledPair { channels: [a, b], coupling } in &mut self.couplings {
+            // Products are taken where both channels have a sample.
+            if self.missing[*a] == 0 && self.missing[*b] == 0 {
+                coupling.observe(&self.cascades[*a], &self.cascades[*b]);
             }
         }
     }
@@ -64,7 +68,7 @@ impl CoupledEstimators {
     /// The estimators of these samples followed, after a gap, by those of `later`.
     pub(crate) fn followed_by(mut self, later: &Self) -> Self {
         self.cascades.iter_mut().zip(&later.cascades).for_each(|(cascade, later)| cascade.merge(later));
-        self.couplings.iter_mut().zip(&later.couplings).for_each(|(coupling, later)| coupling.merge(later));
+        self.couplings.iter_mut().zip(&later.couplings).for_each(|(pair, later)| pair.coupling.merge(&later.coupling));
         self
     }
 
@@ -73,19 +77,18 @@ impl CoupledEstimators {
         &self.cascades[channel]
     }
 
-    /// Covariances of the second differences of all channels at one octave, up to a common factor; `None` where the octave
-    /// has no differences.
+    /// Covariances of the second differences of all channels at one octave, up to a common factor, 0 of channels that are not coupled;
+    /// `None` where the octave has no differences.
     pub(crate) fn covariances(&self, octave: usize) -> Option<DMatrix<f64>> {
         let mut covariances = DMatrix::zeros(self.cascades.len(), self.cascades.len());
-        let mut couplings = self.couplings.iter();
         for (i, cascade) in self.cascades.iter().enumerate() {
             let (squares, count) = cascade.sum_of_squares(octave).filter(|&(_, count)| count > 0)?;
             covariances[(i, i)] = squares as f64 / count as f64;
-            for (j, coupling) in (0..i).zip(&mut couplings) {
-                let (products, count) = coupling.sum_of_products(octave).filter(|&(_, count)| count > 0)?;
-                covariances[(i, j)] = products as f64 / count as f64;
-                covariances[(j, i)] = covariances[(i, j)];
-            }
+        }
+        for CoupledPair { channels: [i, j], coupling } in &self.couplings {
+            let (products, count) = coupling.sum_of_products(octave).filter(|&(_, count)| count > 0)?;
+            covariances[(*i, *j)] = products as f64 / count as f64;
+            covariances[(*j, *i)] = covariances[(*i, *j)];
         }
         Some(covariances)
     }
@@ -94,11 +97,10 @@ impl CoupledEstimators {
 /// Estimators of one half of a recording, or of both halves, in physical units.
 #[derive(Clone)]
 pub(crate) struct RecordPart {
-    /// In the order of all positions.
-    pub channels: Vec<ChannelProfile>,
+    pub channels: PerChannel<ChannelProfile>,
     estimators: CoupledEstimators,
-    /// Smallest distance of two values by channel, in its unit: one count, or several.
-    resolutions: Vec<f64>,
+    /// Smallest distance of two values, in the channel's unit: one count, or several.
+    resolutions: PerChannel<f64>,
     period_s: f64,
     shorter: Option<ShorterCurves>,
 }
@@ -109,14 +111,14 @@ struct ShorterCurves {
     samples_per_mean: u64,
     /// Averaging factor from which on the estimators are used, samples.
     until: u64,
-    /// By channel, with the samples that were replaced.
-    curves: Vec<(Curve<OCTAVES>, u64)>,
+    /// With the samples that were replaced.
+    curves: PerChannel<(Curve<OCTAVES>, u64)>,
 }
 
 /// The curves of the recording as measured, and the estimators of its halves.
 pub(crate) struct RecordEstimators {
-    /// Of the recording as measured, without preprocessing, in the order of its channels.
-    pub measured: Vec<Curve<OCTAVES>>,
+    /// Of the recording as measured, without preprocessing.
+    pub measured: PerChannel<Curve<OCTAVES>>,
     /// The halves with spikes and knocks.
     pub raw: [RecordPart; 2],
     /// The halves without what the rules of the first half exclude.
@@ -126,12 +128,12 @@ pub(crate) struct RecordEstimators {
 }
 
 impl RecordEstimators {
-    /// Estimates from `measurement`, or where that has means from them and from the `shorter` averaging times. The channels of
-    /// each part are `coupled`, then all others that were recorded.
+    /// Estimates from `measurement`, or where that has means from them and from the `shorter` averaging times, with the covariances of
+    /// the channels `coupled`.
     pub(crate) fn estimate(
         measurement: &Measurement,
         shorter: Option<&ShorterTimes>,
-        coupled: &[ChannelProfile],
+        coupled: &[ChannelId],
         preprocessing: &Preprocessing,
     ) -> Self {
         let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
@@ -156,7 +158,7 @@ impl RecordEstimators {
                 .map(|(half, part)| part.with_shorter(shorter, exclusion, |of| of.half(half, exclusion)))
         };
         Self {
-            measured: shorter.channels.iter().map(|channel| channel.measured.clone()).collect(),
+            measured: shorter.channels.map(|channel| channel.measured.clone()),
             raw: halves(raw, Exclusion::None),
             ruled: halves(ruled, Exclusion::ByFirstHalf),
             both: both.with_shorter(shorter, Exclusion::ByWhole, |of| of.both(Exclusion::ByWhole)),
@@ -165,8 +167,9 @@ impl RecordEstimators {
 }
 
 /// The curves of all channels as measured.
-fn measured(measurement: &Measurement) -> Vec<Curve<OCTAVES>> {
-    let curve = |channel: &MeasuredChannel| {
+fn measured(measurement: &Measurement) -> PerChannel<Curve<OCTAVES>> {
+    per_channel(measurement.ids(), |id| {
+        let channel = &measurement[id];
         let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
         let mut missing = 0_u32;
         for (position, &count) in channel.counts.iter().enumerate() {
@@ -179,30 +182,27 @@ fn measured(measurement: &Measurement) -> Vec<Curve<OCTAVES>> {
             estimator.push(count);
         }
         estimator.curve(measurement.period_s()).scaled(channel.profile.lsb)
-    };
-    in_parallel(&measurement.channels, curve)
+    })
 }
 
 /// The estimators of a half of a recording, by time, without the samples of `exclusion`.
 fn half(
     measurement: &Measurement,
-    coupled: &[ChannelProfile],
+    coupled: &[ChannelId],
     preprocessing: &Preprocessing,
     exclusion: Exclusion,
     half: Half,
 ) -> RecordPart {
-    let others = measurement.profiles().filter(|channel| !coupled.contains(channel));
-    let channels: Vec<ChannelProfile> = coupled.iter().copied().chain(others).collect();
-    let resolutions =
-        channels.iter().map(|channel| f64::from(preprocessing.counts_per_step(*channel)) * channel.lsb).collect();
-    let mut estimators = CoupledEstimators::new(channels.len(), coupled.len());
-    let recorded: Vec<RecordedSamples> = channels
-        .iter()
-        .filter_map(|channel| {
-            let of = measurement.channel(channel)?;
-            let excluded = preprocessing.excluded(*channel, exclusion);
-            let is_corrected = preprocessing.corrects(*channel, exclusion);
-            Some(RecordedSamples { channel: of, is_excluded: positions(measurement, of, &excluded), is_corrected })
+    let resolution = |channel| f64::from(preprocessing.counts_per_step(channel)) * measurement[channel].profile.lsb;
+    let coupled: Vec<usize> = coupled.iter().map(|channel| channel.position()).collect();
+    let mut estimators = CoupledEstimators::new(measurement.channels.len(), &coupled);
+    let recorded: Vec<RecordedSamples> = measurement
+        .ids()
+        .map(|id| {
+            let channel = &measurement[id];
+            let excluded = preprocessing.excluded(id, exclusion);
+            let is_corrected = preprocessing.corrects(id, exclusion);
+            RecordedSamples { id, channel, is_excluded: positions(measurement, channel, &excluded), is_corrected }
         })
         .collect();
     let middle = measurement.middle();
@@ -222,12 +222,18 @@ fn half(
                 if !of.is_corrected {
                     return steps as i32;
                 }
-                let profile = of.channel.profile;
-                (steps - STEPS_PER_COUNT * preprocessing.offset(profile, exclusion, slot) / profile.lsb).round() as i32
+                let offset = preprocessing.offset(of.id, exclusion, slot);
+                (steps - STEPS_PER_COUNT * offset / of.channel.profile.lsb).round() as i32
             })
         }));
     }
-    RecordPart { channels, estimators, resolutions, period_s: measurement.period_s(), shorter: None }
+    RecordPart {
+        channels: measurement.profiles().collect(),
+        estimators,
+        resolutions: measurement.ids().map(resolution).collect(),
+        period_s: measurement.period_s(),
+        shorter: None,
+    }
 }
 
 /// A half of a recording, by time.
@@ -239,6 +245,7 @@ enum Half {
 
 /// A channel's samples, and whether each is left out.
 struct RecordedSamples<'a> {
+    id: ChannelId,
     channel: &'a MeasuredChannel,
     is_excluded: Vec<bool>,
     /// Whether an offset is subtracted from any of them.
@@ -259,10 +266,16 @@ fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u
 }
 
 impl RecordPart {
-    /// Of one channel, whose estimator has counts of [`STEPS_PER_COUNT`] steps.
-    pub(crate) fn of_channel(channel: ChannelProfile, cascade: Cascade<OCTAVES, OVERLAP>, period_s: f64) -> Self {
-        let estimators = CoupledEstimators { cascades: vec![cascade], missing: vec![0], couplings: Vec::new() };
-        Self { channels: vec![channel], estimators, resolutions: vec![channel.lsb], period_s, shorter: None }
+    /// Of channels whose estimators have counts of [`STEPS_PER_COUNT`] steps.
+    pub(crate) fn new(
+        channels: PerChannel<ChannelProfile>,
+        cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
+        period_s: f64,
+    ) -> Self {
+        let missing = vec![0; cascades.len()];
+        let estimators = CoupledEstimators { cascades, missing, couplings: Vec::new() };
+        let resolutions = channels.map(|channel| channel.lsb);
+        Self { channels, estimators, resolutions, period_s, shorter: None }
     }
 
     /// The part with the curves of `shorter` at averaging times that are too short for its own samples, which are means.
@@ -272,12 +285,8 @@ impl RecordPart {
         exclusion: Exclusion,
         curve: impl Fn(&ShorterTimesOfChannel) -> Curve<OCTAVES>,
     ) -> Self {
-        let of = |channel: &ChannelProfile| {
-            let of = shorter.of(*channel)?;
-            Some((of.resolution, (curve(of), of.replaced(exclusion))))
-        };
-        let (resolutions, curves) =
-            self.channels.iter().map(|channel| of(channel).unwrap_or((channel.lsb, (Curve::empty(), 0)))).unzip();
+        let curves = shorter.channels.map(|of| (curve(of), of.replaced(exclusion)));
+        let resolutions = shorter.channels.map(|of| of.resolution);
         let shorter = ShorterCurves { samples_per_mean: shorter.samples_per_mean, until: shorter.until(), curves };
         Self { resolutions, shorter: Some(shorter), ..self }
     }
@@ -292,14 +301,19 @@ impl RecordPart {
         self.shorter.as_ref().map_or(1, |shorter| shorter.until)
     }
 
-    /// Position of a channel.
-    pub(crate) fn position(&self, channel: ChannelProfile) -> Option<usize> {
-        self.channels.iter().position(|of| *of == channel)
+    /// Channels whose covariance with `channel` is known, in their order.
+    pub(crate) fn coupled_with(&self, channel: ChannelId) -> impl Iterator<Item = ChannelId> {
+        self.channels.ids().filter(move |&other| other != channel && self.pair(channel, other).is_some())
     }
 
-    /// Allan variances of the channel at a position, in its unit squared.
-    pub(crate) fn curve(&self, channel: usize) -> Curve<OCTAVES> {
-        let own = self.estimators.cascade(channel).curve(self.period_s).scaled(self.step_size(channel));
+    fn pair(&self, a: ChannelId, b: ChannelId) -> Option<&CoupledPair> {
+        let [a, b] = [a, b].map(ChannelId::position);
+        self.estimators.couplings.iter().find(|pair| pair.channels == [a, b] || pair.channels == [b, a])
+    }
+
+    /// Allan variances of a channel, in its unit squared.
+    pub(crate) fn curve(&self, channel: ChannelId) -> Curve<OCTAVES> {
+        let own = self.estimators.cascade(channel.position()).curve(self.period_s).scaled(self.step_size(channel));
         match &self.shorter {
             None => own,
             Some(shorter) => {
@@ -308,30 +322,23 @@ impl RecordPart {
         }
     }
 
-    /// Samples of the channel at a position that were replaced because they are missing.
-    pub(crate) fn replaced(&self, channel: usize) -> u64 {
-        if let Some(shorter) = &self.shorter {
-            return shorter.curves[channel].1;
+    /// Samples of a channel that were replaced because they are missing.
+    pub(crate) fn replaced(&self, channel: ChannelId) -> u64 {
+        match &self.shorter {
+            Some(shorter) => shorter.curves[channel].1,
+            None => self.estimators.cascade(channel.position()).replaced(),
         }
-        let cascade = self.estimators.cascade(channel);
-        let sums = (0..OCTAVES).filter_map(|octave| cascade.octave_sums(octave));
-        sums.map(|sums| u64::from(sums.interpolation.replaced())).sum()
     }
 
-    /// Smallest distance of two values of the channel at a position, in its unit.
-    pub(crate) fn resolution(&self, channel: usize) -> f64 {
+    /// Smallest distance of two values of a channel, in its unit.
+    pub(crate) fn resolution(&self, channel: ChannelId) -> f64 {
         self.resolutions[channel]
     }
 
-    /// Smallest distance of two values of a channel, in its unit; 0 of a channel that was not recorded.
-    pub(crate) fn resolution_of(&self, channel: ChannelProfile) -> f64 {
-        self.position(channel).map_or(0.0, |position| self.resolution(position))
-    }
-
-    /// Allan covariances of two coupled channels, in the product of their units.
-    pub(crate) fn covariance(&self, a: usize, b: usize) -> CovarianceCurve<OCTAVES> {
-        let (high, low) = (a.max(b), a.min(b));
-        let mut points = self.estimators.couplings[high * (high - 1) / 2 + low].points();
+    /// Allan covariances of two channels, in the product of their units; none of channels that are not coupled.
+    pub(crate) fn covariance(&self, a: ChannelId, b: ChannelId) -> CovarianceCurve<OCTAVES> {
+        let Some(pair) = self.pair(a, b) else { return CovarianceCurve::new() };
+        let mut points = pair.coupling.points();
         points.iter_mut().for_each(|point| point.covariance *= self.step_size(a) * self.step_size(b));
         if let Some(shorter) = &self.shorter {
             let in_samples = |point: &Covariance| Covariance { n: point.n * shorter.samples_per_mean, ..*point };
@@ -341,7 +348,7 @@ impl RecordPart {
     }
 
     /// Physical size of 1 in what the estimators take.
-    fn step_size(&self, channel: usize) -> f64 {
+    fn step_size(&self, channel: ChannelId) -> f64 {
         self.channels[channel].lsb / STEPS_PER_COUNT
     }
 }

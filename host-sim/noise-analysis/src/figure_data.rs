@@ -9,7 +9,7 @@ use crate::spectra::Welch;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
-use measurement::{ChannelProfile, DataSheetNoise, Measurement, Quantity};
+use measurement::{ChannelId, DataSheetNoise, Measurement, Quantity};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 
@@ -37,17 +37,17 @@ const DIGITS: usize = 6;
 pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<&Measurement>) {
     let period_s = report.sample_rate_hz.recip();
     let stages = if report.part.filter.as_deref() == Some("moving_average") { 1 } else { 2 };
-    let recorded: Vec<(ChannelProfile, &ChannelReport)> = measurement.profiles().zip(&report.channels).collect();
-    let mut data = in_parallel(&recorded, |(profile, channel)| {
-        let series = Series::from_measurement(measurement, profile);
+    let recorded: Vec<(ChannelId, &ChannelReport)> = measurement.ids().zip(&report.channels).collect();
+    let mut data = in_parallel(&recorded, |&(id, channel)| {
+        let profile = &measurement[id].profile;
+        let series = Series::from_measurement(measurement, id);
         FigureData {
             data_sheet: data_sheet(&profile.data_sheet),
             spectrum: {
                 let model = |frequency: f64| model_density(&channel.refitted.terms, stages, frequency, period_s);
                 let own = spectrum(&UniformSeries::from_series(&series), model);
                 let faster = first.and_then(|first| {
-                    let channel = first.channels.iter().find(|channel| channel.profile.name == profile.name)?;
-                    let series = Series::from_measurement(first, &channel.profile);
+                    let series = Series::from_measurement(first, first.named(profile.name)?);
                     spectrum(&UniformSeries::from_series(&series), model)
                 });
                 with_faster(own, faster, measurement.sample_rate_hz)

@@ -7,23 +7,22 @@ use crate::covariates::CovariateFit;
 use crate::detectors::bias;
 use crate::estimators::RecordPart;
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
-use crate::parallel::in_parallel;
+use crate::parallel::per_channel;
 use crate::preprocessing::Exclusion;
 use crate::report::{ModelErrorReport, ModelReport, term_reports};
 use crate::series::Series;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectral_lines::{MergedLine, fit_with_lines};
-use crate::traced_record::{TracedRecord, agree_on_filter};
+use crate::traced_record::{Condensed, TracedRecord, agree_on_filter};
 use crate::uniform_series::UniformSeries;
 use allan_core::{Curve, Model};
-use measurement::ChannelProfile;
+use measurement::{ChannelId, PerChannel};
 
 /// The models of every channel by the first half alone.
 pub(crate) struct FirstHalf {
-    /// In the order of the measurement's channels.
-    pub channels: Vec<FirstHalfFit>,
+    pub channels: PerChannel<FirstHalfFit>,
     /// The series of [`TracedRecord::series`] without what the rules of the first half exclude, in both halves.
-    series: Vec<Series>,
+    series: PerChannel<Series>,
 }
 
 /// The models of one channel by the first half alone.
@@ -44,16 +43,17 @@ impl FirstHalf {
     pub(crate) fn fit(record: &TracedRecord) -> Self {
         let series = record.series_without(Exclusion::ByFirstHalf);
         let middle = record.measurement.middle();
-        let halves: Vec<Series> = series.iter().map(|series| series.before(middle)).collect();
-        let mut channels =
-            in_parallel(&record.channels, |trace| match record.traced.iter().position(|of| *of == trace.channel) {
-                Some(own) => FirstHalfFit::trace(record, own, &series, &halves),
-                None => FirstHalfFit::baseline(record, trace.channel),
-            });
-        let fits = record.channels.iter().zip(&mut channels).map(|(trace, of)| (trace.channel, &mut of.fit));
-        let traced = fits.filter(|(channel, _)| record.traced.contains(channel));
+        let halves = series.map(|series| series.before(middle));
+        let mut channels = per_channel(record.channels.ids(), |channel| {
+            if record.is_traced(channel) {
+                FirstHalfFit::trace(record, channel, &series, &halves)
+            } else {
+                FirstHalfFit::baseline(record, channel)
+            }
+        });
+        let fits = record.channels.ids().zip(channels.iter_mut().map(|of| &mut of.fit));
         // The filter of the whole record is the one that is reported.
-        let _of_first_half = agree_on_filter(record.measurement, &record.estimators, traced);
+        let _of_first_half = agree_on_filter(record.measurement, &record.estimators, fits);
         for FirstHalfFit { fit, slowest, lines, .. } in &mut channels {
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
@@ -62,77 +62,73 @@ impl FirstHalf {
         Self { channels, series }
     }
 
-    /// How the noise of each traced channel changes, in the order of the traced channels.
-    pub(crate) fn nonstationarities(&self, record: &TracedRecord) -> Vec<Option<Nonstationarity>> {
-        let fits = record.channels.iter().zip(&self.channels);
-        let fit_of = |profile: &ChannelProfile| fits.clone().find(|(trace, _)| trace.channel == *profile);
-        let channels: Vec<TracedChannel> = record
-            .traced
-            .iter()
-            .zip(&self.series)
-            .filter_map(|(profile, series)| {
-                let (_, half) = fit_of(profile)?;
-                Some(TracedChannel {
-                    name: profile.name,
-                    series,
-                    shorter: record.condensed.and_then(|of| Some((of.shorter, of.shorter.of(*profile)?))),
-                    epochs: half.epochs.as_ref(),
-                    baseline: &half.fit.trace.before,
-                    model: &half.fit.trace.after,
-                })
-            })
-            .collect();
-        let positions: Vec<usize> = (0..channels.len()).collect();
-        in_parallel(&positions, |&position| nonstationarity::describe(&channels, position))
+    /// How the noise of each traced channel changes.
+    pub(crate) fn nonstationarities(&self, record: &TracedRecord) -> PerChannel<Option<Nonstationarity>> {
+        let traced: Vec<ChannelId> = record.measurement.inertial().collect();
+        let of = |&channel: &ChannelId| {
+            let half = &self.channels[channel];
+            TracedChannel {
+                name: record.measurement[channel].profile.name,
+                series: &self.series[channel],
+                shorter: record.condensed.map(|of| (of.shorter, &of.shorter.channels[channel])),
+                epochs: half.epochs.as_ref(),
+                baseline: &half.fit.trace.before,
+                model: &half.fit.trace.after,
+            }
+        };
+        let channels: Vec<TracedChannel> = traced.iter().map(of).collect();
+        per_channel(record.channels.ids(), |channel| {
+            nonstationarity::describe(&channels, traced.iter().position(|of| *of == channel)?)
+        })
     }
 }
 
 impl FirstHalfFit {
     /// The baseline model alone.
-    fn baseline(record: &TracedRecord, channel: ChannelProfile) -> Self {
-        let estimators = &record.estimators;
-        let position = estimators.both.position(channel).unwrap_or_default();
-        let fit = ChannelFit::fit_baseline(CovariateFit::estimate(&estimators.ruled[0], position, false, |_| None));
+    fn baseline(record: &TracedRecord, channel: ChannelId) -> Self {
+        let covariates = CovariateFit::estimate(&record.estimators.ruled[0], channel, false, |_| None);
+        let fit = ChannelFit::fit_baseline(covariates);
         Self { raw: fit.trace.before.clone(), fit, slowest: None, lines: Vec::new(), epoch_curves: None, epochs: None }
     }
 
-    /// The baseline model and what it lacks, of the channel of `series[own]`; `halves` are the first halves of `series`.
-    fn trace(record: &TracedRecord, own: usize, series: &[Series], halves: &[Series]) -> Self {
+    /// The baseline model and what it lacks; `halves` are the first halves of `series`.
+    fn trace(
+        record: &TracedRecord,
+        channel: ChannelId,
+        series: &PerChannel<Series>,
+        halves: &PerChannel<Series>,
+    ) -> Self {
         let (estimators, preprocessing) = (&record.estimators, &record.preprocessing);
-        let channel = record.traced[own];
-        // Temperature and supply in the first half.
-        let (slow, slow_halves): (Vec<ChannelProfile>, Vec<&Series>) = estimators
-            .both
-            .channels
-            .iter()
-            .zip(halves)
-            .filter(|(regressor, _)| regressor.quantity.is_environment())
-            .map(|(regressor, series)| (*regressor, series))
-            .unzip();
-        let bias_changes = bias::find(&halves[own], &slow_halves, &[], &record.noise_grids);
-        let sensitivity = |regressor: ChannelProfile| {
+        let quantity = |of: ChannelId| record.measurement[of].profile.quantity;
+        let slow: Vec<ChannelId> = halves.ids().filter(|&of| quantity(of).is_environment()).collect();
+        let slow_halves: Vec<&Series> = slow.iter().map(|&of| &halves[of]).collect();
+        let own = &halves[channel];
+        let bias_changes = bias::find(own, &slow_halves, &[], &record.noise_grids);
+        let sensitivity = |regressor: ChannelId| {
             let is_of = |(number, _): &&(usize, bias::BiasSensitivity)| slow[*number] == regressor;
             bias_changes.sensitivities.iter().find(is_of).map(|(_, followed)| *followed)
         };
         let has_ramp = preprocessing.has_ramp(channel);
-        let has_rules = estimators.both.channels.iter().any(|of| record.has_rules(*of));
+        let has_rules = halves.ids().any(|of| record.has_rules(of));
         let raw = has_rules.then(|| {
-            let raw = CovariateFit::estimate(&estimators.raw[0], own, has_ramp, sensitivity);
+            let raw = CovariateFit::estimate(&estimators.raw[0], channel, has_ramp, sensitivity);
             ChannelFit::fit_baseline(raw).trace.before
         });
-        let covariates = CovariateFit::estimate(&estimators.ruled[0], own, has_ramp, sensitivity);
-        let followed = covariates.compensated_series(&series[own], series);
+        let covariates = CovariateFit::estimate(&estimators.ruled[0], channel, has_ramp, sensitivity);
+        let followed = covariates.compensated_series(&series[channel], series);
         let middle = record.measurement.middle();
-        let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&series[own]), middle);
+        let epoch_curves = EpochCurves::from_series(followed.as_ref().unwrap_or(&series[channel]), middle);
         let epoch_curves = match record.condensed {
-            Some(condensed) => epoch_curves.map(|curves| curves.in_samples(condensed.shorter, channel)),
+            Some(Condensed { shorter, .. }) => {
+                epoch_curves.map(|curves| curves.in_samples(shorter, &shorter.channels[channel]))
+            }
             None => epoch_curves,
         };
-        let rest = covariates.compensated_series(&halves[own], halves);
-        let faster = record.condensed.map(|condensed| condensed.faster_lines(record.measurement, channel));
-        let (fit, lines) = fit_with_lines(covariates, &halves[own], rest.as_ref(), &record.measurement.profile, faster);
+        let rest = covariates.compensated_series(own, halves);
+        let faster = record.condensed.map(|condensed| condensed.faster_lines[channel].as_slice());
+        let (fit, lines) = fit_with_lines(covariates, own, rest.as_ref(), &record.measurement.profile, faster);
         let raw = raw.unwrap_or_else(|| fit.trace.before.clone());
-        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(&halves[own]));
+        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         Self { raw, fit, slowest: CosineSpectrum::new(&rest), lines, epoch_curves, epochs: None }
     }
 
@@ -147,26 +143,23 @@ impl FirstHalfFit {
     }
 
     /// The error on the second half of the curve of the first half itself.
-    pub(crate) fn curve_error(&self, record: &TracedRecord, channel: ChannelProfile) -> ModelErrorReport {
-        let position = record.estimators.both.position(channel).unwrap_or_default();
-        let unseen = self.fit.covariates.compensated(&record.estimators.raw[1], position);
+    pub(crate) fn curve_error(&self, record: &TracedRecord, channel: ChannelId) -> ModelErrorReport {
+        let unseen = self.fit.covariates.compensated(&record.estimators.raw[1], channel);
         ModelErrorReport::of_curve(&self.fit.covariates.curve, &unseen, &self.fit.trace.after)
     }
 
     /// Whether the second half does not contradict the model with the added terms.
-    pub(crate) fn held(&self, record: &TracedRecord, channel: ChannelProfile) -> bool {
-        let position = record.estimators.both.position(channel).unwrap_or_default();
-        let unseen = self.fit.covariates.compensated(&record.estimators.ruled[1], position);
+    pub(crate) fn held(&self, record: &TracedRecord, channel: ChannelId) -> bool {
+        let unseen = self.fit.covariates.compensated(&record.estimators.ruled[1], channel);
         Contradiction::find(&self.fit.trace.after, &unseen).is_none()
     }
 
     /// The baseline model of the first half as it was recorded.
-    pub(crate) fn before(&self, record: &TracedRecord, channel: ChannelProfile, whole: &Curve<OCTAVES>) -> ModelReport {
+    pub(crate) fn before(&self, record: &TracedRecord, channel: ChannelId, whole: &Curve<OCTAVES>) -> ModelReport {
         let estimators = &record.estimators;
-        let position = estimators.both.position(channel).unwrap_or_default();
-        let error = |part: &RecordPart| ModelErrorReport::new(&self.raw, &part.curve(position));
+        let error = |part: &RecordPart| ModelErrorReport::new(&self.raw, &part.curve(channel));
         ModelReport {
-            terms: term_reports(&self.raw, channel.unit),
+            terms: term_reports(&self.raw, record.measurement[channel].profile.unit),
             adev: whole.points().iter().map(|point| self.raw.avar(point.n).sqrt()).collect(),
             fitted: error(&estimators.raw[0]),
             unseen: error(&estimators.raw[1]),
@@ -179,17 +172,16 @@ impl FirstHalfFit {
     pub(crate) fn after(
         &self,
         record: &TracedRecord,
-        channel: ChannelProfile,
+        channel: ChannelId,
         whole: &Curve<OCTAVES>,
-        avar_of: impl Fn(ChannelProfile, u64) -> Option<f64>,
+        avar_of: impl Fn(ChannelId, u64) -> Option<f64>,
     ) -> ModelReport {
         let estimators = &record.estimators;
-        let position = estimators.both.position(channel).unwrap_or_default();
         let (model, covariates) = (&self.fit.trace.after, &self.fit.covariates);
-        let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, position));
+        let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, channel));
         ModelReport {
-            terms: term_reports(model, channel.unit),
-            adev: self.fit.deviations(&estimators.both, position, whole, avar_of),
+            terms: term_reports(model, record.measurement[channel].profile.unit),
+            adev: self.fit.deviations(&estimators.both, channel, whole, avar_of),
             fitted: ModelErrorReport::new(model, self.fit.fitted_curve()),
             unseen: unseen(&estimators.raw[1]),
             unseen_excluding: record.has_rules(channel).then(|| unseen(&estimators.ruled[1])),

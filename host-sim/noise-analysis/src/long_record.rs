@@ -29,7 +29,9 @@ use crate::spectra::stacked_spectrum::StackedSpectrum;
 use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
 use crate::traced_record::Condensed;
-use measurement::{ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, lost_part};
+use measurement::{
+    ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, RecordingDescription, SampleBlock, lost_part,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Samples of the longest recording that is analysed without being condensed.
@@ -82,9 +84,9 @@ struct FastFindings {
 }
 
 impl FastFindings {
-    /// Of the channel with this profile, and with that of `first` among the first samples, of which `shown` is known.
-    fn new(profile: &ChannelProfile, first: Option<ChannelProfile>, shown: &SampleEffects) -> Self {
-        let traced = first.filter(|of| of.quantity.is_inertial());
+    /// Of the channel with this profile, which is `first` among the first samples, of which `shown` is known.
+    fn new(profile: &ChannelProfile, first: Option<ChannelId>, shown: &SampleEffects) -> Self {
+        let traced = first.filter(|_| profile.quantity.is_inertial());
         let all = traced.into_iter().flat_map(|of| shown.recording.iter().chain(shown.of(of)));
         let effects = all.map(|detection| &detection.effect);
         Self {
@@ -140,14 +142,14 @@ pub struct LongRecord {
     /// Means of [`ShorterTimes::samples_per_mean`] samples each.
     pub(crate) means: Measurement,
     pub(crate) shorter: ShorterTimes,
-    /// Of each channel, the lines that the means do not show.
-    pub(crate) faster_lines: Vec<Vec<MergedLine>>,
+    /// The lines that the means do not show.
+    pub(crate) faster_lines: PerChannel<Vec<MergedLine>>,
     /// Of each channel, what only the samples themselves show.
     pub(crate) effects: Vec<Vec<Effect>>,
     /// The same of the first half of the recording, as far as it is known.
     pub(crate) effects_of_first_half: Vec<Vec<Effect>>,
-    /// Of each channel, the samples that are refused in it alone, by cause.
-    pub(crate) refused: Vec<BTreeMap<&'static str, u64>>,
+    /// The samples that are refused in a channel alone, by cause.
+    pub(crate) refused: PerChannel<BTreeMap<&'static str, u64>>,
 }
 
 impl From<&Measurement> for LongRecord {
@@ -183,10 +185,8 @@ impl LongRecordReader {
         let halves = [means / 2 / 2, means / 2].map(|start| start * samples_per_mean);
         let epochs: Vec<u64> = epoch_starts(means).map(|start| start * samples_per_mean).collect();
         // The same channels, of which the size of a count may be another one.
-        let of_first: Vec<Option<ChannelProfile>> =
-            description.channels.iter().map(|of| first.profiles().find(|first| first.name == of.name)).collect();
-        let traced: Vec<ChannelProfile> = first.profiles().filter(|of| of.quantity.is_inertial()).collect();
-        let shown = SampleEffects::detect(&first, &traced);
+        let of_first: Vec<Option<ChannelId>> = description.channels.iter().map(|of| first.named(of.name)).collect();
+        let shown = SampleEffects::detect(&first);
         let fast: Vec<FastFindings> = description
             .channels
             .iter()
@@ -194,10 +194,10 @@ impl LongRecordReader {
             .map(|(of, first)| FastFindings::new(of, *first, &shown))
             .collect();
         let repeated = shown.repeated();
-        let rules = in_parallel(&of_first, |first_profile| {
-            let profile = first_profile.filter(|of| of.quantity.is_inertial() && !shown.is_saturated(*of))?;
-            let series =
-                Series::from_measurement(&first, &profile).with_counts_per_step(shown.counts_per_step(profile));
+        let rules = in_parallel(&of_first, |of_first| {
+            let is_screened = |of: &ChannelId| first[*of].profile.quantity.is_inertial() && !shown.is_saturated(*of);
+            let channel = of_first.filter(is_screened)?;
+            let series = Series::from_measurement(&first, channel).with_counts_per_step(shown.counts_per_step(channel));
             SpikeRule::fit_for(&series.without(&repeated), description.samples)
         });
         let screen = SampleScreen::new(&description.channels, rules, !repeated.is_empty());
@@ -206,9 +206,9 @@ impl LongRecordReader {
             stacked: StackedSpectrum::new(period_s, STRETCH_PERIODS as usize, fast.resolution),
             epochs: EpochSpectra::new(period_s, &epochs),
         };
-        let channel = |(profile, fast): (&ChannelProfile, &FastFindings)| {
-            let at_first = first.channels.iter().find(|channel| channel.profile.name == profile.name);
-            let largest = at_first.iter().flat_map(|channel| &channel.counts).map(|count| count.unsigned_abs()).max();
+        let channel = |((profile, fast), of_first): ((&ChannelProfile, &FastFindings), &Option<ChannelId>)| {
+            let counts = of_first.iter().flat_map(|&of| &first[of].counts);
+            let largest = counts.map(|count| count.unsigned_abs()).max();
             LongChannel {
                 recorded: StreamedCurves::new(&halves),
                 screened: StreamedCurves::new(&epochs),
@@ -217,7 +217,7 @@ impl LongRecordReader {
                 spectra: profile.quantity.is_inertial().then(|| spectra(fast)),
             }
         };
-        let channels = description.channels.iter().zip(&fast).map(channel).collect();
+        let channels = description.channels.iter().zip(&fast).zip(&of_first).map(channel).collect();
         let [_, middle] = halves;
         Self { description, first, samples_per_mean, middle, screen, channels, fast, last: None, gaps: 0 }
     }
@@ -259,27 +259,22 @@ impl LongRecordReader {
             of_first_half.map(|spikes| spikes.map(|found| found.effect).into_iter().collect()).collect();
         let refused = channels.iter().map(|of| of.screened.refused.clone()).collect();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
-        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
-        let all = channels.into_iter().zip(fast).zip(description.channels.iter().zip(&means.channels));
-        let shorter =
-            |((channel, fast), (profile, mean)): ((LongChannel, FastFindings), (&ChannelProfile, &MeasuredChannel))| {
-                let parts =
-                    |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
-                ShorterTimesOfChannel {
-                    profile: mean.profile,
-                    resolution: fast.resolution,
-                    measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
-                    recorded: parts(&channel.recorded),
-                    screened: parts(&channel.screened),
-                    middle,
-                    spectra: channel
-                        .spectra
-                        .map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
-                    is_screened: channel.screened.refused != channel.recorded.refused,
-                    period_s,
-                    lsb: profile.lsb,
-                }
-            };
+        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean)).into();
+        let all = channels.into_iter().zip(fast).zip(&description.channels);
+        let shorter = |((channel, fast), profile): ((LongChannel, FastFindings), &ChannelProfile)| {
+            let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
+            ShorterTimesOfChannel {
+                resolution: fast.resolution,
+                measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
+                recorded: parts(&channel.recorded),
+                screened: parts(&channel.screened),
+                middle,
+                spectra: channel.spectra.map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
+                is_screened: channel.screened.refused != channel.recorded.refused,
+                period_s,
+                lsb: profile.lsb,
+            }
+        };
         let shorter = ShorterTimes { samples_per_mean, channels: all.map(shorter).collect() };
         LongRecord { description, first, means, shorter, faster_lines, effects, effects_of_first_half, refused }
     }

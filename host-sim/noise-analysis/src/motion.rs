@@ -13,7 +13,7 @@ use crate::distributions::quantile;
 use crate::findings::{Effect, Parameter, SIGNIFICANCE};
 use crate::report::Stretch;
 use crate::series::Series;
-use measurement::ChannelProfile;
+use measurement::{ChannelId, ChannelProfile, PerChannel, Quantity};
 use std::ops::Range;
 
 /// Length of a mean, s.
@@ -30,6 +30,7 @@ const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// The motion of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlatformMotion {
+    quantity: Quantity,
     /// Numbers of the seconds in which the channel is moved, in ascending order.
     seconds: Vec<Range<usize>>,
     /// Whether the channel changes faster than a Gaussian process would.
@@ -83,7 +84,8 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
         ("to", exact(to, BLOCK_S, "s")),
         ("size", exact(largest, channel.initial_bias_error?, channel.unit)),
     ];
-    Some(PlatformMotion { seconds, is_sudden: is_sudden(&means), effect: Effect::new("motion", parameters, evidence) })
+    let effect = Effect::new("motion", parameters, evidence);
+    Some(PlatformMotion { quantity: channel.quantity, seconds, is_sudden: is_sudden(&means), effect })
 }
 
 /// Whether one of the changes within three seconds is larger than chance has one in a Gaussian process of their median size.
@@ -99,20 +101,22 @@ fn is_sudden(means: &[Option<f64>]) -> bool {
 /// Those of the `motions` of all channels that are of the platform. `distance_of_levels` is that of the levels of the random telegraph
 /// noise of a channel.
 pub(crate) fn of_platform(
-    motions: Vec<(ChannelProfile, PlatformMotion)>,
-    distance_of_levels: impl Fn(ChannelProfile) -> Option<f64>,
-) -> Vec<(ChannelProfile, PlatformMotion)> {
-    let is_of_platform = |(channel, motion): &(ChannelProfile, PlatformMotion)| {
-        let others = motions.iter().filter(|(other, _)| other != channel && other.quantity == channel.quantity);
-        let is_shared = others.clone().any(|(_, other)| motion.overlaps(other));
+    motions: PerChannel<Option<PlatformMotion>>,
+    distance_of_levels: impl Fn(ChannelId) -> Option<f64>,
+) -> PerChannel<Option<PlatformMotion>> {
+    let is_of_platform = |(channel, motion): (ChannelId, &PlatformMotion)| {
+        let others = motions.with_ids().filter(|(other, _)| *other != channel).filter_map(|(_, other)| other.as_ref());
+        let is_shared = others.filter(|other| other.quantity == motion.quantity).any(|other| motion.overlaps(other));
         let is_telegraph = || {
             let size = &motion.effect.parameters["size"];
-            distance_of_levels(*channel).is_some_and(|distance| size.low.abs().min(size.high.abs()) < distance)
+            distance_of_levels(channel).is_some_and(|distance| size.low.abs().min(size.high.abs()) < distance)
         };
         is_shared || (motion.is_sudden && !is_telegraph())
     };
-    let kept: Vec<bool> = motions.iter().map(is_of_platform).collect();
-    motions.into_iter().zip(kept).filter_map(|(motion, is_kept)| is_kept.then_some(motion)).collect()
+    let kept = |(channel, motion): (ChannelId, &Option<PlatformMotion>)| {
+        motion.as_ref().filter(|motion| is_of_platform((channel, motion))).cloned()
+    };
+    motions.with_ids().map(kept).collect()
 }
 
 impl PlatformMotion {
@@ -147,6 +151,7 @@ mod tests {
     use super::{at_rest, find, of_platform};
     use crate::report::Stretch;
     use crate::series::Series;
+    use measurement::PerChannel;
     use measurement::adis16405::profile;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -172,7 +177,7 @@ mod tests {
     #[test]
     fn a_drift_that_goes_far_in_one_channel_is_no_motion() {
         let profile = profile(0.05);
-        let [x, y] = ["accl_x", "accl_y"].map(|name| profile.channel(name).unwrap());
+        let x = profile.channel("accl_x").unwrap();
         for seed in 0..10 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             // A process of deviation 0.1 g with a time constant of 10 s over 1000 s leaves its median by 0.15 g many times.
@@ -183,16 +188,16 @@ mod tests {
                 state
             });
             let found = find(&drift, &x).expect("goes far");
-            let alone = of_platform(vec![(x, found.clone())], |_| None);
-            assert!(alone.is_empty(), "{seed}: {alone:?}");
-            let both = vec![(x, found.clone()), (y, found)];
+            let alone = of_platform(PerChannel::from(vec![Some(found.clone()), None]), |_| None);
+            assert_eq!(alone, PerChannel::from(vec![None, None]), "{seed}");
+            let both = PerChannel::from(vec![Some(found.clone()), Some(found)]);
             assert_eq!(of_platform(both.clone(), |_| None), both, "{seed}");
         }
         // A turn begins at once, and is one unless the channel jumps as far again and again.
-        let turn = vec![(x, find(&series(-0.7), &x).unwrap())];
+        let turn = PerChannel::from(vec![Some(find(&series(-0.7), &x).unwrap())]);
         assert_eq!(of_platform(turn.clone(), |_| None), turn);
         assert_eq!(of_platform(turn.clone(), |_| Some(0.3)), turn);
-        assert_eq!(of_platform(turn, |_| Some(0.7)), []);
+        assert_eq!(of_platform(turn, |_| Some(0.7)), PerChannel::from(vec![None]));
     }
 
     #[test]

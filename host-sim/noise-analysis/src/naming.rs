@@ -535,7 +535,7 @@ fn unexplained_band(line: &MergedLine, model: &Model, why: &str) -> Effect {
 /// Drift that `channel` has in common with others.
 fn common_mode_effect(common: &ChannelsInCommon, channel: ChannelProfile, unit: &str) -> Effect {
     let parameter = |of: BoundedEstimate, unit: &str| Parameter::new(of.value, of.low, of.high, unit);
-    let others: Vec<&str> = common.channels.iter().filter(|other| **other != channel).map(|other| other.name).collect();
+    let others: Vec<&str> = common.names.iter().copied().filter(|other| *other != channel.name).collect();
     let evidence = format!(
         "moves with {}: their spectra are e^{:.0} times as likely as those of channels with nothing in common, and no \
          measured cause explains it; a shared reference, supply or temperature gradient",

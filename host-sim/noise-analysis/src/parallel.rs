@@ -1,6 +1,7 @@
 //! How many threads an analysis may use: as many as there are cores, or one where the recordings themselves are analysed side by
 //! side. The result does not depend on it.
 
+use measurement::{ChannelId, PerChannel};
 use std::cell::Cell;
 use std::num::NonZero;
 use std::panic::resume_unwind;
@@ -51,6 +52,14 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync)
     });
     results.sort_unstable_by_key(|(at, _)| *at);
     results.into_iter().map(|(_, result)| result).collect()
+}
+
+/// What `task` makes of each channel, on as many threads as there are cores.
+pub(crate) fn per_channel<T: Send>(
+    channels: impl Iterator<Item = ChannelId>,
+    task: impl Fn(ChannelId) -> T + Sync,
+) -> PerChannel<T> {
+    in_parallel(&channels.collect::<Vec<_>>(), |&channel| task(channel)).into()
 }
 
 /// Runs `task` for each of `changed`, on as many threads as there are cores.

@@ -5,21 +5,20 @@
 //! stays in the samples, because the noise model has a term for it. A sensitivity to temperature or supply stays in them too,
 //! and is kept for the regression on covariates.
 
-use crate::detectors::bias;
-use crate::detectors::bias::{BiasChanges, BiasSensitivity};
+use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::findings::{Correction, Detection, Effect};
-use crate::parallel::in_parallel;
+use crate::parallel::{in_parallel, per_channel};
 use crate::sample_effects::SampleEffects;
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
-use measurement::{ChannelProfile, Measurement, Quantity};
+use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::sync::Arc;
 
 /// Which of the samples that the detectors found are left out. Samples that were read twice always are.
@@ -43,207 +42,125 @@ struct ChannelExclusion {
 }
 
 /// Effects in the samples, and the corrections that remove them.
-#[derive(Default)]
 pub(crate) struct Preprocessing {
     /// Sample periods of all samples.
     slots: Arc<[u64]>,
     /// What shows in samples alone.
     samples: SampleEffects,
-    channel_effects: Vec<(ChannelProfile, Effect)>,
     /// Sample periods that no channel uses: their sample equals the one before in all channels.
     repeated: Vec<u64>,
-    exclusions: Vec<(ChannelProfile, ChannelExclusion)>,
-    /// By channel: the first sample period from which on an offset is subtracted, and the offset in the channel's unit.
-    offsets: Vec<(ChannelProfile, u64, f64)>,
-    /// By channel: responses to temperature and vibration that are subtracted, as the first half and as the whole record show
-    /// them.
-    responses: Vec<(ChannelProfile, [Vec<BiasResponse>; 2])>,
-    /// A channel, the temperature or supply that it depends on, and how much.
-    sensitivities: Vec<(ChannelProfile, ChannelProfile, BiasSensitivity)>,
+    channels: PerChannel<ChannelPreprocessing>,
 }
 
-/// What was found in one channel.
-struct ChannelFindings {
-    knocks: Vec<Detection>,
-    spikes: Option<Detection>,
-    bias_changes: BiasChanges,
-    /// As the first half shows them, if the whole record shows any.
-    responses_of_first_half: Vec<BiasResponse>,
-    /// Channels that the bias may depend on, in the order of the sensitivities in `bias_changes`.
-    regressors: Vec<ChannelProfile>,
+/// What was found in the samples of one channel; nothing in one that is not inertial.
+#[derive(Default)]
+struct ChannelPreprocessing {
+    effects: Vec<Effect>,
     exclusion: ChannelExclusion,
+    /// The first sample period from which on an offset is subtracted, and the offset in the channel's unit.
+    offset: Option<(u64, f64)>,
+    /// Responses to temperature and vibration that are subtracted, as the first half and as the whole record show them.
+    responses: [Vec<BiasResponse>; 2],
+    /// The temperature or supply that it depends on, and how much.
+    sensitivities: Vec<(ChannelId, BiasSensitivity)>,
 }
 
 impl Preprocessing {
-    /// Looks for knocks, spikes, steps, ramps, sensitivities and a coarse resolution in the channels `traced`, and for lost or
+    /// Looks for knocks, spikes, steps, ramps, sensitivities and a coarse resolution in the inertial channels, and for lost or
     /// repeated samples and a wrong sample rate in the whole recording. Where that has `means` of samples, what shows in samples
     /// alone is not looked for.
-    pub(crate) fn detect(
-        measurement: &Measurement,
-        means: bool,
-        traced: &[ChannelProfile],
-        noise_grids: &NoiseGrids,
-    ) -> Self {
-        let samples = if means { SampleEffects::default() } else { SampleEffects::detect(measurement, traced) };
+    pub(crate) fn detect(measurement: &Measurement, means: bool, noise_grids: &NoiseGrids) -> Self {
+        let samples = if means { SampleEffects::none(measurement) } else { SampleEffects::detect(measurement) };
         let repeated = samples.repeated();
         let slots = measurement.slots.as_slice().into();
-        let mut preprocessing = Self { slots, samples, repeated, ..Self::default() };
-        let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
-        let series_of = |channel: ChannelProfile| preprocessing.measured(measurement, channel);
-        let series: Vec<Series> = in_parallel(traced, |&channel| series_of(channel));
-        let knocks = KnocksInChannels::find(&series, measurement.middle(), measurement.profile.dithered_avar_counts2);
+        let channels = measurement.ids().map(|_| ChannelPreprocessing::default()).collect();
+        let preprocessing = Self { slots, samples, repeated, channels };
+        let series = per_channel(measurement.ids(), |channel| preprocessing.measured(measurement, channel));
+        let knocks = KnocksInChannels::find(measurement, &series);
         // What a channel may depend on, without its own knocks.
-        let regressors: Vec<(ChannelProfile, Series)> = recorded
-            .iter()
-            .map(|&channel| match traced.iter().position(|of| *of == channel) {
-                Some(at) => (channel, knocks.removed_from(&series[at], at)),
-                None => (channel, series_of(channel)),
-            })
-            .collect();
-        let numbered: Vec<usize> = (0..traced.len()).collect();
-        let found = in_parallel(&numbered, |&at| {
-            let quiet = knocks.removed_from(&series[at], at);
-            let has_spikes = !means && !preprocessing.samples.is_saturated(traced[at]);
-            let spikes = if has_spikes { spikes::find(&quiet) } else { None };
-            let mut exclusion = ChannelExclusion {
-                spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
-                knocks: slots_within(&series[at], &knocks.by_whole[at]),
-                by_first_half: Vec::new(),
-            };
-            exclusion.by_first_half =
-                excluded_by_first_half(&series[at], &knocks.by_first_half[at], measurement.middle());
-            let (profiles, others): (Vec<ChannelProfile>, Vec<&Series>) = regressors
-                .iter()
-                .filter(|(regressor, _)| may_depend(traced[at], *regressor))
-                .map(|(regressor, series)| (*regressor, series))
-                .unzip();
-            let quiet = without_slow_lines(quiet.without(&exclusion.spikes));
-            let bias_changes = bias::find(&quiet, &others, &accelerations(traced, &series, traced[at]), noise_grids);
-            let responses_of_first_half = if bias_changes.responses.is_empty() {
-                Vec::new()
-            } else {
-                let first_half = |of: &Series| of.before(measurement.middle());
-                let others: Vec<Series> = others.iter().copied().map(first_half).collect();
-                let others: Vec<&Series> = others.iter().collect();
-                let all: Vec<Series> = series.iter().map(first_half).collect();
-                let own = all[at].clone().without(&exclusion.by_first_half);
-                bias::find(&own, &others, &accelerations(traced, &all, traced[at]), noise_grids).responses
-            };
-            ChannelFindings {
-                knocks: knocks.detections(&series[at], at, traced),
-                responses_of_first_half,
-                bias_changes,
-                regressors: profiles,
-                spikes,
-                exclusion,
+        let quiet: PerChannel<Series> =
+            series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
+        let found = per_channel(measurement.ids(), |channel| {
+            if !measurement[channel].profile.quantity.is_inertial() {
+                return ChannelPreprocessing::default();
             }
+            let has_spikes = !means && !preprocessing.samples.is_saturated(channel);
+            ChannelPreprocessing::detect(measurement, channel, has_spikes, (&series, &quiet, &knocks), noise_grids)
         });
-        for (&channel, found) in traced.iter().zip(found) {
-            let ChannelFindings { knocks, spikes, bias_changes, responses_of_first_half, regressors, exclusion } =
-                found;
-            let BiasChanges { step, ramp, sensitivities, responses } = bias_changes;
-            if !responses.is_empty() {
-                preprocessing.channel_effects.extend(responses.iter().map(|of| (channel, of.effect.clone())));
-                preprocessing.responses.push((channel, [responses_of_first_half, responses]));
-            }
-            if let Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) = &step {
-                preprocessing.offsets.push((channel, *from, *size));
-            }
-            // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its
-            // own drift.
-            let slow = sensitivities.into_iter().map(|(place, sensitivity)| (channel, regressors[place], sensitivity));
-            preprocessing.sensitivities.extend(slow.filter(|(_, regressor, _)| regressor.quantity.is_environment()));
-            preprocessing.exclusions.push((channel, exclusion));
-            let findings = knocks.into_iter().chain(spikes).chain(step).chain(ramp);
-            preprocessing.channel_effects.extend(findings.map(|finding| (channel, finding.effect)));
-        }
-        preprocessing
+        Self { channels: found, ..preprocessing }
     }
 
     /// How many counts the smallest step of a channel's values has.
-    pub(crate) fn counts_per_step(&self, channel: ChannelProfile) -> u32 {
+    pub(crate) fn counts_per_step(&self, channel: ChannelId) -> u32 {
         self.samples.counts_per_step(channel)
     }
 
     /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
-    pub(crate) fn excludes(&self, channel: ChannelProfile, exclusion: Exclusion) -> bool {
-        self.exclusion(channel).is_some_and(|own| !own.slots(exclusion).is_empty())
+    pub(crate) fn excludes(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
+        !self.channels[channel].exclusion.slots(exclusion).is_empty()
     }
 
     /// Whether `exclusion` leaves out a sample of any channel, beyond those that were read twice.
     pub(crate) fn excludes_any(&self, exclusion: Exclusion) -> bool {
-        self.exclusions.iter().any(|(_, own)| !own.slots(exclusion).is_empty())
+        self.channels.ids().any(|channel| self.excludes(channel, exclusion))
     }
 
     /// Whether the series of a channel is the same for two exclusions.
-    pub(crate) fn leaves_the_same(&self, channel: ChannelProfile, one: Exclusion, other: Exclusion) -> bool {
-        let has_responses = self.responses.iter().any(|(of, _)| *of == channel);
-        !has_responses && self.excluded(channel, one) == self.excluded(channel, other)
+    pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
+        let responses = |exclusion| self.channels[channel].responses(exclusion);
+        responses(one) == responses(other) && self.excluded(channel, one) == self.excluded(channel, other)
     }
 
     /// Sample periods that a channel does not use, in ascending order.
-    pub(crate) fn excluded(&self, channel: ChannelProfile, exclusion: Exclusion) -> Vec<u64> {
-        let own = self.exclusion(channel).map(|own| own.slots(exclusion)).unwrap_or_default();
-        merged([&self.repeated, &own])
+    pub(crate) fn excluded(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
+        merged([&self.repeated, &self.channels[channel].exclusion.slots(exclusion)])
     }
 
     /// Samples of a channel that arrived and are not used, by cause.
-    pub(crate) fn refused(&self, channel: ChannelProfile) -> impl Iterator<Item = (&'static str, u64)> {
-        let own = self.exclusion(channel);
-        let count = |slots: Option<&Vec<u64>>| slots.map_or(0, |slots| slots.len() as u64);
-        let counts = [
-            ("repeated", self.repeated.len() as u64),
-            ("knock", count(own.map(|own| &own.knocks))),
-            ("spikes", count(own.map(|own| &own.spikes))),
-        ];
-        counts.into_iter().filter(|(_, count)| *count > 0)
-    }
-
-    fn exclusion(&self, channel: ChannelProfile) -> Option<&ChannelExclusion> {
-        self.exclusions.iter().find(|(of, _)| *of == channel).map(|(_, own)| own)
+    pub(crate) fn refused(&self, channel: ChannelId) -> impl Iterator<Item = (&'static str, u64)> {
+        let own = &self.channels[channel].exclusion;
+        let causes = [("repeated", &self.repeated), ("knock", &own.knocks), ("spikes", &own.spikes)];
+        causes.map(|(cause, slots)| (cause, slots.len() as u64)).into_iter().filter(|(_, count)| *count > 0)
     }
 
     /// Whether anything is subtracted from samples of a channel.
-    pub(crate) fn corrects(&self, channel: ChannelProfile, exclusion: Exclusion) -> bool {
-        self.offsets.iter().any(|(of, ..)| *of == channel) || !self.responses(channel, exclusion).is_empty()
+    pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
+        let own = &self.channels[channel];
+        own.offset.is_some() || !own.responses(exclusion).is_empty()
     }
 
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
-    pub(crate) fn offset(&self, channel: ChannelProfile, exclusion: Exclusion, slot: u64) -> f64 {
-        let steps = self.offsets.iter().filter(|(of, from, _)| *of == channel && slot >= *from);
-        let responses = self.responses(channel, exclusion).iter().map(|response| response.bias(slot));
-        steps.map(|(.., size)| *size).chain(responses).sum()
-    }
-
-    /// The responses of a channel to temperature and vibration that are subtracted from its samples.
-    fn responses(&self, channel: ChannelProfile, exclusion: Exclusion) -> &[BiasResponse] {
-        let own = self.responses.iter().find(|(of, _)| *of == channel);
-        own.map_or(&[], |(_, [first_half, whole])| if exclusion == Exclusion::ByWhole { whole } else { first_half })
+    pub(crate) fn offset(&self, channel: ChannelId, exclusion: Exclusion, slot: u64) -> f64 {
+        let own = &self.channels[channel];
+        let step = own.offset.filter(|(from, _)| slot >= *from).map(|(_, size)| size);
+        step.into_iter().chain(own.responses(exclusion).iter().map(|response| response.bias(slot))).sum()
     }
 
     /// Whether the first half may show other responses to temperature and vibration than the whole record.
     pub(crate) fn has_responses(&self) -> bool {
-        !self.responses.is_empty()
+        self.channels.iter().any(|of| !of.responses(Exclusion::ByWhole).is_empty())
     }
 
     /// Whether a channel responds to temperature behind a lag or with a curvature.
-    pub(crate) fn responds_to_temperature(&self, channel: ChannelProfile) -> bool {
-        self.responses(channel, Exclusion::ByWhole).iter().any(|of| of.effect.kind != "vibration_rectification")
+    pub(crate) fn responds_to_temperature(&self, channel: ChannelId) -> bool {
+        let responses = self.channels[channel].responses(Exclusion::ByWhole);
+        responses.iter().any(|of| of.effect.kind != "vibration_rectification")
     }
 
     /// A channel's series as measured, with its resolution.
-    pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelProfile) -> Series {
-        let series = Series::with_shared_slots(measurement, &channel, || Arc::clone(&self.slots));
+    pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelId) -> Series {
+        let series = Series::with_shared_slots(measurement, channel, || Arc::clone(&self.slots));
         series.with_counts_per_step(self.samples.counts_per_step(channel))
     }
 
     /// A channel's series after preprocessing.
-    pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelProfile, exclusion: Exclusion) -> Series {
+    pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelId, exclusion: Exclusion) -> Series {
         let mut series = self.measured(measurement, channel);
-        for &(_, from, size) in self.offsets.iter().filter(|(of, ..)| *of == channel) {
+        let own = &self.channels[channel];
+        if let Some((from, size)) = own.offset {
             series = series.lowered_from(from, size);
         }
-        for response in self.responses(channel, exclusion) {
+        for response in own.responses(exclusion) {
             let values = Arc::make_mut(&mut series.values);
             values.iter_mut().zip(series.slots.iter()).for_each(|(value, slot)| *value -= response.bias(*slot));
         }
@@ -251,21 +168,78 @@ impl Preprocessing {
     }
 
     /// Whether a ramp was found in a channel.
-    pub(crate) fn has_ramp(&self, channel: ChannelProfile) -> bool {
+    pub(crate) fn has_ramp(&self, channel: ChannelId) -> bool {
         self.effects(channel).any(|effect| effect.kind == NoiseTerm::RateRamp.name())
     }
 
     /// Sensitivity of a channel to a temperature or supply.
-    pub(crate) fn sensitivity(&self, channel: ChannelProfile, regressor: ChannelProfile) -> Option<BiasSensitivity> {
-        let of = |(of, to, _): &&(ChannelProfile, ChannelProfile, BiasSensitivity)| (*of, *to) == (channel, regressor);
-        self.sensitivities.iter().find(of).map(|(.., followed)| *followed)
+    pub(crate) fn sensitivity(&self, channel: ChannelId, regressor: ChannelId) -> Option<BiasSensitivity> {
+        let known = self.channels[channel].sensitivities.iter().find(|(to, _)| *to == regressor);
+        known.map(|(_, sensitivity)| *sensitivity)
     }
 
     /// The effects of a channel, those that concern every channel first.
-    pub(crate) fn effects(&self, channel: ChannelProfile) -> impl Iterator<Item = Effect> + '_ {
-        let own = self.channel_effects.iter().filter(move |(of, _)| *of == channel).map(|(_, effect)| effect);
+    pub(crate) fn effects(&self, channel: ChannelId) -> impl Iterator<Item = Effect> + '_ {
         let of_samples = self.samples.recording.iter().chain(self.samples.of(channel));
-        of_samples.map(|detection| &detection.effect).chain(own).cloned()
+        of_samples.map(|detection| &detection.effect).chain(&self.channels[channel].effects).cloned()
+    }
+}
+
+impl ChannelPreprocessing {
+    /// What the samples of `channel` show; spikes are looked for if it `has_spikes`. `series` and `quiet` are those of all channels,
+    /// with and without `knocks`.
+    fn detect(
+        measurement: &Measurement,
+        channel: ChannelId,
+        has_spikes: bool,
+        (series, quiet, knocks): (&PerChannel<Series>, &PerChannel<Series>, &KnocksInChannels),
+        noise_grids: &NoiseGrids,
+    ) -> Self {
+        let middle = measurement.middle();
+        let spikes = if has_spikes { spikes::find(&quiet[channel]) } else { None };
+        let exclusion = ChannelExclusion {
+            spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
+            knocks: slots_within(&series[channel], &knocks.by_whole[channel]),
+            by_first_half: excluded_by_first_half(&series[channel], &knocks.by_first_half[channel], middle),
+        };
+        let regressors: Vec<ChannelId> =
+            measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
+        let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
+        let own = without_slow_lines(quiet[channel].clone().without(&exclusion.spikes));
+        let BiasChanges { step, ramp, sensitivities, responses } =
+            bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids);
+        let responses_of_first_half = if responses.is_empty() {
+            Vec::new()
+        } else {
+            let others: Vec<Series> = others.iter().map(|of| of.before(middle)).collect();
+            let others: Vec<&Series> = others.iter().collect();
+            let all = series.map(|of| of.before(middle));
+            let own = all[channel].clone().without(&exclusion.by_first_half);
+            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids).responses
+        };
+        let offset = match &step {
+            Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) => Some((*from, *size)),
+            _ => None,
+        };
+        // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its own drift.
+        let slow = sensitivities.into_iter().map(|(place, sensitivity)| (regressors[place], sensitivity));
+        let found = knocks.detections(measurement, &series[channel], channel).into_iter();
+        let found = found.chain(spikes).chain(step).chain(ramp).map(|detection| detection.effect);
+        Self {
+            effects: responses.iter().map(|of| of.effect.clone()).chain(found).collect(),
+            exclusion,
+            offset,
+            responses: [responses_of_first_half, responses],
+            sensitivities: slow
+                .filter(|(regressor, _)| measurement[*regressor].profile.quantity.is_environment())
+                .collect(),
+        }
+    }
+
+    /// The responses to temperature and vibration that are subtracted from the samples.
+    fn responses(&self, exclusion: Exclusion) -> &[BiasResponse] {
+        let [first_half, whole] = &self.responses;
+        if exclusion == Exclusion::ByWhole { whole } else { first_half }
     }
 }
 
@@ -279,61 +253,66 @@ impl ChannelExclusion {
     }
 }
 
-/// The knocks in the traced channels, by channel.
+/// The knocks in the inertial channels.
 struct KnocksInChannels {
-    by_whole: Vec<Vec<Knock>>,
+    by_whole: PerChannel<Vec<Knock>>,
     /// By the rules of the first half, in both halves.
-    by_first_half: Vec<Vec<Knock>>,
+    by_first_half: PerChannel<Vec<Knock>>,
 }
 
 impl KnocksInChannels {
-    fn find(series: &[Series], middle: u64, dithered_avar_counts2: f64) -> Self {
-        let first: Vec<Series> = series.iter().map(|of| of.before(middle)).collect();
-        let second: Vec<Series> = series.iter().map(|of| of.from(middle)).collect();
-        let rules = in_parallel(&first, |first| KnockRule::fit(first, dithered_avar_counts2));
+    fn find(measurement: &Measurement, series: &PerChannel<Series>) -> Self {
+        let (middle, dithered) = (measurement.middle(), measurement.profile.dithered_avar_counts2);
+        let inertial: Vec<ChannelId> = measurement.inertial().collect();
+        let of_all = |part: &dyn Fn(&Series) -> Series| inertial.iter().map(|&of| part(&series[of])).collect();
+        let whole: Vec<Series> = of_all(&Series::clone);
+        let first: Vec<Series> = of_all(&|of| of.before(middle));
+        let second: Vec<Series> = of_all(&|of| of.from(middle));
+        let rules = in_parallel(&first, |first| KnockRule::fit(first, dithered));
         let parts = in_parallel(&[first, second], |part| knocks::find_by(&rules, part));
-        let in_both = |channel: usize| parts.iter().flat_map(|part| part[channel].clone()).collect();
-        Self {
-            by_whole: knocks::find(series, dithered_avar_counts2),
-            by_first_half: (0..series.len()).map(in_both).collect(),
+        let nothing = || measurement.ids().map(|_| Vec::new()).collect::<PerChannel<Vec<Knock>>>();
+        let (mut by_whole, mut by_first_half) = (nothing(), nothing());
+        for (at, (&channel, found)) in inertial.iter().zip(knocks::find(&whole, dithered)).enumerate() {
+            by_whole[channel] = found;
+            by_first_half[channel] = parts.iter().flat_map(|part| part[at].clone()).collect();
         }
+        Self { by_whole, by_first_half }
     }
 
-    /// The series of channel `at` without the knocks of the whole record.
-    fn removed_from(&self, series: &Series, at: usize) -> Series {
-        let knocks = &self.by_whole[at];
+    /// The series of a channel without the knocks of the whole record.
+    fn removed_from(&self, series: &Series, channel: ChannelId) -> Series {
+        let knocks = &self.by_whole[channel];
         if knocks.is_empty() { series.clone() } else { series.clone().without(&slots_within(series, knocks)) }
     }
 
-    /// The knocks of channel `at` as they are reported.
-    fn detections(&self, series: &Series, at: usize, channels: &[ChannelProfile]) -> Vec<Detection> {
+    /// The knocks of a channel as they are reported.
+    fn detections(&self, measurement: &Measurement, series: &Series, channel: ChannelId) -> Vec<Detection> {
         let detection = |knock: &Knock| {
-            let shows = |others: &&Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
-            let shown: Vec<&str> = channels
-                .iter()
-                .zip(&self.by_whole)
+            let shows = |others: &Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
+            let shown: Vec<&str> = self
+                .by_whole
+                .with_ids()
                 .filter(|(_, others)| shows(others))
-                .map(|(of, _)| of.name)
+                .map(|(of, _)| measurement[of].profile.name)
                 .collect();
             knock.detection(series, &shown)
         };
-        self.by_whole[at].iter().map(detection).collect()
+        self.by_whole[channel].iter().map(detection).collect()
     }
 }
 
-/// The accelerometers of `series`, of the channels `traced`, as what may shake `channel`.
+/// The accelerometers, of which these are the `series`, as what may shake `channel`.
 fn accelerations<'s>(
-    traced: &[ChannelProfile],
-    series: &'s [Series],
-    channel: ChannelProfile,
+    measurement: &Measurement,
+    series: &'s PerChannel<Series>,
+    channel: ChannelId,
 ) -> Vec<Acceleration<'s>> {
-    let all = traced.iter().zip(series).filter(|(of, _)| of.quantity == Quantity::SpecificForce);
-    let acceleration = |(of, series): (&ChannelProfile, &'s Series)| Acceleration {
-        name: of.name,
-        series,
-        largest: largest_sensitivity(channel.range, of.range),
+    let acceleration = |of: ChannelId| {
+        let profile = &measurement[of].profile;
+        let largest = largest_sensitivity(measurement[channel].profile.range, profile.range);
+        Acceleration { name: profile.name, series: &series[of], largest }
     };
-    all.map(acceleration).collect()
+    measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
 }
 
 /// A series without sinusoids of a few periods, which the regressions on its block means would take for ramps and steps; the
@@ -377,7 +356,8 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
 
 /// Whether the bias of `channel` may depend on `regressor`: on temperature and supply, and that of a gyroscope on the
 /// specific force.
-fn may_depend(channel: ChannelProfile, regressor: ChannelProfile) -> bool {
-    let motion = regressor.quantity == Quantity::SpecificForce && channel.quantity == Quantity::AngularRate;
-    regressor.quantity.is_environment() || motion
+fn may_depend(measurement: &Measurement, channel: ChannelId, regressor: ChannelId) -> bool {
+    let [channel, regressor] = [channel, regressor].map(|of| measurement[of].profile.quantity);
+    let motion = regressor == Quantity::SpecificForce && channel == Quantity::AngularRate;
+    regressor.is_environment() || motion
 }

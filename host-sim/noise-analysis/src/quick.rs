@@ -14,16 +14,15 @@ use crate::estimators::RecordPart;
 use crate::figure_data;
 use crate::findings::Effect;
 use crate::naming::{ChannelFindings, name_effects};
-use crate::parallel::{self, in_parallel};
+use crate::parallel::{self, per_channel};
 use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA,
     SlopeMethodReport, by_cause, term_reports,
 };
 use crate::streamed_curves::{StreamedCurves, joined};
 use crate::unexplained;
-use crate::{OCTAVES, OVERLAP};
-use allan_core::{Cascade, Curve, Model};
-use measurement::{ChannelProfile, Measurement, RecordingDescription, SampleBlock};
+use allan_core::{Cascade, Model};
+use measurement::{ChannelId, ChannelProfile, Measurement, PerChannel, RecordingDescription, SampleBlock};
 use std::collections::BTreeMap;
 
 /// Why there is neither clock nor filter.
@@ -62,16 +61,16 @@ impl CurveEstimators {
     #[must_use]
     pub fn report(&self, done: &(dyn Fn() + Sync)) -> Report {
         let Self { description, channels, .. } = self;
-        let all: Vec<(&ChannelProfile, &StreamedCurves)> = description.channels.iter().zip(channels).collect();
-        let fitted = in_parallel(&all, |(profile, estimators)| {
-            let fitted = FittedChannel::fit(description, **profile, estimators);
+        let parts = Parts::new(description, channels);
+        let fitted = per_channel(parts.both.channels.ids(), |channel| {
+            let fitted = FittedChannel::fit(description, channel, &parts);
             done();
             fitted
         });
         let (effects, of_half): (Vec<Vec<Effect>>, Vec<Vec<Effect>>) =
-            fitted.iter().map(|channel| channel.effects(description)).unzip();
+            fitted.iter().map(|channel| channel.effects(description, &parts)).unzip();
         let mut channels: Vec<ChannelReport> =
-            fitted.iter().zip(channels).map(|(fitted, of)| fitted.report(description, of)).collect();
+            fitted.iter().zip(channels).map(|(fitted, of)| fitted.report(description, &parts, of)).collect();
         let duration_s = description.periods as f64 * description.period_s();
         let findings = causes::find(&mut channels, &effects, &of_half, &description.profile, duration_s);
         Report {
@@ -93,13 +92,32 @@ impl CurveEstimators {
     }
 }
 
-/// A channel with its models.
-struct FittedChannel {
-    profile: ChannelProfile,
-    whole: Curve<OCTAVES>,
+/// The curves of all channels in the parts of the recording.
+struct Parts {
     first: RecordPart,
     second: RecordPart,
     both: RecordPart,
+}
+
+impl Parts {
+    fn new(description: &RecordingDescription, channels: &[StreamedCurves]) -> Self {
+        let profiles: PerChannel<ChannelProfile> = description.channels.iter().copied().collect();
+        let part = |cascades| RecordPart::new(profiles.clone(), cascades, description.period_s());
+        let half = |number: usize| {
+            let of = |curves: &StreamedCurves| {
+                curves.parts().nth(number).map_or_else(Cascade::new, |(_, half)| half.clone())
+            };
+            part(channels.iter().map(of).collect())
+        };
+        let all = |curves: &StreamedCurves| joined(curves.parts().map(|(_, part)| part));
+        Self { first: half(0), second: half(1), both: part(channels.iter().map(all).collect()) }
+    }
+}
+
+/// A channel with its models.
+struct FittedChannel {
+    channel: ChannelId,
+    profile: ChannelProfile,
     /// Of the first half.
     half: ChannelFit,
     /// Of the whole record.
@@ -107,36 +125,32 @@ struct FittedChannel {
 }
 
 impl FittedChannel {
-    fn fit(description: &RecordingDescription, profile: ChannelProfile, estimators: &StreamedCurves) -> Self {
-        let period_s = description.period_s();
-        let part = |cascade: Cascade<OCTAVES, OVERLAP>| RecordPart::of_channel(profile, cascade, period_s);
-        let mut halves = estimators.parts().map(|(_, half)| part(half.clone()));
-        let [first, second] = std::array::from_fn(|_| halves.next().unwrap_or_else(|| part(Cascade::new())));
-        let both = part(joined(estimators.parts().map(|(_, part)| part)));
+    fn fit(description: &RecordingDescription, channel: ChannelId, parts: &Parts) -> Self {
+        let profile = parts.both.channels[channel];
         let filters = &description.profile.filters;
         let fit = |part: &RecordPart| {
-            let curve = CovariateFit::estimate(part, 0, false, |_| None);
+            let curve = CovariateFit::estimate(part, channel, false, |_| None);
             if profile.quantity.is_inertial() {
                 ChannelFit::fit_curve(curve, filters)
             } else {
                 ChannelFit::fit_baseline(curve)
             }
         };
-        let (half, mut fit) = (fit(&first), fit(&both));
+        let (half, mut fit) = (fit(&parts.first), fit(&parts.both));
         // The terms that held on the second half are those of the whole record, as in the whole analysis.
-        if profile.quantity.is_inertial() && Contradiction::find(&half.trace.after, &second.curve(0)).is_none() {
+        let held = || Contradiction::find(&half.trace.after, &parts.second.curve(channel)).is_none();
+        if profile.quantity.is_inertial() && held() {
             fit.take_terms_that_held(&half.trace, None);
         }
-        let whole = estimators.whole().curve(period_s).scaled(profile.lsb);
-        Self { profile, whole, first, second, both, half, fit }
+        Self { channel, profile, half, fit }
     }
 
     /// The effects of the channel in the whole record and in its first half.
-    fn effects(&self, description: &RecordingDescription) -> (Vec<Effect>, Vec<Effect>) {
+    fn effects(&self, description: &RecordingDescription, parts: &Parts) -> (Vec<Effect>, Vec<Effect>) {
         if !self.profile.quantity.is_inertial() {
             return (Vec::new(), Vec::new());
         }
-        let (profile, resolution) = (&description.profile, self.both.resolution(0));
+        let (profile, resolution) = (&description.profile, parts.both.resolution(self.channel));
         let of = |fit: &ChannelFit| {
             let findings = ChannelFindings {
                 channel: self.profile,
@@ -155,11 +169,12 @@ impl FittedChannel {
         (of(&self.fit), of(&self.half))
     }
 
-    fn report(&self, description: &RecordingDescription, estimators: &StreamedCurves) -> ChannelReport {
+    fn report(&self, description: &RecordingDescription, parts: &Parts, estimators: &StreamedCurves) -> ChannelReport {
         let unit = self.profile.unit;
         let (before, after) = (&self.half.trace.before, &self.half.trace.after);
-        let [first, second] = [&self.first, &self.second].map(|part| part.curve(0));
-        let whole = self.whole.clone().with_confidence(|point| before.variance_fractions(point.n));
+        let [first, second] = [&parts.first, &parts.second].map(|part| part.curve(self.channel));
+        let whole = estimators.whole().curve(description.period_s()).scaled(self.profile.lsb);
+        let whole = whole.with_confidence(|point| before.variance_fractions(point.n));
         let deviations = |model: &Model| whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect();
         let of_half = |model: &Model| ModelReport {
             terms: term_reports(model, unit),
@@ -175,7 +190,7 @@ impl FittedChannel {
             name: self.profile.name.to_owned(),
             unit: unit.to_owned(),
             samples: description.samples,
-            missing: missing_samples(description, &self.both, estimators),
+            missing: missing_samples(description, parts.both.replaced(self.channel), estimators),
             curve: whole.points().iter().map(|point| CurvePoint::new(point, whole.samples())).collect(),
             read_off: SlopeMethodReport::from_curve(&whole, unit),
             before: of_half(before),
@@ -199,16 +214,12 @@ impl FittedChannel {
 }
 
 /// Samples of a channel that are missing in its model.
-fn missing_samples(
-    description: &RecordingDescription,
-    both: &RecordPart,
-    estimators: &StreamedCurves,
-) -> MissingSamples {
+fn missing_samples(description: &RecordingDescription, replaced: u64, estimators: &StreamedCurves) -> MissingSamples {
     let mut refused: BTreeMap<String, u64> = BTreeMap::new();
     let of_all = description.dropped.iter().filter(|(cause, _)| **cause != "gap");
     for (&cause, &count) in of_all.chain(&estimators.refused).filter(|(_, count)| **count > 0) {
         *refused.entry(cause.to_owned()).or_insert(0) += count;
     }
     let lost = description.dropped.get("gap").copied().unwrap_or(0);
-    MissingSamples { lost, refused, replaced: both.replaced(0) }
+    MissingSamples { lost, refused, replaced }
 }

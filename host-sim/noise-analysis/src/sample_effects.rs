@@ -4,47 +4,36 @@
 use crate::detectors::effective_lsb;
 use crate::detectors::output_range::{ValueCounts, find_noise_below_count};
 use crate::findings::Detection;
-use crate::parallel::in_parallel;
+use crate::parallel::per_channel;
 use crate::sampling_faults;
 use crate::series::Series;
-use measurement::{ChannelProfile, Measurement};
+use measurement::{ChannelId, Measurement, PerChannel};
 
-/// What the samples show; nothing by default.
-#[derive(Default)]
+/// What the samples show.
 pub(crate) struct SampleEffects {
     /// Of every channel: lost and repeated samples, the sample clock.
     pub recording: Vec<Detection>,
-    /// Channels whose values are all multiples of several counts, and of how many.
-    counts_per_step: Vec<(ChannelProfile, u32)>,
-    /// Of one channel each: a resolution of several counts, values that are cut off, noise below a count.
-    channels: Vec<(ChannelProfile, Detection)>,
+    channels: PerChannel<SamplesOfChannel>,
+}
+
+/// What the samples of one channel show.
+struct SamplesOfChannel {
+    counts_per_step: u32,
+    /// Of an inertial channel: a resolution of several counts, values that are cut off, noise below a count.
+    found: Vec<Detection>,
 }
 
 impl SampleEffects {
-    /// What the samples of the channels `traced` show; the steps of all channels.
-    pub(crate) fn detect(measurement: &Measurement, traced: &[ChannelProfile]) -> Self {
-        let measured = |channel: ChannelProfile| Series::from_measurement(measurement, &channel);
-        let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
-        let steps = in_parallel(&recorded, |&channel| effective_lsb::counts_per_step(&measured(channel)));
-        let steps = recorded.into_iter().zip(steps).filter(|(_, counts)| *counts > 1).collect();
-        let mut effects =
-            Self { recording: sampling_faults::detect(measurement), counts_per_step: steps, channels: Vec::new() };
-        let found = in_parallel(traced, |&channel| {
-            let series = measured(channel);
-            let resolution = effective_lsb::find(&series);
-            let series = series.with_counts_per_step(effects.counts_per_step(channel));
-            let mut values = ValueCounts::default();
-            let recorded = measurement.channel(&channel).into_iter();
-            recorded.flat_map(|of| of.used_samples(&measurement.slots)).for_each(|(_, count)| values.push(count));
-            let range = values
-                .saturation(&channel, series.resolution)
-                .or_else(|| find_noise_below_count(&series, measurement.profile.dithered_avar_counts2));
-            [resolution, range]
-        });
-        for (&channel, found) in traced.iter().zip(found) {
-            effects.channels.extend(found.into_iter().flatten().map(|detection| (channel, detection)));
-        }
-        effects
+    /// What the samples show in all inertial channels, and the steps of all channels.
+    pub(crate) fn detect(measurement: &Measurement) -> Self {
+        let channels = per_channel(measurement.ids(), |channel| SamplesOfChannel::detect(measurement, channel));
+        Self { recording: sampling_faults::detect(measurement), channels }
+    }
+
+    /// Nothing, as of a measurement that has means.
+    pub(crate) fn none(measurement: &Measurement) -> Self {
+        let nothing = |_| SamplesOfChannel { counts_per_step: 1, found: Vec::new() };
+        Self { recording: Vec::new(), channels: measurement.ids().map(nothing).collect() }
     }
 
     /// Sample periods whose sample equals the one before in all channels.
@@ -53,17 +42,36 @@ impl SampleEffects {
     }
 
     /// How many counts the smallest step of a channel's values has.
-    pub(crate) fn counts_per_step(&self, channel: ChannelProfile) -> u32 {
-        self.counts_per_step.iter().find(|(of, _)| *of == channel).map_or(1, |(_, counts)| *counts)
+    pub(crate) fn counts_per_step(&self, channel: ChannelId) -> u32 {
+        self.channels[channel].counts_per_step
     }
 
     /// What the samples of one channel show.
-    pub(crate) fn of(&self, channel: ChannelProfile) -> impl Iterator<Item = &Detection> {
-        self.channels.iter().filter(move |(of, _)| *of == channel).map(|(_, detection)| detection)
+    pub(crate) fn of(&self, channel: ChannelId) -> &[Detection] {
+        &self.channels[channel].found
     }
 
     /// Whether values of a channel are cut off: they are no noise around which a sample could be a spike.
-    pub(crate) fn is_saturated(&self, channel: ChannelProfile) -> bool {
-        self.of(channel).any(|detection| detection.effect.kind == "saturated")
+    pub(crate) fn is_saturated(&self, channel: ChannelId) -> bool {
+        self.of(channel).iter().any(|detection| detection.effect.kind == "saturated")
+    }
+}
+
+impl SamplesOfChannel {
+    fn detect(measurement: &Measurement, channel: ChannelId) -> Self {
+        let recorded = &measurement[channel];
+        let series = Series::from_measurement(measurement, channel);
+        let counts_per_step = effective_lsb::counts_per_step(&series);
+        if !recorded.profile.quantity.is_inertial() {
+            return Self { counts_per_step, found: Vec::new() };
+        }
+        let resolution = effective_lsb::find(&series);
+        let series = series.with_counts_per_step(counts_per_step);
+        let mut values = ValueCounts::default();
+        recorded.used_samples(&measurement.slots).for_each(|(_, count)| values.push(count));
+        let range = values
+            .saturation(&recorded.profile, series.resolution)
+            .or_else(|| find_noise_below_count(&series, measurement.profile.dithered_avar_counts2));
+        Self { counts_per_step, found: resolution.into_iter().chain(range).collect() }
     }
 }

@@ -1,7 +1,7 @@
 //! The samples of one channel on the recording's time base.
 
 use crate::findings::Correction;
-use measurement::{ChannelProfile, MeasuredChannel, Measurement};
+use measurement::{ChannelId, MeasuredChannel, Measurement};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -24,25 +24,22 @@ pub struct Series {
 }
 
 impl Series {
-    /// The samples of `channel` that were not refused; an empty series if it was not recorded.
+    /// The samples of `channel` that were not refused.
     #[must_use]
-    pub fn from_measurement(measurement: &Measurement, channel: &ChannelProfile) -> Self {
+    pub fn from_measurement(measurement: &Measurement, channel: ChannelId) -> Self {
         Self::with_shared_slots(measurement, channel, || measurement.slots.as_slice().into())
     }
 
     /// The same; `slots` gives the sample periods of all samples, which the series shares if none of the channel was refused.
     pub(crate) fn with_shared_slots(
         measurement: &Measurement,
-        channel: &ChannelProfile,
+        channel: ChannelId,
         slots: impl FnOnce() -> Arc<[u64]>,
     ) -> Self {
-        let recorded = measurement.channel(channel);
-        let counts = recorded.map(|channel| channel.counts.as_slice()).unwrap_or_default();
-        let refused = recorded.map(MeasuredChannel::refused_positions).unwrap_or_default();
-        let value = |count: &i32| f64::from(*count) * channel.lsb;
-        let (slots, values) = if counts.is_empty() {
-            ([].into(), [].into())
-        } else if refused.is_empty() {
+        let MeasuredChannel { profile, counts, .. } = &measurement[channel];
+        let refused = measurement[channel].refused_positions();
+        let value = |count: &i32| f64::from(*count) * profile.lsb;
+        let (slots, values) = if refused.is_empty() {
             (slots(), counts.iter().map(value).collect())
         } else {
             let used: Vec<usize> =
@@ -55,8 +52,8 @@ impl Series {
             values,
             span: 0..measurement.periods(),
             period_s: measurement.period_s(),
-            resolution: channel.lsb,
-            unit: channel.unit,
+            resolution: profile.lsb,
+            unit: profile.unit,
         }
     }
 

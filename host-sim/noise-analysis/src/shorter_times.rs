@@ -6,7 +6,7 @@ use crate::spectra::epoch_spectra::PartSpectra;
 use crate::streamed_curves::{STEPS_PER_COUNT, joined};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
-use measurement::ChannelProfile;
+use measurement::PerChannel;
 use std::ops::Range;
 
 /// The curve of the means is used from this averaging factor on, in means: from there on it has as many differences as that of the
@@ -19,15 +19,12 @@ pub(crate) type Parts = Vec<(u64, Cascade<OCTAVES, OVERLAP>)>;
 /// The averaging times that are too short for the means of a long recording.
 pub(crate) struct ShorterTimes {
     pub samples_per_mean: u64,
-    /// In the order of the channels of the measurement.
-    pub channels: Vec<ShorterTimesOfChannel>,
+    pub channels: PerChannel<ShorterTimesOfChannel>,
 }
 
 /// The same of one channel.
 #[derive(Clone)]
 pub(crate) struct ShorterTimesOfChannel {
-    /// Of the means.
-    pub profile: ChannelProfile,
     /// Smallest distance of two values, in the channel's unit.
     pub resolution: f64,
     /// The whole curve as recorded.
@@ -54,7 +51,7 @@ impl ShorterTimes {
             let middle = self.slots_of(0..of.middle / self.samples_per_mean / 2).end;
             ShorterTimesOfChannel { recorded: first(&of.recorded), screened: first(&of.screened), middle, ..of.clone() }
         };
-        Self { samples_per_mean: self.samples_per_mean, channels: self.channels.iter().map(half).collect() }
+        Self { samples_per_mean: self.samples_per_mean, channels: self.channels.map(half) }
     }
 
     /// Sample periods of some means.
@@ -65,11 +62,6 @@ impl ShorterTimes {
     /// Averaging factor from which on the curve is that of the means, samples.
     pub(crate) fn until(&self) -> u64 {
         LEAST_FACTOR * self.samples_per_mean
-    }
-
-    /// A channel of the measurement of the means.
-    pub(crate) fn of(&self, channel: ChannelProfile) -> Option<&ShorterTimesOfChannel> {
-        self.channels.iter().find(|of| of.profile == channel)
     }
 
     /// The curve of `means`, with that of the samples at averaging times that are too short for it.

@@ -4,7 +4,7 @@ use crate::series::Series;
 use crate::spectra::MarkovEstimate;
 use crate::spectra::common_mode::CrossSpectra;
 use crate::uniform_series::UniformSeries;
-use measurement::ChannelProfile;
+use measurement::ChannelId;
 
 /// Smallest gain in ln likelihood of a common-mode drift. Three channels can share a drift in 10 ways, each with a few
 /// distinct correlation times; a gain of 9 in one of them leaves a probability of about 1 in 500 by chance.
@@ -12,23 +12,26 @@ const MIN_GAIN: f64 = 9.0;
 
 /// Drift that several channels of one quantity have in common, without a measured cause.
 pub(crate) struct ChannelsInCommon {
-    pub channels: Vec<ChannelProfile>,
+    pub channels: Vec<ChannelId>,
+    /// Names of the channels.
+    pub names: Vec<&'static str>,
     /// Increase of the ln likelihood of the spectra.
     pub gain: f64,
     pub drift: MarkovEstimate,
 }
 
-/// The drift that `channels` of one quantity have in common; `samples` are those of each less its covariates. All have a filter with
+/// The drift that `channels` of one quantity, each with its name, have in common; `samples` are those of each less its covariates. All have a filter with
 /// an impulse response of `filter_length_s`, or none.
 pub(crate) fn common_mode(
-    channels: &[ChannelProfile],
+    channels: &[(ChannelId, &'static str)],
     samples: &[UniformSeries],
     filter_length_s: f64,
 ) -> Option<ChannelsInCommon> {
     let transforms = CrossSpectra::new(samples, filter_length_s)?;
     let (members, gain) = transforms.most_likely_set().filter(|(_, gain)| *gain > MIN_GAIN)?;
     let drift = transforms.fit_markov(&members)?;
-    Some(ChannelsInCommon { channels: members.iter().map(|&member| channels[member]).collect(), gain, drift })
+    let (channels, names) = members.iter().map(|&member| channels[member]).unzip();
+    Some(ChannelsInCommon { channels, names, gain, drift })
 }
 
 /// Whether the means of the first and of the last tenth of a series are at least half as far apart as a ramp of `slope`, in its

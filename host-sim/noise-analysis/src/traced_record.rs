@@ -9,7 +9,7 @@ use crate::estimators::RecordEstimators;
 use crate::findings::{Detection, Effect};
 use crate::motion::{self, PlatformMotion};
 use crate::naming::{ChannelFindings, name_effects};
-use crate::parallel::in_parallel;
+use crate::parallel::{in_parallel, per_channel};
 use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::preprocessing::{Exclusion, Preprocessing};
 use crate::report::Stretch;
@@ -24,7 +24,7 @@ use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
-use measurement::{ChannelProfile, Measurement, Quantity};
+use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 
 /// A recording with what was found in all of it.
 pub(crate) struct TracedRecord<'a> {
@@ -32,21 +32,16 @@ pub(crate) struct TracedRecord<'a> {
     pub measurement: &'a Measurement,
     /// Where `measurement` has means, what is known beside them.
     pub condensed: Option<Condensed<'a>>,
-    /// The channels in which effects are traced: the inertial ones.
-    pub traced: Vec<ChannelProfile>,
     /// Covariances of the block means of each channel's noise, computed once.
     pub noise_grids: NoiseGrids,
     pub preprocessing: Preprocessing,
     pub estimators: RecordEstimators,
-    /// After preprocessing: of the traced channels, then of temperature and supply.
-    pub series: Vec<Series>,
-    /// In the order of the measurement's channels.
-    pub channels: Vec<ChannelTrace>,
+    /// After preprocessing.
+    pub series: PerChannel<Series>,
+    pub channels: PerChannel<ChannelTrace>,
     /// The filter that the part has, by the whole record.
     pub filter: Result<PartFilter, Unidentified>,
-    /// The channels of `series`.
-    coupled: Vec<ChannelProfile>,
-    motions: Vec<(ChannelProfile, PlatformMotion)>,
+    motions: PerChannel<Option<PlatformMotion>>,
 }
 
 /// What is known of a long recording beside the means of its samples.
@@ -54,13 +49,12 @@ pub(crate) struct TracedRecord<'a> {
 pub(crate) struct Condensed<'a> {
     /// The averaging times that are too short for the means.
     pub shorter: &'a ShorterTimes,
-    /// Of each channel of the measurement, the lines that the means do not show.
-    pub faster_lines: &'a [Vec<MergedLine>],
+    /// The lines that the means do not show.
+    pub faster_lines: &'a PerChannel<Vec<MergedLine>>,
 }
 
 /// The noise of one channel in all of a recording.
 pub(crate) struct ChannelTrace {
-    pub channel: ChannelProfile,
     pub fit: ChannelFit,
     /// Lines in the spectrum.
     pub lines: Vec<MergedLine>,
@@ -73,59 +67,46 @@ pub(crate) struct ChannelTrace {
     signals: UnexplainedSignals,
 }
 
-impl<'a> Condensed<'a> {
-    /// The lines of a channel that the means of `measurement` do not show.
-    pub(crate) fn faster_lines(&self, measurement: &Measurement, channel: ChannelProfile) -> &'a [MergedLine] {
-        let position = measurement.profiles().position(|of| of == channel);
-        position.and_then(|position| self.faster_lines.get(position)).map_or(&[], Vec::as_slice)
-    }
-}
-
 impl<'a> TracedRecord<'a> {
     /// What `measurement` shows; where that has means, with what is known beside them.
     pub(crate) fn new(measurement: &'a Measurement, condensed: Option<Condensed<'a>>) -> Self {
         let shorter = condensed.map(|condensed| condensed.shorter);
-        let of = |quantities: [Quantity; 2]| {
-            quantities.into_iter().flat_map(|quantity| measurement.of_quantity(quantity)).collect::<Vec<_>>()
-        };
-        let traced = of([Quantity::AngularRate, Quantity::SpecificForce]);
-        let coupled = [traced.clone(), of([Quantity::Temperature, Quantity::SupplyVoltage])].concat();
+        let environment = measurement.ids().filter(|&channel| measurement[channel].profile.quantity.is_environment());
+        let coupled: Vec<ChannelId> = measurement.inertial().chain(environment).collect();
         let noise_grids = NoiseGrids::default();
-        let preprocessing = Preprocessing::detect(measurement, shorter.is_some(), &traced, &noise_grids);
+        let preprocessing = Preprocessing::detect(measurement, shorter.is_some(), &noise_grids);
         let estimators = RecordEstimators::estimate(measurement, shorter, &coupled, &preprocessing);
-        let moved = in_parallel(&traced, |channel| {
-            motion::find(&preprocessing.measured(measurement, *channel), channel).map(|motion| (*channel, motion))
+        let moved = per_channel(measurement.ids(), |channel| {
+            let profile = &measurement[channel].profile;
+            let is_traced = profile.quantity.is_inertial();
+            is_traced.then(|| motion::find(&preprocessing.measured(measurement, channel), profile)).flatten()
         });
-        let series = in_parallel(&coupled, |&channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
-        let recorded: Vec<ChannelProfile> = measurement.profiles().collect();
-        let mut channels = in_parallel(&recorded, |&channel| match traced.iter().position(|of| *of == channel) {
-            Some(own) => ChannelTrace::trace(measurement, condensed, &preprocessing, &estimators, &series, own),
-            None => ChannelTrace::baseline(&estimators, channel),
+        let series =
+            per_channel(measurement.ids(), |channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
+        let mut channels = per_channel(measurement.ids(), |channel| {
+            if measurement[channel].profile.quantity.is_inertial() {
+                ChannelTrace::trace(measurement, condensed, &preprocessing, &estimators, &series, channel)
+            } else {
+                ChannelTrace::baseline(&estimators, channel)
+            }
         });
-        let traces = channels.iter_mut().map(|trace| (trace.channel, &mut trace.fit));
-        let filter = agree_on_filter(measurement, &estimators, traces.filter(|(channel, _)| traced.contains(channel)));
+        let fits = measurement.ids().zip(channels.iter_mut().map(|trace| &mut trace.fit));
+        let filter = agree_on_filter(measurement, &estimators, fits);
         for ChannelTrace { fit, slowest, lines, .. } in &mut channels {
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
-        let distance_of_levels = |channel: ChannelProfile| {
-            let telegraph = channels.iter().find(|trace| trace.channel == channel)?.telegraph.as_ref()?;
+        let distance_of_levels = |channel: ChannelId| {
+            let telegraph = channels[channel].telegraph.as_ref()?;
             telegraph.effect.parameters.get("amplitude").map(|amplitude| amplitude.value)
         };
-        let motions = motion::of_platform(moved.into_iter().flatten().collect(), distance_of_levels);
-        Self {
-            measurement,
-            condensed,
-            traced,
-            noise_grids,
-            preprocessing,
-            estimators,
-            series,
-            channels,
-            filter,
-            coupled,
-            motions,
-        }
+        let motions = motion::of_platform(moved, distance_of_levels);
+        Self { measurement, condensed, noise_grids, preprocessing, estimators, series, channels, filter, motions }
+    }
+
+    /// Whether effects are traced in a channel: in the inertial ones.
+    pub(crate) fn is_traced(&self, channel: ChannelId) -> bool {
+        self.measurement[channel].profile.quantity.is_inertial()
     }
 
     /// Completes the models with the lines of the spectrum that the curve does not resolve.
@@ -136,66 +117,57 @@ impl<'a> TracedRecord<'a> {
         }
     }
 
-    /// The series of the same channels as [`series`](Self::series), without the samples of `exclusion`.
-    pub(crate) fn series_without(&self, exclusion: Exclusion) -> Vec<Series> {
-        let coupled: Vec<(&ChannelProfile, &Series)> = self.coupled.iter().zip(&self.series).collect();
-        in_parallel(&coupled, |&(&channel, whole)| {
+    /// The series of the channels, without the samples of `exclusion`.
+    pub(crate) fn series_without(&self, exclusion: Exclusion) -> PerChannel<Series> {
+        per_channel(self.series.ids(), |channel| {
             let is_same = self.preprocessing.leaves_the_same(channel, exclusion, Exclusion::ByWhole);
-            if is_same { whole.clone() } else { self.preprocessing.series(self.measurement, channel, exclusion) }
+            let other = || self.preprocessing.series(self.measurement, channel, exclusion);
+            if is_same { self.series[channel].clone() } else { other() }
         })
     }
 
     /// Whether the rules of the first half leave out samples of a channel.
-    pub(crate) fn has_rules(&self, channel: ChannelProfile) -> bool {
-        let shorter = self.condensed.and_then(|condensed| condensed.shorter.of(channel));
-        let is_screened = shorter.is_some_and(|of| of.is_screened);
+    pub(crate) fn has_rules(&self, channel: ChannelId) -> bool {
+        let is_screened = self.condensed.is_some_and(|of| of.shorter.channels[channel].is_screened);
         is_screened || self.preprocessing.excludes(channel, Exclusion::ByFirstHalf)
-    }
-
-    /// The series of one channel, if it is among them.
-    pub(crate) fn series_of(&self, channel: ChannelProfile) -> Option<&Series> {
-        self.coupled.iter().position(|of| *of == channel).map(|position| &self.series[position])
     }
 
     /// Stretches in which the platform did not move.
     pub(crate) fn at_rest(&self) -> Vec<Stretch> {
         let duration_s = self.measurement.periods() as f64 * self.measurement.period_s();
-        motion::at_rest(self.motions.iter().map(|(_, motion)| motion), duration_s)
+        motion::at_rest(self.motions.iter().flatten(), duration_s)
     }
 
-    /// The effects of each channel, in the order of the channels.
-    pub(crate) fn effects(&self) -> Vec<Vec<Effect>> {
-        let commons = common_modes(&self.channels);
-        self.channels
-            .iter()
-            .map(|trace| {
-                let common = commons.iter().find(|common| common.channels.contains(&trace.channel));
-                if self.traced.contains(&trace.channel) { self.effects_of(trace, common) } else { Vec::new() }
-            })
-            .collect()
+    /// The effects of each channel.
+    pub(crate) fn effects(&self) -> PerChannel<Vec<Effect>> {
+        let commons = self.common_modes();
+        let of = |channel: ChannelId| {
+            let common = commons.iter().find(|common| common.channels.contains(&channel));
+            if self.is_traced(channel) { self.effects_of(channel, common) } else { Vec::new() }
+        };
+        self.channels.ids().map(of).collect()
     }
 
-    fn effects_of(&self, trace: &ChannelTrace, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
+    fn effects_of(&self, channel: ChannelId, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
         let Self { preprocessing, estimators, measurement, .. } = self;
-        let channel = trace.channel;
-        let moved = self.motions.iter().filter(|(of, _)| *of == channel);
-        let mut effects: Vec<Effect> = moved.map(|(_, motion)| motion.effect.clone()).collect();
+        let (trace, own) = (&self.channels[channel], &self.series[channel]);
+        let mut effects: Vec<Effect> = self.motions[channel].iter().map(|motion| motion.effect.clone()).collect();
         effects.extend(preprocessing.effects(channel));
         // The longest octaves of the curve see a sinusoid of a few periods as a ramp.
         let has_ramp = preprocessing.has_ramp(channel) || trace.lines.iter().any(MergedLine::is_slow);
-        let mut named = name_effects(&measurement.profile, &trace.findings(estimators, common));
+        let mut named = name_effects(&measurement.profile, &self.findings(channel, common));
         // The response that is not proportional has the sensitivity too.
         let responds = preprocessing.responds_to_temperature(channel);
         named.retain(|effect| !responds || effect.kind != "temperature");
         let is_ramp = |effect: &Effect| {
             let slope = effect.parameters.get("slope").map_or(0.0, |slope| slope.value);
-            !has_ramp && self.series_of(channel).is_some_and(|own| goes_as_far_as_ramp(own, slope))
+            !has_ramp && goes_as_far_as_ramp(own, slope)
         };
         let is_named = |effect: &Effect| effect.kind != NoiseTerm::RateRamp.name() || is_ramp(effect);
         effects.extend(named.into_iter().filter(is_named));
-        let resolution = estimators.both.resolution_of(channel);
+        let resolution = estimators.both.resolution(channel);
         let in_steps =
-            |(position, of): (usize, &Sensitivity)| (of.value * estimators.both.resolution(position)).powi(2);
+            |(covariate, of): (ChannelId, &Sensitivity)| (of.value * estimators.both.resolution(covariate)).powi(2);
         let of_covariates = trace.fit.covariates.sensitivities().map(in_steps).sum();
         let by_curve = unexplained::by_curve(&trace.fit, &measurement.profile, resolution, of_covariates);
         if let Some(unexplained) = &by_curve {
@@ -204,9 +176,8 @@ impl<'a> TracedRecord<'a> {
         effects.extend(by_curve);
         effects.retain(|effect| !trace.signals.has(effect, &trace.lines));
         effects.extend(trace.signals.effects());
-        let own = self.series_of(channel);
-        let temperature = self.coupled.iter().position(|of| of.quantity == Quantity::Temperature);
-        let level = own.zip(temperature).and_then(|(own, at)| unexplained::level_by_temperature(own, &self.series[at]));
+        let temperature = measurement.of_quantity(Quantity::Temperature).next();
+        let level = temperature.and_then(|of| unexplained::level_by_temperature(own, &self.series[of]));
         if level.is_some() {
             // The limit above which a sample is a spike is that of a constant level.
             effects.retain(|effect| effect.kind != "spikes");
@@ -221,16 +192,42 @@ impl<'a> TracedRecord<'a> {
         effects.retain(|effect| !is_visit(effect));
         effects
     }
+
+    fn findings<'f>(&'f self, channel: ChannelId, common: Option<&'f ChannelsInCommon>) -> ChannelFindings<'f> {
+        let (trace, both) = (&self.channels[channel], &self.estimators.both);
+        let sensitivities = trace.fit.covariates.sensitivities();
+        ChannelFindings {
+            channel: both.channels[channel],
+            resolution: both.resolution(channel),
+            fit: &trace.fit,
+            sensitivities: sensitivities.map(|(covariate, of)| (both.channels[covariate], *of)).collect(),
+            lines: Some(&trace.lines),
+            telegraph: trace.telegraph.as_ref(),
+            common,
+            rest: trace.rest.as_ref(),
+        }
+    }
+
+    /// The drift that the gyroscopes have in common, and that of the accelerometers.
+    fn common_modes(&self) -> Vec<ChannelsInCommon> {
+        let filter_s = self.channels.iter().map(|trace| filter_length_s(&trace.fit.trace.after)).fold(0.0, f64::max);
+        let of_quantity = |quantity: &Quantity| {
+            let named = |channel: ChannelId| (channel, self.measurement[channel].profile.name);
+            let rest = |channel: ChannelId| Some((named(channel), self.channels[channel].rest.clone()?));
+            let (channels, rests): (Vec<_>, Vec<UniformSeries>) =
+                self.measurement.of_quantity(*quantity).filter_map(rest).unzip();
+            common_mode(&channels, &rests, filter_s)
+        };
+        in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], of_quantity).into_iter().flatten().collect()
+    }
 }
 
 impl ChannelTrace {
     /// The baseline model alone.
-    fn baseline(estimators: &RecordEstimators, channel: ChannelProfile) -> Self {
-        let position = estimators.both.position(channel).unwrap_or_default();
-        let covariates = CovariateFit::estimate(&estimators.both, position, false, |_| None);
+    fn baseline(estimators: &RecordEstimators, channel: ChannelId) -> Self {
+        let covariates = CovariateFit::estimate(&estimators.both, channel, false, |_| None);
         let fit = ChannelFit::fit_baseline(covariates);
         Self {
-            channel,
             fit,
             lines: Vec::new(),
             telegraph: None,
@@ -240,69 +237,51 @@ impl ChannelTrace {
         }
     }
 
-    /// The baseline model and what it lacks, of the channel of `series[own]`.
+    /// The baseline model and what it lacks.
     fn trace(
         measurement: &Measurement,
         condensed: Option<Condensed>,
         preprocessing: &Preprocessing,
         estimators: &RecordEstimators,
-        series: &[Series],
-        own: usize,
+        series: &PerChannel<Series>,
+        channel: ChannelId,
     ) -> Self {
-        let channel = estimators.both.channels[own];
-        let covariates = CovariateFit::estimate(&estimators.both, own, preprocessing.has_ramp(channel), |regressor| {
+        let has_ramp = preprocessing.has_ramp(channel);
+        let covariates = CovariateFit::estimate(&estimators.both, channel, has_ramp, |regressor| {
             preprocessing.sensitivity(channel, regressor)
         });
-        let own = &series[own];
+        let own = &series[channel];
         let rest = covariates.compensated_series(own, series);
-        let faster = condensed.map(|condensed| condensed.faster_lines(measurement, channel));
+        let faster = condensed.map(|condensed| condensed.faster_lines[channel].as_slice());
         let (fit, mut lines) = fit_with_lines(covariates, own, rest.as_ref(), &measurement.profile, faster);
         let correlation_times: Vec<f64> = fit.correlation_times().collect();
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         let is_reversible =
             |found: &Detection| random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value);
-        let telegraph = random_telegraph::find(&rest, channel.unit, &correlation_times).filter(is_reversible);
+        let telegraph = random_telegraph::find(&rest, own.unit, &correlation_times).filter(is_reversible);
         let slowest = CosineSpectrum::new(&rest);
         let signals = UnexplainedSignals::find(&rest, &mut lines, &fit.bands());
-        Self { channel, fit, lines, telegraph, rest: Some(rest), slowest, signals }
-    }
-
-    fn findings<'a>(
-        &'a self,
-        estimators: &RecordEstimators,
-        common: Option<&'a ChannelsInCommon>,
-    ) -> ChannelFindings<'a> {
-        let both = &estimators.both;
-        let sensitivities = self.fit.covariates.sensitivities();
-        ChannelFindings {
-            channel: self.channel,
-            resolution: both.resolution_of(self.channel),
-            fit: &self.fit,
-            sensitivities: sensitivities.map(|(position, of)| (both.channels[position], *of)).collect(),
-            lines: Some(&self.lines),
-            telegraph: self.telegraph.as_ref(),
-            common,
-            rest: self.rest.as_ref(),
-        }
+        Self { fit, lines, telegraph, rest: Some(rest), slowest, signals }
     }
 }
 
-/// Gives `fits` of channels in one part of a recording the filter that the part of the sensor has once, as they show it
+/// Gives the `fits` of the inertial channels in one part of a recording the filter that the sensor has once, as they show it
 /// together.
 pub(crate) fn agree_on_filter<'f>(
     measurement: &Measurement,
     estimators: &RecordEstimators,
-    fits: impl Iterator<Item = (ChannelProfile, &'f mut ChannelFit)>,
+    fits: impl Iterator<Item = (ChannelId, &'f mut ChannelFit)>,
 ) -> Result<PartFilter, Unidentified> {
     let profile = &measurement.profile;
     let decimation = profile.internal_rate_hz * estimators.both.sample_period();
-    let mut fits: Vec<(ChannelProfile, &mut ChannelFit)> = fits.collect();
+    let is_inertial = |channel: ChannelId| measurement[channel].profile.quantity.is_inertial();
+    let mut fits: Vec<(ChannelId, &mut ChannelFit)> = fits.filter(|(channel, _)| is_inertial(*channel)).collect();
     let channels: Vec<FilteredChannel> = fits
         .iter()
         .map(|(channel, fit)| {
-            let resolution = estimators.both.resolution_of(*channel);
+            let resolution = estimators.both.resolution(*channel);
             FilteredChannel {
-                name: channel.name,
+                name: measurement[*channel].profile.name,
                 curve: &fit.covariates.curve,
                 model: &fit.trace.after,
                 resolution,
@@ -316,16 +295,4 @@ pub(crate) fn agree_on_filter<'f>(
         fit.agree(filter.as_ref().ok(), is_dithered);
     }
     filter
-}
-
-/// The drift that the gyroscopes have in common, and that of the accelerometers.
-fn common_modes(channels: &[ChannelTrace]) -> Vec<ChannelsInCommon> {
-    let filter_s = channels.iter().map(|trace| filter_length_s(&trace.fit.trace.after)).fold(0.0, f64::max);
-    let of_quantity = |quantity: &Quantity| {
-        let members = channels.iter().filter(|trace| trace.channel.quantity == *quantity);
-        let (profiles, rests): (Vec<ChannelProfile>, Vec<UniformSeries>) =
-            members.filter_map(|trace| Some((trace.channel, trace.rest.clone()?))).unzip();
-        common_mode(&profiles, &rests, filter_s)
-    };
-    in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], of_quantity).into_iter().flatten().collect()
 }

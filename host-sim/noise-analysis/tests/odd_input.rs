@@ -260,3 +260,26 @@ fn periodic_counts_and_silence_are_analysed_without_a_panic() {
         }
     }
 }
+
+/// A profile with a value that is not a number equals no profile, not even itself: each channel has the noise of its own samples all
+/// the same.
+#[test]
+fn a_channel_has_its_own_noise_whatever_its_profile_says() {
+    let samples = 20_000;
+    let mut measurement = gyro(white(1, samples, 20.0));
+    let sensor = measurement.profile.clone();
+    for (name, counts) in [("gyro_y", 40.0), ("magn_x", 80.0)] {
+        let mut channel = sensor.channel(name).expect("a channel of the part");
+        channel.initial_bias_error = Some(f64::NAN);
+        measurement.channels.push(MeasuredChannel::new(channel, white(counts as u64, samples, counts)));
+    }
+    let report = analyze(&measurement);
+    for (channel, counts) in report.channels.iter().zip([20.0, 40.0, 80.0]) {
+        let lsb = sensor.channel(&channel.name).expect("a channel of the part").lsb;
+        // 20,000 samples know N to 0.5 %.
+        for model in [&channel.before, &channel.after, &channel.refitted] {
+            let of = coefficient(model, "angle_random_walk").value / (counts * lsb / RATE_HZ.sqrt());
+            assert!((of - 1.0).abs() < 0.03, "{}: {of}", channel.name);
+        }
+    }
+}

@@ -39,7 +39,8 @@ impl Case {
     }
 
     fn series(&self, channel: Channel) -> Series {
-        Series::from_measurement(&self.measurement, &self.measurement.profile.channels[channel as usize])
+        let channel = self.measurement.named(channel.name()).expect("a recorded channel");
+        Series::from_measurement(&self.measurement, channel)
     }
 
     /// The results of all detectors.

@@ -7,7 +7,7 @@ use crate::estimators::CoupledEstimators;
 use crate::parallel::in_parallel;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::PowerLaw;
-use measurement::{ChannelProfile, MeasuredChannel, Measurement};
+use measurement::{ChannelId, MeasuredChannel, Measurement};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::ops::Range;
@@ -54,7 +54,7 @@ pub struct CommonModeRegression {
 impl CommonModeRegression {
     /// The regression of `channels` of a recording; `None` if there are fewer than two, or too few samples for it.
     #[must_use]
-    pub fn estimate(measurement: &Measurement, channels: &[ChannelProfile]) -> Option<Self> {
+    pub fn estimate(measurement: &Measurement, channels: &[ChannelId]) -> Option<Self> {
         let others = channels.len().checked_sub(1).filter(|&others| others > 0)?;
         let period = measurement.period_s();
         let [first, second, unseen] = quarters_and_second_half(measurement, channels);
@@ -95,7 +95,7 @@ impl CommonModeRegression {
         });
         let trusted = by_channel().map(|of| Some(remaining_variance(&late, of, &weights(&early, of)?)? < 1.0));
         Some(Self {
-            channels: channels.iter().map(|channel| channel.name.to_owned()).collect(),
+            channels: channels.iter().map(|&channel| measurement[channel].profile.name.to_owned()).collect(),
             weights_tau_s: weights_at as f64 * period,
             trusted: trusted.collect::<Option<_>>()?,
             shares: shares.collect(),
@@ -105,11 +105,12 @@ impl CommonModeRegression {
 }
 
 /// Estimators of the first quarter, the second quarter, and the second half.
-fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelProfile]) -> [CoupledEstimators; 3] {
-    let recorded: Vec<&MeasuredChannel> = channels.iter().filter_map(|channel| measurement.channel(channel)).collect();
+fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelId]) -> [CoupledEstimators; 3] {
+    let recorded: Vec<&MeasuredChannel> = channels.iter().map(|&channel| &measurement[channel]).collect();
+    let positions_of_all: Vec<usize> = (0..channels.len()).collect();
     let quarter = |number: usize| (number * measurement.len()).div_ceil(4);
     let part = |positions: &Range<usize>| {
-        let mut part = CoupledEstimators::new(channels.len(), channels.len());
+        let mut part = CoupledEstimators::new(channels.len(), &positions_of_all);
         for position in positions.clone() {
             part.gap(measurement.missing_before(position));
             part.push(recorded.iter().map(|of| (!of.is_refused(position)).then(|| of.counts[position])));
@@ -120,7 +121,7 @@ fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelProfil
     let parts = [quarter(2)..measurement.len(), 0..quarter(1), quarter(1)..quarter(2)];
     let mut parts = in_parallel(&parts, part).into_iter();
     let [second_half, first, second] =
-        std::array::from_fn(|_| parts.next().unwrap_or_else(|| CoupledEstimators::new(0, 0)));
+        std::array::from_fn(|_| parts.next().unwrap_or_else(|| CoupledEstimators::new(0, &[])));
     [first, second, second_half]
 }
 
@@ -167,10 +168,6 @@ mod tests {
         }
     }
 
-    fn profiles(measurement: &Measurement) -> Vec<ChannelProfile> {
-        measurement.profiles().collect()
-    }
-
     #[test]
     fn a_common_walk_is_explained_by_its_share_of_the_variance_and_removed() {
         /// White noise of every channel and step of the walk, counts.
@@ -186,7 +183,8 @@ mod tests {
             columns.iter_mut().zip(values).for_each(|((_, counts), value)| counts.push(value.round() as i32));
         }
         let measurement = measurement(columns.to_vec());
-        let found = CommonModeRegression::estimate(&measurement, &profiles(&measurement)).expect("three channels");
+        let found = CommonModeRegression::estimate(&measurement, &measurement.ids().collect::<Vec<_>>())
+            .expect("three channels");
         // Allan variances of a sampled random walk and of white noise.
         let (walk, white) = (|n: f64| STEP * STEP * (2.0 * n * n + 1.0) / (6.0 * n), |n: f64| WHITE * WHITE / n);
         for octave in found.shares.iter().filter(|octave| octave.edf > 100.0) {
@@ -212,6 +210,6 @@ mod tests {
     #[test]
     fn a_single_channel_has_no_common_mode() {
         let measurement = measurement(vec![("gyro_x", (0..100).map(|at| at % 7).collect())]);
-        assert_eq!(CommonModeRegression::estimate(&measurement, &profiles(&measurement)), None);
+        assert_eq!(CommonModeRegression::estimate(&measurement, &measurement.ids().collect::<Vec<_>>()), None);
     }
 }

@@ -2,10 +2,9 @@
 
 use crate::preprocessing::Exclusion;
 use crate::series::Series;
-use crate::shorter_times::ShorterTimes;
+use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
-use measurement::ChannelProfile;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
@@ -68,9 +67,9 @@ impl EpochCurves {
 
     /// The same curves of a channel by averaging factors in samples, where the series has means, with the `shorter` averaging times.
     #[must_use]
-    pub(crate) fn in_samples(self, shorter: &ShorterTimes, channel: ChannelProfile) -> Self {
+    pub(crate) fn in_samples(self, shorter: &ShorterTimes, of: &ShorterTimesOfChannel) -> Self {
         let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
-            let of_samples = shorter.of(channel).and_then(|of| of.within(slots, Exclusion::ByFirstHalf));
+            let of_samples = of.within(slots, Exclusion::ByFirstHalf);
             of_samples.map_or_else(|| shorter.in_samples(means), |of_samples| shorter.continued(of_samples, means))
         };
         let epochs = |curves: &[Curve<OCTAVES>], ranges: &[Range<u64>]| {
