@@ -186,11 +186,11 @@ impl<'a> Recorded<'a> {
             let (trace, half) = (&record.channels[channel], &first_half.channels[channel]);
             let whole = estimators.measured[channel]
                 .clone()
-                .with_confidence(|point| half.fit.trace.before.variance_fractions(point.n));
+                .with_confidence(|point| half.fit.before.variance_fractions(point.n));
             let after = half.after(record, channel, &whole, avar_of);
             // The model with the added terms, fitted to the whole record, with the errors of `after`.
             let refitted = ModelReport {
-                terms: term_reports(&trace.fit.trace.after, profile.unit),
+                terms: term_reports(trace.fit.after(), profile.unit),
                 adev: trace.fit.deviations(&estimators.both, channel, &whole, avar_of),
                 ..after.clone()
             };
@@ -256,7 +256,7 @@ fn keep_terms_that_held(record: &mut TracedRecord, first_half: &FirstHalf) {
     let filter = record.filter.clone().ok();
     for (channel, half) in first_half.channels.with_ids() {
         if record.is_traced(channel) && half.held(record, channel) {
-            record.channels[channel].fit.take_terms_that_held(&half.fit.trace, filter.as_ref());
+            record.channels[channel].fit.take_terms_that_held(&half.fit.traced, filter.as_ref());
         }
     }
 }
@@ -275,7 +275,7 @@ impl Assessed {
         let own = if record.is_traced(channel) { &record.series[channel] } else { &recorded };
         // Models that are assessed by samples that still have the share of the covariates.
         let models = AssessedModels {
-            refitted: &trace.fit.trace.after,
+            refitted: trace.fit.after(),
             uncompensated: trace.fit.with_covariates(),
             of_first_half: half.fit.with_covariates(),
         };

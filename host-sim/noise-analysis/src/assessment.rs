@@ -10,6 +10,7 @@ mod spectral_white_noise;
 pub use innovations::Innovations;
 
 use crate::findings::{BoundedEstimate, Parameter};
+use crate::noise_terms::is_white;
 use crate::series::Series;
 use crate::spectra::{Welch, correlation_time};
 use crate::uniform_series::UniformSeries;
@@ -208,8 +209,8 @@ fn is_known(model: &Model) -> bool {
 /// The terms of a model with the white noise as one: what passed the filter and what entered after it add up at averaging
 /// times longer than the filter, and their sum is N.
 fn terms_with_one_white_noise(model: &Model) -> Vec<FittedTerm> {
-    let is_white = |term: &FittedTerm| name(&term.kind) == NoiseTerm::AngleRandomWalk.name();
-    let (white, others): (Vec<FittedTerm>, Vec<FittedTerm>) = model.terms().iter().copied().partition(is_white);
+    let (white, others): (Vec<FittedTerm>, Vec<FittedTerm>) =
+        model.terms().iter().copied().partition(|term| is_white(&term.kind));
     let Some(first) = white.first().copied() else { return others };
     let parts: Vec<BoundedEstimate> =
         white.iter().map(|&FittedTerm { value, low, high, .. }| BoundedEstimate { value, low, high }).collect();
@@ -274,9 +275,8 @@ fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<NavigationDri
 /// The record length that each coefficient of `model` needs, which was fitted to `duration` s. Of the white noise behind a
 /// filter and that after it, the larger one stands for N.
 fn record_lengths(model: &Model, duration: f64) -> Vec<RecordLength> {
-    let is_white = |term: &FittedTerm| name(&term.kind) == NoiseTerm::AngleRandomWalk.name();
-    let largest = model.terms().iter().filter(|term| is_white(term)).map(|term| term.value).fold(0.0, f64::max);
-    let is_smaller = |term: &FittedTerm| is_white(term) && term.value < largest;
+    let largest = model.terms().iter().filter(|term| is_white(&term.kind)).map(|term| term.value).fold(0.0, f64::max);
+    let is_smaller = |term: &FittedTerm| is_white(&term.kind) && term.value < largest;
     let of = |(index, term): (usize, &FittedTerm)| {
         let length = record_length::required_length(model, index, duration);
         let more_hours = length.map(|length| (length - duration) / 3600.0);

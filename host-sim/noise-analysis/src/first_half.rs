@@ -72,8 +72,8 @@ impl FirstHalf {
                 series: &self.series[channel],
                 shorter: record.condensed.map(|of| (of.shorter, &of.shorter.channels[channel])),
                 epochs: half.epochs.as_ref(),
-                baseline: &half.fit.trace.before,
-                model: &half.fit.trace.after,
+                baseline: &half.fit.before,
+                model: half.fit.after(),
             }
         };
         let channels: Vec<TracedChannel> = traced.iter().map(of).collect();
@@ -88,7 +88,7 @@ impl FirstHalfFit {
     fn baseline(record: &TracedRecord, channel: ChannelId) -> Self {
         let covariates = CovariateFit::estimate(&record.estimators.ruled[0], channel, false, |_| None);
         let fit = ChannelFit::fit_baseline(covariates);
-        Self { raw: fit.trace.before.clone(), fit, slowest: None, lines: Vec::new(), epoch_curves: None, epochs: None }
+        Self { raw: fit.before.clone(), fit, slowest: None, lines: Vec::new(), epoch_curves: None, epochs: None }
     }
 
     /// The baseline model and what it lacks; `halves` are the first halves of `series`.
@@ -112,7 +112,7 @@ impl FirstHalfFit {
         let has_rules = halves.ids().any(|of| record.has_rules(of));
         let raw = has_rules.then(|| {
             let raw = CovariateFit::estimate(&estimators.raw[0], channel, has_ramp, sensitivity);
-            ChannelFit::fit_baseline(raw).trace.before
+            ChannelFit::fit_baseline(raw).before
         });
         let covariates = CovariateFit::estimate(&estimators.ruled[0], channel, has_ramp, sensitivity);
         let followed = covariates.compensated_series(&series[channel], series);
@@ -127,7 +127,7 @@ impl FirstHalfFit {
         let rest = covariates.compensated_series(own, halves);
         let faster = record.condensed.map(|condensed| condensed.faster_lines[channel].as_slice());
         let (fit, lines) = fit_with_lines(covariates, own, rest.as_ref(), &record.measurement.profile, faster);
-        let raw = raw.unwrap_or_else(|| fit.trace.before.clone());
+        let raw = raw.unwrap_or_else(|| fit.before.clone());
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         Self { raw, fit, slowest: CosineSpectrum::new(&rest), lines, epoch_curves, epochs: None }
     }
@@ -135,7 +135,7 @@ impl FirstHalfFit {
     /// Fits the model to the later quarter of the first half where its noise changes.
     fn fit_to_recent(&mut self) {
         let Some(curves) = self.epoch_curves.take() else { return };
-        let epochs = ChannelEpochs::compare(curves, &self.fit.trace.after);
+        let epochs = ChannelEpochs::compare(curves, self.fit.after());
         if let Some(recent) = epochs.recent_curve() {
             self.fit.fit_to(&recent);
         }
@@ -145,13 +145,13 @@ impl FirstHalfFit {
     /// The error on the second half of the curve of the first half itself.
     pub(crate) fn curve_error(&self, record: &TracedRecord, channel: ChannelId) -> ModelErrorReport {
         let unseen = self.fit.covariates.compensated(&record.estimators.raw[1], channel);
-        ModelErrorReport::of_curve(&self.fit.covariates.curve, &unseen, &self.fit.trace.after)
+        ModelErrorReport::of_curve(&self.fit.covariates.curve, &unseen, self.fit.after())
     }
 
     /// Whether the second half does not contradict the model with the added terms.
     pub(crate) fn held(&self, record: &TracedRecord, channel: ChannelId) -> bool {
         let unseen = self.fit.covariates.compensated(&record.estimators.ruled[1], channel);
-        Contradiction::find(&self.fit.trace.after, &unseen).is_none()
+        Contradiction::find(self.fit.after(), &unseen).is_none()
     }
 
     /// The baseline model of the first half as it was recorded.
@@ -177,7 +177,7 @@ impl FirstHalfFit {
         avar_of: impl Fn(ChannelId, u64) -> Option<f64>,
     ) -> ModelReport {
         let estimators = &record.estimators;
-        let (model, covariates) = (&self.fit.trace.after, &self.fit.covariates);
+        let (model, covariates) = (self.fit.after(), &self.fit.covariates);
         let unseen = |part: &RecordPart| ModelErrorReport::new(model, &covariates.compensated(part, channel));
         ModelReport {
             terms: term_reports(model, record.measurement[channel].profile.unit),

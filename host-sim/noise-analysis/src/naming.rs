@@ -1,14 +1,16 @@
 //! Names the effects that the whole record shows in a channel: which of them are reported, with parameters, units and
 //! bounds, and with evidence that a person can check.
 
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES, filter_length_s, line_frequency};
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES};
 use crate::detectors::random_telegraph::is_reversible;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
+use crate::noise_terms::{filter_length_s, is_white, line_frequency};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
 use crate::spectra::{MarkovEstimate, Modulation};
 use crate::spectral_lines::{FEW_PERIODS, MergedLine};
 use crate::streamed_curves::STEPS_PER_COUNT;
+use crate::traced_model::Addition;
 use crate::uniform_series::UniformSeries;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::confidence::NORMAL_975;
@@ -16,7 +18,6 @@ use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
-use allan_core::trace::AddedTerm;
 use allan_core::{AllanPoint, Cascade, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::PI;
@@ -61,7 +62,7 @@ pub(crate) struct ChannelFindings<'a> {
 /// The effects of a channel beyond the baseline model, without those that preprocessing found.
 pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) -> Vec<Effect> {
     let &ChannelFindings { channel, resolution, fit, lines, common, .. } = findings;
-    let (model, unit, period_s) = (&fit.trace.after, channel.unit, fit.trace.after.sample_period());
+    let (model, unit, period_s) = (fit.after(), channel.unit, fit.after().sample_period());
     let (plausible, implausible): (Vec<_>, Vec<_>) = findings
         .sensitivities
         .iter()
@@ -86,8 +87,7 @@ pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) 
         .map(|line| line_effect(line, fit, unit))
         .filter(|effect| is_shown(effect, duration_s))
         .collect();
-    for found in &fit.trace.added {
-        let term = &model.terms()[found.term];
+    for (term, found) in fit.traced.added() {
         match term.kind {
             NoiseTerm::Filtered(filter) => {
                 effects.push(filter_effect((term, &filter), found, unit, period_s, profile.internal_rate_hz));
@@ -185,7 +185,7 @@ fn kurtosis_ratio(
     resolution: f64,
     markov: Markov,
 ) -> Option<KurtosisRatio> {
-    let model = &fit.trace.after;
+    let model = fit.after();
     if fit.covariates.is_empty() {
         return telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov);
     }
@@ -254,21 +254,20 @@ fn has_few_periods(kind: &NoiseTerm, duration_s: f64) -> bool {
 fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     let period_s = model.sample_period();
     let rounding = ROUNDING * resolution * resolution * period_s;
-    let is_white = |kind: &NoiseTerm| matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_));
     let white = model.terms().iter().filter(|term| is_white(&term.kind));
     let left: f64 = white.map(|term| term.low * term.low).sum();
     markov.time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding
 }
 
 /// A term that was added to the baseline model.
-fn term_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64) -> Effect {
+fn term_effect(term: &FittedTerm, found: &Addition, unit: &str, period_s: f64) -> Effect {
     added_effect(term, found, unit, period_s, &meaning(&term.kind))
 }
 
 /// A filter that was added to the baseline model, in a sensor whose internal sample rate is `internal_rate_hz`.
 fn filter_effect(
     (term, filter): (&FittedTerm, &MovingAverageFilter),
-    found: &AddedTerm,
+    found: &Addition,
     unit: &str,
     period_s: f64,
     internal_rate_hz: f64,
@@ -276,7 +275,7 @@ fn filter_effect(
     added_effect(term, found, unit, period_s, &filter_meaning(filter, internal_rate_hz))
 }
 
-fn added_effect(term: &FittedTerm, found: &AddedTerm, unit: &str, period_s: f64, meaning: &str) -> Effect {
+fn added_effect(term: &FittedTerm, found: &Addition, unit: &str, period_s: f64, meaning: &str) -> Effect {
     let residual = found.residual;
     let evidence = format!(
         "{:+.1} % at tau = {} s ({:.0} sigma) before it was added, which takes {:.0} sigma off the fit; {meaning}",
@@ -298,7 +297,7 @@ fn normal_bounds(estimate: MeasuredValue, unit: &str) -> Parameter {
 /// A Markov term whose kurtosis is that of random telegraph noise.
 fn telegraph_effect(
     term: &FittedTerm,
-    found: &AddedTerm,
+    found: &Addition,
     kurtosis: &KurtosisRatio,
     unit: &str,
     period_s: f64,
@@ -317,7 +316,7 @@ fn telegraph_effect(
 }
 
 /// A term that fits an octave of the curve and is contradicted by `what` the samples show.
-fn unexplained_octave(found: &AddedTerm, curve: &Curve<OCTAVES>, what: &str) -> Effect {
+fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, what: &str) -> Effect {
     let point = curve.points().iter().find(|point| point.n == found.residual.n);
     // Of the measured deviation at this averaging time; that of the model is taken as exact.
     let bound = |of: fn(&AllanPoint) -> f64| point.map_or(1.0, |point| (of(point) / point.avar).sqrt());
@@ -354,7 +353,7 @@ fn markov_effect(term: &FittedTerm, by_spectrum: &MarkovEstimate, unit: &str) ->
 }
 
 /// A Markov term in the place of the white noise.
-fn low_pass_effect(term: &FittedTerm, markov: Markov, found: &AddedTerm, period_s: f64) -> Effect {
+fn low_pass_effect(term: &FittedTerm, markov: Markov, found: &Addition, period_s: f64) -> Effect {
     let corner = |time_constant: f64| 0.5 / (PI * time_constant);
     let (shortest, longest) = term.shape[0];
     let bandwidth = Parameter::new(corner(markov.time_constant), corner(longest), corner(shortest), "Hz");
@@ -435,7 +434,7 @@ fn shared_drift_effect(
 
 /// A line of the spectrum beside what `fit` has.
 fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &str) -> Effect {
-    let model = &fit.trace.after;
+    let model = fit.after();
     if line.shape_p_value < SIGNIFICANCE {
         let why = format!(
             "has not the spectrum of a resonance, by chance {:.0e}: a frequency or a strength that changes",

@@ -8,9 +8,10 @@
 //! frequency; for white noise at `n = 1` it is `3/M` of `M` samples, as the table of Greenhall and Riley has it.
 
 use crate::OCTAVES;
+use crate::noise_terms::{is_filter, is_white};
 use allan_core::confidence::{NORMAL_975, octave_correlation};
 use allan_core::model::FittedTerm;
-use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+use allan_core::{AllanPoint, Curve, Model};
 use nalgebra::{DMatrix, DVector};
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -75,8 +76,7 @@ fn transfer_function(n: u64) -> Cow<'static, [f64]> {
 ///
 /// The shapes count as known.
 pub(crate) fn with_bounds_behind_a_filter(curve: &Curve<OCTAVES>, model: &Model) -> Model {
-    let is_filter = |term: &FittedTerm| matches!(term.kind, NoiseTerm::Filtered(_)) && term.value > 0.0;
-    if !model.terms().iter().any(is_filter) {
+    if !model.terms().iter().any(|term| is_filter(&term.kind) && term.value > 0.0) {
         return model.clone();
     }
     let points: Vec<&AllanPoint> =
@@ -93,9 +93,8 @@ pub(crate) fn with_bounds_behind_a_filter(curve: &Curve<OCTAVES>, model: &Model)
     let estimator = weighted * information.inverse();
     let covariance = estimator.transpose() * relative_covariance(model, &points) * &estimator;
     let widened = |term: &FittedTerm| {
-        let is_white = matches!(term.kind, NoiseTerm::Filtered(_) | NoiseTerm::AngleRandomWalk);
         let position = present.iter().position(|known| std::ptr::eq(*known, term));
-        let Some(position) = position.filter(|_| is_white) else { return *term };
+        let Some(position) = position.filter(|_| is_white(&term.kind)) else { return *term };
         // Of the squared coefficient, whose relative error is twice that of the coefficient.
         let half_width = NORMAL_975 * covariance[(position, position)].sqrt() / 2.0;
         let low = term.value * (1.0 - half_width).max(0.0);
@@ -109,9 +108,9 @@ mod tests {
     use super::*;
     use crate::OVERLAP;
     use crate::simulated_part::{RecordedChannel, read};
-    use allan_core::Cascade;
     use allan_core::fit::fit;
     use allan_core::term::MovingAverageFilter;
+    use allan_core::{Cascade, NoiseTerm};
 
     /// The degrees of freedom of white noise without a filter are those of Greenhall and Riley, and neighbouring octaves
     /// correlate by the tabulated 0.53 (a fully overlapping estimator has 2 % more than one of eightfold overlap).

@@ -13,7 +13,7 @@
 mod channel_deviance;
 mod screen;
 
-pub(crate) use channel_deviance::{FilteredChannel, is_white};
+pub(crate) use channel_deviance::FilteredChannel;
 
 use crate::OCTAVES;
 use crate::findings::{BoundedEstimate, SIGNIFICANCE};

@@ -138,9 +138,9 @@ impl FittedChannel {
         };
         let (half, mut fit) = (fit(&parts.first), fit(&parts.both));
         // The terms that held on the second half are those of the whole record, as in the whole analysis.
-        let held = || Contradiction::find(&half.trace.after, &parts.second.curve(channel)).is_none();
+        let held = || Contradiction::find(half.after(), &parts.second.curve(channel)).is_none();
         if profile.quantity.is_inertial() && held() {
-            fit.take_terms_that_held(&half.trace, None);
+            fit.take_terms_that_held(&half.traced, None);
         }
         Self { channel, profile, half, fit }
     }
@@ -171,7 +171,7 @@ impl FittedChannel {
 
     fn report(&self, description: &RecordingDescription, parts: &Parts, estimators: &StreamedCurves) -> ChannelReport {
         let unit = self.profile.unit;
-        let (before, after) = (&self.half.trace.before, &self.half.trace.after);
+        let (before, after) = (&self.half.before, self.half.after());
         let [first, second] = [&parts.first, &parts.second].map(|part| part.curve(self.channel));
         let whole = estimators.whole().curve(description.period_s()).scaled(self.profile.lsb);
         let whole = whole.with_confidence(|point| before.variance_fractions(point.n));
@@ -183,7 +183,7 @@ impl FittedChannel {
             unseen: ModelErrorReport::new(model, &second),
             unseen_excluding: None,
         };
-        let (refitted, after_report) = (&self.fit.trace.after, of_half(after));
+        let (refitted, after_report) = (self.fit.after(), of_half(after));
         let duration_s = description.periods as f64 * description.period_s();
         let has_samples = whole.samples() > 0;
         ChannelReport {

@@ -108,11 +108,11 @@ pub(crate) fn fit_with_lines(
     if fit.correlation_times().next().is_some() && lines.iter().any(MergedLine::is_broad) {
         // A broad line may be a part of a Markov process, which the background of the first search has no form for.
         lines.retain(|line| !line.is_broad());
-        lines.extend(find(series, Some(&fit.trace.after)).into_iter().filter(MergedLine::is_broad));
+        lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad));
         lines.extend(faster().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
-    lines.retain(|line| line.is_sinusoid() || !is_leakage(&fit.trace.after, line.frequency.value));
+    lines.retain(|line| line.is_sinusoid() || !is_leakage(fit.after(), line.frequency.value));
     (fit, lines)
 }
 

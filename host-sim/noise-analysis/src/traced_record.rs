@@ -1,7 +1,7 @@
 //! What all of a recording shows: the effects in the samples of each channel, the noise model of each channel with what its
 //! baseline lacks, and the filter that the part has once.
 
-use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, filter_length_s};
+use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::covariates::CovariateFit;
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::random_telegraph;
@@ -9,6 +9,7 @@ use crate::estimators::RecordEstimators;
 use crate::findings::{Detection, Effect};
 use crate::motion::{self, PlatformMotion};
 use crate::naming::{ChannelFindings, name_effects};
+use crate::noise_terms::filter_length_s;
 use crate::parallel::{in_parallel, per_channel};
 use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::preprocessing::{Exclusion, Preprocessing};
@@ -210,7 +211,7 @@ impl<'a> TracedRecord<'a> {
 
     /// The drift that the gyroscopes have in common, and that of the accelerometers.
     fn common_modes(&self) -> Vec<ChannelsInCommon> {
-        let filter_s = self.channels.iter().map(|trace| filter_length_s(&trace.fit.trace.after)).fold(0.0, f64::max);
+        let filter_s = self.channels.iter().map(|trace| filter_length_s(trace.fit.after())).fold(0.0, f64::max);
         let of_quantity = |quantity: &Quantity| {
             let named = |channel: ChannelId| (channel, self.measurement[channel].profile.name);
             let rest = |channel: ChannelId| Some((named(channel), self.channels[channel].rest.clone()?));
@@ -283,7 +284,7 @@ pub(crate) fn agree_on_filter<'f>(
             FilteredChannel {
                 name: measurement[*channel].profile.name,
                 curve: &fit.covariates.curve,
-                model: &fit.trace.after,
+                model: fit.after(),
                 resolution,
                 is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
             }

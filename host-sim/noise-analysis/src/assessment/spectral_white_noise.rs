@@ -1,6 +1,7 @@
 //! N by the spectrum beside N by the fit: whether the record identifies it, and whether the two agree.
 
 use crate::findings::{BoundedEstimate, Parameter};
+use crate::noise_terms::is_white;
 use crate::spectra::{KnownShapes, Welch, WhiteNoiseFit, fit_white_noise};
 use crate::units::coefficient_unit;
 use allan_core::{Model, NoiseTerm};
@@ -80,7 +81,6 @@ fn note(fit: &WhiteNoiseFit, fitted: &Model) -> Option<String> {
 
 /// The white noise of a model at low frequencies, behind a filter or not.
 fn white_noise_of(model: &Model) -> BoundedEstimate {
-    let is_white = |kind: &NoiseTerm| matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_));
     let white = || model.terms().iter().filter(|term| is_white(&term.kind));
     BoundedEstimate {
         value: white().map(|term| term.value * term.value).sum::<f64>().sqrt(),

@@ -1,6 +1,7 @@
 //! The deviance of the curve of one channel as a function of the filter, and the decimation at which several have the least.
 
 use crate::OCTAVES;
+use crate::noise_terms::is_white;
 use crate::octave_covariance::relative_covariance;
 use allan_core::fit::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
@@ -148,11 +149,6 @@ impl<'a> ChannelDeviance<'a> {
         let variance = (score.transpose() * relative_covariance(&model, &points) * &score)[(0, 0)];
         (variance / score.dot(&own)).max(1.0)
     }
-}
-
-/// Whether a term is white noise, behind a filter or not.
-pub(crate) fn is_white(kind: &NoiseTerm) -> bool {
-    matches!(kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_))
 }
 
 /// The largest decimation at which a filter is tried: its length, beyond which no two samples are correlated.

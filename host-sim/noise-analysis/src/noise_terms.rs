@@ -1,0 +1,38 @@
+//! What the terms of a noise model are: white noise, filters, lines.
+
+use allan_core::{Model, NoiseTerm};
+
+/// Whether a term is a digital filter.
+pub(crate) fn is_filter(kind: &NoiseTerm) -> bool {
+    matches!(kind, NoiseTerm::Filtered(_))
+}
+
+/// Whether a term is white noise, filtered or not.
+pub(crate) fn is_white(kind: &NoiseTerm) -> bool {
+    is_filter(kind) || *kind == NoiseTerm::AngleRandomWalk
+}
+
+/// Whether a term is a line.
+pub(crate) fn is_line(kind: &NoiseTerm) -> bool {
+    line_frequency(kind).is_some()
+}
+
+/// Frequency of a term that is a line, Hz.
+pub(crate) fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
+    match kind {
+        NoiseTerm::Sinusoid(line) => Some(line.frequency),
+        NoiseTerm::Resonance(line) => Some(line.frequency),
+        _ => None,
+    }
+}
+
+/// Length of the impulse response of the longest filter in a model, s.
+pub(crate) fn filter_length_s(model: &Model) -> f64 {
+    let length = |kind: &NoiseTerm| match kind {
+        NoiseTerm::Filtered(filter) => {
+            f64::from(filter.stages) * f64::from(filter.taps) * model.sample_period() / filter.decimation
+        }
+        _ => 0.0,
+    };
+    model.terms().iter().map(|term| length(&term.kind)).fold(0.0, f64::max)
+}
