@@ -145,7 +145,7 @@ fn remaining_variance(covariances: &DMatrix<f64>, of: usize, weights: &DVector<f
 #[cfg(test)]
 mod tests {
     use super::CommonModeRegression;
-    use measurement::{ChannelProfile, MeasuredChannel, Measurement, adis16405};
+    use measurement::{MeasuredChannel, Measurement, adis16405};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
