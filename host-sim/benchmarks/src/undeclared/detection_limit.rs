@@ -43,7 +43,7 @@ const FALSE_ALARM: f64 = 0.01;
 /// Number of distinguishable time constants: octaves in half an hour.
 const TIME_CONSTANTS: f64 = 12.0;
 /// Number of independent times of a step.
-const TIMES: f64 = 40.0;
+pub(super) const TIMES: f64 = 40.0;
 /// Number of axes along which an acceleration may act.
 const AXES: f64 = 3.0;
 /// Steps per correlation time of a simulated telegraph signal; the level is constant within a step.
@@ -176,7 +176,7 @@ fn smallest_telegraph(place: &ChannelUnderTest<'_>, time_constant_s: f64, seed: 
 
 /// Standard deviation at the limit of a process that has the density `unit_density` for a deviation of 1 and could be at
 /// `places` places. `peak` is the centre and the width of a peak of the density, Hz.
-fn smallest_deviation(
+pub(super) fn smallest_deviation(
     place: &ChannelUnderTest<'_>,
     places: f64,
     peak: Option<(f64, f64)>,

@@ -9,7 +9,7 @@ use super::effect::{EffectKind, GYROS, draw_unit, scaled, size};
 use super::environment::log_uniform;
 use super::generator::TrueRecording;
 use super::outside::{OutsideEffect, OutsideKind};
-use super::outside_limit::smallest_outside_size;
+use super::outside_limit::with_strength as outside_with_strength;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -52,7 +52,7 @@ pub enum RecordingGroup {
     Pair,
     /// Three effects.
     Triple,
-    /// One effect that no kind of the report describes.
+    /// One effect that the analysis was not made for.
     Outside(OutsideKind),
 }
 
@@ -82,7 +82,7 @@ impl DrawnRecording {
         }
     }
 
-    /// A recording of `seconds` seconds with an effect that no kind of the report describes.
+    /// A recording of `seconds` seconds with an effect that the analysis was not made for.
     #[must_use]
     pub fn draw_outside(kind: OutsideKind, seconds: f64, seed: u64) -> Self {
         let nothing = Self::draw(&[], seconds, seed);
@@ -93,10 +93,13 @@ impl DrawnRecording {
         let gyros = &OutputRegister::INERTIAL[..3];
         let channel = gyros.choose(&mut random).copied().unwrap_or(OutputRegister::GyroX);
         let strength = log_uniform(&mut random, STRENGTH_OF_PAIR.0, STRENGTH_OF_PAIR.1);
-        let mut effect = OutsideEffect::draw_unit(kind, channel, seconds, &mut random);
+        let mut unit = OutsideEffect::draw_unit(kind, channel, seconds, &mut random);
+        if kind == OutsideKind::Knock {
+            unit.shares = knock_shares(channel, &simulation.noise, &mut random);
+        }
         let environment = simulation.environment(simulation.samples());
         let place = ChannelUnderTest::new(&simulation, channel, &[]);
-        effect.size = strength * smallest_outside_size(&effect, &environment, &place);
+        let (effect, strength) = outside_with_strength(unit, strength, &environment, &place);
         simulation.outside.push(effect);
         Self { simulation, strengths: vec![strength], ..nothing }
     }
@@ -136,6 +139,17 @@ impl DrawnRecording {
         let (chosen, _) = all.partial_shuffle(&mut random, KINDS);
         std::array::from_fn(|at| chosen[at])
     }
+}
+
+/// A knock in all channels: in `channel` with the factor 1, in the others with half to all of that in terms of their white noise, in
+/// either direction.
+fn knock_shares(channel: OutputRegister, noise: &NoiseModel, random: &mut ChaCha8Rng) -> Vec<(OutputRegister, f64)> {
+    let white = |of: OutputRegister| noise.channel(of).angle_random_walk;
+    let mut share = |of: OutputRegister| {
+        let factor = random.random_range(0.5..1.0) * if random.random_bool(0.5) { 1.0 } else { -1.0 };
+        (of, if of == channel { 1.0 } else { factor * white(of) / white(channel) })
+    };
+    OutputRegister::INERTIAL.map(&mut share).to_vec()
 }
 
 /// Effects of `kinds`, each in a channel from `channel`, with their strengths beside the other effects. The strength of an effect

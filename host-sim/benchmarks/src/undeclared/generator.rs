@@ -15,7 +15,7 @@ use std::f64::consts::{PI, TAU};
 use virtual_sensor::{ChannelNoise, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 
 /// Largest count of the 14-bit registers of the inertial channels.
-const LARGEST_COUNT: f64 = 8191.0;
+const LARGEST_COUNT: i32 = 8191;
 /// Supply voltage, V, and specific force along z, g.
 const SUPPLY_V: f64 = 5.0;
 const GRAVITY_G: f64 = 1.0;
@@ -39,7 +39,7 @@ pub struct TrueRecording {
     pub noise: NoiseModel,
     /// Environment and hidden effects.
     pub scenario: SensorScenario,
-    /// Hidden effects that no kind of the report describes.
+    /// Hidden effects that the analysis was not made for.
     pub outside: Vec<OutsideEffect>,
     /// Seconds that the host counts in a true second.
     pub host_clock_ratio: f64,
@@ -67,7 +67,7 @@ impl TrueRecording {
     #[must_use]
     pub fn record(&self) -> Recording {
         let samples = self.samples();
-        let counts: Vec<Vec<i16>> = self.counts(samples);
+        let counts = self.counts(samples);
         let effects = &self.scenario.effects;
         let share = |of: fn(&InjectedEffect) -> Option<f64>| effects.iter().find_map(of).unwrap_or(0.0);
         let repeated = share(|effect| match effect {
@@ -96,15 +96,17 @@ impl TrueRecording {
                 continue;
             }
             // A delayed sample waits in a queue: no time stamp is earlier than the one before.
-            latest_s = latest_s.max((at as f64 * period_s + LATENCY_S * latency) * self.host_clock_ratio);
-            let words = Counts::new(std::array::from_fn(|channel| counts[channel][shown]));
+            let sampled_s = self.outside.iter().fold(at as f64 * period_s, |time_s, effect| effect.sampled_at(time_s));
+            latest_s = latest_s.max((sampled_s + LATENCY_S * latency) * self.host_clock_ratio);
+            let word = |channel: usize| counts[channel][shown].clamp(-LARGEST_COUNT, LARGEST_COUNT) as i16;
+            let words = Counts::new(std::array::from_fn(word));
             recorder.push(TimeStamp::from_time(latest_s), &Burst::from_counts(&words));
         }
         recorder.finish()
     }
 
     /// Register counts of every channel, in the order of the burst.
-    fn counts(&self, samples: usize) -> Vec<Vec<i16>> {
+    fn counts(&self, samples: usize) -> Vec<Vec<i32>> {
         let period_s = 1.0 / SAMPLE_RATE_HZ;
         let taps = self.scenario.effects.iter().find_map(|effect| match effect {
             InjectedEffect::FilterBandwidth { taps_log2 } => Some(1_usize << taps_log2),
@@ -143,9 +145,14 @@ impl TrueRecording {
                     add_sensed(effect, &mut values, lead, &environment, &mut random);
                 }
             }
-            for effect in self.outside.iter().filter(|effect| effect.channel() == output) {
+            let outside = || {
+                let share =
+                    |effect: &'_ OutsideEffect| effect.shares.iter().find(|(of, _)| *of == output).map(|of| of.1);
+                self.outside.iter().filter_map(move |effect| Some((effect, share(effect)?)))
+            };
+            for (effect, share) in outside() {
                 let signal = effect.signal(&environment, samples, period_s);
-                values[lead..].iter_mut().zip(signal).for_each(|(value, added)| *value += added);
+                values[lead..].iter_mut().zip(signal).for_each(|(value, added)| *value += share * added);
             }
             if let Some(taps) = taps.filter(|_| Channel::INERTIAL.contains(&channel)) {
                 values = moving_average(&moving_average(&values, taps), taps);
@@ -160,8 +167,9 @@ impl TrueRecording {
                 }
             }
             let lsb = channel.lsb(GyroRange::Dps300);
-            let count = |value: f64| (value / lsb).round().clamp(-LARGEST_COUNT, LARGEST_COUNT) as i16;
-            values.into_iter().map(count).collect()
+            let mut counts: Vec<i32> = values.into_iter().map(|value| (value / lsb).round() as i32).collect();
+            outside().for_each(|(effect, _)| effect.change_counts(&mut counts, period_s));
+            counts
         };
         Channel::ALL.map(simulation::output_register).iter().map(channel).collect()
     }

@@ -1,22 +1,27 @@
-//! Effects outside the vocabulary of the report: no kind that it has a name for describes them, so that a wrong name is the only
-//! name that it can give, and `unexplained` the right answer.
+//! Effects outside the vocabulary of the report: the right answer is `unexplained`, or the name that describes the effect, where
+//! the report has one ([`OutsideKind::right_names`]). Every other name is wrong.
 
-use super::environment::{EnvironmentCourse, log_uniform};
+use super::environment::{EnvironmentCourse, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Exp1};
 use serde::Serialize;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use virtual_sensor::OutputRegister;
 
-/// Kinds of effects that no kind of the report describes.
+/// Standard deviation of the logarithm of the level of a band that wanders: by a factor of 2 either way.
+const LEVEL_DEVIATION: f64 = std::f64::consts::LN_2;
+/// Time constant of a knock's decay, s: half a second until it is below a hundredth.
+const KNOCK_DECAY_S: f64 = 0.1;
+
+/// Kinds of effects that the analysis was not made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutsideKind {
     /// A sinusoid whose frequency rises linearly over the record.
     Chirp,
-    /// Disturbances at random times, each a jump that decays exponentially.
+    /// Disturbances at random times, each a jump that decays exponentially (shot noise).
     Decays,
     /// A rise and a sudden fall, again and again: a thermostat.
     Sawtooth,
@@ -24,12 +29,50 @@ pub enum OutsideKind {
     ModulatedLine,
     /// White noise whose standard deviation grows with the temperature.
     LevelByTemperature,
+    /// The output stays at its last value for a while, in one channel ("stuck" in E. Balaban et al., "Modeling, detection, and
+    /// disambiguation of sensor faults for aerospace applications", IEEE Sensors J. 9, 2009).
+    HeldValue,
+    /// Two converters take turns, one of them with an offset (N. Kurosawa et al., "Explicit analysis of channel mismatch effects in
+    /// time-interleaved ADC systems", IEEE Trans. Circuits Syst. I 48, 2001).
+    AlternatingConverters,
+    /// The sensor's sample clock changes its rate at one time.
+    ClockStep,
+    /// The sensor heats itself from its start on, which its thermometer does not show: an exponential approach.
+    SelfHeating,
+    /// After an overload the output is constant until the converter has recovered, again and again (overvoltage recovery in IEEE Std
+    /// 1241).
+    DeadTime,
+    /// The supply drops for a short time at regular intervals, as while a radio sends, and is not measured.
+    SupplyDroop,
+    /// A line that is switched on for half of the time, as of a heater driven by pulse-width modulation.
+    SwitchedLine,
+    /// Codes that the converter never gives, at every carry into a higher bit (IEEE Std 1241).
+    MissingCodes,
+    /// A band of noise, as of a vibration, whose level wanders.
+    WanderingBand,
+    /// The platform is knocked once: half a second of a damped oscillation in all six channels.
+    Knock,
 }
 
 impl OutsideKind {
     /// Every kind, in the order of the tables.
-    pub const ALL: [Self; 5] =
-        [Self::Chirp, Self::Decays, Self::Sawtooth, Self::ModulatedLine, Self::LevelByTemperature];
+    pub const ALL: [Self; 15] = [
+        Self::Chirp,
+        Self::Decays,
+        Self::Sawtooth,
+        Self::ModulatedLine,
+        Self::LevelByTemperature,
+        Self::HeldValue,
+        Self::AlternatingConverters,
+        Self::ClockStep,
+        Self::SelfHeating,
+        Self::DeadTime,
+        Self::SupplyDroop,
+        Self::SwitchedLine,
+        Self::MissingCodes,
+        Self::WanderingBand,
+        Self::Knock,
+    ];
 
     /// Its name in the tables.
     #[must_use]
@@ -40,20 +83,54 @@ impl OutsideKind {
             Self::Sawtooth => "sawtooth",
             Self::ModulatedLine => "modulated line",
             Self::LevelByTemperature => "level by temp.",
+            Self::HeldValue => "held value",
+            Self::AlternatingConverters => "two converters",
+            Self::ClockStep => "clock step",
+            Self::SelfHeating => "self-heating",
+            Self::DeadTime => "dead time",
+            Self::SupplyDroop => "supply droop",
+            Self::SwitchedLine => "switched line",
+            Self::MissingCodes => "missing codes",
+            Self::WanderingBand => "wandering band",
+            Self::Knock => "knock",
+        }
+    }
+
+    /// Names in a report that describe the effect.
+    #[must_use]
+    pub const fn right_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Chirp => &["chirp"],
+            Self::Decays => &["shot_noise"],
+            Self::Sawtooth | Self::SupplyDroop => &["periodic"],
+            Self::ModulatedLine | Self::SwitchedLine => &["modulated_line"],
+            Self::LevelByTemperature => &["level_change"],
+            Self::HeldValue | Self::DeadTime => &["stuck"],
+            // An offset of every second sample is a line at half the sample rate, and nothing else.
+            Self::AlternatingConverters => &["sinusoid", "periodic"],
+            Self::ClockStep => &["sample_clock"],
+            Self::SelfHeating | Self::MissingCodes => &[],
+            Self::WanderingBand => &["resonance"],
+            Self::Knock => &["knock", "motion"],
         }
     }
 }
 
-/// An effect outside the vocabulary, in one channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// An effect outside the vocabulary.
+#[derive(Debug, Clone, PartialEq)]
 pub struct OutsideEffect {
     pub(super) kind: OutsideKind,
-    pub(super) channel: OutputRegister,
-    /// In the unit of the channel: the amplitude, the height of a jump, or the standard deviation at the highest temperature.
+    /// The outputs that it is in, each with a factor on its size; none of an effect of the sample clock.
+    pub(super) shares: Vec<(OutputRegister, f64)>,
+    /// In the unit of the channel: the amplitude, the height of a jump, the distance of two levels, or the standard deviation at its
+    /// highest. Of a held value and of a dead time the length in s, of a clock step the relative change of the rate.
     pub(super) size: f64,
     /// Of the sweep its first and its last frequency, of the others the frequency at which they repeat and that of the
-    /// modulation, Hz; of decays one over the mean time between them and one over their time constant.
+    /// modulation, Hz; of what comes at random times one over the mean time between them and one over their time constant; of a
+    /// band its centre and its width. One over the modulus of missing codes.
     pub(super) frequencies_hz: [f64; 2],
+    /// When it begins, s from the first sample, and the time constant or the length of a part of it, s.
+    pub(super) times_s: [f64; 2],
     /// Of the random numbers that the effect itself has.
     pub(super) seed: u64,
 }
@@ -64,13 +141,19 @@ impl OutsideEffect {
         self.kind
     }
 
-    /// The output that it is in.
-    pub(super) fn channel(&self) -> OutputRegister {
-        self.channel
+    /// The outputs that it is in; none of an effect that concerns the samples of all channels.
+    pub(super) fn channels(&self) -> impl Iterator<Item = OutputRegister> + '_ {
+        self.shares.iter().map(|(channel, _)| *channel)
     }
 
-    /// With random parameters, of size 1.
+    /// Whether it shows in `channel`.
+    pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
+        self.shares.is_empty() || self.channels().any(|of| of == channel)
+    }
+
+    /// With random parameters, of size 1, in a record of `seconds` s.
     pub(super) fn draw_unit(kind: OutsideKind, channel: OutputRegister, seconds: f64, random: &mut ChaCha8Rng) -> Self {
+        let mut times_s = [0.0; 2];
         let frequencies_hz = match kind {
             OutsideKind::Chirp => {
                 let first = log_uniform(random, 1.0, 10.0);
@@ -83,15 +166,38 @@ impl OutsideEffect {
             }
             OutsideKind::Sawtooth => [log_uniform(random, 4.0, 20.0) / seconds, 0.0],
             OutsideKind::ModulatedLine => [log_uniform(random, 2.0, 40.0), log_uniform(random, 3.0, 30.0) / seconds],
-            OutsideKind::LevelByTemperature => [0.0; 2],
+            OutsideKind::HeldValue | OutsideKind::ClockStep | OutsideKind::Knock => {
+                times_s[0] = seconds * random.random_range(0.15..0.85);
+                [log_uniform(random, 5.0, 40.0), 0.0]
+            }
+            OutsideKind::SelfHeating => {
+                times_s[1] = seconds * log_uniform(random, 0.02, 0.2);
+                [0.0; 2]
+            }
+            OutsideKind::DeadTime => [log_uniform(random, 10.0, 40.0) / seconds, 0.0],
+            // A twentieth to a fifth of the time.
+            OutsideKind::SupplyDroop => {
+                let frequency = log_uniform(random, 0.05, 0.5);
+                times_s[1] = random.random_range(0.05..0.2) / frequency;
+                [frequency, 0.0]
+            }
+            OutsideKind::SwitchedLine => [log_uniform(random, 2.0, 40.0), log_uniform(random, 5.0, 50.0) / seconds],
+            OutsideKind::MissingCodes => [0.5f64.powi(random.random_range(2..=4)), 0.0],
+            OutsideKind::WanderingBand => {
+                times_s[1] = seconds * log_uniform(random, 0.01, 0.05);
+                let centre = log_uniform(random, 5.0, 40.0);
+                [centre, centre * log_uniform(random, 0.1, 0.4)]
+            }
+            OutsideKind::LevelByTemperature | OutsideKind::AlternatingConverters => [0.0; 2],
         };
-        Self { kind, channel, size: 1.0, frequencies_hz, seed: random.random() }
+        let shares = if kind == OutsideKind::ClockStep { Vec::new() } else { vec![(channel, 1.0)] };
+        Self { kind, shares, size: 1.0, frequencies_hz, times_s, seed: random.random() }
     }
 
-    /// What it adds to each sample of its channel.
+    /// What it adds to each sample of a channel in which it is with the factor 1; nothing of an effect on the counts or on the clock.
     pub(super) fn signal(&self, environment: &EnvironmentCourse, samples: usize, period_s: f64) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let (size, [first, second]) = (self.size, self.frequencies_hz);
+        let (size, [first, second], [begin_s, part_s]) = (self.size, self.frequencies_hz, self.times_s);
         let seconds = samples as f64 * period_s;
         let signal = |value: &mut dyn FnMut(f64) -> f64| {
             (0..samples).map(|at| size * value(at as f64 * period_s)).collect::<Vec<f64>>()
@@ -101,15 +207,11 @@ impl OutsideEffect {
                 signal(&mut |time_s| (TAU * (first + 0.5 * (second - first) * time_s / seconds) * time_s).sin())
             }
             OutsideKind::Decays => {
-                let mut wait = || <Exp1 as Distribution<f64>>::sample(&Exp1, &mut random) / first;
-                let (mut next_s, mut height) = (wait(), 0.0);
+                let mut events = RandomTimes::new(first, &mut random);
+                let mut height = 0.0;
                 let kept = (-period_s * second).exp();
                 signal(&mut |time_s| {
-                    height *= kept;
-                    while next_s <= time_s {
-                        height += 1.0;
-                        next_s += wait();
-                    }
+                    height = height * kept + events.until(time_s) as f64;
                     height
                 })
             }
@@ -121,7 +223,103 @@ impl OutsideEffect {
                 let levels = relative(&environment.temperature_c);
                 levels.take(samples).map(|level| size * level * normal(&mut random)).collect()
             }
+            OutsideKind::AlternatingConverters => {
+                (0..samples).map(|at| if at % 2 == 0 { 0.5 * size } else { -0.5 * size }).collect()
+            }
+            OutsideKind::SelfHeating => signal(&mut |time_s| 1.0 - (-time_s / part_s).exp()),
+            OutsideKind::SupplyDroop => {
+                signal(&mut |time_s| if (first * time_s).fract() < first * part_s { -1.0 } else { 0.0 })
+            }
+            OutsideKind::SwitchedLine => {
+                signal(&mut |time_s| if (second * time_s).fract() < 0.5 { (TAU * first * time_s).sin() } else { 0.0 })
+            }
+            OutsideKind::WanderingBand => {
+                let [cosine, sine] =
+                    [(); 2].map(|()| gauss_markov(1.0 / (PI * second), samples, period_s, &mut random));
+                let level = gauss_markov(part_s, samples, period_s, &mut random);
+                let value = |at: usize| {
+                    let phase = TAU * first * at as f64 * period_s;
+                    // The mean square of the level is 1.
+                    let level = (LEVEL_DEVIATION * level[at] - LEVEL_DEVIATION.powi(2)).exp();
+                    size * level * (cosine[at] * phase.cos() + sine[at] * phase.sin())
+                };
+                (0..samples).map(value).collect()
+            }
+            OutsideKind::Knock => signal(&mut |time_s| {
+                let since_s = time_s - begin_s;
+                if since_s < 0.0 { 0.0 } else { (-since_s / KNOCK_DECAY_S).exp() * (TAU * first * since_s).sin() }
+            }),
+            OutsideKind::HeldValue | OutsideKind::ClockStep | OutsideKind::DeadTime | OutsideKind::MissingCodes => {
+                vec![0.0; samples]
+            }
         }
+    }
+
+    /// What it makes of the counts of a channel that it is in.
+    pub(super) fn change_counts(&self, counts: &mut [i32], period_s: f64) {
+        let at = |time_s: f64| (time_s / period_s).round() as usize;
+        match self.kind {
+            OutsideKind::HeldValue => {
+                let first = at(self.times_s[0]).min(counts.len().saturating_sub(1));
+                let end = (first + at(self.size) + 1).min(counts.len());
+                let held = counts[first];
+                counts[first..end].fill(held);
+            }
+            OutsideKind::DeadTime => {
+                let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+                let mut events = RandomTimes::new(self.frequencies_hz[0], &mut random);
+                let mean = counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len().max(1) as f64;
+                let (level, mut until) = (mean.round() as i32, 0);
+                for (sample, count) in counts.iter_mut().enumerate() {
+                    if events.until(sample as f64 * period_s) > 0 {
+                        until = sample + at(self.size);
+                    }
+                    if sample < until {
+                        *count = level;
+                    }
+                }
+            }
+            OutsideKind::MissingCodes => {
+                let modulus = (1.0 / self.frequencies_hz[0]).round() as i32;
+                for count in counts.iter_mut().filter(|count| count.rem_euclid(modulus) == modulus - 1) {
+                    *count += 1;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// True time at which a sample is taken that is nominally taken at `time_s`: later by the clock that got slower.
+    pub(super) fn sampled_at(&self, time_s: f64) -> f64 {
+        match self.kind {
+            OutsideKind::ClockStep => time_s + self.size * (time_s - self.times_s[0]).max(0.0),
+            _ => time_s,
+        }
+    }
+}
+
+/// Events at random times, exponentially distributed.
+struct RandomTimes<'a> {
+    rate_hz: f64,
+    next_s: f64,
+    random: &'a mut ChaCha8Rng,
+}
+
+impl<'a> RandomTimes<'a> {
+    fn new(rate_hz: f64, random: &'a mut ChaCha8Rng) -> Self {
+        let first: f64 = Exp1.sample(random);
+        Self { rate_hz, next_s: first / rate_hz, random }
+    }
+
+    /// Number of events since the last call, up to `time_s`.
+    fn until(&mut self, time_s: f64) -> u32 {
+        let mut events = 0;
+        while self.next_s <= time_s {
+            let wait: f64 = Exp1.sample(self.random);
+            self.next_s += wait / self.rate_hz;
+            events += 1;
+        }
+        events
     }
 }
 
@@ -130,4 +328,94 @@ pub(super) fn relative(course: &[f64]) -> impl Iterator<Item = f64> + '_ {
     let lowest = course.iter().copied().fold(f64::INFINITY, f64::min);
     let highest = course.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     course.iter().map(move |value| (value - lowest) / (highest - lowest).max(f64::MIN_POSITIVE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f64 = 0.005;
+    const SAMPLES: usize = 100_000;
+
+    fn effect(kind: OutsideKind) -> OutsideEffect {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        OutsideEffect::draw_unit(kind, OutputRegister::GyroX, SAMPLES as f64 * PERIOD_S, &mut random)
+    }
+
+    fn environment() -> EnvironmentCourse {
+        EnvironmentCourse {
+            temperature_c: vec![0.0; SAMPLES],
+            supply_v: Vec::new(),
+            force_g: [const { Vec::new() }; 3],
+        }
+    }
+
+    /// Counts of a sawtooth, no two neighbours of which are equal.
+    fn counts() -> Vec<i32> {
+        (0..SAMPLES).map(|at| (at % 101) as i32 - 50).collect()
+    }
+
+    fn standing(counts: &[i32]) -> usize {
+        counts.windows(2).filter(|pair| pair[0] == pair[1]).count()
+    }
+
+    #[test]
+    fn a_held_value_stands_for_its_length_and_dead_times_at_the_mean() {
+        let mut held = counts();
+        let length_s = 3.0;
+        OutsideEffect { size: length_s, ..effect(OutsideKind::HeldValue) }.change_counts(&mut held, PERIOD_S);
+        assert_eq!(standing(&held), 600);
+
+        let dead = OutsideEffect { size: 0.1, ..effect(OutsideKind::DeadTime) };
+        let mut changed = counts();
+        dead.change_counts(&mut changed, PERIOD_S);
+        // 10 to 40 events are expected, of 20 samples each; the fewest and the most at 3.5 σ.
+        let events = standing(&changed) as f64 / 19.0;
+        let expected = dead.frequencies_hz[0] * SAMPLES as f64 * PERIOD_S;
+        assert!((events - expected).abs() < 3.5 * expected.sqrt(), "{events}, {expected}");
+    }
+
+    #[test]
+    fn missing_codes_are_never_given_and_no_other_changes() {
+        let missing = effect(OutsideKind::MissingCodes);
+        let modulus = (1.0 / missing.frequencies_hz[0]) as i32;
+        let mut changed = counts();
+        missing.change_counts(&mut changed, PERIOD_S);
+        assert!(changed.iter().all(|count| count.rem_euclid(modulus) != modulus - 1));
+        let differing = counts().iter().zip(&changed).filter(|(before, after)| before != after).count();
+        let hit = counts().iter().filter(|count| count.rem_euclid(modulus) == modulus - 1).count();
+        assert_eq!(differing, hit);
+    }
+
+    #[test]
+    fn two_converters_differ_by_the_size_and_a_clock_loses_its_step() {
+        let signal = effect(OutsideKind::AlternatingConverters).signal(&environment(), SAMPLES, PERIOD_S);
+        assert!(signal.windows(2).all(|pair| (pair[1] - pair[0]).abs() == 1.0));
+        let clock = OutsideEffect { size: 0.01, times_s: [100.0, 0.0], ..effect(OutsideKind::ClockStep) };
+        assert_eq!([50.0, 100.0, 300.0].map(|time_s| clock.sampled_at(time_s)), [50.0, 100.0, 302.0]);
+    }
+
+    /// The mean square of each signal: ½·½ of a line that is on half of the time, a part `p` of unit droops; a band of
+    /// variance 1 whose level has a mean square of 1, with few correlation times of 5 to 25 s in 500 s.
+    #[test]
+    fn signals_have_the_power_of_their_definition() {
+        let power = |kind: OutsideKind| {
+            let signal = effect(kind).signal(&environment(), SAMPLES, PERIOD_S);
+            signal.iter().map(|value| value * value).sum::<f64>() / SAMPLES as f64
+        };
+        assert!((power(OutsideKind::SwitchedLine) - 0.25).abs() < 0.02, "{}", power(OutsideKind::SwitchedLine));
+        let droop = effect(OutsideKind::SupplyDroop);
+        let part = droop.frequencies_hz[0] * droop.times_s[1];
+        assert!((power(OutsideKind::SupplyDroop) - part).abs() < 0.02, "{}, {part}", power(OutsideKind::SupplyDroop));
+        let band = power(OutsideKind::WanderingBand);
+        assert!((0.3..3.0).contains(&band), "{band}");
+    }
+
+    #[test]
+    fn self_heating_approaches_its_size() {
+        let heating = effect(OutsideKind::SelfHeating);
+        let signal = heating.signal(&environment(), SAMPLES, PERIOD_S);
+        let at = |time_constants: f64| signal[(time_constants * heating.times_s[1] / PERIOD_S) as usize];
+        assert!(signal[0].abs() < 1e-9 && (at(1.0) - 0.632).abs() < 1e-3 && (at(3.0) - 0.950).abs() < 1e-3);
+    }
 }

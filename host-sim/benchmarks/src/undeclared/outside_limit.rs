@@ -1,36 +1,93 @@
 //! Detection limit of effects outside the vocabulary: the smallest size at which a test that is told their signal detects them in
 //! half of the recordings.
 
-use super::channel_under_test::ChannelUnderTest;
-use super::detection_limit::{required_ratio, solve_size};
+use super::block_covariance::BLOCKS;
+use super::channel_under_test::{ChannelUnderTest, resonance_density};
+use super::detection_limit::{
+    HOST_CLOCK_TOLERANCE, TIMES, required_ratio, smallest_deviation, solve_size, waveform_test,
+};
 use super::environment::EnvironmentCourse;
 use super::outside::{OutsideEffect, OutsideKind, relative};
 use realfft::RealFftPlanner;
 
-/// Size at the detection limit of `effect`, beside the noise of its channel `place`.
-pub(super) fn smallest_outside_size(
-    effect: &OutsideEffect,
+/// The effect with its size at `strength` times the detection limit, beside the noise of its channel `place`, and the strength that
+/// it has: that of missing codes has no size to choose.
+///
+/// The significance of a number of samples, of a difference of two clocks and of a level grows with the root of it, as that of dropped
+/// samples does.
+pub(super) fn with_strength(
+    unit: OutsideEffect,
+    strength: f64,
     environment: &EnvironmentCourse,
     place: &ChannelUnderTest<'_>,
-) -> f64 {
-    let period_s = place.record.period_s;
-    let samples = environment.temperature_c.len();
-    // Independent frequencies; times with lengths; both.
-    let places = match effect.kind() {
-        OutsideKind::Chirp | OutsideKind::Sawtooth | OutsideKind::ModulatedLine => 0.5 * samples as f64,
-        OutsideKind::Decays => 40.0 * 12.0,
-        OutsideKind::LevelByTemperature => 1.0,
-    };
-    let required = required_ratio(places);
-    if effect.kind() == OutsideKind::LevelByTemperature {
-        let white = place.white_density() / period_s;
-        let levels: Vec<f64> = relative(&environment.temperature_c).collect();
-        return white.sqrt()
-            * solve_size(required, |size| ratio_of_levels(levels.iter().map(|level| (size * level).powi(2))));
+) -> (OutsideEffect, f64) {
+    let limit = smallest_outside_size(&unit, environment, place);
+    match unit.kind() {
+        OutsideKind::MissingCodes => {
+            let expected = place.record.seconds / place.record.period_s * unit.frequencies_hz[0];
+            (unit, (expected / required_ratio(1.0)).sqrt())
+        }
+        OutsideKind::HeldValue | OutsideKind::ClockStep | OutsideKind::Knock => {
+            (OutsideEffect { size: strength * strength * limit, ..unit }, strength)
+        }
+        _ => (OutsideEffect { size: strength * limit, ..unit }, strength),
     }
-    let unit = OutsideEffect { size: 1.0, ..*effect }.signal(environment, samples, period_s);
+}
+
+/// Size at the detection limit of `effect`.
+fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse, place: &ChannelUnderTest<'_>) -> f64 {
+    let period_s = place.record.period_s;
+    let samples = (place.record.seconds / period_s).round();
     let density = |frequency: f64| place.density_before_filter(frequency);
-    (required / ratio_of_signal(&unit, period_s, density)).sqrt()
+    let of_signal = |places: f64| {
+        let unit = OutsideEffect { size: 1.0, ..effect.clone() };
+        let unit = unit.signal(environment, samples as usize, period_s);
+        (required_ratio(places) / ratio_of_signal(&unit, period_s, density)).sqrt()
+    };
+    // Each of a row of equal samples is as improbable as that two neighbours are equal.
+    let equal = |places: f64| required_ratio(places) / -place.equal_probability().ln();
+    match effect.kind() {
+        // Independent frequencies.
+        OutsideKind::Chirp | OutsideKind::Sawtooth | OutsideKind::ModulatedLine | OutsideKind::SwitchedLine => {
+            of_signal(0.5 * samples)
+        }
+        // Frequencies with parts of a period.
+        OutsideKind::SupplyDroop => of_signal(0.5 * samples * TIMES),
+        // Times with lengths.
+        OutsideKind::Decays => of_signal(40.0 * 12.0),
+        OutsideKind::AlternatingConverters => of_signal(1.0),
+        OutsideKind::Knock => of_signal(samples),
+        OutsideKind::LevelByTemperature => {
+            let white = place.white_density() / period_s;
+            let levels: Vec<f64> = relative(&environment.temperature_c).collect();
+            white.sqrt()
+                * solve_size(required_ratio(1.0), |size| {
+                    ratio_of_levels(levels.iter().map(|level| (size * level).powi(2)))
+                })
+        }
+        OutsideKind::HeldValue => equal(samples) * period_s,
+        // Every one of them is at a time of its own.
+        OutsideKind::DeadTime => equal(samples) * period_s,
+        OutsideKind::ClockStep => HOST_CLOCK_TOLERANCE,
+        OutsideKind::SelfHeating => {
+            let block_s = place.record.seconds / BLOCKS as f64;
+            // Mean of the approach over each block.
+            let (length, test) = (block_s / effect.times_s[1], waveform_test(place));
+            let mean = |block: usize| 1.0 - (-length * block as f64).exp() * -(-length).exp_m1() / length;
+            let values: Vec<f64> = (0..BLOCKS).map(mean).collect();
+            // Octaves of time constants.
+            let places = 12.0;
+            solve_size(required_ratio(places), |size| {
+                test.ratio(&values.iter().map(|value| size * value).collect::<Vec<f64>>())
+            })
+        }
+        OutsideKind::WanderingBand => {
+            let [centre_hz, width_hz] = effect.frequencies_hz;
+            let unit = |frequency: f64| resonance_density(centre_hz, width_hz, period_s, frequency);
+            smallest_deviation(place, 0.5 / period_s / width_hz, Some((centre_hz, width_hz)), unit)
+        }
+        OutsideKind::MissingCodes => 1.0,
+    }
 }
 
 /// Expected log likelihood ratio of a known signal in noise of the two-sided `density`: the energy of its spectrum over that
@@ -42,8 +99,11 @@ fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) 
         return 0.0;
     }
     let seconds = signal.len() as f64 * period_s;
+    // Each ordinate stands for two frequencies, that at half the sample rate for one.
+    let is_single = |k: usize| 2 * k == signal.len();
     let energy = |(k, bin): (usize, &realfft::num_complex::Complex<f64>)| {
-        period_s * period_s * bin.norm_sqr() / seconds / density(k as f64 / seconds)
+        let part = if is_single(k) { 0.5 } else { 1.0 };
+        part * period_s * period_s * bin.norm_sqr() / seconds / density(k as f64 / seconds)
     };
     output.iter().enumerate().skip(1).map(energy).sum()
 }
@@ -66,6 +126,14 @@ mod tests {
     fn the_ratio_of_a_sinusoid_has_its_closed_form() {
         let signal: Vec<f64> = (0..1000).map(|at| 0.3 * (TAU * 0.07 * f64::from(at)).sin()).collect();
         let expected = 0.09 * 1000.0 * 0.01 / (4.0 * 0.2);
+        assert!((ratio_of_signal(&signal, 0.01, |_| 0.2) / expected - 1.0).abs() < 1e-6);
+    }
+
+    /// `½·Σs²/σ²` of any known signal in white noise of variance σ², S over the sample period.
+    #[test]
+    fn the_ratio_of_an_alternating_offset_is_half_its_energy() {
+        let signal: Vec<f64> = (0..1000).map(|at| if at % 2 == 0 { 0.3 } else { -0.3 }).collect();
+        let expected = 0.5 * 1000.0 * 0.09 / (0.2 / 0.01);
         assert!((ratio_of_signal(&signal, 0.01, |_| 0.2) / expected - 1.0).abs() < 1e-6);
     }
 

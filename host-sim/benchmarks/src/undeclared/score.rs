@@ -107,7 +107,7 @@ pub struct RecordingScore {
     pub outside: Option<OutsideScore>,
 }
 
-/// A hidden effect that no kind of the report describes.
+/// A hidden effect that the analysis was not made for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutsideScore {
     /// Kind of the effect.
@@ -116,6 +116,8 @@ pub struct OutsideScore {
     pub strength: f64,
     /// Whether the report says that something is unexplained in its channel.
     pub unexplained: bool,
+    /// Whether the report has a name for it that describes it, in its channel.
+    pub named: bool,
 }
 
 /// Generates a recording, of which the share `loss` of the samples is lost at random, analyses it and compares the report
@@ -187,10 +189,13 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
     let is_true = |channel: Channel, kind: &str| {
         let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
         // Where something is hidden, a part of it that is said to be unexplained is no wrong name.
-        let is_unexplained = kind == UNEXPLAINED
-            && (outside.is_some_and(|effect| simulation::channel(effect.channel()) == channel)
-                || effects.iter().any(|effect| shows_in(effect, channel)));
+        let output = simulation::output_register(channel);
+        let is_outside = outside.is_some_and(|effect| {
+            effect.shows_in(output) && (kind == UNEXPLAINED || effect.kind().right_names().contains(&kind))
+        });
+        let is_unexplained = kind == UNEXPLAINED && effects.iter().any(|effect| shows_in(effect, channel));
         is_lost
+            || is_outside
             || is_unexplained
             || (kind == "noise_below_count" && is_below_a_count(channel))
             || effects.iter().any(|effect| effect.name() == kind && shows_in(effect, channel))
@@ -213,9 +218,10 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
 }
 
 fn score_outside(effect: &OutsideEffect, strength: f64, scored: &[(Channel, &ChannelReport)]) -> OutsideScore {
-    let own = scored.iter().filter(|(channel, _)| *channel == simulation::channel(effect.channel()));
-    let unexplained = own.flat_map(|(_, report)| &report.effects).any(|found| found.kind == UNEXPLAINED);
-    OutsideScore { kind: effect.kind(), strength, unexplained }
+    let own = scored.iter().filter(|(channel, _)| effect.shows_in(simulation::output_register(*channel)));
+    let names: Vec<&str> = own.flat_map(|(_, report)| &report.effects).map(|found| found.kind.as_str()).collect();
+    let named = names.iter().any(|name| effect.kind().right_names().contains(name));
+    OutsideScore { kind: effect.kind(), strength, unexplained: names.contains(&UNEXPLAINED), named }
 }
 
 /// Whether `effect` is in `channel`. Effects without channels concern the samples of all channels.

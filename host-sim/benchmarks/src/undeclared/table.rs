@@ -96,11 +96,12 @@ impl ScoreTable {
         Proportion::count(self.outcomes.iter().map(|(_, outcome)| !outcome.false_alarms.is_empty()))
     }
 
-    /// Effects outside the vocabulary, of a strength of at least [`STRONG`], that are reported as unexplained.
+    /// Effects outside the vocabulary, of a strength of at least [`STRONG`], that are reported as unexplained or by a name that
+    /// describes them.
     #[must_use]
-    pub fn unexplained(&self) -> Proportion {
+    pub fn outside_told(&self) -> Proportion {
         let strong = self.outcomes.iter().filter_map(|(_, outcome)| outcome.outside.as_ref());
-        Proportion::count(strong.filter(|score| score.strength >= STRONG).map(|score| score.unexplained))
+        Proportion::count(strong.filter(|score| score.strength >= STRONG).map(OutsideScore::is_told))
     }
 
     /// Scores of the effects of one kind outside the vocabulary, each with what was reported instead.
@@ -145,6 +146,14 @@ impl ParameterScore {
 
     fn is_covered(&self) -> bool {
         (self.low..=self.high).contains(&self.truth)
+    }
+}
+
+impl OutsideScore {
+    /// Whether the report says in its channel that something is unexplained, or describes it.
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        self.unexplained || self.named
     }
 }
 
@@ -302,10 +311,14 @@ impl ScoreTable {
         if OutsideKind::ALL.into_iter().all(|kind| self.outside(kind).next().is_none()) {
             return Ok(());
         }
-        writeln!(out, "\nEffects that no kind of the report describes\n")?;
-        writeln!(out, "{:<18}{:>12}{:>14}{:>14}   wrong names", "", "number", "unexplained", "no wrong name")?;
+        writeln!(out, "\nEffects that the analysis was not made for\n")?;
+        let heads = ["number", "unexplained", "right name", "either", "no wrong name"];
+        let [number, unexplained, right, either, unnamed] = heads;
+        writeln!(out, "{:<18}{number:>8}{unexplained:>14}{right:>12}{either:>8}{unnamed:>15}   wrong names", "")?;
         for kind in OutsideKind::ALL {
             let unexplained = Proportion::count(self.outside(kind).map(|(score, _)| score.unexplained));
+            let named = Proportion::count(self.outside(kind).map(|(score, _)| score.named));
+            let told = Proportion::count(self.outside(kind).map(|(score, _)| score.is_told()));
             let unnamed = Proportion::count(self.outside(kind).map(|(_, wrong)| wrong.is_empty()));
             let mut names: BTreeMap<&str, usize> = BTreeMap::new();
             for wrong in self.outside(kind).flat_map(|(_, wrong)| wrong) {
@@ -314,10 +327,12 @@ impl ScoreTable {
             let names: Vec<String> = names.into_iter().map(|(name, count)| format!("{name} × {count}")).collect();
             writeln!(
                 out,
-                "{:<18}{:>12}{:>14}{:>14}   {}",
+                "{:<18}{:>8}{:>14}{:>12}{:>8}{:>15}   {}",
                 kind.name(),
                 unexplained.all,
                 unexplained.yes,
+                named.yes,
+                told.yes,
                 unnamed.yes,
                 names.join(", ")
             )?;
@@ -334,7 +349,7 @@ impl ScoreTable {
             ("both effects of a pair named", self.all_named(RecordingGroup::Pair)),
             ("all three effects of a triple named", self.all_named(RecordingGroup::Triple)),
             ("wrong names, over all recordings", self.wrong_names()),
-            ("effects outside the vocabulary unexplained", self.unexplained()),
+            ("effects outside the vocabulary unexplained or rightly named", self.outside_told()),
             ("parameters within 10 % (frequencies 2 %)", self.near()),
             ("95 % intervals that contain the true value", self.coverage()),
             ("error on unseen data within 1.5 times the true model's", self.unseen(UnseenErrors::is_near_truth)),
@@ -343,7 +358,7 @@ impl ScoreTable {
         ];
         for (what, share) in lines {
             let percent = share.percent().map_or("–".to_owned(), |percent| format!("{percent:.1} %"));
-            writeln!(out, "{what:<56}{percent:>8}   ({} of {})", share.yes, share.all)?;
+            writeln!(out, "{what:<60}{percent:>8}   ({} of {})", share.yes, share.all)?;
         }
         let mut alarms: BTreeMap<&str, usize> = BTreeMap::new();
         for alarm in self.outcomes(RecordingGroup::Nothing).flat_map(|outcome| &outcome.false_alarms) {

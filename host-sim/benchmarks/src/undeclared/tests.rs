@@ -11,7 +11,7 @@ use super::detection_limit::{
 use super::effect::{draw_unit, scaled, size};
 use super::score::compare;
 use super::truth::{TrueModelErrors, true_model_errors};
-use super::{DrawnRecording, EffectKind, RecordingGroup, TrueRecording, UndeclaredPlan};
+use super::{DrawnRecording, EffectKind, OutsideKind, RecordingGroup, TrueRecording, UndeclaredPlan};
 use adis16405_driver::Channel;
 use allan_core::NoiseTerm as Term;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance};
@@ -250,10 +250,10 @@ fn a_recording_depends_on_its_seed_only_and_no_seed_is_used_twice() {
     };
     let mut seeds: Vec<u64> =
         plan(false).recordings().into_iter().chain(plan(true).recordings()).map(|(_, seed)| seed).collect();
-    assert_eq!(seeds.len(), 2 * (200 + 16 * 40 + 200 + 50 + 5 * 20));
+    assert_eq!(seeds.len(), 2 * (200 + 16 * 40 + 200 + 50 + 15 * 20));
     seeds.sort_unstable();
     seeds.dedup();
-    assert_eq!(seeds.len(), 2 * (200 + 16 * 40 + 200 + 50 + 5 * 20), "no seed is used twice");
+    assert_eq!(seeds.len(), 2 * (200 + 16 * 40 + 200 + 50 + 15 * 20), "no seed is used twice");
     let differ = |kinds: [EffectKind; 3]| kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[0] != kinds[2];
     assert!((0..100).all(|seed| differ(DrawnRecording::several(seed))));
 }
@@ -338,6 +338,43 @@ fn an_effect_is_named_in_its_channel_and_a_false_alarm_in_another() {
     // Accelerometers are not scored during a motion.
     case.simulation.scenario.environment.motion.deviation_g = 0.1;
     assert_eq!(compare(&case, &report(&[(Channel::AcclX, "markov", &[])]), 0.0).false_alarms, [""; 0]);
+}
+
+/// Outside the vocabulary, `unexplained` and a name that describes the effect are right, in the channels that it is in.
+#[test]
+fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() {
+    let quiet = |kind: OutsideKind| {
+        let mut case = DrawnRecording::from_group(RecordingGroup::Outside(kind), 100.0, 2);
+        case.simulation.scenario.environment.motion.deviation_g = 0.0;
+        case
+    };
+    let told = |case: &DrawnRecording, channel: Channel, name: &'static str| {
+        let score = compare(case, &report(&[(channel, name, &[])]), 0.0);
+        let outside = score.outside.expect("an effect is hidden");
+        (outside.unexplained, outside.named, score.false_alarms.is_empty())
+    };
+    let held = quiet(OutsideKind::HeldValue);
+    let own = simulation::channel(held.simulation.outside[0].channels().next().expect("a channel"));
+    let other = if own == Channel::GyroX { Channel::GyroY } else { Channel::GyroX };
+    assert_eq!(told(&held, own, "unexplained"), (true, false, true));
+    assert_eq!(told(&held, own, "stuck"), (false, true, true));
+    assert_eq!(told(&held, own, "spikes"), (false, false, false));
+    assert_eq!(told(&held, other, "stuck"), (false, false, false));
+    // The clock is that of all channels; a knock is in all of them.
+    assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, "sample_clock"), (false, true, true));
+    assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, "dropped_samples"), (false, false, false));
+    assert_eq!(told(&quiet(OutsideKind::Knock), Channel::AcclZ, "knock"), (false, true, true));
+}
+
+/// 2 is the smallest strength that is drawn. Each kind is in the counts, the stamps or both.
+#[test]
+fn every_effect_outside_the_vocabulary_changes_the_recording() {
+    for kind in OutsideKind::ALL {
+        let case = DrawnRecording::from_group(RecordingGroup::Outside(kind), 100.0, 3);
+        assert!(case.strengths[0] >= 2.0, "{kind:?}: {}", case.strengths[0]);
+        let without = TrueRecording { outside: Vec::new(), ..case.simulation.clone() };
+        assert_ne!(case.simulation.record(), without.record(), "{kind:?}");
+    }
 }
 
 /// The noise of the paper is about a count in an accelerometer, of which 2 taps a stage leave 0.6 and 64 a tenth.
