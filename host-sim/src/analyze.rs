@@ -6,7 +6,7 @@ use crate::progress::{self, Progress};
 use crate::{many, streaming};
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
-use noise_analysis::analysis::{analyze_and_release, analyze_long};
+use noise_analysis::analysis::{analyze_and_release, analyze_condensed};
 use noise_analysis::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
 use noise_analysis::report::Report;
 use noise_analysis::several::{self, NoiseAgreement, NoiseInflation};
@@ -136,7 +136,7 @@ fn analyze_stream(mut stream: SampleStream, end_reading: &mut dyn FnMut(&SampleS
     let long = streaming::long_record(&mut stream)?;
     end_reading(&stream);
     drop(stream);
-    Ok(progress::analysing(|watch| analyze_long(&long, watch)))
+    Ok(progress::analysing(|watch| analyze_condensed(&long, watch)))
 }
 
 fn note_all(notes: &[String]) {

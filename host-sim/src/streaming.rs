@@ -2,7 +2,8 @@
 
 use anyhow::Result;
 use measurement::SampleBlock;
-use noise_analysis::long_record::{LongRecord, LongRecordReader};
+use noise_analysis::condensed_record::CondensedRecord;
+use noise_analysis::long_record::LongRecordReader;
 use noise_analysis::parallel;
 use noise_analysis::quick::CurveEstimators;
 use recordings::sample_stream::{SampleStream, StreamError};
@@ -18,7 +19,7 @@ pub(crate) fn curves(stream: &mut SampleStream) -> Result<CurveEstimators> {
 }
 
 /// What is kept of a long recording.
-pub(crate) fn long_record(stream: &mut SampleStream) -> Result<LongRecord> {
+pub(crate) fn long_record(stream: &mut SampleStream) -> Result<CondensedRecord<'static>> {
     let begin = |stream: &SampleStream| LongRecordReader::new(stream.description().clone(), stream.beginning());
     Ok(read(stream, begin, LongRecordReader::push)?.finish())
 }

@@ -36,6 +36,11 @@ impl<T> PerChannel<T> {
         self.0.iter_mut()
     }
 
+    /// The values in the order of the channels, to change them.
+    pub fn as_mut_slice(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+
     /// Each channel with its value.
     pub fn with_ids(&self) -> impl Iterator<Item = (ChannelId, &T)> + Clone {
         self.ids().zip(&self.0)

@@ -1,9 +1,9 @@
 //! The pipeline from a recording to its report.
 //!
 //! ```text
-//! Measurement ─► TracedRecord: preprocessing, curves, models of the whole record ─► effects ─► causes ─► Report
-//!                    ├─► FirstHalf: models of the first half, their errors on the second ──────────────────┤
-//! first half alone ─► TracedRecord ─► effects, to validate those of the whole ───────────────────────────────┘
+//! Measurement ─► CondensedRecord ─► TracedRecord: preprocessing, curves, models of the whole ─► effects ─► causes ─► Report
+//!                     │                  └─► FirstHalf: models of the first half, errors on the second ───────────┤
+//!                     └─► its first half ─► TracedRecord ─► effects, to validate those of the whole ──────────────┘
 //! ```
 //!
 //! Effects are named on the whole record. The errors before and after come from models of the first half alone, compared
@@ -13,22 +13,21 @@
 use crate::OCTAVES;
 use crate::assessment::{AssessedModels, Assessment};
 use crate::causes;
+use crate::condensed_record::CondensedRecord;
 use crate::figure_data;
-use crate::first_half::{FirstHalf, FirstHalfFit};
-use crate::long_record::LongRecord;
+use crate::first_half::{Epochs, FirstHalf};
+use crate::long_record;
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::per_channel;
 use crate::part_report;
-use crate::report::{
-    ChannelReport, CurvePoint, FigureData, MissingSamples, ModelReport, Report, SCHEMA, SlopeMethodReport, by_cause,
-    term_reports,
-};
+use crate::report::{ChannelReport, MissingSamples, Report, SCHEMA, by_cause};
 use crate::series::Series;
 use crate::spectra::allan_deviations_by_spectrum;
-use crate::traced_record::{Condensed, TracedRecord};
+use crate::traced_part::ChannelTrace;
+use crate::traced_record::TracedRecord;
 use crate::uniform_series::UniformSeries;
-use allan_core::AllanPoint;
 use measurement::{ChannelId, Measurement, RecordingDescription};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -66,8 +65,8 @@ impl fmt::Display for Stage {
 /// Effects are traced in the inertial channels only; the others get the baseline model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {
-    match LongRecord::condensed_from(measurement) {
-        Some(long) => analyze_long(&long, &|_| {}),
+    match long_record::condensed_from(measurement) {
+        Some(record) => analyze_condensed(&record, &|_| {}),
         None => analyze_samples(measurement),
     }
 }
@@ -76,171 +75,110 @@ pub fn analyze(measurement: &Measurement) -> Report {
 /// `watch` with each stage when it begins.
 #[must_use]
 pub fn analyze_and_release(measurement: Measurement, watch: &dyn Fn(Stage)) -> Report {
-    match LongRecord::condensed_from(&measurement) {
-        Some(long) => {
+    let record = match long_record::condensed_from(&measurement) {
+        Some(record) => {
             drop(measurement);
-            analyze_long(&long, watch)
+            record
         }
-        None => Recorded::of_samples(&measurement, &RecordingDescription::from(&measurement)).report(watch),
-    }
+        None => CondensedRecord::of_samples(Cow::Owned(measurement)),
+    };
+    analyze_condensed(&record, watch)
 }
 
 /// Analyses all samples of every channel of a measurement, however many there are.
 #[must_use]
 pub fn analyze_samples(measurement: &Measurement) -> Report {
-    Recorded::of_samples(measurement, &RecordingDescription::from(measurement)).report(&|_| {})
+    analyze_condensed(&CondensedRecord::of_samples(Cow::Borrowed(measurement)), &|_| {})
 }
 
-/// Analyses a recording of which not all samples are kept. Calls `watch` with each stage when it begins.
+/// Analyses a recording, of which not all samples need be kept. Calls `watch` with each stage when it begins.
 #[must_use]
-pub fn analyze_long(record: &LongRecord, watch: &dyn Fn(Stage)) -> Report {
-    let LongRecord { description, first, means, .. } = record;
-    Recorded { description, measurement: means, first, long: Some(record) }.report(watch)
+pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Report {
+    let CondensedRecord { description, means: measurement, .. } = record;
+    watch(Stage::WholeRecord);
+    let mut whole = TracedRecord::new(record);
+    watch(Stage::FirstHalf);
+    let (first_half, epochs) = FirstHalf::fit(&whole);
+    whole.part.take_terms_that_held(&first_half.part, &whole.estimators.ruled[1]);
+    whole.part.add_lines_of_spectrum();
+    watch(Stage::Effects);
+    let effects = whole.effects();
+    // What the first half shows by itself, to compare with what the whole record shows.
+    let effects_of_half = if effects.iter().all(Vec::is_empty) {
+        effects.clone()
+    } else {
+        TracedRecord::new(&record.first_half()).effects()
+    };
+    watch(Stage::Assessment);
+    let mut channels = channel_reports(&whole, &first_half, &epochs);
+    let duration_s = description.periods as f64 * description.period_s();
+    let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
+    let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
+    let part = part_report::report(record.first_samples(), description.samples, &whole.part.filter);
+    // The samples are transformed once more for the figures: what is not needed then is released.
+    drop((whole, first_half, epochs));
+    let mut report = Report {
+        schema: SCHEMA,
+        quick: false,
+        sample_rate_hz: description.sample_rate_hz,
+        samples: description.samples,
+        dropped: by_cause(&description.dropped),
+        flagged: by_cause(&description.flagged),
+        part,
+        findings,
+        common_mode: common_mode_regression(measurement, &channels),
+        channels,
+    };
+    figure_data::set(&mut report, measurement, record.first.as_ref());
+    report
 }
 
-/// What a report is made of.
-struct Recorded<'a> {
-    description: &'a RecordingDescription,
-    /// The samples, or those of a long record in means.
-    measurement: &'a Measurement,
-    /// The samples, or the first of them.
-    first: &'a Measurement,
-    long: Option<&'a LongRecord>,
+/// The report of every channel, without its effects.
+fn channel_reports(whole: &TracedRecord, first_half: &FirstHalf, epochs: &Epochs) -> Vec<ChannelReport> {
+    let record = whole.record;
+    let assessments =
+        per_channel(record.channels.ids(), |channel| Assessed::new(whole, channel, &first_half.part.channels[channel]));
+    let nonstationarities = epochs.nonstationarities(whole, first_half);
+    let at_rest = whole.at_rest();
+    let report = |(channel, Assessed { assessment, by_spectrum })| {
+        let mut report = first_half.report(&whole.part, &whole.estimators, channel, whole.has_rules(channel));
+        for point in &mut report.curve {
+            point.adev_by_spectrum = by_spectrum.get(point.n.ilog2() as usize).copied().flatten();
+        }
+        ChannelReport {
+            samples: record.description.samples,
+            missing: missing_samples(whole, channel),
+            nonstationarity: nonstationarities[channel].clone(),
+            at_rest: at_rest.clone(),
+            assessment,
+            ..report
+        }
+    };
+    record.channels.ids().zip(assessments).map(report).collect()
 }
 
-impl<'a> Recorded<'a> {
-    fn of_samples(measurement: &'a Measurement, description: &'a RecordingDescription) -> Self {
-        Self { description, measurement, first: measurement, long: None }
-    }
+/// Samples of a channel that are missing in its model.
+fn missing_samples(whole: &TracedRecord, channel: ChannelId) -> MissingSamples {
+    let CondensedRecord { description, samples_per_mean, channels, .. } = whole.record;
+    // Of means, a knock has all of their samples.
+    let by_rules = whole.preprocessing.refused(channel).map(|(cause, means)| (cause, means * samples_per_mean));
+    let own = channels[channel].refused.iter().map(|(&cause, &count)| (cause, count));
+    missing(description, own.chain(by_rules), whole.estimators.both.replaced(channel))
+}
 
-    fn report(&self, watch: &dyn Fn(Stage)) -> Report {
-        let &Self { description, measurement, first, long } = self;
-        let condensed = long.map(LongRecord::condensed);
-        watch(Stage::WholeRecord);
-        let mut record = TracedRecord::new(measurement, condensed);
-        watch(Stage::FirstHalf);
-        let first_half = FirstHalf::fit(&record);
-        keep_terms_that_held(&mut record, &first_half);
-        record.add_lines_of_spectrum();
-        watch(Stage::Effects);
-        let mut effects = record.effects();
-        // What the first half shows by itself, to compare with what the whole record shows.
-        let mut effects_of_half = if effects.iter().all(Vec::is_empty) {
-            effects.clone()
-        } else {
-            let half = measurement.before(measurement.middle());
-            let shorter = condensed.map(|condensed| condensed.shorter.of_first_half());
-            let of_half = condensed.zip(shorter.as_ref()).map(|(of, shorter)| Condensed { shorter, ..of });
-            TracedRecord::new(&half, of_half).effects()
-        };
-        if let Some(long) = long {
-            for (effects, of_samples) in
-                [(&mut effects, &long.effects), (&mut effects_of_half, &long.effects_of_first_half)]
-            {
-                for (effects, of_samples) in effects.iter_mut().zip(of_samples) {
-                    effects.splice(0..0, of_samples.iter().cloned());
-                }
-            }
-        }
-        watch(Stage::Assessment);
-        let mut channels = self.channel_reports(&record, &first_half);
-        let duration_s = description.periods as f64 * description.period_s();
-        let findings = causes::find(
-            &mut channels,
-            &effects.into_vec(),
-            &effects_of_half.into_vec(),
-            &description.profile,
-            duration_s,
-        );
-        let part = part_report::report(first, description.samples, &record.filter);
-        // The samples are transformed once more for the figures: what is not needed then is released.
-        drop((record, first_half));
-        let mut report = Report {
-            schema: SCHEMA,
-            quick: false,
-            sample_rate_hz: description.sample_rate_hz,
-            samples: description.samples,
-            dropped: by_cause(&description.dropped),
-            flagged: by_cause(&description.flagged),
-            part,
-            findings,
-            common_mode: common_mode_regression(measurement, &channels),
-            channels,
-        };
-        figure_data::set(&mut report, measurement, long.map(|long| &long.first));
-        report
+/// The samples that are missing in the model of a channel, of which those of `own` are refused in it alone.
+pub(crate) fn missing<'c>(
+    description: &RecordingDescription,
+    own: impl Iterator<Item = (&'c str, u64)>,
+    replaced: u64,
+) -> MissingSamples {
+    let of_all =
+        description.dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
+    let mut refused: BTreeMap<String, u64> = BTreeMap::new();
+    for (cause, count) in of_all.chain(own).filter(|(_, count)| *count > 0) {
+        *refused.entry(cause.to_owned()).or_insert(0) += count;
     }
-
-    /// The report of every channel, in the order of the channels, without its effects.
-    fn channel_reports(&self, record: &TracedRecord, first_half: &FirstHalf) -> Vec<ChannelReport> {
-        let TracedRecord { estimators, measurement, .. } = record;
-        let assessments =
-            per_channel(measurement.ids(), |channel| Assessed::new(record, channel, &first_half.channels[channel]));
-        let nonstationarities = first_half.nonstationarities(record);
-        let at_rest = record.at_rest();
-        let avar_of = |of: ChannelId, n: u64| {
-            estimators.measured[of].points().iter().find(|point| point.n == n).map(|point| point.avar)
-        };
-        let report = |(channel, assessed): (ChannelId, Assessed)| {
-            let profile = &measurement[channel].profile;
-            let (trace, half) = (&record.channels[channel], &first_half.channels[channel]);
-            let whole = estimators.measured[channel]
-                .clone()
-                .with_confidence(|point| half.fit.before.variance_fractions(point.n));
-            let after = half.after(record, channel, &whole, avar_of);
-            // The model with the added terms, fitted to the whole record, with the errors of `after`.
-            let refitted = ModelReport {
-                terms: term_reports(trace.fit.after(), profile.unit),
-                adev: trace.fit.deviations(&estimators.both, channel, &whole, avar_of),
-                ..after.clone()
-            };
-            let points = whole.points().iter();
-            ChannelReport {
-                name: profile.name.to_owned(),
-                unit: profile.unit.to_owned(),
-                samples: self.description.samples,
-                missing: self.missing_samples(record, channel),
-                curve: points.map(|point| curve_point(point, whole.samples(), &assessed.by_spectrum)).collect(),
-                read_off: SlopeMethodReport::from_curve(&whole, profile.unit),
-                before: half.before(record, channel, &whole),
-                first_half_curve: half.curve_error(record, channel),
-                after,
-                refitted,
-                nonstationarity: nonstationarities[channel].clone(),
-                at_rest: at_rest.clone(),
-                effects: Vec::new(),
-                assessment: assessed.assessment,
-                figure_data: FigureData::default(),
-            }
-        };
-        measurement.ids().zip(assessments).map(report).collect()
-    }
-
-    /// Samples of a channel that are missing in its model.
-    fn missing_samples(&self, record: &TracedRecord, channel: ChannelId) -> MissingSamples {
-        let TracedRecord { measurement, preprocessing, estimators, .. } = record;
-        let dropped = &self.description.dropped;
-        let of_all = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(&cause, &count)| (cause, count));
-        let own: Vec<(&str, u64)> = match self.long {
-            // Of means, a knock has all of their samples.
-            Some(long) => {
-                let samples = |(cause, means)| (cause, means * long.shorter.samples_per_mean);
-                let of_means = preprocessing.refused(channel).map(samples);
-                long.refused[channel].iter().map(|(&cause, &count)| (cause, count)).chain(of_means).collect()
-            }
-            None => {
-                let refused =
-                    measurement[channel].refused.iter().map(|(&cause, positions)| (cause, positions.len() as u64));
-                refused.chain(preprocessing.refused(channel)).collect()
-            }
-        };
-        let mut refused: BTreeMap<String, u64> = BTreeMap::new();
-        for (cause, count) in of_all.chain(own).filter(|(_, count)| *count > 0) {
-            *refused.entry(cause.to_owned()).or_insert(0) += count;
-        }
-        let lost = dropped.get("gap").copied().unwrap_or(0);
-        MissingSamples { lost, refused, replaced: estimators.both.replaced(channel) }
-    }
+    MissingSamples { lost: description.dropped.get("gap").copied().unwrap_or(0), refused, replaced }
 }
 
 /// The drift that the channels whose noise was followed have in common.
@@ -251,16 +189,6 @@ fn common_mode_regression(measurement: &Measurement, channels: &[ChannelReport])
     CommonModeRegression::estimate(measurement, &followed)
 }
 
-/// Makes the terms of the first half's model those of the whole record's where the second half does not contradict it.
-fn keep_terms_that_held(record: &mut TracedRecord, first_half: &FirstHalf) {
-    let filter = record.filter.clone().ok();
-    for (channel, half) in first_half.channels.with_ids() {
-        if record.is_traced(channel) && half.held(record, channel) {
-            record.channels[channel].fit.take_terms_that_held(&half.fit.traced, filter.as_ref());
-        }
-    }
-}
-
 /// What the samples of a channel say beside its fits.
 struct Assessed {
     assessment: Assessment,
@@ -269,10 +197,10 @@ struct Assessed {
 }
 
 impl Assessed {
-    fn new(record: &TracedRecord, channel: ChannelId, half: &FirstHalfFit) -> Self {
-        let trace = &record.channels[channel];
-        let recorded = Series::from_measurement(record.measurement, channel);
-        let own = if record.is_traced(channel) { &record.series[channel] } else { &recorded };
+    fn new(whole: &TracedRecord, channel: ChannelId, half: &ChannelTrace) -> Self {
+        let trace = &whole.part.channels[channel];
+        let recorded = Series::from_measurement(whole.measurement(), channel);
+        let own = if whole.record.is_traced(channel) { &whole.series[channel] } else { &recorded };
         // Models that are assessed by samples that still have the share of the covariates.
         let models = AssessedModels {
             refitted: trace.fit.after(),
@@ -283,16 +211,11 @@ impl Assessed {
         let factors: Vec<u64> = (0..OCTAVES).map(|octave| 1 << octave).collect();
         let mut by_spectrum = allan_deviations_by_spectrum(&UniformSeries::from_series(&recorded), &factors);
         // Means tell nothing of the averaging times that are shorter than they are.
-        let shorter = record.condensed.map_or(0, |condensed| condensed.shorter.samples_per_mean.ilog2() as usize);
+        let shorter = whole.record.samples_per_mean.ilog2() as usize;
         by_spectrum.splice(0..0, vec![None; shorter]);
-        let of_channel = record.condensed.map(|condensed| &condensed.shorter.channels[channel]);
-        let samples = of_channel.and_then(|of| Some((of.spectrum_within(0..u64::MAX)?, of.resolution)));
-        let samples = samples.as_ref().map(|(spectrum, resolution)| (spectrum, *resolution));
-        Self { assessment: Assessment::new(own, samples, models), by_spectrum }
+        let samples = &whole.record.channels[channel].samples;
+        let spectrum = samples.spectrum_within(0..u64::MAX);
+        let spectrum = spectrum.as_ref().map(|spectrum| (spectrum, samples.resolution));
+        Self { assessment: Assessment::new(own, spectrum, models), by_spectrum }
     }
-}
-
-fn curve_point(point: &AllanPoint, samples: u64, by_spectrum: &[Option<f64>]) -> CurvePoint {
-    let adev_by_spectrum = by_spectrum.get(point.n.ilog2() as usize).copied().flatten();
-    CurvePoint { adev_by_spectrum, ..CurvePoint::new(point, samples) }
 }

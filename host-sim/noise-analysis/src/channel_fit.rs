@@ -2,7 +2,7 @@
 
 use crate::OCTAVES;
 use crate::covariates::CovariateFit;
-use crate::estimators::RecordPart;
+use crate::estimators::RecordEstimators;
 use crate::findings::BoundedEstimate;
 use crate::noise_terms::{filter_length_s, is_filter, is_line, is_white, line_frequency};
 use crate::part_filter::PartFilter;
@@ -126,18 +126,19 @@ impl ChannelFit {
         avars.fold(0.0, f64::max) > profile.dithered_avar_counts2 * resolution * resolution
     }
 
-    /// The Allan deviation of the model with the added terms at each point of `whole`, with the share of the covariates: that
-    /// is in the measured curve and not in the model. `avar_of` is the Allan variance of a channel of the whole record at an
-    /// averaging factor.
+    /// The Allan deviation of the model with the added terms at each point of the curve of the `whole` record, with the share of the
+    /// covariates: that is in the measured curve and not in the model.
     pub(crate) fn deviations(
         &self,
-        both: &RecordPart,
+        estimators: &RecordEstimators,
         channel: ChannelId,
         whole: &Curve<OCTAVES>,
-        avar_of: impl Fn(ChannelId, u64) -> Option<f64>,
     ) -> Vec<f64> {
         let factors = || whole.points().iter().map(|point| point.n);
-        let shares = self.covariates.shares(both, channel, factors(), avar_of);
+        let avar_of = |of: ChannelId, n: u64| {
+            estimators.measured[of].points().iter().find(|point| point.n == n).map(|point| point.avar)
+        };
+        let shares = self.covariates.shares(&estimators.both, channel, factors(), avar_of);
         factors().zip(shares).map(|(n, share)| (self.after().avar(n) + share).sqrt()).collect()
     }
 

@@ -4,22 +4,23 @@
 //! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
 //! channels are taken where both have a sample.
 
-use crate::parallel::{in_parallel, per_channel};
-use crate::preprocessing::{Exclusion, Preprocessing};
-use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
+use crate::condensed_record::CondensedRecord;
+use crate::exclusion::Exclusion;
+use crate::gapped_cascade::GappedCascade;
+use crate::parallel::in_parallel;
+use crate::preprocessing::Preprocessing;
+use crate::sample_curves::SampleCurves;
 use crate::streamed_curves::STEPS_PER_COUNT;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
-use allan_core::{Cascade, Coupling, Covariance, Curve};
-use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel};
+use allan_core::{Cascade, Coupling, Curve};
+use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, Quantity};
 use nalgebra::DMatrix;
 
 /// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
 #[derive(Clone)]
 pub(crate) struct CoupledEstimators {
-    cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
-    /// Samples that are missing in each channel since its last one.
-    missing: Vec<u32>,
+    cascades: Vec<GappedCascade>,
     couplings: Vec<CoupledPair>,
 }
 
@@ -35,34 +36,26 @@ impl CoupledEstimators {
     pub(crate) fn new(channels: usize, coupled: &[usize]) -> Self {
         let pairs = coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]));
         Self {
-            cascades: vec![Cascade::new(); channels],
-            missing: vec![0; channels],
+            cascades: vec![GappedCascade::default(); channels],
             couplings: pairs.map(|channels| CoupledPair { channels, coupling: Coupling::new() }).collect(),
         }
     }
 
     /// Takes the sample of every channel in the next sample period; `None` where a channel has none.
     pub(crate) fn push(&mut self, values: impl Iterator<Item = Option<i32>>) {
-        for ((cascade, missing), value) in self.cascades.iter_mut().zip(&mut self.missing).zip(values) {
-            match value {
-                Some(value) => {
-                    cascade.gap(std::mem::take(missing));
-                    cascade.push(value);
-                }
-                None => *missing = missing.saturating_add(1),
-            }
-        }
+        self.cascades.iter_mut().zip(values).for_each(|(cascade, value)| cascade.push_one(value));
         for CoupledPair { channels: [a, b], coupling } in &mut self.couplings {
             // Products are taken where both channels have a sample.
-            if self.missing[*a] == 0 && self.missing[*b] == 0 {
-                coupling.observe(&self.cascades[*a], &self.cascades[*b]);
+            let (a, b) = (&self.cascades[*a], &self.cascades[*b]);
+            if a.has_latest() && b.has_latest() {
+                coupling.observe(a.cascade(), b.cascade());
             }
         }
     }
 
     /// Records that the samples of `missing` sample periods are missing in every channel.
     pub(crate) fn gap(&mut self, missing: u32) {
-        self.missing.iter_mut().for_each(|of| *of = of.saturating_add(missing));
+        self.cascades.iter_mut().for_each(|cascade| cascade.miss(missing.into()));
     }
 
     /// The estimators of these samples followed, after a gap, by those of `later`.
@@ -74,7 +67,7 @@ impl CoupledEstimators {
 
     /// The cascade of a channel.
     pub(crate) fn cascade(&self, channel: usize) -> &Cascade<OCTAVES, OVERLAP> {
-        &self.cascades[channel]
+        self.cascades[channel].cascade()
     }
 
     /// Covariances of the second differences of all channels at one octave, up to a common factor, 0 of channels that are not coupled;
@@ -82,7 +75,7 @@ impl CoupledEstimators {
     pub(crate) fn covariances(&self, octave: usize) -> Option<DMatrix<f64>> {
         let mut covariances = DMatrix::zeros(self.cascades.len(), self.cascades.len());
         for (i, cascade) in self.cascades.iter().enumerate() {
-            let (squares, count) = cascade.sum_of_squares(octave).filter(|&(_, count)| count > 0)?;
+            let (squares, count) = cascade.cascade().sum_of_squares(octave).filter(|&(_, count)| count > 0)?;
             covariances[(i, i)] = squares as f64 / count as f64;
         }
         for CoupledPair { channels: [i, j], coupling } in &self.couplings {
@@ -102,17 +95,12 @@ pub(crate) struct RecordPart {
     /// Smallest distance of two values, in the channel's unit: one count, or several.
     resolutions: PerChannel<f64>,
     period_s: f64,
-    shorter: Option<ShorterCurves>,
-}
-
-/// The curves at averaging times that are too short for the estimators, which have the means of samples.
-#[derive(Clone)]
-struct ShorterCurves {
+    /// Samples of a mean, where the estimators have means; otherwise 1.
     samples_per_mean: u64,
     /// Averaging factor from which on the estimators are used, samples.
     until: u64,
-    /// With the samples that were replaced.
-    curves: PerChannel<(Curve<OCTAVES>, u64)>,
+    /// The curves at shorter averaging times, with the samples that were replaced.
+    shorter: PerChannel<(Curve<OCTAVES>, u64)>,
 }
 
 /// The curves of the recording as measured, and the estimators of its halves.
@@ -128,14 +116,8 @@ pub(crate) struct RecordEstimators {
 }
 
 impl RecordEstimators {
-    /// Estimates from `measurement`, or where that has means from them and from the `shorter` averaging times, with the covariances of
-    /// the channels `coupled`.
-    pub(crate) fn estimate(
-        measurement: &Measurement,
-        shorter: Option<&ShorterTimes>,
-        coupled: &[ChannelId],
-        preprocessing: &Preprocessing,
-    ) -> Self {
+    /// Estimates from the means of `record`, and from the curves of its samples at shorter averaging times.
+    pub(crate) fn estimate(record: &CondensedRecord, preprocessing: &Preprocessing) -> Self {
         let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
         // Nothing is estimated twice.
         let mut distinct = vec![Exclusion::None];
@@ -144,57 +126,33 @@ impl RecordEstimators {
         distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
         let work: Vec<(Exclusion, Half)> =
             distinct.iter().flat_map(|&of| [Half::First, Half::Second].map(|half| (of, half))).collect();
-        let parts = in_parallel(&work, |&(exclusion, of)| half(measurement, coupled, preprocessing, exclusion, of));
+        let parts = in_parallel(&work, |&(exclusion, of)| half(record, preprocessing, exclusion, of));
         let of = |exclusion: Exclusion| {
             let position = distinct.iter().position(|of| *of == exclusion).unwrap_or(0);
             [parts[2 * position].clone(), parts[2 * position + 1].clone()]
         };
         let (raw, ruled, [first, second]) = (of(Exclusion::None), of(ruled), of(both));
-        let both = RecordPart { estimators: first.estimators.clone().followed_by(&second.estimators), ..first };
-        let Some(shorter) = shorter else { return Self { measured: measured(measurement), raw, ruled, both } };
+        let both = first.followed_by(&second);
         let halves = |parts: [RecordPart; 2], exclusion: Exclusion| {
             let [first, second] = parts;
             [(0, first), (1, second)]
-                .map(|(half, part)| part.with_shorter(shorter, exclusion, |of| of.half(half, exclusion)))
+                .map(|(half, part)| part.with_shorter(record, exclusion, |of| of.half(half, exclusion)))
         };
         Self {
-            measured: shorter.channels.map(|channel| channel.measured.clone()),
+            measured: record.channels.map(|channel| channel.samples.measured.clone()),
             raw: halves(raw, Exclusion::None),
             ruled: halves(ruled, Exclusion::ByFirstHalf),
-            both: both.with_shorter(shorter, Exclusion::ByWhole, |of| of.both(Exclusion::ByWhole)),
+            both: both.with_shorter(record, Exclusion::ByWhole, |of| of.both(Exclusion::ByWhole)),
         }
     }
 }
 
-/// The curves of all channels as measured.
-fn measured(measurement: &Measurement) -> PerChannel<Curve<OCTAVES>> {
-    per_channel(measurement.ids(), |id| {
-        let channel = &measurement[id];
-        let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
-        let mut missing = 0_u32;
-        for (position, &count) in channel.counts.iter().enumerate() {
-            missing = missing.saturating_add(measurement.missing_before(position));
-            if channel.is_refused(position) {
-                missing = missing.saturating_add(1);
-                continue;
-            }
-            estimator.gap(std::mem::take(&mut missing));
-            estimator.push(count);
-        }
-        estimator.curve(measurement.period_s()).scaled(channel.profile.lsb)
-    })
-}
-
 /// The estimators of a half of a recording, by time, without the samples of `exclusion`.
-fn half(
-    measurement: &Measurement,
-    coupled: &[ChannelId],
-    preprocessing: &Preprocessing,
-    exclusion: Exclusion,
-    half: Half,
-) -> RecordPart {
-    let resolution = |channel| f64::from(preprocessing.counts_per_step(channel)) * measurement[channel].profile.lsb;
-    let coupled: Vec<usize> = coupled.iter().map(|channel| channel.position()).collect();
+fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Exclusion, half: Half) -> RecordPart {
+    let measurement = record.means.as_ref();
+    let is_coupled = |quantity: Quantity| quantity.is_inertial() || quantity.is_environment();
+    let coupled = measurement.ids().filter(|&channel| is_coupled(measurement[channel].profile.quantity));
+    let coupled: Vec<usize> = coupled.map(ChannelId::position).collect();
     let mut estimators = CoupledEstimators::new(measurement.channels.len(), &coupled);
     let recorded: Vec<RecordedSamples> = measurement
         .ids()
@@ -230,9 +188,11 @@ fn half(
     RecordPart {
         channels: measurement.profiles().collect(),
         estimators,
-        resolutions: measurement.ids().map(resolution).collect(),
+        resolutions: record.channels.map(|of| of.samples.resolution),
         period_s: measurement.period_s(),
-        shorter: None,
+        samples_per_mean: record.samples_per_mean,
+        until: 1,
+        shorter: measurement.ids().map(|_| (Curve::empty(), 0)).collect(),
     }
 }
 
@@ -266,39 +226,44 @@ fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u
 }
 
 impl RecordPart {
-    /// Of channels whose estimators have counts of [`STEPS_PER_COUNT`] steps.
-    pub(crate) fn new(
-        channels: PerChannel<ChannelProfile>,
-        cascades: Vec<Cascade<OCTAVES, OVERLAP>>,
-        period_s: f64,
-    ) -> Self {
-        let missing = vec![0; cascades.len()];
-        let estimators = CoupledEstimators { cascades, missing, couplings: Vec::new() };
-        let resolutions = channels.map(|channel| channel.lsb);
-        Self { channels, estimators, resolutions, period_s, shorter: None }
+    /// This part followed, after a gap, by `later`.
+    pub(crate) fn followed_by(&self, later: &Self) -> Self {
+        Self { estimators: self.estimators.clone().followed_by(&later.estimators), ..self.clone() }
     }
 
-    /// The part with the curves of `shorter` at averaging times that are too short for its own samples, which are means.
+    /// Of channels that are not coupled, whose estimators have counts of [`STEPS_PER_COUNT`] steps.
+    pub(crate) fn new(channels: PerChannel<ChannelProfile>, cascades: Vec<GappedCascade>, period_s: f64) -> Self {
+        Self {
+            resolutions: channels.map(|channel| channel.lsb),
+            shorter: channels.map(|_| (Curve::empty(), 0)),
+            channels,
+            estimators: CoupledEstimators { cascades, couplings: Vec::new() },
+            period_s,
+            samples_per_mean: 1,
+            until: 1,
+        }
+    }
+
+    /// The part with the curves of the samples of `record` at averaging times that are too short for its means.
     fn with_shorter(
         self,
-        shorter: &ShorterTimes,
+        record: &CondensedRecord,
         exclusion: Exclusion,
-        curve: impl Fn(&ShorterTimesOfChannel) -> Curve<OCTAVES>,
+        curve: impl Fn(&SampleCurves) -> Curve<OCTAVES>,
     ) -> Self {
-        let curves = shorter.channels.map(|of| (curve(of), of.replaced(exclusion)));
-        let resolutions = shorter.channels.map(|of| of.resolution);
-        let shorter = ShorterCurves { samples_per_mean: shorter.samples_per_mean, until: shorter.until(), curves };
-        Self { resolutions, shorter: Some(shorter), ..self }
+        let until = record.channels.iter().map(|of| of.samples.until()).max().unwrap_or(1);
+        let shorter = record.channels.map(|of| (curve(&of.samples), of.samples.replaced(exclusion)));
+        Self { until, shorter, ..self }
     }
 
     /// Seconds between samples.
     pub(crate) fn sample_period(&self) -> f64 {
-        self.shorter.as_ref().map_or(self.period_s, |shorter| self.period_s / shorter.samples_per_mean as f64)
+        self.period_s / self.samples_per_mean as f64
     }
 
     /// Least averaging factor at which the covariances of channels are known, samples.
     pub(crate) fn coupled_from(&self) -> u64 {
-        self.shorter.as_ref().map_or(1, |shorter| shorter.until)
+        self.until
     }
 
     /// Channels whose covariance with `channel` is known, in their order.
@@ -314,19 +279,14 @@ impl RecordPart {
     /// Allan variances of a channel, in its unit squared.
     pub(crate) fn curve(&self, channel: ChannelId) -> Curve<OCTAVES> {
         let own = self.estimators.cascade(channel.position()).curve(self.period_s).scaled(self.step_size(channel));
-        match &self.shorter {
-            None => own,
-            Some(shorter) => {
-                shorter.curves[channel].0.clone().continued_by_means(&own, shorter.samples_per_mean, shorter.until)
-            }
-        }
+        self.shorter[channel].0.clone().continued_by_means(&own, self.samples_per_mean, self.until)
     }
 
     /// Samples of a channel that were replaced because they are missing.
     pub(crate) fn replaced(&self, channel: ChannelId) -> u64 {
-        match &self.shorter {
-            Some(shorter) => shorter.curves[channel].1,
-            None => self.estimators.cascade(channel.position()).replaced(),
+        match self.samples_per_mean {
+            1 => self.estimators.cascade(channel.position()).replaced(),
+            _ => self.shorter[channel].1,
         }
     }
 
@@ -339,11 +299,11 @@ impl RecordPart {
     pub(crate) fn covariance(&self, a: ChannelId, b: ChannelId) -> CovarianceCurve<OCTAVES> {
         let Some(pair) = self.pair(a, b) else { return CovarianceCurve::new() };
         let mut points = pair.coupling.points();
-        points.iter_mut().for_each(|point| point.covariance *= self.step_size(a) * self.step_size(b));
-        if let Some(shorter) = &self.shorter {
-            let in_samples = |point: &Covariance| Covariance { n: point.n * shorter.samples_per_mean, ..*point };
-            return points.iter().map(in_samples).filter(|point| point.n >= shorter.until).collect();
+        for point in points.iter_mut() {
+            point.n *= self.samples_per_mean;
+            point.covariance *= self.step_size(a) * self.step_size(b);
         }
+        points.retain(|point| point.n >= self.until);
         points
     }
 

@@ -14,24 +14,25 @@
 //! The second differences of means are those of the samples at longer averaging times, so that the two curves of a channel are
 //! one. Memory does not depend on the length of the recording.
 
+use crate::condensed_record::{CondensedChannel, CondensedRecord};
 use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
-use crate::findings::{Detection, Effect};
+use crate::findings::Effect;
 use crate::nonstationarity::epochs;
 use crate::parallel::{self, in_parallel};
+use crate::sample_curves::SampleCurves;
 use crate::sample_effects::SampleEffects;
 use crate::sample_screen::SampleScreen;
 use crate::sampling_faults;
 use crate::series::Series;
-use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::spectra::epoch_spectra::{EpochSpectra, PartSpectra};
 use crate::spectra::stacked_spectrum::StackedSpectrum;
 use crate::spectral_lines::{self, MergedLine};
 use crate::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
-use crate::traced_record::Condensed;
 use measurement::{
-    ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, RecordingDescription, SampleBlock, lost_part,
+    ChannelId, ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, lost_part,
 };
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Samples of the longest recording that is analysed without being condensed.
@@ -86,9 +87,7 @@ struct FastFindings {
 impl FastFindings {
     /// Of the channel with this profile, which is `first` among the first samples, of which `shown` is known.
     fn new(profile: &ChannelProfile, first: Option<ChannelId>, shown: &SampleEffects) -> Self {
-        let traced = first.filter(|_| profile.quantity.is_inertial());
-        let all = traced.into_iter().flat_map(|of| shown.recording.iter().chain(shown.of(of)));
-        let effects = all.map(|detection| &detection.effect);
+        let effects = first.into_iter().flat_map(|of| shown.of(of));
         Self {
             effects: effects.filter(|effect| FAST_KINDS.contains(&effect.kind.as_str())).cloned().collect(),
             resolution: profile.lsb * f64::from(first.map_or(1, |of| shown.counts_per_step(of))),
@@ -134,45 +133,16 @@ impl LongChannel {
     }
 }
 
-/// A long recording, condensed.
-pub struct LongRecord {
-    pub(crate) description: RecordingDescription,
-    /// The first samples, as recorded.
-    pub(crate) first: Measurement,
-    /// Means of [`ShorterTimes::samples_per_mean`] samples each.
-    pub(crate) means: Measurement,
-    pub(crate) shorter: ShorterTimes,
-    /// The lines that the means do not show.
-    pub(crate) faster_lines: PerChannel<Vec<MergedLine>>,
-    /// Of each channel, what only the samples themselves show.
-    pub(crate) effects: Vec<Vec<Effect>>,
-    /// The same of the first half of the recording, as far as it is known.
-    pub(crate) effects_of_first_half: Vec<Vec<Effect>>,
-    /// The samples that are refused in a channel alone, by cause.
-    pub(crate) refused: PerChannel<BTreeMap<&'static str, u64>>,
-}
-
-impl From<&Measurement> for LongRecord {
-    fn from(measurement: &Measurement) -> Self {
+/// A measurement of which only means are kept; `None` where its analysis needs all samples.
+pub(crate) fn condensed_from(measurement: &Measurement) -> Option<CondensedRecord<'static>> {
+    let (samples, periods) = (measurement.len() as u64, measurement.periods());
+    let has_losses = lost_part(samples, periods) > MOST_LOST;
+    let most = if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES };
+    (samples > most).then(|| {
         let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
         measurement.blocks(BLOCK).for_each(|block| reader.push(&block));
         reader.finish()
-    }
-}
-
-impl LongRecord {
-    /// A measurement, condensed; `None` where its analysis needs all samples.
-    pub(crate) fn condensed_from(measurement: &Measurement) -> Option<Self> {
-        let (samples, periods) = (measurement.len() as u64, measurement.periods());
-        let has_losses = lost_part(samples, periods) > MOST_LOST;
-        let most = if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES };
-        (samples > most).then(|| Self::from(measurement))
-    }
-
-    /// What the analysis of the means needs beside them.
-    pub(crate) fn condensed(&self) -> Condensed<'_> {
-        Condensed { shorter: &self.shorter, faster_lines: &self.faster_lines }
-    }
+    })
 }
 
 impl LongRecordReader {
@@ -238,45 +208,54 @@ impl LongRecordReader {
 
     /// The recording, all of which was read.
     #[must_use]
-    pub fn finish(mut self) -> LongRecord {
+    pub fn finish(mut self) -> CondensedRecord<'static> {
         push_screened(&mut self.channels, &self.screen.finish());
         let Self { description, first, samples_per_mean, middle, screen, channels, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
-        let lost = lost.map(|Detection { effect, .. }| effect);
         let period_s = description.period_s();
-        let effects = |(((of, channel), profile), spikes): (
-            ((&FastFindings, &LongChannel), &ChannelProfile),
-            Option<Detection>,
-        )| {
-            let saturation = channel.values.saturation(profile, of.resolution);
-            let found = saturation.filter(|_| profile.quantity.is_inertial()).into_iter().chain(spikes);
-            lost.iter().chain(&of.effects).cloned().chain(found.map(|found| found.effect)).collect::<Vec<Effect>>()
-        };
-        let spikes = screen.spikes(description.periods, period_s);
-        let effects = fast.iter().zip(&channels).zip(&description.channels).zip(spikes).map(effects).collect();
-        let of_first_half = screen.spikes(middle, period_s);
-        let effects_of_first_half =
-            of_first_half.map(|spikes| spikes.map(|found| found.effect).into_iter().collect()).collect();
-        let refused = channels.iter().map(|of| of.screened.refused.clone()).collect();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
-        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean)).into();
-        let all = channels.into_iter().zip(fast).zip(&description.channels);
-        let shorter = |((channel, fast), profile): ((LongChannel, FastFindings), &ChannelProfile)| {
+        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
+        let spikes = screen.spikes(description.periods, period_s).zip(screen.spikes(middle, period_s));
+        let mut condensed = Vec::new();
+        for ((((channel, fast), profile), faster_lines), (spikes, spikes_of_first_half)) in
+            channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(spikes)
+        {
+            let is_inertial = profile.quantity.is_inertial();
+            let saturation = channel.values.saturation(profile, fast.resolution);
+            let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
+            let found = found.chain(saturation.into_iter().chain(spikes).map(|found| found.effect));
             let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
-            ShorterTimesOfChannel {
-                resolution: fast.resolution,
-                measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
-                recorded: parts(&channel.recorded),
-                screened: parts(&channel.screened),
-                middle,
-                spectra: channel.spectra.map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
-                is_screened: channel.screened.refused != channel.recorded.refused,
-                period_s,
-                lsb: profile.lsb,
-            }
-        };
-        let shorter = ShorterTimes { samples_per_mean, channels: all.map(shorter).collect() };
-        LongRecord { description, first, means, shorter, faster_lines, effects, effects_of_first_half, refused }
+            condensed.push(CondensedChannel {
+                samples: SampleCurves {
+                    samples_per_mean,
+                    resolution: fast.resolution,
+                    measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
+                    recorded: parts(&channel.recorded),
+                    screened: parts(&channel.screened),
+                    middle,
+                    spectra: channel
+                        .spectra
+                        .map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
+                    is_screened: channel.screened.refused != channel.recorded.refused,
+                    period_s,
+                    lsb: profile.lsb,
+                },
+                counts_per_step: 1,
+                can_show_spikes: false,
+                faster_lines,
+                effects: found.filter(|_| is_inertial).collect(),
+                effects_of_first_half: spikes_of_first_half.map(|found| found.effect).into_iter().collect(),
+                refused: channel.screened.refused,
+            });
+        }
+        CondensedRecord {
+            means: Cow::Owned(means),
+            first: Some(first),
+            samples_per_mean,
+            repeated: Vec::new(),
+            channels: condensed.into(),
+            description,
+        }
     }
 }
 

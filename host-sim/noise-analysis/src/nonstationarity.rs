@@ -36,8 +36,8 @@ pub use related_line::RelatedLine;
 pub use tracked_parameters::TrackedSet;
 
 use crate::OCTAVES;
+use crate::sample_curves::SampleCurves;
 use crate::series::Series;
-use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use allan_core::{Curve, Model};
 use prediction::{beyond_drift, expected_drift, select_tracked, track};
 use serde::Serialize;
@@ -99,7 +99,7 @@ pub(crate) struct TracedChannel<'a> {
     /// The samples, without what the rules of the first half exclude.
     pub series: &'a Series,
     /// Where `series` has means of samples, what is known of these.
-    pub shorter: Option<(&'a ShorterTimes, &'a ShorterTimesOfChannel)>,
+    pub samples: &'a SampleCurves,
     /// `None` of a record that is too short for epochs.
     pub epochs: Option<&'a ChannelEpochs>,
     /// The baseline model of the first half.
@@ -147,7 +147,7 @@ pub(crate) fn describe<'a>(channels: &[TracedChannel<'a>], of: usize) -> Option<
             line_error_hz: line_hz.map(|frequency| frequency * error[1]),
         }
     };
-    let source = |of: &TracedChannel<'a>| LineSource { name: of.name, series: of.series, shorter: of.shorter };
+    let source = |of: &TracedChannel<'a>| LineSource { name: of.name, series: of.series, samples: of.samples };
     let sources: Vec<LineSource> = channels.iter().map(source).collect();
     Some(Nonstationarity {
         quarters: *quarters,

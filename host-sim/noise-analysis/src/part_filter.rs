@@ -56,6 +56,8 @@ pub(crate) enum Unidentified {
     NotCorrelated,
     /// Only these of three channels or more are correlated.
     Minority(Vec<&'static str>),
+    /// The samples were not used.
+    NotSought,
 }
 
 /// The common filter of `channels`, of which the sensor may have `filters`; its clock runs at about `nominal_decimation` values

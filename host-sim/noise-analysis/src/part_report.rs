@@ -7,6 +7,9 @@ use crate::report::PartReport;
 use crate::sampling_faults::rate_by_time_stamps;
 use measurement::Measurement;
 
+/// Why there is neither clock nor filter where the samples are not used.
+pub(crate) const NOT_SOUGHT: &str = "clock and filter of the part are not estimated in a quick report";
+
 /// The report on the filter that the inertial channels of a recording of so many samples have in common; `measurement` has its first
 /// samples, or all of them.
 pub(crate) fn report(measurement: &Measurement, samples: u64, common: &Result<PartFilter, Unidentified>) -> PartReport {
@@ -112,6 +115,7 @@ fn reason(measurement: &Measurement, samples: u64, unidentified: &Unidentified) 
             samples,
             1e3 * measurement.period_s(),
         ),
+        Unidentified::NotSought => NOT_SOUGHT.to_owned(),
         Unidentified::Minority(names) => format!(
             "only {} is correlated as behind a filter, which the other channels contradict: it is no filter of the part",
             names.join(" and "),

@@ -5,32 +5,22 @@
 //! stays in the samples, because the noise model has a term for it. A sensitivity to temperature or supply stays in them too,
 //! and is kept for the regression on covariates.
 
+use crate::condensed_record::CondensedRecord;
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
+use crate::exclusion::Exclusion;
 use crate::findings::{Correction, Detection, Effect};
 use crate::parallel::{in_parallel, per_channel};
-use crate::sample_effects::SampleEffects;
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
 use allan_core::NoiseTerm;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::sync::Arc;
-
-/// Which of the samples that the detectors found are left out. Samples that were read twice always are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Exclusion {
-    /// None.
-    None,
-    /// Knocks and spikes by rules that were fitted to the first half of the record, in both halves.
-    ByFirstHalf,
-    /// The knocks and spikes of the whole record.
-    ByWhole,
-}
 
 /// Sample periods that one channel does not use, in ascending order.
 #[derive(Default)]
@@ -45,8 +35,8 @@ struct ChannelExclusion {
 pub(crate) struct Preprocessing {
     /// Sample periods of all samples.
     slots: Arc<[u64]>,
-    /// What shows in samples alone.
-    samples: SampleEffects,
+    /// How many counts the smallest step of the values of each channel has.
+    counts_per_step: PerChannel<u32>,
     /// Sample periods that no channel uses: their sample equals the one before in all channels.
     repeated: Vec<u64>,
     channels: PerChannel<ChannelPreprocessing>,
@@ -66,33 +56,25 @@ struct ChannelPreprocessing {
 }
 
 impl Preprocessing {
-    /// Looks for knocks, spikes, steps, ramps, sensitivities and a coarse resolution in the inertial channels, and for lost or
-    /// repeated samples and a wrong sample rate in the whole recording. Where that has `means` of samples, what shows in samples
-    /// alone is not looked for.
-    pub(crate) fn detect(measurement: &Measurement, means: bool, noise_grids: &NoiseGrids) -> Self {
-        let samples = if means { SampleEffects::none(measurement) } else { SampleEffects::detect(measurement) };
-        let repeated = samples.repeated();
+    /// Looks for knocks, spikes, steps, ramps and sensitivities in the inertial channels.
+    pub(crate) fn detect(record: &CondensedRecord, noise_grids: &NoiseGrids) -> Self {
+        let measurement = record.means.as_ref();
         let slots = measurement.slots.as_slice().into();
         let channels = measurement.ids().map(|_| ChannelPreprocessing::default()).collect();
-        let preprocessing = Self { slots, samples, repeated, channels };
+        let counts_per_step = record.channels.map(|of| of.counts_per_step);
+        let preprocessing = Self { slots, counts_per_step, repeated: record.repeated.clone(), channels };
         let series = per_channel(measurement.ids(), |channel| preprocessing.measured(measurement, channel));
         let knocks = KnocksInChannels::find(measurement, &series);
         // What a channel may depend on, without its own knocks.
         let quiet: PerChannel<Series> =
             series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
         let found = per_channel(measurement.ids(), |channel| {
-            if !measurement[channel].profile.quantity.is_inertial() {
+            if !record.is_traced(channel) {
                 return ChannelPreprocessing::default();
             }
-            let has_spikes = !means && !preprocessing.samples.is_saturated(channel);
-            ChannelPreprocessing::detect(measurement, channel, has_spikes, (&series, &quiet, &knocks), noise_grids)
+            ChannelPreprocessing::detect(record, channel, (&series, &quiet, &knocks), noise_grids)
         });
         Self { channels: found, ..preprocessing }
-    }
-
-    /// How many counts the smallest step of a channel's values has.
-    pub(crate) fn counts_per_step(&self, channel: ChannelId) -> u32 {
-        self.samples.counts_per_step(channel)
     }
 
     /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
@@ -150,7 +132,7 @@ impl Preprocessing {
     /// A channel's series as measured, with its resolution.
     pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelId) -> Series {
         let series = Series::with_shared_slots(measurement, channel, || Arc::clone(&self.slots));
-        series.with_counts_per_step(self.samples.counts_per_step(channel))
+        series.with_counts_per_step(self.counts_per_step[channel])
     }
 
     /// A channel's series after preprocessing.
@@ -169,34 +151,31 @@ impl Preprocessing {
 
     /// Whether a ramp was found in a channel.
     pub(crate) fn has_ramp(&self, channel: ChannelId) -> bool {
-        self.effects(channel).any(|effect| effect.kind == NoiseTerm::RateRamp.name())
+        self.effects(channel).iter().any(|effect| effect.kind == NoiseTerm::RateRamp.name())
     }
 
-    /// Sensitivity of a channel to a temperature or supply.
-    pub(crate) fn sensitivity(&self, channel: ChannelId, regressor: ChannelId) -> Option<BiasSensitivity> {
-        let known = self.channels[channel].sensitivities.iter().find(|(to, _)| *to == regressor);
-        known.map(|(_, sensitivity)| *sensitivity)
+    /// The temperature and supply that a channel depends on, and how much.
+    pub(crate) fn sensitivities(&self, channel: ChannelId) -> &[(ChannelId, BiasSensitivity)] {
+        &self.channels[channel].sensitivities
     }
 
-    /// The effects of a channel, those that concern every channel first.
-    pub(crate) fn effects(&self, channel: ChannelId) -> impl Iterator<Item = Effect> + '_ {
-        let of_samples = self.samples.recording.iter().chain(self.samples.of(channel));
-        of_samples.map(|detection| &detection.effect).chain(&self.channels[channel].effects).cloned()
+    /// The effects of a channel.
+    pub(crate) fn effects(&self, channel: ChannelId) -> &[Effect] {
+        &self.channels[channel].effects
     }
 }
 
 impl ChannelPreprocessing {
-    /// What the samples of `channel` show; spikes are looked for if it `has_spikes`. `series` and `quiet` are those of all channels,
-    /// with and without `knocks`.
+    /// What the samples of `channel` show. `series` and `quiet` are those of all channels, with and without `knocks`.
     fn detect(
-        measurement: &Measurement,
+        record: &CondensedRecord,
         channel: ChannelId,
-        has_spikes: bool,
         (series, quiet, knocks): (&PerChannel<Series>, &PerChannel<Series>, &KnocksInChannels),
         noise_grids: &NoiseGrids,
     ) -> Self {
+        let measurement = record.means.as_ref();
         let middle = measurement.middle();
-        let spikes = if has_spikes { spikes::find(&quiet[channel]) } else { None };
+        let spikes = if record.channels[channel].can_show_spikes { spikes::find(&quiet[channel]) } else { None };
         let exclusion = ChannelExclusion {
             spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
             knocks: slots_within(&series[channel], &knocks.by_whole[channel]),

@@ -3,7 +3,7 @@
 
 use crate::detectors::effective_lsb;
 use crate::detectors::output_range::{ValueCounts, find_noise_below_count};
-use crate::findings::Detection;
+use crate::findings::{Detection, Effect};
 use crate::parallel::per_channel;
 use crate::sampling_faults;
 use crate::series::Series;
@@ -12,12 +12,13 @@ use measurement::{ChannelId, Measurement, PerChannel};
 /// What the samples show.
 pub(crate) struct SampleEffects {
     /// Of every channel: lost and repeated samples, the sample clock.
-    pub recording: Vec<Detection>,
+    recording: Vec<Detection>,
     channels: PerChannel<SamplesOfChannel>,
 }
 
 /// What the samples of one channel show.
 struct SamplesOfChannel {
+    is_inertial: bool,
     counts_per_step: u32,
     /// Of an inertial channel: a resolution of several counts, values that are cut off, noise below a count.
     found: Vec<Detection>,
@@ -30,12 +31,6 @@ impl SampleEffects {
         Self { recording: sampling_faults::detect(measurement), channels }
     }
 
-    /// Nothing, as of a measurement that has means.
-    pub(crate) fn none(measurement: &Measurement) -> Self {
-        let nothing = |_| SamplesOfChannel { counts_per_step: 1, found: Vec::new() };
-        Self { recording: Vec::new(), channels: measurement.ids().map(nothing).collect() }
-    }
-
     /// Sample periods whose sample equals the one before in all channels.
     pub(crate) fn repeated(&self) -> Vec<u64> {
         self.recording.iter().flat_map(Detection::excluded).copied().collect()
@@ -46,14 +41,16 @@ impl SampleEffects {
         self.channels[channel].counts_per_step
     }
 
-    /// What the samples of one channel show.
-    pub(crate) fn of(&self, channel: ChannelId) -> &[Detection] {
-        &self.channels[channel].found
+    /// What the samples show in one channel, if it is inertial; what concerns every channel first.
+    pub(crate) fn of(&self, channel: ChannelId) -> impl Iterator<Item = &Effect> {
+        let SamplesOfChannel { is_inertial, found, .. } = &self.channels[channel];
+        let all = self.recording.iter().chain(found);
+        all.filter(|_| *is_inertial).map(|detection| &detection.effect)
     }
 
     /// Whether values of a channel are cut off: they are no noise around which a sample could be a spike.
     pub(crate) fn is_saturated(&self, channel: ChannelId) -> bool {
-        self.of(channel).iter().any(|detection| detection.effect.kind == "saturated")
+        self.of(channel).any(|effect| effect.kind == "saturated")
     }
 }
 
@@ -62,8 +59,9 @@ impl SamplesOfChannel {
         let recorded = &measurement[channel];
         let series = Series::from_measurement(measurement, channel);
         let counts_per_step = effective_lsb::counts_per_step(&series);
-        if !recorded.profile.quantity.is_inertial() {
-            return Self { counts_per_step, found: Vec::new() };
+        let is_inertial = recorded.profile.quantity.is_inertial();
+        if !is_inertial {
+            return Self { is_inertial, counts_per_step, found: Vec::new() };
         }
         let resolution = effective_lsb::find(&series);
         let series = series.with_counts_per_step(counts_per_step);
@@ -72,6 +70,6 @@ impl SamplesOfChannel {
         let range = values
             .saturation(&recorded.profile, series.resolution)
             .or_else(|| find_noise_below_count(&series, measurement.profile.dithered_avar_counts2));
-        Self { counts_per_step, found: resolution.into_iter().chain(range).collect() }
+        Self { is_inertial, counts_per_step, found: resolution.into_iter().chain(range).collect() }
     }
 }

@@ -74,25 +74,22 @@ pub(crate) struct MergedLine {
 /// Finds the lines of `series` and traces what the baseline model lacks with them.
 ///
 /// `rest` is the series less its covariates, if the channel depends on any; lines that come from a covariate are left out.
-/// Of a series that has means of samples, `faster` are the lines that it does not show, and that are known beforehand; what they
-/// look like in the series is left out.
+/// Of a series that has means of so many samples, `faster` are the lines that it does not show, and that are known beforehand; what
+/// they look like in the series is left out.
 pub(crate) fn fit_with_lines(
     covariates: CovariateFit,
     series: &Series,
     rest: Option<&Series>,
     profile: &SensorProfile,
-    faster: Option<&[MergedLine]>,
+    (samples_per_mean, faster): (u64, &[MergedLine]),
 ) -> (ChannelFit, Vec<MergedLine>) {
     let rate_error = profile.sample_rate_error;
     let find = |series: &Series, known: Option<&Model>| {
         let mut lines = find(series, known, rate_error);
-        if let Some(faster) = faster {
-            lines.retain(|line| !faster.iter().any(|faster| is_alias(line, faster, series.period_s)));
-            lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s));
-        }
+        lines.retain(|line| !faster.iter().any(|faster| is_alias(line, faster, series.period_s)));
+        lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s, samples_per_mean));
         lines
     };
-    let faster = || faster.into_iter().flatten();
     let mut lines = find(series, None);
     if let Some(rest) = rest {
         let left = find(rest, None);
@@ -101,7 +98,7 @@ pub(crate) fn fit_with_lines(
         };
         lines.retain(|line| left.iter().any(|left| is_own(line, left)));
     }
-    lines.extend(faster());
+    lines.extend(faster);
     let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
     let filters = profile.filters_read_at(1.0 / covariates.curve.sample_period());
     let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &filters);
@@ -109,17 +106,18 @@ pub(crate) fn fit_with_lines(
         // A broad line may be a part of a Markov process, which the background of the first search has no form for.
         lines.retain(|line| !line.is_broad());
         lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad));
-        lines.extend(faster().filter(|line| line.is_broad()));
+        lines.extend(faster.iter().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
     lines.retain(|line| line.is_sinusoid() || !is_leakage(fit.after(), line.frequency.value));
     (fit, lines)
 }
 
-/// The deviation of a line of means over `width` s, before they were taken: a mean has `sin(πfw)/(πfw)` of a sinusoid.
-fn before_averaging(line: &MergedLine, width: f64) -> MeasuredValue {
-    let phase = PI * line.frequency.value * width;
-    let gain = phase.sin() / phase;
+/// The deviation of a line of means of `m` samples over `width` s, before they were taken: a mean has
+/// `sin(πfw)/(m·sin(πfw/m))` of a sinusoid.
+fn before_averaging(line: &MergedLine, width: f64, m: u64) -> MeasuredValue {
+    let (phase, m) = (PI * line.frequency.value * width, m as f64);
+    let gain = phase.sin() / (m * (phase / m).sin());
     MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
 }
 

@@ -1,6 +1,7 @@
 //! Curves of a channel whose samples come in blocks and are not kept: of the whole record, and of parts that follow each other in
 //! time.
 
+use crate::gapped_cascade::GappedCascade;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::Cascade;
 use measurement::MeasuredChannel;
@@ -13,36 +14,15 @@ pub(crate) const STEPS_PER_COUNT: f64 = 16.0;
 /// The estimators of one channel.
 #[derive(Clone)]
 pub(crate) struct StreamedCurves {
-    whole: GappedEstimator,
+    whole: GappedCascade,
     /// In steps of a count, as those of a recording in memory.
-    parts: Vec<GappedEstimator>,
+    parts: Vec<GappedCascade>,
     /// First sample period of each part but the first.
     boundaries: Vec<u64>,
     /// Sample period of the last sample.
     last: Option<u64>,
     /// Samples that are refused in this channel alone, by cause.
     pub refused: BTreeMap<&'static str, u64>,
-}
-
-/// An estimator and the samples that are missing since its last one.
-#[derive(Clone, Default)]
-struct GappedEstimator {
-    cascade: Cascade<OCTAVES, OVERLAP>,
-    missing: u32,
-}
-
-impl GappedEstimator {
-    /// Takes samples that follow each other.
-    fn push(&mut self, counts: &[i32]) {
-        if self.missing > 0 && !counts.is_empty() {
-            self.cascade.gap(std::mem::take(&mut self.missing));
-        }
-        self.cascade.push_slice(counts);
-    }
-
-    fn miss(&mut self, samples: u64) {
-        self.missing = self.missing.saturating_add(u32::try_from(samples).unwrap_or(u32::MAX));
-    }
 }
 
 /// The estimator of parts that follow each other, with a gap between them.
@@ -57,8 +37,8 @@ impl StreamedCurves {
     /// Without samples; `boundaries` are the first sample periods of each part but the first, in ascending order.
     pub(crate) fn new(boundaries: &[u64]) -> Self {
         Self {
-            whole: GappedEstimator::default(),
-            parts: vec![GappedEstimator::default(); boundaries.len() + 1],
+            whole: GappedCascade::default(),
+            parts: vec![GappedCascade::default(); boundaries.len() + 1],
             boundaries: boundaries.to_vec(),
             last: None,
             refused: BTreeMap::new(),
@@ -67,13 +47,18 @@ impl StreamedCurves {
 
     /// The estimator of the whole record, in counts.
     pub(crate) fn whole(&self) -> &Cascade<OCTAVES, OVERLAP> {
-        &self.whole.cascade
+        self.whole.cascade()
     }
 
     /// The first sample period of each part and its estimator, in steps of a count ([`STEPS_PER_COUNT`]).
     pub(crate) fn parts(&self) -> impl Iterator<Item = (u64, &Cascade<OCTAVES, OVERLAP>)> {
         let starts = std::iter::once(0).chain(self.boundaries.iter().copied());
-        starts.zip(self.parts.iter().map(|part| &part.cascade))
+        starts.zip(self.parts.iter().map(GappedCascade::cascade))
+    }
+
+    /// The estimator of the part of this number, in steps of a count.
+    pub(crate) fn part(&self, number: usize) -> GappedCascade {
+        self.parts.get(number).cloned().unwrap_or_default()
     }
 
     /// Takes the next samples of the channel, which were taken in the sample periods `slots`.

@@ -3,7 +3,7 @@
 
 use measurement::adis16405::profile;
 use measurement::{MeasuredChannel, Measurement, RecordingDescription};
-use noise_analysis::analysis::{analyze, analyze_long, analyze_samples};
+use noise_analysis::analysis::{analyze, analyze_condensed, analyze_samples};
 use noise_analysis::long_record::LongRecordReader;
 use noise_analysis::report::{ChannelReport, Parameter, Report, Validation};
 use rand::{Rng, SeedableRng};
@@ -77,7 +77,7 @@ fn spikes(measurement: &Measurement) -> u64 {
 fn condensed(measurement: &Measurement, rows: usize) -> Report {
     let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
     measurement.blocks(rows).for_each(|block| reader.push(&block));
-    analyze_long(&reader.finish(), &|_| {})
+    analyze_condensed(&reader.finish(), &|_| {})
 }
 
 fn channel<'a>(report: &'a Report, name: &str) -> &'a ChannelReport {

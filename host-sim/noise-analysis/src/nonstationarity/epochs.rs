@@ -1,8 +1,8 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
-use crate::preprocessing::Exclusion;
+use crate::exclusion::Exclusion;
+use crate::sample_curves::SampleCurves;
 use crate::series::Series;
-use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
 use serde::Serialize;
@@ -65,11 +65,12 @@ impl EpochCurves {
         parts.all(|part| part.points().iter().any(|point| point.avar > 0.0)).then_some(curves)
     }
 
-    /// The same curves of a channel by averaging factors in samples, where the series has means, with the `shorter` averaging times.
+    /// The same curves of a channel by averaging factors in samples, where the series has means, with those of the samples at `shorter`
+    /// averaging times.
     #[must_use]
-    pub(crate) fn in_samples(self, shorter: &ShorterTimes, of: &ShorterTimesOfChannel) -> Self {
+    pub(crate) fn in_samples(self, shorter: &SampleCurves) -> Self {
         let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
-            let of_samples = of.within(slots, Exclusion::ByFirstHalf);
+            let of_samples = shorter.within(slots, Exclusion::ByFirstHalf);
             of_samples.map_or_else(|| shorter.in_samples(means), |of_samples| shorter.continued(of_samples, means))
         };
         let epochs = |curves: &[Curve<OCTAVES>], ranges: &[Range<u64>]| {

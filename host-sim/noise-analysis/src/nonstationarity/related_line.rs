@@ -6,8 +6,8 @@
 use super::epochs::{ComparedCurve, EpochCurves, SIGNIFICANCE};
 use super::prediction::mean_avar;
 use super::tracked_parameters::{TrackedModel, minimum};
+use crate::sample_curves::SampleCurves;
 use crate::series::Series;
-use crate::shorter_times::{ShorterTimes, ShorterTimesOfChannel};
 use crate::spectra::Welch;
 use crate::uniform_series::UniformSeries;
 use allan_core::Model;
@@ -35,7 +35,7 @@ pub(crate) struct LineSource<'a> {
     pub name: &'static str,
     pub series: &'a Series,
     /// Where `series` has means of samples, what is known of these.
-    pub shorter: Option<(&'a ShorterTimes, &'a ShorterTimesOfChannel)>,
+    pub samples: &'a SampleCurves,
 }
 
 /// A line of another channel that moves with the line of a channel.
@@ -128,10 +128,10 @@ fn centroid(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<f64> {
 
 /// The spectrum of the sample periods `slots` of a channel, which resolves a line near `near` Hz; `None` if the samples do not show such.
 fn spectrum(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<Welch> {
-    let LineSource { series, shorter, .. } = channel;
+    let LineSource { series, samples, .. } = channel;
     let rate = 1.0 / series.period_s;
     if near > MAX_FREQUENCY * rate {
-        let of_samples = shorter.and_then(|(times, of)| of.spectrum_within(times.slots_of(slots)));
+        let of_samples = samples.spectrum_within(samples.slots_of(slots));
         return of_samples.filter(|spectrum| near <= MAX_FREQUENCY / spectrum.sample_period());
     }
     let length = ((rate / (RESOLUTION * near)) as usize).next_power_of_two();

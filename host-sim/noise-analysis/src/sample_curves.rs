@@ -1,12 +1,13 @@
-//! The averaging times that are too short for the means that are kept of a long recording.
+//! The curves of the samples of a channel at the averaging times that are too short for the means that are kept of them.
 
-use crate::preprocessing::Exclusion;
+use crate::exclusion::Exclusion;
+use crate::gapped_cascade::GappedCascade;
 use crate::spectra::Welch;
 use crate::spectra::epoch_spectra::PartSpectra;
 use crate::streamed_curves::{STEPS_PER_COUNT, joined};
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
-use measurement::PerChannel;
+use measurement::{ChannelId, Measurement};
 use std::ops::Range;
 
 /// The curve of the means is used from this averaging factor on, in means: from there on it has as many differences as that of the
@@ -16,15 +17,11 @@ const LEAST_FACTOR: u64 = OVERLAP as u64;
 /// Estimators of parts of the record that follow each other, each with its first sample period.
 pub(crate) type Parts = Vec<(u64, Cascade<OCTAVES, OVERLAP>)>;
 
-/// The averaging times that are too short for the means of a long recording.
-pub(crate) struct ShorterTimes {
-    pub samples_per_mean: u64,
-    pub channels: PerChannel<ShorterTimesOfChannel>,
-}
-
-/// The same of one channel.
+/// The curves of the samples of a channel; of one all of whose samples are kept, only the whole curve.
 #[derive(Clone)]
-pub(crate) struct ShorterTimesOfChannel {
+pub(crate) struct SampleCurves {
+    /// Samples of a mean.
+    pub samples_per_mean: u64,
     /// Smallest distance of two values, in the channel's unit.
     pub resolution: f64,
     /// The whole curve as recorded.
@@ -43,15 +40,31 @@ pub(crate) struct ShorterTimesOfChannel {
     pub lsb: f64,
 }
 
-impl ShorterTimes {
+impl SampleCurves {
+    /// Of a channel all of whose samples are kept.
+    pub(crate) fn of_all(measurement: &Measurement, channel: ChannelId, resolution: f64) -> Self {
+        let (period_s, lsb) = (measurement.period_s(), measurement[channel].profile.lsb);
+        let mut cascade = GappedCascade::default();
+        cascade.push_channel(&measurement.slots, &measurement[channel]);
+        Self {
+            samples_per_mean: 1,
+            resolution,
+            measured: cascade.curve(period_s).scaled(lsb),
+            recorded: Parts::new(),
+            screened: Parts::new(),
+            middle: measurement.middle(),
+            spectra: PartSpectra::default(),
+            is_screened: false,
+            period_s,
+            lsb,
+        }
+    }
+
     /// Those of the first half of the record.
     pub(crate) fn of_first_half(&self) -> Self {
-        let half = |of: &ShorterTimesOfChannel| {
-            let first = |parts: &Parts| parts.iter().filter(|(start, _)| *start < of.middle).cloned().collect();
-            let middle = self.slots_of(0..of.middle / self.samples_per_mean / 2).end;
-            ShorterTimesOfChannel { recorded: first(&of.recorded), screened: first(&of.screened), middle, ..of.clone() }
-        };
-        Self { samples_per_mean: self.samples_per_mean, channels: self.channels.map(half) }
+        let first = |parts: &Parts| parts.iter().filter(|(start, _)| *start < self.middle).cloned().collect();
+        let middle = self.slots_of(0..self.middle / self.samples_per_mean / 2).end;
+        Self { recorded: first(&self.recorded), screened: first(&self.screened), middle, ..self.clone() }
     }
 
     /// Sample periods of some means.
@@ -61,10 +74,10 @@ impl ShorterTimes {
 
     /// Averaging factor from which on the curve is that of the means, samples.
     pub(crate) fn until(&self) -> u64 {
-        LEAST_FACTOR * self.samples_per_mean
+        if self.samples_per_mean == 1 { 1 } else { LEAST_FACTOR * self.samples_per_mean }
     }
 
-    /// The curve of `means`, with that of the samples at averaging times that are too short for it.
+    /// The curve of `means`, with `shorter`, that of the samples, at averaging times that are too short for it.
     pub(crate) fn continued(&self, shorter: Curve<OCTAVES>, means: &Curve<OCTAVES>) -> Curve<OCTAVES> {
         shorter.continued_by_means(means, self.samples_per_mean, self.until())
     }
@@ -73,9 +86,7 @@ impl ShorterTimes {
     pub(crate) fn in_samples(&self, means: &Curve<OCTAVES>) -> Curve<OCTAVES> {
         Curve::empty().continued_by_means(means, self.samples_per_mean, 0)
     }
-}
 
-impl ShorterTimesOfChannel {
     /// The curve of a half as recorded, or without spikes and repeated samples; 0 is the first half.
     pub(crate) fn half(&self, half: usize, exclusion: Exclusion) -> Curve<OCTAVES> {
         let slots = if half == 0 { 0..self.middle } else { self.middle..u64::MAX };
@@ -110,7 +121,7 @@ impl ShorterTimesOfChannel {
         if exclusion == Exclusion::None { &self.recorded } else { &self.screened }
     }
 
-    fn curve<'a>(&self, parts: impl IntoIterator<Item = &'a (u64, Cascade<OCTAVES, OVERLAP>)>) -> Curve<OCTAVES> {
+    fn curve<'p>(&self, parts: impl IntoIterator<Item = &'p (u64, Cascade<OCTAVES, OVERLAP>)>) -> Curve<OCTAVES> {
         joined(parts.into_iter().map(|(_, part)| part)).curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
     }
 }
