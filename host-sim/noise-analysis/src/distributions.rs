@@ -6,6 +6,9 @@ use statrs::function::gamma::checked_gamma_ur;
 
 pub use allan_core::confidence::NORMAL_975;
 
+/// Variance of the error of rounding to steps of 1, which is uniform over a step where noise reaches over several.
+pub(crate) const ROUNDING: f64 = 1.0 / 12.0;
+
 /// Probability that a standard normal number exceeds `z`.
 pub fn upper_tail(z: f64) -> f64 {
     Normal::standard().sf(z)

@@ -1,8 +1,10 @@
 //! A cascade that counts the samples that are missing until the next one.
 
+use crate::series::Series;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
 use measurement::MeasuredChannel;
+use std::ops::Range;
 
 /// An estimator and the samples that are missing since its last one.
 #[derive(Clone, Default)]
@@ -59,14 +61,31 @@ impl GappedCascade {
         values.iter().for_each(|value| self.push_one(count(value)));
     }
 
-    /// Takes the samples of a channel that are not refused, which were taken in the sample periods `slots`, from the first on.
-    pub(crate) fn push_channel(&mut self, slots: &[u64], channel: &MeasuredChannel) {
-        let mut next = slots.first().copied().unwrap_or(0);
-        for (slot, count) in channel.used_samples(slots) {
+    /// Takes samples, each with the sample period in which it was taken, from the sample period `from` on.
+    pub(crate) fn push_slots(&mut self, from: u64, samples: impl Iterator<Item = (u64, i32)>) {
+        let mut next = from;
+        for (slot, count) in samples {
             self.miss(slot - next);
             self.push_one(Some(count));
             next = slot + 1;
         }
+    }
+
+    /// The estimator of the samples of a channel that are not refused, which were taken in the sample periods `slots`, in counts.
+    pub(crate) fn of_channel(slots: &[u64], channel: &MeasuredChannel) -> Self {
+        let mut cascade = Self::default();
+        cascade.push_slots(slots.first().copied().unwrap_or(0), channel.used_samples(slots));
+        cascade
+    }
+
+    /// The estimator of the samples of `series` at some positions, in steps of its resolution.
+    pub(crate) fn of_series(series: &Series, positions: Range<usize>) -> Self {
+        let (slots, values) = (&series.slots[positions.clone()], &series.values[positions]);
+        let count = |value: &f64| (value / series.resolution).round() as i32;
+        let mut cascade = Self::default();
+        let samples = slots.iter().copied().zip(values.iter().map(count));
+        cascade.push_slots(slots.first().copied().unwrap_or(0), samples);
+        cascade
     }
 
     /// The estimator of these samples followed, after a gap, by those of `later`.

@@ -6,6 +6,7 @@
 //! least deviance `Σ edf·(ln(m/v) + v/m − 1)`, the measure of every other fit here, so it is close where the record
 //! determines the curve and not where white noise hides the slow part.
 
+use crate::minimum::golden_section;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm, model::FittedTerm};
 
@@ -63,7 +64,7 @@ pub fn fit(channels: &[SlowNoise], sample_period: f64) -> Option<GaussMarkovFit>
     let grid = ((to - from) * PER_OCTAVE as f64).ceil() as usize;
     let step = (to - from) / grid as f64;
     let best = (0..=grid).map(|at| from + at as f64 * step).min_by(|a, b| deviance(*a).total_cmp(&deviance(*b)))?;
-    let time_constant = golden_section((best - step, best + step), deviance).exp2();
+    let time_constant = golden_section((best - step, best + step), SECTIONS, deviance).exp2();
     let fits = channels.iter().map(|channel| (channel, variance(channel, time_constant, sample_period).0));
     let ratio = |channel: &SlowNoise, variance: f64| {
         let of = |octave: &SlowOctave| {
@@ -113,16 +114,6 @@ fn variance(channel: &SlowNoise, time_constant: f64, sample_period: f64) -> (f64
         edf * ((modelled / model).ln() + model / modelled - 1.0)
     };
     (variance, points.iter().map(deviance).sum())
-}
-
-/// The place of the minimum of `of` in an interval that has one.
-fn golden_section((mut low, mut high): (f64, f64), of: impl Fn(f64) -> f64) -> f64 {
-    let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
-    for _ in 0..SECTIONS {
-        let (left, right) = (high - ratio * (high - low), low + ratio * (high - low));
-        if of(left) < of(right) { high = right } else { low = left }
-    }
-    0.5 * (low + high)
 }
 
 #[cfg(test)]

@@ -1,21 +1,22 @@
 //! Noise analysis: the samples of a sensor and its profile in, findings out.
 //!
 //! ```text
-//! Measurement ─► preprocessing (sampling_faults, detectors) ─► estimators ─► covariates ─► spectral_lines ─► channel_fit
-//!                      └─► series ─► assessment                                                            │
-//!                                                    report ◄─ causes ◄─ naming ◄─ slow_drift ◄────────────┘
+//! Measurement ─► CondensedRecord ─► preprocessing (detectors) ─► estimators ─► covariates ─► channel_lines ─► channel_fit
+//!                      └─► series ─► assessment                                └───────── traced_part ───────────┘ │
+//!                                                     report ◄─ causes ◄─ naming ◄─ slow_drift ◄───────────────────┘
 //!
 //! traced_record: all of this for the whole record      first_half: models of the first half, errors on the second
 //! ```
 //!
-//! Between `channel_fit` and `naming`, `part_filter` gives all channels the one filter of the sensor, and `octave_covariance` the
-//! bounds of the noise behind it. `contradiction` tells where a model fails.
+//! A part of a recording, be it the whole, a half or curves alone, is fitted by `traced_part`: the model of each channel
+//! (`traced_model`), then the one filter of the sensor by all channels (`part_filter`), with the bounds of the noise behind it
+//! (`octave_covariance`). `contradiction` tells where a model fails.
 //!
 //! Once the filter is agreed on, `nonstationarity` tells whether the noise changes while the record is made, which decides what
 //! the models of the first half are fitted to.
 //!
-//! [`long_record`] condenses a recording that is too long to be kept: its means take the way of samples, and `shorter_times` has the
-//! curves at the averaging times that are too short for them.
+//! A [`condensed_record`] has means in the place of samples, of one sample each where the record is short. [`long_record`] condenses a
+//! recording that is too long to be kept; `sample_curves` has the curves at the averaging times that are too short for its means.
 //!
 //! [`quick`] makes the report of the curves alone, from samples that are read in blocks.
 //!
@@ -26,6 +27,7 @@ pub mod analysis;
 pub mod assessment;
 mod causes;
 mod channel_fit;
+mod channel_lines;
 pub mod comparison;
 pub mod condensed_record;
 pub mod contradiction;
@@ -41,6 +43,7 @@ mod gapped_cascade;
 pub mod gauss_markov;
 mod interpolation;
 pub mod long_record;
+mod minimum;
 mod motion;
 mod naming;
 mod noise_terms;

@@ -1,9 +1,12 @@
 //! Names the effects that the whole record shows in a channel: which of them are reported, with parameters, units and
 //! bounds, and with evidence that a person can check.
 
+use crate::OCTAVES;
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES};
 use crate::detectors::random_telegraph::is_reversible;
+use crate::distributions::ROUNDING;
 use crate::findings::{BoundedEstimate, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
+use crate::gapped_cascade::GappedCascade;
 use crate::noise_terms::{filter_length_s, is_white, line_frequency};
 use crate::report::term_parameters;
 use crate::slow_drift::ChannelsInCommon;
@@ -12,13 +15,12 @@ use crate::spectral_lines::{FEW_PERIODS, MergedLine};
 use crate::streamed_curves::STEPS_PER_COUNT;
 use crate::traced_model::Addition;
 use crate::uniform_series::UniformSeries;
-use crate::{OCTAVES, OVERLAP};
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
-use allan_core::{AllanPoint, Cascade, Curve, Model};
+use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::PI;
 
@@ -38,8 +40,6 @@ const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
 /// How many times as likely a Gaussian process is as a telegraph signal, where it is named: a probability of 95 % where the two are as
 /// frequent.
 const TOLD_APART: f64 = 19.0;
-/// Variance of the rounding error, in squares of the resolution.
-const ROUNDING: f64 = 1.0 / 12.0;
 
 /// What was found in a channel over the whole record.
 pub(crate) struct ChannelFindings<'a> {
@@ -190,11 +190,9 @@ fn kurtosis_ratio(
         return telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov);
     }
     let rest = rest?;
-    let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
+    let mut estimator = GappedCascade::default();
     let step = resolution / STEPS_PER_COUNT;
-    for value in rest.values() {
-        if value.is_finite() { estimator.push((value / step).round() as i32) } else { estimator.gap(1) }
-    }
+    estimator.push_values(rest.values(), step);
     telegraph::kurtosis_ratio(&estimator.curve(rest.sample_period()).scaled(step), model, markov)
 }
 

@@ -60,9 +60,12 @@ impl CurveEstimators {
         whole.take_terms_that_held(&first_half.part, &estimators.raw[1]);
         let effects = |part: &TracedPart| -> Vec<Vec<Effect>> {
             let of = |channel: ChannelId| {
+                if !estimators.both.channels[channel].quantity.is_inertial() {
+                    return Vec::new();
+                }
                 let (mut named, unexplained) = part.named_effects(profile, &estimators.both, channel, None);
                 named.extend(unexplained);
-                if estimators.both.channels[channel].quantity.is_inertial() { named } else { Vec::new() }
+                named
             };
             part.channels.ids().map(of).collect()
         };

@@ -44,8 +44,7 @@ impl SampleCurves {
     /// Of a channel all of whose samples are kept.
     pub(crate) fn of_all(measurement: &Measurement, channel: ChannelId, resolution: f64) -> Self {
         let (period_s, lsb) = (measurement.period_s(), measurement[channel].profile.lsb);
-        let mut cascade = GappedCascade::default();
-        cascade.push_channel(&measurement.slots, &measurement[channel]);
+        let cascade = GappedCascade::of_channel(&measurement.slots, &measurement[channel]);
         Self {
             samples_per_mean: 1,
             resolution,

@@ -15,6 +15,7 @@
 //! freedom are divided by that.
 
 use crate::comparison::rejected;
+use crate::gapped_cascade::GappedCascade;
 use crate::report::TermReport;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::confidence::{NORMAL_975, octave_correlation};
@@ -205,18 +206,11 @@ fn cascade(recording: &Measurement, channel: &ChannelProfile, lsb: f64) -> Optio
     let measured: &MeasuredChannel = recording.channel(channel)?;
     // 1 in recordings of one range: the counts stay as they are. A float too large for an integer becomes the largest one.
     let steps = measured.profile.lsb / lsb;
-    let mut cascade = Cascade::new();
-    let mut missing = 0_u32;
-    for (position, &count) in measured.counts.iter().enumerate() {
-        missing = missing.saturating_add(recording.missing_before(position));
-        if measured.is_refused(position) {
-            missing = missing.saturating_add(1);
-        } else {
-            cascade.gap(std::mem::take(&mut missing));
-            cascade.push((f64::from(count) * steps).round() as i32);
-        }
-    }
-    Some(cascade)
+    let samples = measured.used_samples(&recording.slots);
+    let mut cascade = GappedCascade::default();
+    let from = recording.slots.first().copied().unwrap_or(0);
+    cascade.push_slots(from, samples.map(|(slot, count)| (slot, (f64::from(count) * steps).round() as i32)));
+    Some(cascade.cascade().clone())
 }
 
 /// One estimator of all differences, none of which has samples of two recordings.

@@ -32,6 +32,7 @@ mod lines;
 mod markov_spectrum;
 pub(crate) mod periodic_signal;
 mod periodogram;
+mod slow_background;
 mod smooth_shape;
 pub(crate) mod stacked_spectrum;
 mod transforms;

@@ -1,9 +1,7 @@
-//! The lines in the spectrum of a channel as terms of its noise model.
+//! The lines in the spectrum of a channel, and the terms of a noise model that they are.
 //!
 //! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
 
-use crate::channel_fit::ChannelFit;
-use crate::covariates::CovariateFit;
 use crate::findings::MeasuredValue;
 use crate::series::Series;
 use crate::spectra;
@@ -12,7 +10,6 @@ use allan_core::Model;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
-use measurement::SensorProfile;
 use std::f64::consts::{PI, SQRT_2};
 
 /// Peaks closer than this part of their frequency are one line if either has a width.
@@ -40,15 +37,10 @@ const MIN_PHASE_CHANGES: f64 = 30.0;
 /// Least bandwidth of a resonance of few phase changes in the record, in units of its frequency: that of a damping ratio of half a
 /// percent. The speed of the motor in the measured recordings wanders by a third of that.
 const NARROWEST_BAND: f64 = 0.01;
-/// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
-const MIN_OWN_DEVIATION: f64 = 0.5;
 /// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
 pub(crate) const FEW_PERIODS: f64 = 8.0;
 /// Full width at half maximum of a normal curve, in standard deviations.
 const FULL_WIDTH: f64 = 2.35;
-/// Power gain of a filter below which the spectrum holds leakage from other frequencies.
-const LEAKAGE_GAIN: f64 = 0.1;
-
 /// One line of a spectrum, merged from one or several peaks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MergedLine {
@@ -71,58 +63,20 @@ pub(crate) struct MergedLine {
     duration_s: f64,
 }
 
-/// Finds the lines of `series` and traces what the baseline model lacks with them.
-///
-/// `rest` is the series less its covariates, if the channel depends on any; lines that come from a covariate are left out.
-/// Of a series that has means of so many samples, `faster` are the lines that it does not show, and that are known beforehand; what
-/// they look like in the series is left out.
-pub(crate) fn fit_with_lines(
-    covariates: CovariateFit,
-    series: &Series,
-    rest: Option<&Series>,
-    profile: &SensorProfile,
-    (samples_per_mean, faster): (u64, &[MergedLine]),
-) -> (ChannelFit, Vec<MergedLine>) {
-    let rate_error = profile.sample_rate_error;
-    let find = |series: &Series, known: Option<&Model>| {
-        let mut lines = find(series, known, rate_error);
-        lines.retain(|line| !faster.iter().any(|faster| is_alias(line, faster, series.period_s)));
-        lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s, samples_per_mean));
-        lines
-    };
-    let mut lines = find(series, None);
-    if let Some(rest) = rest {
-        let left = find(rest, None);
-        let is_own = |line: &MergedLine, left: &MergedLine| {
-            line.is_same(left) && left.deviation.value > MIN_OWN_DEVIATION * line.deviation.value
-        };
-        lines.retain(|line| left.iter().any(|left| is_own(line, left)));
-    }
-    lines.extend(faster);
-    let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
-    let filters = profile.filters_read_at(1.0 / covariates.curve.sample_period());
-    let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &filters);
-    if fit.correlation_times().next().is_some() && lines.iter().any(MergedLine::is_broad) {
-        // A broad line may be a part of a Markov process, which the background of the first search has no form for.
-        lines.retain(|line| !line.is_broad());
-        lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad));
-        lines.extend(faster.iter().filter(|line| line.is_broad()));
-        fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
-    }
-    lines.retain(|line| line.is_sinusoid() || !is_leakage(fit.after(), line.frequency.value));
-    (fit, lines)
-}
-
-/// The deviation of a line of means of `m` samples over `width` s, before they were taken: a mean has
-/// `sin(πfw)/(m·sin(πfw/m))` of a sinusoid.
-fn before_averaging(line: &MergedLine, width: f64, m: u64) -> MeasuredValue {
-    let (phase, m) = (PI * line.frequency.value * width, m as f64);
-    let gain = phase.sin() / (m * (phase / m).sin());
+/// The deviation of a line of means of `m` samples over `width` s, before they were taken.
+pub(crate) fn before_averaging(line: &MergedLine, width: f64, m: u64) -> MeasuredValue {
+    let gain = gain_of_mean(line.frequency.value, width, m);
     MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
 }
 
+/// Part of a sinusoid of `frequency` Hz that is in the means of `m` samples over `width` s: `sin(πfw)/(m·sin(πfw/m))`.
+fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
+    let (phase, m) = (PI * frequency * width, m as f64);
+    phase.sin() / (m * (phase / m).sin())
+}
+
 /// Whether `line` of a series is what the faster line `of` looks like at its sample period, s: as wide, at the alias of its frequency.
-fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
+pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
     let turns = of.frequency.value * period_s;
     let alias = (turns - turns.round()).abs() / period_s;
     let reach =
@@ -134,7 +88,7 @@ fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
 
 /// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
 /// of white, flicker and random-walk noise.
-fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLine> {
+pub(crate) fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLine> {
     let duration_s = series.duration_s();
     let grid = UniformSeries::from_series(series);
     let peaks = match known {
@@ -187,18 +141,6 @@ fn markov_background(model: &Model, frequency: f64) -> f64 {
     let noise =
         density_of(&|kind| !matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)));
     1.0 + markov / noise.max(MIN_NOISE * markov)
-}
-
-/// Whether a broad line at `frequency` Hz may be leakage into a null of a filter of the model.
-fn is_leakage(model: &Model, frequency: f64) -> bool {
-    let gain = |kind: &NoiseTerm| match kind {
-        // The density of the filtered unit white noise is 1 at low frequencies.
-        NoiseTerm::Filtered(filter) if filter.decimation == 1.0 => {
-            kind.process().density(frequency, model.sample_period())
-        }
-        _ => 1.0,
-    };
-    model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min) < LEAKAGE_GAIN
 }
 
 /// The change of the amplitude of the strongest of `peaks`, if the first two sinusoids beside it are at equal distances on either
@@ -255,12 +197,12 @@ impl MergedLine {
     }
 
     /// Whether both have the same frequency, within the wider of them and the resolution.
-    fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         let reach = self.width.value.max(other.width.value).max(MERGE_RESOLUTIONS / self.duration_s);
         (self.frequency.value - other.frequency.value).abs() < reach
     }
 
-    fn is_sinusoid(&self) -> bool {
+    pub(crate) fn is_sinusoid(&self) -> bool {
         matches!(self.kind(), NoiseTerm::Sinusoid(_))
     }
 
@@ -315,7 +257,7 @@ impl MergedLine {
 
 #[cfg(test)]
 mod tests {
-    use super::find;
+    use super::{find, gain_of_mean};
     use crate::series::Series;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -347,5 +289,26 @@ mod tests {
         // The amplitude of each sideband is known to a fiftieth of that of the line.
         assert!((modulation.depth.value - 0.5).abs() < 0.1, "{modulation:?}");
         assert_eq!(of(0.0).map(|(_, modulation)| modulation), Some(None));
+    }
+
+    /// Means of samples, not of the time between them: the largest frequency in the means is that of two fifths of their rate.
+    #[test]
+    fn a_mean_has_the_part_of_a_sinusoid_that_its_samples_have() {
+        const MEANS: usize = 10_000;
+        for m in [1, 2, 4, 64] {
+            for turns_in_mean in [0.011, 0.1, 0.4] {
+                let sample = |at: usize| (TAU * turns_in_mean * at as f64 / m as f64).sin();
+                let mean = |number: usize| (m * number..m * (number + 1)).map(sample).sum::<f64>() / m as f64;
+                let square = (0..MEANS).map(|number| mean(number).powi(2)).sum::<f64>() / MEANS as f64;
+                // The mean square of whole turns is exactly ½; what is left over of the last one is below 1 in 110 turns.
+                let expected = gain_of_mean(turns_in_mean, 1.0, m as u64) / 2f64.sqrt();
+                assert!(
+                    (square.sqrt() / expected - 1.0).abs() < 0.005,
+                    "{m}, {turns_in_mean}: {} {expected}",
+                    square.sqrt()
+                );
+            }
+        }
+        assert_eq!(gain_of_mean(0.37, 0.9, 1), 1.0);
     }
 }

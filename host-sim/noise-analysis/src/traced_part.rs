@@ -2,6 +2,7 @@
 //! lacks, and the filter that the sensor has once.
 
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::channel_lines::fit_with_lines;
 use crate::condensed_record::CondensedRecord;
 use crate::contradiction::Contradiction;
 use crate::covariates::CovariateFit;
@@ -15,7 +16,7 @@ use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::series::Series;
 use crate::slow_drift::ChannelsInCommon;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
-use crate::spectral_lines::{MergedLine, fit_with_lines};
+use crate::spectral_lines::MergedLine;
 use crate::unexplained;
 use crate::unexplained_signals::UnexplainedSignals;
 use crate::uniform_series::UniformSeries;

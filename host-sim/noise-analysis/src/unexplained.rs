@@ -2,7 +2,7 @@
 //! the temperature.
 
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
-use crate::distributions::{NORMAL_975, quantile, upper_tail};
+use crate::distributions::{NORMAL_975, ROUNDING, quantile, upper_tail};
 use crate::findings::{Effect, Parameter, SIGNIFICANCE};
 use crate::series::Series;
 use allan_core::{AllanPoint, Model};
@@ -15,8 +15,6 @@ const MIN_EXCESS: f64 = 0.01;
 /// Degrees of freedom from which the χ² distribution is taken for that of the cube of a normal variable (E. Wilson and M.
 /// Hilferty, PNAS 17, 1931), which is then exact to 10⁻³ of the tail beyond five standard deviations.
 const MANY: f64 = 1e4;
-/// Variance of a rounding error that is not dithered, at most, in squares of the resolution.
-const ROUNDING: f64 = 1.0 / 12.0;
 
 /// Averaging time of the largest Allan deviation of a Markov process, in time constants (IEEE Std 952, annex C).
 const MARKOV_PEAK: f64 = 1.89;

@@ -1,5 +1,6 @@
 //! N by the spectrum beside N by the fit: whether the record identifies it, and whether the two agree.
 
+use crate::distributions::ROUNDING;
 use crate::findings::{BoundedEstimate, Parameter};
 use crate::noise_terms::is_white;
 use crate::spectra::{KnownShapes, Welch, WhiteNoiseFit, fit_white_noise};
@@ -12,8 +13,6 @@ pub(super) const WELCH_SAMPLES: usize = 1 << 13;
 /// Least variance of the noise of a sample, in counts², at which rounding acts as white noise: then the error's correlation
 /// with the noise, `exp(−2π²σ²)`, is 2 %.
 const DITHERED_COUNTS2: f64 = 0.2;
-/// Variance of a rounding error, counts².
-const ROUNDING_COUNTS2: f64 = 1.0 / 12.0;
 
 /// N by the spectrum, and what the reader has to know of it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,7 +40,7 @@ pub(super) fn estimate(welch: Option<&Welch>, fitted: &Model, count: f64, unit: 
         return without("drift, lines or rounding hide the white noise in the spectrum".to_owned());
     };
     let in_counts = fit.sample_deviation / count;
-    if in_counts * in_counts < DITHERED_COUNTS2 + ROUNDING_COUNTS2 {
+    if in_counts * in_counts < DITHERED_COUNTS2 + ROUNDING {
         return without(format!(
             "the white noise of a sample is {in_counts:.2} of a count with its rounding: the record shows the rounding, not the noise"
         ));

@@ -3,9 +3,8 @@
 
 use crate::distributions::poisson_bounds;
 use crate::findings::{Detection, Effect, Parameter};
+use crate::gapped_cascade::GappedCascade;
 use crate::series::Series;
-use crate::{OCTAVES, OVERLAP};
-use allan_core::Cascade;
 use measurement::ChannelProfile;
 
 /// Samples at an end of the values from which on the channel is cut off there. Three times as many as at any other value, by
@@ -114,16 +113,7 @@ pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64
     if series.values.len() < FEWEST_SAMPLES {
         return None;
     }
-    let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
-    let mut next = series.slots.first().copied().unwrap_or(0);
-    for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
-        if slot > next {
-            estimator.gap(u32::try_from(slot - next).unwrap_or(u32::MAX));
-        }
-        estimator.push((value / series.resolution).round() as i32);
-        next = slot + 1;
-    }
-    let curve = estimator.curve(series.period_s);
+    let curve = GappedCascade::of_series(series, 0..series.values.len()).curve(series.period_s);
     let largest = curve.points().iter().take(NOISE_OCTAVES).map(|point| point.avar).fold(0.0, f64::max);
     if largest > dithered_avar_counts2 {
         return None;

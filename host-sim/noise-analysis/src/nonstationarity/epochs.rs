@@ -1,10 +1,11 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
+use crate::OCTAVES;
 use crate::exclusion::Exclusion;
+use crate::gapped_cascade::GappedCascade;
 use crate::sample_curves::SampleCurves;
 use crate::series::Series;
-use crate::{OCTAVES, OVERLAP};
-use allan_core::{AllanPoint, Cascade, Curve, Model};
+use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
@@ -126,16 +127,7 @@ pub(crate) fn epochs(record: Range<u64>, middle: u64) -> Option<(u64, [Vec<Range
 pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
     let range = position(slots.start)..position(slots.end);
-    let mut estimator = Cascade::<OCTAVES, OVERLAP>::new();
-    let mut next = series.slots.get(range.start).copied().unwrap_or(0);
-    for (&slot, value) in series.slots[range.clone()].iter().zip(&series.values[range]) {
-        if slot > next {
-            estimator.gap(u32::try_from(slot - next).unwrap_or(u32::MAX));
-        }
-        estimator.push((value / series.resolution).round() as i32);
-        next = slot + 1;
-    }
-    estimator.curve(series.period_s).scaled(series.resolution)
+    GappedCascade::of_series(series, range).curve(series.period_s).scaled(series.resolution)
 }
 
 fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {

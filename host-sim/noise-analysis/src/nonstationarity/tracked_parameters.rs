@@ -1,6 +1,7 @@
 //! A model whose white noise and one of whose lines may change from epoch to epoch.
 
 use super::epochs::SIGNIFICANCE;
+use crate::minimum::downhill;
 use allan_core::confidence::octave_correlation;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Sinusoid};
@@ -10,6 +11,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Number of parameters that can be tracked.
 pub(crate) const PARAMETERS: usize = 2;
+/// To which parameters are fitted, in their logarithm.
+const ACCURACY: f64 = 1e-5;
 /// Largest change of a line's frequency from its mean, in ln f.
 const MAX_LINE: f64 = 0.3;
 /// Largest change of the level, in ln of the variance: a factor of about 20.
@@ -284,24 +287,7 @@ fn shifted(kind: NoiseTerm, factor: f64) -> NoiseTerm {
     }
 }
 
-/// The position of the minimum of `of` near `start`, at most `farthest` from 0: downhill in growing steps, then by golden
-/// section search.
+/// Where `of` is least near `start`, at most `farthest` from 0.
 pub(crate) fn minimum(of: impl Fn(f64) -> f64, start: f64, step: f64, farthest: f64) -> f64 {
-    const GOLDEN: f64 = 0.618_033_988_749_895;
-    let mut step = if of(start + step) < of(start - step) { step } else { -step };
-    let (mut behind, mut here, mut value) = (start - step, start, of(start));
-    for _ in 0..40 {
-        let next = of(here + step);
-        if next >= value || (here + step).abs() > farthest {
-            break;
-        }
-        (behind, here, value) = (here, here + step, next);
-        step *= 1.5;
-    }
-    let (mut low, mut high) = if step > 0.0 { (behind, here + step) } else { (here + step, behind) };
-    while high - low > 1e-5 {
-        let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-        if of(a) < of(b) { high = b } else { low = a }
-    }
-    (low + high) / 2.0
+    downhill(of, (start, step), farthest, ACCURACY)
 }

@@ -1,6 +1,8 @@
 //! The deviance of the curve of one channel as a function of the filter, and the decimation at which several have the least.
 
 use crate::OCTAVES;
+use crate::distributions::ROUNDING;
+use crate::minimum::golden_section;
 use crate::noise_terms::is_white;
 use crate::octave_covariance::relative_covariance;
 use allan_core::fit::DevianceComparison;
@@ -9,8 +11,6 @@ use allan_core::term::MovingAverageFilter;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 
-/// Variance of the rounding to multiples of 1.
-const ROUNDING: f64 = 1.0 / 12.0;
 /// Rounding takes at most this part of a measured variance: it is white only where the noise is larger.
 const MOST_ROUNDING: f64 = 0.5;
 /// Decimations are tried in steps of this factor, a quarter of an octave: with the shape of the filter known, the curve of the
@@ -176,26 +176,6 @@ pub(super) fn slowest_deviance(
     let tried = decimations(filter).map(|decimation| (decimation, total(decimation)));
     let (start, _) = tried.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
     let (from, to) = ((start / STEP).max(LEAST_DECIMATION), (start * STEP).min(longest_decimation(filter)));
-    Some(MovingAverageFilter { decimation: minimum(from, to, total), ..filter })
-}
-
-/// Where `value` is least between `from` and `to`, by golden section in the logarithm.
-pub(super) fn minimum(from: f64, to: f64, mut value: impl FnMut(f64) -> f64) -> f64 {
-    let section = (5f64.sqrt() - 1.0) / 2.0;
-    let (mut low, mut high) = (from.ln(), to.ln());
-    let inner = |low: f64, high: f64| (high - section * (high - low), low + section * (high - low));
-    let (mut left, mut right) = inner(low, high);
-    let (mut at_left, mut at_right) = (value(left.exp()), value(right.exp()));
-    for _ in 0..SEARCH_STEPS {
-        if at_left < at_right {
-            (high, right, at_right) = (right, left, at_left);
-            left = inner(low, high).0;
-            at_left = value(left.exp());
-        } else {
-            (low, left, at_left) = (left, right, at_right);
-            right = inner(low, high).1;
-            at_right = value(right.exp());
-        }
-    }
-    (0.5 * (low + high)).exp()
+    let least = golden_section((from.ln(), to.ln()), SEARCH_STEPS, |log| total(log.exp()));
+    Some(MovingAverageFilter { decimation: least.exp(), ..filter })
 }

@@ -10,7 +10,8 @@
 //! noise and single samples are, and for a sawtooth.
 
 use super::periodogram::{smooth_length, taper};
-use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use super::slow_background::SlowBackground;
+use super::smooth_shape::SpectralBand;
 use super::transforms;
 use crate::distributions::{quantile, upper_tail};
 use crate::findings::{Parameter, SIGNIFICANCE};
@@ -26,11 +27,8 @@ const MOST_EMPTY: f64 = 1.0 / 32.0;
 const TIMES: u32 = 7;
 /// Lowest order, in periods per record, that the filters pass: below, the density is known to the scatter of a few ordinates.
 const LOWEST: usize = 6;
-/// Corners of the Markov processes of the noise, in periods per record, from the least on, each twice the one before.
-const LEAST_CORNER: f64 = 2.0;
-const CORNERS: usize = 10;
-/// White noise, a random walk and the Markov processes.
-const TERMS: usize = 2 + CORNERS;
+/// White noise, a random walk and ten Markov processes.
+const TERMS: usize = 12;
 /// An ordinate over the noise that is a line, which chance exceeds at one of 10⁶, and ordinates on either side that its taper reaches.
 const LINE: f64 = 14.0;
 const LINE_REACH: usize = 2;
@@ -176,13 +174,6 @@ impl WhitenedRecord {
 
 /// One over the density of the noise at each order, up to a factor; 0 at lines and where the density is not known.
 fn weights(ordinates: &[f64]) -> Option<Vec<f64>> {
-    let basis = |order: f64| -> [f64; TERMS] {
-        std::array::from_fn(|term| match term {
-            0 => 1.0,
-            1 => 1.0 / (order * order),
-            term => 1.0 / (1.0 + (order / (LEAST_CORNER * f64::from(1_u32 << (term - 2)))).powi(2)),
-        })
-    };
     let mut bands: Vec<SpectralBand> = Vec::new();
     let mut first = 1;
     while first + 1 < ordinates.len() {
@@ -193,13 +184,8 @@ fn weights(ordinates: &[f64]) -> Option<Vec<f64>> {
         bands.push(SpectralBand { frequency: 0.5 * (first + next - 1) as f64, density, ordinates: count });
         first = next;
     }
-    let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| basis(band.frequency)).collect();
-    let mut densities = [0.0; TERMS];
-    fit_mixture(&bands, &bases, &mut densities);
-    if densities.iter().sum::<f64>() <= 0.0 {
-        return None;
-    }
-    let noise: Vec<f64> = (0..ordinates.len()).map(|order| mixture_density(&basis(order as f64), &densities)).collect();
+    let background = SlowBackground::<TERMS>::fit(&bands)?;
+    let noise: Vec<f64> = (0..ordinates.len()).map(|order| background.density(order as f64)).collect();
     let ratios: Vec<f64> = ordinates.iter().zip(&noise).map(|(ordinate, noise)| ordinate / noise).collect();
     let around = |at: usize, reach: usize| &ratios[at.saturating_sub(reach)..(at + reach + 1).min(ratios.len())];
     let weight = |(order, noise): (usize, &f64)| {

@@ -7,7 +7,8 @@
 
 use super::line_models::{Sine, transform_at};
 use super::periodogram::taper;
-use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use super::slow_background::SlowBackground;
+use super::smooth_shape::SpectralBand;
 use super::transforms;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
 use crate::findings::{Parameter, SIGNIFICANCE};
@@ -29,11 +30,8 @@ const STEPS: usize = 16;
 const LOBE: f64 = 1.2;
 /// Frequencies that are examined, those with the largest sums over the noise that is fitted to all ordinates.
 const EXAMINED: usize = 8;
-/// Corners of the Markov processes of the noise, in periods per record, from the least on, each twice the one before.
-const LEAST_CORNER: f64 = 2.0;
-const CORNERS: usize = 7;
-/// White noise, a random walk and the Markov processes.
-const TERMS: usize = 2 + CORNERS;
+/// White noise, a random walk and seven Markov processes.
+const TERMS: usize = 9;
 /// Largest probability by chance of the sum of the even harmonics, which a square wave lacks, and of that of the odd ones, which the harmonics of
 /// twice the frequency lack.
 const EVEN_BY_CHANCE: f64 = 1e-3;
@@ -178,29 +176,6 @@ struct PaddedSpectrum {
     between: Vec<(usize, f64)>,
 }
 
-/// A smooth density, by its terms.
-struct SmoothNoise {
-    densities: [f64; TERMS],
-}
-
-/// Values of the terms of the noise at an order in periods per record.
-fn basis(order: f64) -> [f64; TERMS] {
-    std::array::from_fn(|term| match term {
-        0 => 1.0,
-        1 => 1.0 / (order * order),
-        term => {
-            let corner = LEAST_CORNER * (1_u32 << (term - 2)) as f64;
-            1.0 / (1.0 + (order / corner).powi(2))
-        }
-    })
-}
-
-impl SmoothNoise {
-    fn density(&self, order: f64) -> f64 {
-        mixture_density(&basis(order), &self.densities)
-    }
-}
-
 /// Number of the padded ordinate that is nearest to an order in periods per record.
 fn position(order: f64) -> usize {
     (order * PADDING as f64).round() as usize
@@ -262,7 +237,7 @@ impl PaddedSpectrum {
     }
 
     /// The ordinate of a harmonic over the noise.
-    fn ratio(&self, noise: &SmoothNoise, number: usize, fundamental: f64) -> f64 {
+    fn ratio(&self, noise: &SlowBackground<TERMS>, number: usize, fundamental: f64) -> f64 {
         let order = number as f64 * fundamental;
         self.density(order) / noise.density(order)
     }
@@ -279,7 +254,7 @@ impl PaddedSpectrum {
     }
 
     /// The noise by the ordinates that the harmonics of `fundamental` do not reach, or by all of them.
-    fn noise(&self, fundamental: Option<f64>) -> Option<SmoothNoise> {
+    fn noise(&self, fundamental: Option<f64>) -> Option<SlowBackground<TERMS>> {
         let mut bands: Vec<(usize, f64, f64, f64)> = Vec::new();
         for order in self.orders(fundamental) {
             let density = self.density(order as f64);
@@ -299,10 +274,7 @@ impl PaddedSpectrum {
                 ordinates: count,
             })
             .collect();
-        let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| basis(band.frequency)).collect();
-        let mut densities = [0.0; TERMS];
-        fit_mixture(&bands, &bases, &mut densities);
-        (bands.len() >= TERMS && densities.iter().sum::<f64>() > 0.0).then_some(SmoothNoise { densities })
+        if bands.len() < TERMS { None } else { SlowBackground::fit(&bands) }
     }
 
     /// Number of ordinates between the harmonics of `fundamental`, up to twice the highest.
