@@ -36,15 +36,14 @@ pub enum AlarmThreshold {
 pub enum AlarmWatch {
     /// The value of the channel.
     Level,
-    /// The change of the channel over this number of samples (ALM_SMPL).
+    /// The change of the channel over this number of samples (ALM_SMPL); 0 and 1 both mean one sample (data sheet Rev. B,
+    /// Table 26).
     RateOfChange(u8),
 }
 
 /// The setting of an alarm. A raised alarm sets bit 8 or 9 of DIAG_STAT and the error/alarm flag of every output word.
 ///
-/// The layout of the alarm registers is that of an older part of the family and not confirmed for this one by any
-/// source at hand. Check it against your data sheet; [`Adis16405::update_register`](crate::Adis16405::update_register)
-/// can set any other layout.
+/// Tables 24 to 26 of the data sheet (Rev. B, page 16) have the layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

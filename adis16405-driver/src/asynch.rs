@@ -39,7 +39,7 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
     /// [`BurstValidator`](crate::BurstValidator) to decide.
     pub async fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
-        let pauses = self.state.frame_pauses();
+        let pauses = self.state.burst_pauses();
         let (mut whole, mut words);
         let operations: &mut [_] = match self.state.timing.word_gap_ns {
             0 => {

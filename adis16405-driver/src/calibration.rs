@@ -28,7 +28,8 @@ impl GyroBias {
     }
 }
 
-/// The user's corrections that a factory restore has overwritten.
+/// The user's corrections that a factory restore has set to 0: the registers of Tables 10 to 12 of the data sheet (Rev. B,
+/// page 13, where "Figure 12" stands for Table 12). The soft-iron factors are not among them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -39,8 +40,6 @@ pub struct FactoryRestore {
     pub accl: [i16; 3],
     /// Hard-iron correction x, y, z, 0.5 mgauss per count.
     pub hard_iron: [i16; 3],
-    /// Soft-iron factors x, y, z, 0x0800 = 1.
-    pub soft_iron: [u16; 3],
 }
 
 /// Corrections between sensors that the part can apply, MSC_CTRL bits 7 and 6.
@@ -114,12 +113,17 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn keep_negative_x_bias_on_host(&mut self) -> Result<GyroBias, ProtocolError> {
-        let GyroBias { mut part, host_x } = self.gyro_offsets().await?;
-        if part[0] < 0 {
+        let GyroBias { mut part, .. } = self.gyro_offsets().await?;
+        let [x, ..] = part;
+        if x < 0 {
             self.set_register(Register::XgyroOff, 0).await?;
-            self.state.host_bias_x = host_x.saturating_add(part[0]);
             self.state.x_sign_at_risk = false;
             part[0] = 0;
+        }
+        // A correction that the part has is the whole one: it comes from an auto-null or from flash, where an auto-null has
+        // stored it before its negative part was moved to the host.
+        if x != 0 {
+            self.state.host_bias_x = x.min(0);
         }
         Ok(GyroBias { part, host_x: self.state.host_bias_x })
     }

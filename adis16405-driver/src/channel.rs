@@ -133,12 +133,11 @@ impl Channel {
         }
     }
 
-    /// Width of the data field in bits: 12 for supply, temperature and auxiliary input, else 14.
-    ///
-    /// Sources give 12 or 14 bits for the supply. 12 are enough for its values: 5 V is count 2068.
+    /// Width of the data field in bits: 12 for temperature and auxiliary input, else 14 (data sheet Rev. B, Table 9). Of the
+    /// supply 12 are enough for any value that the part can measure: 5 V is count 2068.
     pub const fn bits(self) -> u32 {
         match self {
-            Channel::Supply | Channel::Temp | Channel::AuxAdc => 12,
+            Channel::Temp | Channel::AuxAdc => 12,
             _ => 14,
         }
     }
@@ -171,7 +170,8 @@ impl Channel {
 
     /// Size of one count in [`unit`](Self::unit); only the gyroscopes depend on `range`.
     ///
-    /// For the temperature, sources give 0.14 °C and 0.1357 °C; this returns 0.14 °C, the value that most drivers use.
+    /// That of the temperature is 0.14 °C by the data sheet (Rev. B, Tables 1 and 9), 0.1357 °C by Analog Devices' register
+    /// map; this returns 0.14 °C.
     pub const fn lsb(self, range: GyroRange) -> f64 {
         match self {
             Channel::Supply => 2.418e-3,

@@ -18,15 +18,16 @@ pub enum TimeBase {
 
 /// The power mode of the part, which sets the limits of SPI clock and stall.
 ///
-/// The data sheet (Rev. B, page 10) ends normal mode at SMPL_PRD = 0x08, Linux at 0x09. The driver follows the data
-/// sheet unless [`Timing::normal_mode_max_smpl_prd`] is set.
+/// The data sheet (Rev. B) contradicts itself: normal mode ends at SMPL_PRD = 0x09 by Tables 1 and 2 (pages 4 and 6) and by
+/// the text of page 13, at 0x08 by Table 7 (page 10). The driver takes the safe side at 0x09, a slow clock and the waits of
+/// low-power mode, unless [`Timing::normal_mode_max_smpl_prd`] is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ClockMode {
-    /// SMPL_PRD ≤ 0x08: SCK up to 2 MHz (1 MHz in a burst), stall at least 9 µs.
+    /// SMPL_PRD ≤ 0x08: SCK up to 2 MHz (1 MHz in a burst), stall at least 9 µs, a frame every 40 µs at most (Table 2).
     Normal,
-    /// SMPL_PRD > 0x08: SCK up to 300 kHz, stall 75 µs (the stall is not confirmed by any source at hand).
+    /// SMPL_PRD > 0x08: SCK up to 300 kHz, stall at least 75 µs, a frame every 150 µs at most (Table 2).
     LowPower,
 }
 
@@ -212,8 +213,8 @@ impl TryFrom<u8> for SamplePeriod {
 pub enum SampleClock {
     /// The internal clock.
     Internal(SamplePeriod),
-    /// A clock at pin DIO4/CLKIN, SMPL_PRD = 0. Documented for sibling parts (up to 1.1 kHz); no source at hand
-    /// confirms it for this part.
+    /// A clock at pin DIO4/CLKIN, which GPIO_CTRL makes an input, and SMPL_PRD = 0: pulses of at least 5 µs, at least
+    /// 833 µs apart (1.2 kHz); data ready follows 600 µs later (data sheet Rev. B, Table 2, Figure 4 and page 14).
     External,
 }
 
@@ -283,51 +284,63 @@ impl PerClockMode {
     }
 }
 
-/// The times that the driver keeps. Where sources for this part disagree, [`Timing::DEFAULT`] takes the longer time.
+/// The times that the driver keeps. Pages and tables are those of the data sheet Rev. B; where it contradicts itself,
+/// [`Timing::DEFAULT`] takes the safe side.
 ///
-/// These are not confirmed by any source at hand, so check them against your data sheet: the low-power stall, the times
-/// of a flash update, a factory restore and an auto-null, the reset pulse, the least time of chip select high, and the SMPL_PRD value above which low-power mode begins.
+/// The data sheet gives neither the reset pulse nor the least time of chip select high.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timing {
-    /// Stall after a frame, ns. In normal mode the part needs 9 µs, and Analog Devices' evaluation tool keeps 16 µs.
-    /// The 75 µs of low-power mode are unconfirmed.
+    /// Least stall after a frame or a burst, ns. The part needs 9 µs in normal and 75 µs in low-power mode (Table 2);
+    /// Analog Devices' evaluation tool keeps 16 µs. After a single frame the stall is longer where
+    /// [`read_rate_ns`](Self::read_rate_ns) asks for it.
     pub stall_ns: PerClockMode,
+    /// Least time from one falling edge of chip select to the next, ns, whatever the SCK: 40 µs in normal and 150 µs in
+    /// low-power mode (Table 2 and Figure 3). [`frame_stall_ns`](Self::frame_stall_ns) computes the stall that keeps it.
+    pub read_rate_ns: PerClockMode,
+    /// SCK of single frames, Hz, from which the stall after them is computed. `None`: the fastest of the power mode
+    /// ([`ClockMode::max_sck_hz`]), with which the stall is longest.
+    pub sck_hz: Option<u32>,
     /// Level of chip select during the stall.
     pub stall_select: SelectDuringStall,
     /// Least time that chip select is high between two frames, ns. No source at hand gives it for this part; the
     /// ADIS16470 needs 1 µs. With [`SelectDuringStall::High`] chip select is high for at least the stall anyway.
     pub select_high_ns: u32,
-    /// Pause between the words of a burst, ns. The default is 0: Linux, PX4 and flight software of satellites read the
-    /// part without a pause. Data sheets of sibling parts ask for one SCK period. With a pause, a burst is 13 transfers
-    /// instead of one.
+    /// Pause between the words of a burst, ns. The data sheet asks for one SCK period, 1 µs at 1 MHz (Table 2 and page
+    /// 10); the default is 0, since Linux, PX4 and flight software of satellites read the part without a pause, and with
+    /// one a burst is 13 transfers instead of one.
     pub word_gap_ns: u32,
-    /// Largest SMPL_PRD value in normal mode: 0x08 by the data sheet (Rev. B, page 10), 0x09 by Linux.
+    /// Largest SMPL_PRD value in normal mode: 0x08 by Table 7, 0x09 by Tables 1 and 2 and by page 13.
     pub normal_mode_max_smpl_prd: u8,
-    /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode. The default is the longer time,
-    /// since the mode at power-on depends on the settings in flash.
+    /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode (Table 1). The default is the longer
+    /// time, since the mode at power-on depends on the settings in flash.
     pub start_up_us: u32,
-    /// From a reset, by software or by the line, until the part answers, µs: 100 ms, or 170 ms in low-power mode. The default is the longer
-    /// time.
+    /// From a reset, by software or by the line, until the part answers, µs: 100 ms, or 170 ms in low-power mode (Table 1).
+    /// The default is the longer time.
     pub reset_us: u32,
-    /// Length of the low pulse on the reset line, µs. No source at hand gives the least; 10 µs are usual in the family.
+    /// Length of the low pulse on the reset line, µs. The data sheet gives none; 10 µs are usual in the family.
     pub reset_pulse_us: u32,
-    /// Length of the chip-select pulse that wakes the part, ns. Unconfirmed.
+    /// Length of the chip-select pulse that wakes the part, ns: at least 20 µs (Table 1). The default has 5 µs for the
+    /// clock of the microcontroller.
     pub wake_pulse_ns: u32,
-    /// From wake-up until the part answers, µs.
+    /// From wake-up until the part answers, µs: 4 ms, or 15 ms in low-power mode (Table 1).
     pub wake_us: PerClockMode,
-    /// Duration of a flash memory test, µs.
+    /// Duration of a flash memory test, µs: 17 ms, or 90 ms in low-power mode (Table 1).
     pub flash_test_us: PerClockMode,
-    /// Duration of the internal self-test at 819.2 samples per second, µs.
+    /// Duration of the internal self-test at 819.2 samples per second, µs: 12 ms (Table 1).
     pub self_test_us: u32,
-    /// Time without bus traffic after the flash-update command, µs. Sources give 50 ms and "at least 100 ms".
+    /// Time without bus traffic after the flash-update command, µs. It takes 50 ms (page 10); the default is twice that,
+    /// since the clock of the part is good to ±3 % (Table 1) and a part addressed too soon may lose the update.
     pub flash_update_us: u32,
-    /// Time without bus traffic after the factory-restore command, µs. Unconfirmed.
+    /// Time without bus traffic after the factory-restore command, µs. The flash update that it includes takes at most
+    /// 50 ms (page 13); the default is twice that.
     pub factory_restore_us: u32,
-    /// Time without bus traffic after the auto-null command, µs. Unconfirmed.
+    /// Time without bus traffic after the auto-null command, µs. The flash update that follows the measurement takes at most
+    /// 50 ms (page 13); the default is twice that.
     pub auto_null_us: u32,
-    /// Time without bus traffic after the precision auto-null command, µs: 30 s, or "about 35 s" on an older part.
+    /// Time without bus traffic after the precision auto-null command, µs: 30 s, in which the part is offline, and a flash
+    /// update of at most 50 ms (page 13). The default has 3 % for the clock of the part (Table 1).
     pub precision_auto_null_us: u32,
     /// Interval at which a self-clearing bit is polled, µs.
     pub poll_us: u32,
@@ -337,6 +350,8 @@ impl Timing {
     /// The times of a new driver.
     pub const DEFAULT: Self = Self {
         stall_ns: PerClockMode { normal: 16_000, low_power: 75_000 },
+        read_rate_ns: PerClockMode { normal: 40_000, low_power: 150_000 },
+        sck_hz: None,
         stall_select: SelectDuringStall::High,
         select_high_ns: 1_000,
         word_gap_ns: 0,
@@ -344,20 +359,35 @@ impl Timing {
         start_up_us: 290_000,
         reset_us: 170_000,
         reset_pulse_us: 100,
-        wake_pulse_ns: 10_000,
+        wake_pulse_ns: 25_000,
         wake_us: PerClockMode { normal: 4_000, low_power: 15_000 },
         flash_test_us: PerClockMode { normal: 17_000, low_power: 90_000 },
         self_test_us: 12_000,
         flash_update_us: 100_000,
-        factory_restore_us: 50_000,
-        auto_null_us: 50_000,
-        precision_auto_null_us: 30_000_000,
+        factory_restore_us: 100_000,
+        auto_null_us: 100_000,
+        precision_auto_null_us: 31_000_000,
         poll_us: 1_000,
     };
 
     /// The power mode that a value of SMPL_PRD selects.
     pub const fn clock_mode(&self, smpl_prd: u8) -> ClockMode {
         if smpl_prd <= self.normal_mode_max_smpl_prd { ClockMode::Normal } else { ClockMode::LowPower }
+    }
+
+    /// The stall after a single frame, ns: what is left of [`read_rate_ns`](Self::read_rate_ns) after 16 periods of
+    /// [`sck_hz`](Self::sck_hz), and at least [`stall_ns`](Self::stall_ns). By default 32 µs in normal mode and 96.8 µs in
+    /// low-power mode; at 1 MHz 24 µs.
+    pub const fn frame_stall_ns(&self, mode: ClockMode) -> u32 {
+        let sck_hz = match self.sck_hz {
+            Some(hz) => hz,
+            None => mode.max_sck_hz(),
+        };
+        // The clock is rounded up to whole kHz, so that the stall is not too short.
+        let sck_khz = if sck_hz > 1_000 { sck_hz.div_ceil(1_000) } else { 1 };
+        let stall_ns = self.read_rate_ns.get(mode).saturating_sub(16_000_000 / sck_khz);
+        let least_ns = self.stall_ns.get(mode);
+        if stall_ns > least_ns { stall_ns } else { least_ns }
     }
 }
 

@@ -5,7 +5,7 @@ use core::num::NonZeroU8;
 
 use crate::calibration::{FactoryRestore, GyroBias};
 use crate::channel::GyroRange;
-use crate::clock::{ClockMode, SamplePeriod};
+use crate::clock::{ClockMode, SampleClock, SamplePeriod};
 use crate::config::Config;
 use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::protocol::{Protocol, ProtocolError, WriteOrder};
@@ -51,8 +51,7 @@ impl Product {
 pub enum Sleep {
     /// This number of half seconds; the part then wakes up by itself.
     HalfSeconds(NonZeroU8),
-    /// Until the part is woken, reset or powered on again (bit 8). Linux and an Arduino library use this bit; Analog
-    /// Devices' register map lists only bits 7:0.
+    /// Until the part is woken, reset or powered on again (bit 8; data sheet Rev. B, page 13).
     Indefinite,
 }
 
@@ -62,6 +61,9 @@ const FACTORY_RESTORE: u16 = 1 << 1;
 const FLASH_UPDATE: u16 = 1 << 3;
 const PRECISION_AUTO_NULL: u16 = 1 << 4;
 const SOFTWARE_RESET: u16 = 1 << 7;
+
+/// The bit of GPIO_CTRL that makes DIO4 an output.
+const DIO4_IS_OUTPUT: u16 = 1 << 3;
 
 /// The bit of SLP_CNT for a sleep without end.
 const SLEEP_INDEFINITELY: u16 = 1 << 8;
@@ -77,12 +79,13 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn init(&mut self) -> Result<Product, ProtocolError> {
+        self.state.assume_either_mode();
         let product = self.identity().await?;
         if self.state.stimulated {
             self.stop_stimulus().await?;
         }
         self.configure(self.state.config).await?;
-        self.gyro_offsets().await?;
+        self.keep_negative_x_bias_on_host().await?;
         Ok(product)
     }
 
@@ -102,16 +105,17 @@ impl Protocol<'_> {
         self.set_register(Register::SmplPrd, u16::from(config.smpl_prd())).await?;
         self.state.mode = mode;
 
-        // The lower byte of SENS_AVG holds the filter, the upper one the range. If the present range needs more taps
-        // than the new filter has, the range is written first, so that no sample is taken with a combination that is
-        // not allowed.
+        // A clock at DIO4 needs the line as an input.
+        if matches!(config.sample_clock(), SampleClock::External) {
+            self.update_register(Register::GpioCtrl, DIO4_IS_OUTPUT, 0).await?;
+        }
+
+        // The upper byte of SENS_AVG holds the range, the lower one the filter. The range comes first, since it can change
+        // the filter (data sheet Rev. B, page 14).
         let before = self.read(Register::SensAvg).await;
-        let needed = GyroRange::from_sens_avg(before).map_or(0, GyroRange::min_filter_taps_log2);
-        let order =
-            if needed > config.filter_taps_log2() { WriteOrder::HighByteFirst } else { WriteOrder::LowByteFirst };
         // Stored before the write: if it is interrupted, the part more likely has the new range than the old one.
         self.state.config = config;
-        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), order).await?;
+        self.update_from(Register::SensAvg, before, u16::MAX, config.sens_avg(), WriteOrder::HighByteFirst).await?;
         self.state.configured = true;
         Ok(())
     }
@@ -143,6 +147,7 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
+        self.state.assume_either_mode();
         self.write_low(Register::GlobCmd, SOFTWARE_RESET).await;
         self.state.forget_registers();
         self.pause(self.state.timing.reset_us).await;
@@ -174,7 +179,6 @@ impl Protocol<'_> {
             gyro: self.gyro_offsets().await?,
             accl: self.accl_offsets().await?,
             hard_iron: self.hard_iron().await?,
-            soft_iron: self.soft_iron().await?,
         };
         self.command(FACTORY_RESTORE, self.state.timing.factory_restore_us).await;
         self.state.host_bias_x = 0;

@@ -152,7 +152,9 @@ impl TryFrom<SerializedConfig> for Config {
     }
 }
 
-/// The digital filter of gyroscopes, accelerometers and magnetometers: two cascaded averages of N = 2^M samples each.
+/// The digital filter of gyroscopes, accelerometers and magnetometers: two cascaded averages of N = 2^M samples each, a
+/// Bartlett window of 2N + 1 taps, of which the first and the last are 0, with a phase of N samples (data sheet Rev. B,
+/// Figure 15).
 ///
 /// The −3 dB frequencies that Linux lists for this part are those of two plain averages, to the digits given. The
 /// analog poles before the filter, at 404 Hz and 757 Hz (0.48 ms of delay by a figure for a sibling part), are not
@@ -177,15 +179,14 @@ impl BartlettFilter {
         1 << self.taps_log2
     }
 
-    /// Number of samples that an output depends on, 2N − 1. Analog Devices states 2N + 1 (EngineerZone, thread 17231).
+    /// Number of taps, 2N + 1. The first and the last are 0, so that an output depends on 2N − 1 samples.
     pub const fn length(self) -> u32 {
-        2 * self.taps() - 1
+        2 * self.taps() + 1
     }
 
-    /// Group delay in samples, N − 1, at every frequency. With the [`length`](Self::length) that Analog Devices states
-    /// it would be (2N + 1)/2; no source at hand decides between the two.
+    /// Group delay in samples, N, at every frequency.
     pub const fn group_delay(self) -> u32 {
-        self.taps() - 1
+        self.taps()
     }
 
     /// Amplitude response at `frequency` in cycles per sample (that is f/fs; 0.5 is the Nyquist frequency):
@@ -223,10 +224,11 @@ impl BartlettFilter {
         (2.0 * n * n + 1.0) / (3.0 * n * n * n)
     }
 
-    /// Weight of the sample taken `age` samples ago. The weights are a triangle of length 2N − 1 and sum to 1.
+    /// Weight of the sample taken `age` samples ago. The weights are a triangle over the ages 0 to 2N, with its peak at N,
+    /// and sum to 1.
     pub fn weight(self, age: u32) -> f64 {
         let n = self.taps();
-        let height = if age < n { age + 1 } else { (2 * n - 1).saturating_sub(age) };
+        let height = if age <= n { age } else { (2 * n).saturating_sub(age) };
         f64::from(height) / f64::from(n * n)
     }
 }

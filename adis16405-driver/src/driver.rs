@@ -41,10 +41,19 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         Self { bus: SensorBus::new(spi, delay), state, validator, mode: PhantomData }
     }
 
-    /// Sets the stall after each frame in ns, for both power modes.
+    /// Sets the least stall after each frame and burst in ns, for both power modes. The read rate of the part is kept in any
+    /// case ([`Timing::frame_stall_ns`]).
     #[must_use]
     pub fn with_stall_ns(mut self, stall_ns: u32) -> Self {
         self.state.timing.stall_ns = PerClockMode { normal: stall_ns, low_power: stall_ns };
+        self
+    }
+
+    /// States the SCK of single frames, Hz. The slower it is, the shorter is the stall that keeps the read rate of the part;
+    /// without this call the fastest clock of the power mode is assumed ([`Timing::sck_hz`]).
+    #[must_use]
+    pub fn with_sck_hz(mut self, sck_hz: u32) -> Self {
+        self.state.timing.sck_hz = Some(sck_hz);
         self
     }
 
@@ -135,12 +144,16 @@ macro_rules! procedures {
             /// [`Error::Product`] if PROD_ID is not that of a supported part.
             plain fn identity() -> Product;
 
-            /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and reads the gyro offsets
-            /// ([`x_sign_at_risk`](Self::x_sign_at_risk)).
+            /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and moves a negative correction of
+            /// gyro x from the part to the driver ([`keep_negative_x_bias_on_host`](Self::keep_negative_x_bias_on_host)):
+            /// after a reset the part may have one from its flash, where an auto-null has stored it.
+            ///
+            /// Until SMPL_PRD is read, the waits of low-power mode are kept unless the driver has configured the part before; SCK
+            /// must suit that mode if the part may be in it.
             ///
             /// If a manual self-test has left its stimulus on, it is switched off first. Only bytes that differ are
-            /// written, the lower byte first (in SENS_AVG the upper byte first where the
-            /// filter would be too short for the old range). A register that was written is read back.
+            /// written, the lower byte first; in SENS_AVG the range, then the filter, which the range can change. A register
+            /// that was written is read back.
             ///
             /// # Errors
             /// [`Error::Product`] if PROD_ID is not that of a supported part, [`Error::Verify`] if a register did not
@@ -324,13 +337,17 @@ macro_rules! procedures {
             /// Runs the auto-null (GLOB_CMD bit 0): the part sets its gyro offsets from its present outputs, and must
             /// be still. A negative offset of x is then applied by the driver: see [`GyroBias`].
             ///
+            /// The part then sets its outputs to 0 and writes its registers to flash, which costs one of 10,000 cycles (data
+            /// sheet Rev. B, page 13 and Table 1); [`flash_writes`](Self::flash_writes) counts
+            /// them.
+            ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer after the command, [`Error::Verify`].
             plain fn auto_null() -> GyroBias;
 
             /// Runs the precision auto-null (GLOB_CMD bit 4): as [`auto_null`](Self::auto_null), from an average over
-            /// 30 s ([`Timing::precision_auto_null_us`]) during which the part must be still and the bus is left
-            /// silent. On a sibling part it left a mean residual of 0.05 °/s.
+            /// 30 s ([`Timing::precision_auto_null_us`]) during which the part is offline and must be still, and the bus
+            /// is left silent. It writes the flash too. On a sibling part it left a mean residual of 0.05 °/s.
             ///
             /// The delay of the driver may feed a watchdog.
             ///
@@ -338,8 +355,9 @@ macro_rules! procedures {
             /// Those of [`auto_null`](Self::auto_null).
             plain fn precision_auto_null() -> GyroBias;
 
-            /// Restores the factory calibration (GLOB_CMD bit 1), leaves the bus silent meanwhile, configures the part
-            /// again, and returns the corrections that were overwritten.
+            /// Restores the factory calibration (GLOB_CMD bit 1): the part sets the offsets of gyros and accelerometers and the
+            /// hard-iron correction to 0 and writes its registers to flash, one of 10,000 cycles. Leaves the bus silent
+            /// meanwhile, configures the part again, and returns the corrections that were overwritten.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).

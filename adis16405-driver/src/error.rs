@@ -12,8 +12,8 @@ bitflags::bitflags! {
     /// The status and error flags of DIAG_STAT. A read clears the register, so a procedure that reads it returns the
     /// flags with its result.
     ///
-    /// Bits 12 to 10 are gyro z, y, x by three sources; Linux has x and z exchanged. No source at hand confirms that a
-    /// flag is set again at the next sample while its condition persists.
+    /// A flag is set again at the next sample while its condition persists; those of the supply return to 0 without a read
+    /// too (data sheet Rev. B, page 15 and Table 23). Linux has gyro x and z exchanged.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Diagnosis: u16 {

@@ -45,11 +45,12 @@
 //! |---|---|---|
 //! | SCK, single frames | 2 MHz at most | 300 kHz at most |
 //! | SCK, burst | 1 MHz at most | 300 kHz at most |
-//! | stall after a frame | at least 9 µs; the driver keeps 16 µs | the driver keeps 75 µs (unconfirmed) |
+//! | stall after a frame or burst | at least 9 µs; the driver keeps 16 µs | at least 75 µs |
+//! | from a falling edge of chip select to the next | at least 40 µs | at least 150 µs |
 //!
-//! (ADIS16400/ADIS16405 data sheet Rev. B, page 10.) The driver cannot set SCK. Rates of 163.84 samples per second and
-//! below select low-power mode: reduce SCK first. After a restart of the microcontroller alone, the part may still be
-//! in that mode.
+//! (ADIS16400/ADIS16405 data sheet Rev. B, Tables 2 and 7; where low-power mode begins, [`ClockMode`].) The driver cannot
+//! set SCK. Rates of 163.84 samples per second and below select low-power mode: reduce SCK first. After a restart of the
+//! microcontroller alone, the part may still be in that mode.
 //!
 //! Each frame is a transaction, after which the driver waits for the stall with its own delay: chip select is high
 //! meanwhile, and on a shared bus the other devices have the time. A burst is one transaction of 26 bytes.
@@ -57,7 +58,9 @@
 //!
 //! | field | default | |
 //! |---|---|---|
-//! | [`stall_ns`](Timing::stall_ns) | 16 µs, 75 µs in low-power mode | after each frame and burst |
+//! | [`stall_ns`](Timing::stall_ns) | 16 µs, 75 µs in low-power mode | least pause after each frame and burst |
+//! | [`read_rate_ns`](Timing::read_rate_ns) | 40 µs, 150 µs in low-power mode | from frame to frame |
+//! | [`sck_hz`](Timing::sck_hz) | the fastest: 2 MHz, 300 kHz in low-power mode | sets what the read rate leaves for the stall: 32 µs, 24 µs at 1 MHz |
 //! | [`stall_select`](Timing::stall_select) | [`High`](SelectDuringStall::High) | `Low` holds chip select low for the stall, as one transaction |
 //! | [`select_high_ns`](Timing::select_high_ns) | 1 µs | least time that chip select is high |
 //! | [`word_gap_ns`](Timing::word_gap_ns) | 0 | between the words of a burst; not 0 makes 13 transfers of it |
@@ -125,7 +128,7 @@
 //! | [`hardware_reset`](Adis16405::hardware_reset) | perhaps held in reset, the line being low | call it again; until then [`read`](Adis16405::read) refuses |
 //! | [`stimulus_response`](Adis16405::stimulus_response) | sensors deflected, unless the driver could switch that off | [`stop_stimulus`](Adis16405::stop_stimulus) or [`init`](Adis16405::init); until then [`read`](Adis16405::read) refuses |
 //! | [`self_test`](Adis16405::self_test), [`flash_test`](Adis16405::flash_test) | the test goes on and ends by itself | wait; flags of DIAG_STAT that were read are lost |
-//! | [`auto_null`](Adis16405::auto_null), [`precision_auto_null`](Adis16405::precision_auto_null) | busy up to 30 s; a negative XGYRO_OFF | wait, then [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) |
+//! | [`auto_null`](Adis16405::auto_null), [`precision_auto_null`](Adis16405::precision_auto_null) | busy up to 31 s; a negative XGYRO_OFF | wait, then [`init`](Adis16405::init) |
 //! | setters of offsets, factors, alarms and pins | some registers old, some new, one perhaps with one new byte | call the setter again |
 //! | [`keep_negative_x_bias_on_host`](Adis16405::keep_negative_x_bias_on_host) | XGYRO_OFF may be 0 and its value lost | read [`gyro_offsets`](Adis16405::gyro_offsets) before, and set them again |
 //! | [`factory_restore`](Adis16405::factory_restore) | old or factory corrections | call it again; corrections that it has read are lost |
@@ -138,19 +141,12 @@
 //! A timeout around any method is therefore possible; `burst` and `read` may be dropped at any time without a loss other
 //! than that sample.
 //!
-//! # Unconfirmed facts
+//! # Sources
 //!
-//! No source at hand confirms the following. Each can be set or avoided:
-//!
-//! - the stall in low-power mode, the SMPL_PRD value where that mode begins, the gap between burst words, the least time
-//!   that chip select is high, and the times of reset pulse, flash update, factory restore, auto-null and wake-up pulse:
-//!   [`Timing`];
-//! - 0.14 °C or 0.1357 °C per count: [`ImuSample::temp_udegc`];
-//! - the layout of the alarm registers ([`Alarm`]) and the scale of the analog output ([`DacLevel`]):
-//!   [`update_register`](Adis16405::update_register) writes any other value;
-//! - 12 or 14 bits in SUPPLY_OUT: [`OutputWord`] has the raw word;
-//! - the external clock ([`SampleClock::External`]) and indefinite sleep ([`Sleep::Indefinite`]);
-//! - the delay of the filter ([`BartlettFilter::group_delay`]) and the order of x and z in DIAG_STAT ([`Diagnosis`]).
+//! Facts of the part are those of the data sheet ADIS16400/ADIS16405 Rev. B, with the page or table where it matters. It says
+//! nothing of the reset pulse and of the least time that chip select is high ([`Timing`]), nor of the rate at which supply,
+//! magnetometers, temperature and auxiliary input are refreshed ([`Faults::NO_NEW_DATA`]). The erratum of the x rate
+//! ([`GyroBias`]) is from users of the part.
 //!
 //! # Structure
 //!

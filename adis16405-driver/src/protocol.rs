@@ -145,9 +145,23 @@ impl DriverState {
         self.mode = ClockMode::LowPower;
     }
 
+    /// Unless the driver has configured the part, its power mode is not known: the part may have it from its flash, or from
+    /// before a restart of the microcontroller alone.
+    pub(crate) const fn assume_either_mode(&mut self) {
+        if !self.configured {
+            self.mode = ClockMode::LowPower;
+        }
+    }
+
     /// The pauses after a frame in the present power mode.
     #[inline(never)]
     pub(crate) fn frame_pauses(&self) -> FramePauses {
+        let timing = &self.timing;
+        FramePauses::new(timing.stall_select, timing.frame_stall_ns(self.mode), timing.select_high_ns)
+    }
+
+    /// The pauses after a burst in the present power mode. A burst takes longer than the read rate asks for.
+    pub(crate) fn burst_pauses(&self) -> FramePauses {
         let timing = &self.timing;
         FramePauses::new(timing.stall_select, timing.stall_ns.get(self.mode), timing.select_high_ns)
     }
@@ -273,7 +287,9 @@ impl<'a> Protocol<'a> {
         if different & 0xFF00 != 0 && order == WriteOrder::HighByteFirst {
             self.write_high(register, after).await;
         }
-        if different & 0x00FF != 0 {
+        // After the upper byte the part may have changed the lower one: see `configure`.
+        let may_have_changed = order == WriteOrder::HighByteFirst && different & 0xFF00 != 0;
+        if different & 0x00FF != 0 || may_have_changed {
             self.write_low(register, after).await;
         }
         if different & 0xFF00 != 0 && order == WriteOrder::LowByteFirst {

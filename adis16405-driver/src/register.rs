@@ -105,7 +105,7 @@ registers! {
     SmplPrd "SMPL_PRD" 0x36 ReadWrite 8,
     /// Gyro range (bits 10:8) and filter taps (bits 2:0).
     SensAvg "SENS_AVG" 0x38 ReadWrite 11,
-    /// Sleep. Sources disagree on whether it can be read, and on its width (8 bits, or bit 8 for an indefinite sleep).
+    /// Sleep: bits 7:0 in units of 0.5 s, bit 8 without end (data sheet Rev. B, Table 16).
     SlpCnt "SLP_CNT" 0x3A Write 9,
     /// Status and error flags ([`Diagnosis`](crate::Diagnosis)); a read clears them.
     DiagStat "DIAG_STAT" 0x3C Read 16,

@@ -115,8 +115,8 @@ impl ImuSample {
         millionths(self.aux_adc_uv())
     }
 
-    /// Internal temperature in 10⁻⁶ °C for a scale of `udegc_per_count` in 10⁻⁶ °C a count. Sources give 140,000 (most
-    /// drivers) and 135,700 (Analog Devices' register map).
+    /// Internal temperature in 10⁻⁶ °C for a scale of `udegc_per_count` in 10⁻⁶ °C a count. The data sheet (Rev. B,
+    /// Table 9) gives 140,000, Analog Devices' register map 135,700.
     pub fn temp_udegc(&self, udegc_per_count: i32) -> i32 {
         25_000_000i32.saturating_add(i32::from(self.counts.get(Channel::Temp)).saturating_mul(udegc_per_count))
     }

@@ -53,9 +53,9 @@ impl FlashTest {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Stimulus {
-    /// Positive, MSC_CTRL bit 8.
+    /// Positive, MSC_CTRL bit 8: gyros and accelerometers.
     Positive,
-    /// Negative, MSC_CTRL bit 9.
+    /// Negative, MSC_CTRL bit 9. The data sheet (Rev. B, Table 22) describes it for the gyros alone.
     Negative,
 }
 

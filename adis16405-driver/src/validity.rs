@@ -12,7 +12,7 @@ bitflags::bitflags! {
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Faults: u16 {
         /// The new-data flag of at least one inertial word (gyroscopes and accelerometers) is clear: the word was read
-        /// before. The flags of the other words are not used, since no source at hand confirms that supply,
+        /// before. The flags of the other words are not used, since no source tells whether supply,
         /// magnetometers, temperature and auxiliary input are refreshed with every sample.
         const NO_NEW_DATA = 1 << 0;
         /// The error/alarm flag of at least one word is set; DIAG_STAT holds the reason.
@@ -137,7 +137,7 @@ impl Burst {
 
     /// The channels that `faults`, which this burst shows, refuse: a fault of a word that of the word, any other fault all.
     ///
-    /// The channels that are not inertial are refused only with all others: no source at hand confirms that they are
+    /// The channels that are not inertial are refused only with all others: no source tells whether they are
     /// refreshed with every sample. Without a new inertial word a burst has no new sample.
     fn refused_channels(&self, faults: Faults) -> ChannelMask {
         if faults.is_empty() {

@@ -83,10 +83,11 @@ fn narrow_ranges_need_more_filter_taps() {
 
 /// The weights of two cascaded averages of `n` samples.
 fn weights(n: usize) -> Vec<f64> {
-    let mut weights = vec![0.0; 2 * n - 1];
+    // 2N + 1 taps with a phase of N samples (data sheet Rev. B, Figure 15): the first and the last of a Bartlett window are 0.
+    let mut weights = vec![0.0; 2 * n + 1];
     for first in 0..n {
         for second in 0..n {
-            weights[first + second] += 1.0 / (n * n) as f64;
+            weights[1 + first + second] += 1.0 / (n * n) as f64;
         }
     }
     weights

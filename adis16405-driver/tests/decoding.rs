@@ -7,7 +7,7 @@ use proptest::test_runner::RngSeed;
 
 /// Channel, bits, two's complement, units per count: copied from data sheet and register map, not from the driver.
 const FIELDS: [(Channel, u32, bool, f64); 12] = [
-    (Channel::Supply, 12, false, 0.002418),
+    (Channel::Supply, 14, false, 0.002418),
     (Channel::GyroX, 14, true, 0.05),
     (Channel::GyroY, 14, true, 0.05),
     (Channel::GyroZ, 14, true, 0.05),
@@ -52,6 +52,7 @@ fn channels_have_the_limits_scales_and_offsets_of_the_data_sheet() {
         let limits = match (bits, signed) {
             (14, true) => (-8192, 8191),
             (12, true) => (-2048, 2047),
+            (14, false) => (0, 16_383),
             _ => (0, 4095),
         };
         assert_eq!(channel.limits(), limits, "{channel:?}");
@@ -87,9 +88,9 @@ fn every_count_has_the_value_of_the_data_sheet() {
                 assert!(close(sample.magn_gauss()[axis], signed * 0.0005), "{word:#06x}");
                 assert_eq!(f64::from(sample.magn_ugauss()[axis]), (signed * 500.0).round());
             }
+            assert!(close(sample.supply_v(), f64::from(word) * 0.002418), "{word:#06x}");
+            assert_eq!(f64::from(sample.supply_uv()), f64::from(word) * 2418.0);
             let field = f64::from(word & 0x0FFF);
-            assert!(close(sample.supply_v(), field * 0.002418), "{word:#06x}");
-            assert_eq!(f64::from(sample.supply_uv()), field * 2418.0);
             assert!(close(sample.aux_adc_v(), field * 0.000806), "{word:#06x}");
             assert_eq!(f64::from(sample.aux_adc_uv()), field * 806.0);
             let signed = field - if field >= 2048.0 { 4096.0 } else { 0.0 };

@@ -154,7 +154,7 @@ fn init_switches_off_a_stimulus_that_a_failed_bus_has_left_on() {
 #[test]
 fn after_an_error_the_range_is_that_of_the_part() {
     let whole = transactions_of(|imu| imu.set_range(GyroRange::Dps150).unwrap());
-    assert_eq!(whole, 7);
+    assert_eq!(whole, 8);
     for at in 0..whole {
         let bus = Bus::new(at..at + 1);
         let mut imu = Adis16405::new(bus.clone(), NoDelay, Config::default());
@@ -236,9 +236,9 @@ fn a_shared_delay_serves_both_the_spi_device_and_the_driver() {
         .with_timing(Timing { stall_select: SelectDuringStall::Low, ..Timing::DEFAULT });
     imu.start_up().unwrap();
     let frames = bus.transactions() as u64;
-    // 290 ms of start-up; a stall of 75 µs after the first four frames, 16 µs after the others, and 1 µs of chip select
-    // high after each.
-    assert_eq!(delay.release().0, 290_000_000 + 4 * 75_000 + (frames - 4) * 16_000 + frames * 1_000);
+    // 290 ms of start-up; the stall of low-power mode after the first four frames, that of normal mode after the others, and
+    // 1 µs of chip select high after each.
+    assert_eq!(delay.release().0, 290_000_000 + 4 * 96_667 + (frames - 4) * 32_000 + frames * 1_000);
 }
 
 /// Futures that are dropped while a transaction is under way.

@@ -9,8 +9,13 @@ use std::rc::Rc;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-/// Default stall in normal mode.
-pub(crate) const STALL_NS: u32 = 16_000;
+/// Default stall after a frame in normal mode: 16 periods of the fastest SCK, 2 MHz, take 8 µs of the 40 µs from one frame
+/// to the next (data sheet Rev. B, Table 2).
+pub(crate) const STALL_NS: u32 = 32_000;
+/// Default stall after a burst in normal mode.
+pub(crate) const BURST_STALL_NS: u32 = 16_000;
+/// The same after a frame in low-power mode: 16 periods of 300 kHz take 53.3 µs of 150 µs.
+pub(crate) const SLOW_STALL_NS: u32 = 96_667;
 
 /// What the part and a stop watch see of the driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -131,9 +136,17 @@ pub(crate) fn gyro_offsets(x: u16, y: u16, z: u16) -> Frames {
     read_all(&[(0x1A, x), (0x1C, y), (0x1E, z)])
 }
 
-/// The frames of an `init` on a part that is already configured.
+/// The same frames with the stall of low-power mode.
+pub(crate) fn slow(frames: Frames) -> Frames {
+    let slower = |step| if step == Step::Delay(STALL_NS) { Step::Delay(SLOW_STALL_NS) } else { step };
+    frames.into_iter().map(slower).collect()
+}
+
+/// The frames of an `init` on a part that is already configured, but not by this driver: until SMPL_PRD was read, the stall is
+/// that of low-power mode.
 pub(crate) fn init(smpl_prd: u16, sens_avg: u16) -> Frames {
-    [read(0x56, 16405), read(0x36, smpl_prd), read(0x38, sens_avg), gyro_offsets(0, 0, 0)].concat()
+    let known = [read(0x38, sens_avg), gyro_offsets(0, 0, 0)].concat();
+    [slow([read(0x56, 16405), read(0x36, smpl_prd)].concat()), known].concat()
 }
 
 #[cfg(feature = "async")]

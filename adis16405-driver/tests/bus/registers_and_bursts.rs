@@ -4,7 +4,9 @@ use adis16405_driver::{
     Access, Adis16405, Config, Error, GyroRange, Register, SamplePeriod, SelectDuringStall, Timing,
 };
 
-use crate::harness::{Bench, Frames, NONE, STALL_NS, Step, frame_with, read, read_all, write};
+use crate::harness::{
+    BURST_STALL_NS, Bench, Frames, NONE, SLOW_STALL_NS, STALL_NS, Step, frame_with, read, read_all, write,
+};
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
@@ -34,8 +36,8 @@ fn a_read_is_two_frames_and_several_reads_overlap() {
 }
 
 #[test]
-fn the_stall_is_75_us_in_low_power_mode() {
-    let slow = |answer: [u8; 2], sent: [u8; 2]| frame_with(75_000, &sent, &answer);
+fn the_stall_is_that_of_low_power_mode_above_0x08() {
+    let slow = |answer: [u8; 2], sent: [u8; 2]| frame_with(SLOW_STALL_NS, &sent, &answer);
     let bus = [slow([0, 0], [0x3C, 0]), slow([0x12, 0x34], [0, 0])];
     let low_power = config(GyroRange::Dps300, 2, 0x09);
     assert_eq!(both!(low_power; bus; NONE; |imu| imu.read_register(Register::DiagStat)), Ok(0x1234));
@@ -50,12 +52,29 @@ fn the_limit_of_normal_mode_can_be_set() {
     assert_eq!(value, Ok(7));
 }
 
+/// Data sheet Rev. B, Table 2 and Figure 3: at least 40 µs from one falling edge of chip select to the next in normal mode, 150 µs
+/// in low-power mode, and at least 9 µs or 75 µs between the frames. A frame takes 16 periods of SCK.
 #[test]
-fn the_stall_can_be_set() {
-    let bus = [frame_with(9_000, &[0xBE, 0x80], &[0, 0])];
-    let written = both!(Config::default(), with [.with_stall_ns(9_000)]; bus; NONE;
-        |imu| imu.write_register(Register::GlobCmd, 0x80));
-    assert_eq!(written, Ok(()));
+fn the_stall_keeps_the_read_rate_at_every_clock() {
+    let (normal, low_power) = (Config::default(), config(GyroRange::Dps300, 2, 0x7F));
+    for (config, sck_hz, set_ns, stall_ns) in [
+        (normal, 2_000_000, 9_000, 32_000),
+        (normal, 1_000_000, 9_000, 24_000),
+        (normal, 1_000_000, 30_000, 30_000),
+        // 24.38 µs of 40 µs; the driver takes the clock for 657 kHz.
+        (normal, 656_250, 9_000, 15_647),
+        (normal, 300_000, 9_000, 9_000),
+        (normal, 10_000, 9_000, 9_000),
+        (low_power, 300_000, 75_000, 96_667),
+        (low_power, 100_000, 75_000, 75_000),
+    ] {
+        let read_rate_ns = 1e9 * 16.0 / f64::from(sck_hz) + f64::from(stall_ns);
+        assert!(read_rate_ns >= if config == normal { 40e3 } else { 150e3 } - 0.5, "{sck_hz} Hz");
+        let bus = [frame_with(stall_ns, &[0xBE, 0x80], &[0, 0])];
+        let written = both!(config, with [.with_stall_ns(set_ns).with_sck_hz(sck_hz)]; bus; NONE;
+            |imu| imu.write_register(Register::GlobCmd, 0x80));
+        assert_eq!(written, Ok(()), "{sck_hz} Hz");
+    }
 }
 
 /// Linux, PX4 and Canopus raise chip select between frames and wait then.
@@ -72,10 +91,10 @@ fn chip_select_is_high_during_the_stall_unless_it_is_set_to_be_low() {
     assert_eq!((default.stall_select, default.select_high_ns), (SelectDuringStall::High, 1_000));
     let held_low = Timing { stall_select: SelectDuringStall::Low, ..default };
     for (timing, bus) in [
-        (default, high(16_000)),
-        (Timing { select_high_ns: 20_000, ..default }, high(20_000)),
-        (held_low, low(16_000, Some(1_000))),
-        (Timing { select_high_ns: 0, ..held_low }, low(16_000, None)),
+        (default, high(STALL_NS)),
+        (Timing { select_high_ns: 50_000, ..default }, high(50_000)),
+        (held_low, low(STALL_NS, Some(1_000))),
+        (Timing { select_high_ns: 0, ..held_low }, low(STALL_NS, None)),
     ] {
         let written = both!(Config::default(), with [.with_timing(timing)]; [bus.clone()]; NONE;
             |imu| imu.write_register(Register::GlobCmd, 0x80));
@@ -152,7 +171,7 @@ fn burst_bytes() -> ([u8; 26], [u8; 26]) {
 #[test]
 fn a_burst_is_one_transaction_of_26_bytes() {
     let (sent, answer) = burst_bytes();
-    let bus = [frame_with(STALL_NS, &sent, &answer)];
+    let bus = [frame_with(BURST_STALL_NS, &sent, &answer)];
     let burst = both!(Config::default(); bus; NONE; |imu| imu.burst()).unwrap();
     assert_eq!(burst.words[0].0, 0x8081);
     assert_eq!(burst.words[11].0, 0x9697);
@@ -170,10 +189,11 @@ fn a_word_gap_splits_a_burst_into_13_transfers() {
         Step::Exchange { sent: sent[bytes.clone()].to_vec(), answer: answer[bytes].to_vec() }
     };
     let between = || (0..12).flat_map(|index| [word(index), Step::Delay(1_000)]);
-    let high = [Step::Select].into_iter().chain(between()).chain([word(12), Step::Deselect, Step::Delay(STALL_NS)]);
+    let high =
+        [Step::Select].into_iter().chain(between()).chain([word(12), Step::Deselect, Step::Delay(BURST_STALL_NS)]);
     let low = [Step::Select].into_iter().chain(between()).chain([
         word(12),
-        Step::Delay(STALL_NS),
+        Step::Delay(BURST_STALL_NS),
         Step::Deselect,
         Step::Delay(1_000),
     ]);

@@ -1,5 +1,5 @@
-//! The procedures of the part that take time. Durations are those of the Linux driver and of KU Leuven's; where the two
-//! disagree, the longer one.
+//! The procedures of the part that take time. Durations are those of the data sheet (Rev. B): Table 1, and pages 10 and 13 for
+//! those that write the flash.
 
 /// A procedure that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,9 +37,9 @@ impl Activity {
             Activity::SelfTest => 12,
             Activity::FlashTest if low_power => 90,
             Activity::FlashTest => 17,
-            Activity::FlashUpdate => 100,
-            Activity::FactoryRestore | Activity::AutoNull => 50,
-            Activity::PrecisionAutoNull => 30_000,
+            Activity::FlashUpdate | Activity::FactoryRestore | Activity::AutoNull => 50,
+            // 30 s offline, then the flash update.
+            Activity::PrecisionAutoNull => 30_050,
             Activity::Sleep => 0,
             Activity::WakeUp if low_power => 15,
             Activity::WakeUp => 4,
@@ -52,9 +52,14 @@ impl Activity {
         !matches!(self, Activity::SelfTest | Activity::FlashTest)
     }
 
-    /// True if the part goes on sampling meanwhile.
+    /// True if the part goes on sampling meanwhile, for itself alone if it [is offline](Self::is_offline).
     pub(crate) const fn keeps_sampling(self) -> bool {
         matches!(self, Activity::SelfTest | Activity::FlashTest | Activity::AutoNull | Activity::PrecisionAutoNull)
+    }
+
+    /// True if the samples that the part takes meanwhile reach no output.
+    pub(crate) const fn is_offline(self) -> bool {
+        matches!(self, Activity::PrecisionAutoNull)
     }
 
     /// The bit of MSC_CTRL that starts the procedure and clears at its end; 0 for those of other registers.

@@ -82,6 +82,9 @@ const SUPPLY_RANGE_V: (f64, f64) = (4.75, 5.25);
 /// Size of a count of SUPPLY_OUT, V.
 const SUPPLY_LSB: f64 = OutputRegister::Supply.lsb(0.0);
 
+/// The bits of DIAG_STAT that follow the supply without being read (data sheet Rev. B, page 15).
+pub(crate) const SUPPLY_FLAGS: u16 = SUPPLY_LOW | SUPPLY_HIGH;
+
 /// The bit of DIAG_STAT that the latest sample sets for its supply voltage.
 pub(crate) fn check_supply(counts: &[i16; 12]) -> u16 {
     let supply_v = f64::from(counts[OutputRegister::Supply as usize]) * SUPPLY_LSB;
@@ -101,8 +104,7 @@ const COMPARE_FILTERED: u16 = 1 << 4;
 /// Length of the history: the latest output and as many as ALM_SMPL can count back.
 const HISTORY: usize = 256;
 
-/// The two alarms on the level or the rate of change of any output. Their registers have the layout of the older ADIS16203;
-/// no available source confirms it for the ADIS16405.
+/// The two alarms on the level or the rate of change of any output (data sheet Rev. B, Tables 24 to 26).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Alarms {
     /// Of each alarm the latest outputs of its source, the newest first.
@@ -125,7 +127,8 @@ impl Alarms {
             history.truncate(HISTORY);
             let rate_of_change = control >> (6 + index) & 1 != 0;
             let address = 2 * index as u8;
-            let back = usize::from(registers.read(registers::ALM_SMPL1 + address));
+            // 0x00 and 0x01 both mean one sample (Table 26).
+            let back = usize::from(registers.read(registers::ALM_SMPL1 + address)).max(1);
             let watched = match (rate_of_change, history.get(back)) {
                 (false, _) => Some(i32::from(value)),
                 (true, Some(&before)) => Some(i32::from(value) - i32::from(before)),
@@ -142,11 +145,12 @@ impl Alarms {
     }
 }
 
-/// Bits 13:0 of ALM_MAG in the format of the output: two's complement of 14 or 12 bits, or offset binary of 12.
+/// Bits 13:0 of ALM_MAG in the format of the output: two's complement of 14 or 12 bits, or binary of 14 or 12.
 fn threshold(magnitude: u16, output: usize) -> i32 {
     let field = i32::from(magnitude & 0x3FFF);
     match output {
-        0 | 11 => field & 0x0FFF,
+        0 => field,
+        11 => field & 0x0FFF,
         10 => (field & 0x0FFF) - (field & 0x0800) * 2,
         _ => field - (field & 0x2000) * 2,
     }

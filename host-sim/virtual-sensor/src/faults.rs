@@ -4,7 +4,7 @@ use crate::activity::{Activity, BusyAnswers};
 use crate::diagnosis::{self, DiagnosisFlag};
 use crate::part::VirtualAdis16405;
 use crate::registers::{self, OutputRegister};
-use crate::spi::ViolationKind;
+use crate::spi::{Strictness, ViolationKind};
 
 /// Shortest low pulse on the reset line that resets the part, ns. Assumed: no source at hand gives it.
 const LEAST_RESET_PULSE_NS: u64 = 10_000;
@@ -30,23 +30,17 @@ impl VirtualAdis16405 {
         self.start_up_ns = duration_ns;
     }
 
-    /// Makes the part strict about chip select: it must be high for at least `least_high_ns` between two frames. A frame
-    /// after a shorter time ([`ViolationKind::SelectHigh`]), a second frame without chip select having risen, and one after
-    /// too short a stall ([`ViolationKind::Stall`]) are garbled then: the controller reads wrong words until chip select
-    /// rises, no frame is executed, and DIAG_STAT bit 3 latches. With `None`, the default, chip select may rise and fall at
-    /// once, and too short a stall is recorded only.
-    ///
-    /// No source at hand gives the least time for this part. Those drivers that raise chip select between frames keep it
-    /// high for the stall, 9 µs or more; the ADIS16470 needs 1 µs.
-    pub fn set_strict_select(&mut self, least_high_ns: Option<u64>) {
-        self.spi.least_high_ns = least_high_ns;
+    /// Sets what the part does about a controller that does not keep the data sheet.
+    pub fn set_strictness(&mut self, strictness: Strictness) {
+        self.spi.strictness = strictness;
     }
 }
 
 /// Faults.
 impl VirtualAdis16405 {
     /// Sets a flag of DIAG_STAT once, as a tap beyond the range or a glitch on chip select does. It stays set, and with it
-    /// the error/alarm flag of every output word, until DIAG_STAT is read or the part is reset.
+    /// the error/alarm flag of every output word, until DIAG_STAT is read or the part is reset; those of the supply return to 0
+    /// with the next sample that finds it in its window (data sheet Rev. B, page 15).
     pub fn latch_flag(&mut self, flag: DiagnosisFlag) {
         self.diagnosis |= flag.bit();
     }
@@ -101,7 +95,7 @@ impl VirtualAdis16405 {
             self.reset();
             self.begin(Activity::Reset);
         } else {
-            self.violations.add(self.now_ns, ViolationKind::ResetPulse { low_ns, least_ns: LEAST_RESET_PULSE_NS });
+            self.bus_log.violation(self.now_ns, ViolationKind::ResetPulse { low_ns, least_ns: LEAST_RESET_PULSE_NS });
             self.restart_sampling(self.now_ns);
         }
     }

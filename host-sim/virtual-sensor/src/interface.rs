@@ -4,7 +4,8 @@ use crate::activity::{Activity, BusyAnswers};
 use crate::diagnosis;
 use crate::part::VirtualAdis16405;
 use crate::registers::{self, OutputRegister};
-use crate::spi::{FLOATING, UNDEFINED, ViolationKind, WordStart};
+use crate::signal_chain::SensAvg;
+use crate::spi::{FLOATING, NoteKind, UNDEFINED, ViolationKind, WordStart};
 
 /// Bit 15 of an output register: new data.
 const NEW_DATA: u16 = 0x8000;
@@ -16,8 +17,22 @@ const SIGN: u16 = 1 << 13;
 const INDEFINITE_SLEEP: u16 = 1 << 8;
 /// Unit of SLP_CNT, ns.
 const HALF_SECOND_NS: u64 = 500_000_000;
-/// Length of a data-ready pulse, ns. Assumed: no available source gives it; it must be shorter than a sample period.
+/// Length of a data-ready pulse, ns: the shortest of 100 to 200 µs (data sheet Rev. B, page 14).
 const PULSE_NS: u64 = 100_000;
+/// Least time of chip select low that wakes the part, ns (Table 1).
+const LEAST_WAKE_PULSE_NS: u64 = 20_000;
+/// Least length of a pulse of the external sample clock, ns (Table 2, t1).
+const LEAST_SYNC_PULSE_NS: u64 = 5_000;
+/// Least period of the external sample clock, ns (Table 2, t3).
+const LEAST_SYNC_PERIOD_NS: u64 = 833_000;
+/// From the rising edge of the external sample clock to data ready, ns (Table 2, t2).
+const SYNC_TO_DATA_READY_NS: u64 = 600_000;
+/// GPIO_CTRL: DIO4 is an output, and no input of a sample clock.
+const DIO4_IS_OUTPUT: u16 = 1 << 3;
+/// A frame of ones.
+const DUMMY_FRAME: u16 = 0xFFFF;
+/// The write of 0 to the upper byte of GLOB_CMD.
+const SECOND_COMMAND_BYTE: u16 = 0xBF00;
 /// Size of a count of AUX_DAC, V.
 const AUX_DAC_LSB: f64 = 0.8059e-3;
 
@@ -33,8 +48,10 @@ impl VirtualAdis16405 {
         self.spi.select(self.now_ns);
     }
 
-    /// Chip select rises. An incomplete burst or frame is dropped; a pulse without a byte ends a sleep.
+    /// Chip select rises. An incomplete burst or frame is dropped; 20 µs or more of chip select low end a sleep, with or
+    /// without bytes (data sheet Rev. B, page 13 and Table 1).
     pub fn deselect(&mut self) {
+        self.wake_by_select(true);
         let end = self.spi.deselect(self.now_ns);
         if self.is_alive() {
             if end.in_frame {
@@ -42,12 +59,26 @@ impl VirtualAdis16405 {
             }
             if end.in_frame || end.in_burst {
                 let bytes = end.bytes.unwrap_or(0);
-                self.violations.add(self.now_ns, ViolationKind::FrameLength { bytes });
-            }
-            if end.bytes == Some(0) {
-                self.wake();
+                self.bus_log.violation(self.now_ns, ViolationKind::FrameLength { bytes });
             }
         }
+    }
+
+    /// Ends a sleep if chip select has been low for long enough.
+    fn wake_by_select(&mut self, is_rising: bool) {
+        let Some(low_ns) = self.spi.wake_pulse_ns(self.now_ns).filter(|_| self.is_alive() && self.is_asleep()) else {
+            return;
+        };
+        if low_ns >= LEAST_WAKE_PULSE_NS {
+            self.wake();
+        } else if is_rising {
+            let least_ns = LEAST_WAKE_PULSE_NS;
+            self.bus_log.violation(self.now_ns, ViolationKind::WakePulse { low_ns, least_ns });
+        }
+    }
+
+    fn is_asleep(&self) -> bool {
+        matches!(self.activity, Some((Activity::Sleep, _)))
     }
 
     /// Exchanges one 16-bit word.
@@ -58,15 +89,16 @@ impl VirtualAdis16405 {
     /// Exchanges half a word, the upper byte first.
     pub fn transfer_byte(&mut self, byte: u8) -> u8 {
         if !self.spi.is_selected() {
-            self.violations.add(self.now_ns, ViolationKind::NotSelected);
+            self.bus_log.violation(self.now_ns, ViolationKind::NotSelected);
             return FLOATING;
         }
+        self.wake_by_select(false);
         if self.spi.at_word_begin() && self.is_alive() {
-            if let Some(activity) = self.silent_activity() {
-                self.violations.add(self.now_ns, ViolationKind::Busy { activity });
+            if self.silent_activity().is_some() {
                 self.answer_while_busy();
             }
-            let start = self.spi.begin_word(self.now_ns, self.is_low_power(), &mut self.violations);
+            let smpl_prd = self.registers.read(registers::SMPL_PRD);
+            let start = self.spi.begin_word(self.now_ns, smpl_prd, &mut self.bus_log);
             if start == WordStart::Garbled {
                 self.diagnosis |= diagnosis::SPI;
             }
@@ -109,8 +141,16 @@ impl VirtualAdis16405 {
     fn execute(&mut self, word: u16) {
         let [upper, lower] = word.to_be_bytes();
         let address = upper & 0x7F;
-        if self.silent_activity().is_some() {
+        if let Some(activity) = self.silent_activity() {
             self.answer_while_busy();
+            if word == SECOND_COMMAND_BYTE && !self.spi.is_pedantic() {
+                self.bus_log.note(self.now_ns, NoteKind::SecondCommandByte);
+            } else {
+                self.bus_log.violation(self.now_ns, ViolationKind::Busy { activity });
+            }
+        } else if word == DUMMY_FRAME && !self.spi.is_pedantic() {
+            self.bus_log.note(self.now_ns, NoteKind::DummyFrame);
+            self.spi.answer(UNDEFINED);
         } else if upper & 0x80 != 0 {
             self.spi.answer(UNDEFINED);
             self.write(address, lower);
@@ -128,7 +168,7 @@ impl VirtualAdis16405 {
 impl VirtualAdis16405 {
     fn read(&mut self, address: u8) -> u16 {
         if !registers::readable(address) {
-            self.violations.add(self.now_ns, ViolationKind::Address { address, write: false });
+            self.bus_log.violation(self.now_ns, ViolationKind::Address { address, write: false });
             return UNDEFINED;
         }
         match address & 0x7E {
@@ -163,7 +203,11 @@ impl VirtualAdis16405 {
 
     fn write(&mut self, address: u8, byte: u8) {
         if !registers::writable(address) {
-            self.violations.add(self.now_ns, ViolationKind::Address { address, write: true });
+            if byte == 0 && registers::is_unused_byte(address) && !self.spi.is_pedantic() {
+                self.bus_log.note(self.now_ns, NoteKind::UnusedByte { address });
+            } else {
+                self.bus_log.violation(self.now_ns, ViolationKind::Address { address, write: true });
+            }
             return;
         }
         if address == registers::GLOB_CMD {
@@ -172,6 +216,9 @@ impl VirtualAdis16405 {
         }
         let before = self.registers.clone();
         self.registers.write_byte(address, byte);
+        if address == registers::SENS_AVG_UPPER {
+            self.lengthen_filter();
+        }
         let changed = |register| before.read(register) != self.registers.read(register);
         let (filter, period) = (changed(registers::SENS_AVG), changed(registers::SMPL_PRD));
         if filter {
@@ -187,6 +234,15 @@ impl VirtualAdis16405 {
         }
     }
 
+    /// Raises the taps of the filter to the least that the range allows: a range limits them, and so can change the filter
+    /// (data sheet Rev. B, page 14).
+    fn lengthen_filter(&mut self) {
+        let sens_avg = self.registers.read(registers::SENS_AVG);
+        if let Some(least) = SensAvg::least_taps_log2(sens_avg).filter(|least| sens_avg & 0b111 < u16::from(*least)) {
+            self.registers.store(registers::SENS_AVG, sens_avg & !0b111 | u16::from(least));
+        }
+    }
+
     /// Starts the self-test or flash test whose bit of MSC_CTRL is set.
     fn start_test(&mut self) {
         let control = self.registers.read(registers::MSC_CTRL);
@@ -198,6 +254,7 @@ impl VirtualAdis16405 {
 
     fn sleep(&mut self) {
         let count = self.registers.read(registers::SLP_CNT);
+        self.spi.fall_asleep();
         self.registers.store(registers::SLP_CNT, 0);
         if count & INDEFINITE_SLEEP != 0 {
             self.begin_until(Activity::Sleep, u64::MAX);
@@ -240,18 +297,41 @@ impl VirtualAdis16405 {
             .unwrap_or_else(|| (1..=4).contains(&line) && self.levels() >> (line - 1) & 1 != 0)
     }
 
-    /// Drives DIO`line`, 1 to 4, from outside. Without effect on a line that the part drives.
+    /// Drives DIO`line`, 1 to 4, from outside. Without effect on a line that the part drives. With SMPL_PRD = 0 and
+    /// GPIO_CTRL\[3\] = 0 DIO4 is the external sample clock: 600 µs after it rises a sample is taken, if it stays high for 5 µs and
+    /// has not risen in the 833 µs before (data sheet Rev. B, Table 2, Figure 4 and page 14).
     pub fn drive_pin(&mut self, line: u8, high: bool) {
         if let 1..=4 = line {
             let bit = 1 << (line - 1);
+            let was_high = self.driven & bit != 0;
             self.driven = if high { self.driven | bit } else { self.driven & !bit };
+            if line == 4 && high != was_high && self.registers.read(registers::SMPL_PRD) == 0 {
+                self.clock_edge(high);
+            }
         }
     }
 
-    /// An edge of the external sample clock. Takes a sample if SMPL_PRD selects that clock (0).
-    pub fn external_clock_edge(&mut self) {
-        if self.registers.read(registers::SMPL_PRD) == 0 {
-            self.sample_externally();
+    /// An edge of the external sample clock.
+    fn clock_edge(&mut self, rising: bool) {
+        if self.registers.read(registers::GPIO_CTRL) & DIO4_IS_OUTPUT != 0 {
+            return;
+        }
+        let since_ns = self.clock_rose_at_ns.map(|at_ns| self.now_ns - at_ns);
+        match since_ns {
+            Some(period_ns) if rising && period_ns < LEAST_SYNC_PERIOD_NS => {
+                let least_ns = LEAST_SYNC_PERIOD_NS;
+                self.bus_log.violation(self.now_ns, ViolationKind::SyncPeriod { period_ns, least_ns });
+            }
+            Some(high_ns) if !rising && high_ns < LEAST_SYNC_PULSE_NS => {
+                let least_ns = LEAST_SYNC_PULSE_NS;
+                self.bus_log.violation(self.now_ns, ViolationKind::SyncPulse { high_ns, least_ns });
+                self.next_sample_sixteenths = None;
+            }
+            _ if rising => {
+                self.clock_rose_at_ns = Some(self.now_ns);
+                self.next_sample_sixteenths = Some((self.now_ns + SYNC_TO_DATA_READY_NS) * 16);
+            }
+            _ => {}
         }
     }
 

@@ -5,6 +5,10 @@
 //! map is that of the data sheet and shares no code with the driver. [`EmulatedBus`] puts it behind an embedded-hal
 //! [`SpiDevice`](embedded_hal::spi::SpiDevice), over which the driver reads it.
 //!
+//! Facts are those of the data sheet ADIS16400/ADIS16405 Rev. B, with page, table or figure where it matters. A controller that
+//! addresses the part too soon or clocks it too fast reads garbage and is not heard ([`Violation`]); what drivers of real parts
+//! do and the sheet neither shows nor forbids is accepted with a [`Note`]. [`Strictness`] changes both.
+//!
 //! What a real part may do and a forgiving model does not, each off unless it is asked for:
 //!
 //! | the part is | by |
@@ -12,7 +16,7 @@
 //! | cold: it starts up for 220 to 290 ms, and answers zeros, ones or garbage meanwhile | [`VirtualAdis16405::cold`], [`VirtualAdis16405::power_on`], [`VirtualAdis16405::set_start_up_ns`], [`VirtualAdis16405::set_busy_answers`] |
 //! | slow in its words of supply, magnetometers, temperature and auxiliary input | [`VirtualAdis16405::set_slow_refresh`] |
 //! | latched: a flag of DIAG_STAT is set, once or by a cause that persists | [`VirtualAdis16405::latch_flag`], [`VirtualAdis16405::hold_flag`] |
-//! | strict about chip select and stall: a frame that comes too soon is garbled and lost | [`VirtualAdis16405::set_strict_select`] |
+//! | lenient about its bus, or pedantic about chip select and unused bytes | [`VirtualAdis16405::set_strictness`] |
 //! | reset by its pin, or held in reset | [`EmulatedBus::reset_line`], [`VirtualAdis16405::drive_reset`] |
 //! | broken, without power, or another product | [`VirtualAdis16405::break_sensor`], [`VirtualAdis16405::damage_flash`], [`VirtualAdis16405::power_off`], [`VirtualAdis16405::set_prod_id`] |
 
@@ -39,4 +43,7 @@ pub use noise::{ChannelNoise, NoiseModel, NoiseSource};
 pub use part::VirtualAdis16405;
 pub use registers::OutputRegister;
 pub use signal_chain::CascadedBoxFilter;
-pub use spi::{MAX_SCK_BURST_HZ, MAX_SCK_NORMAL_HZ, MIN_STALL_NORMAL_NS, Violation, ViolationKind};
+pub use spi::{
+    MAX_SCK_BURST_HZ, MAX_SCK_NORMAL_HZ, MIN_READ_RATE_NORMAL_NS, MIN_STALL_NORMAL_NS, Note, NoteKind, Strictness,
+    Violation, ViolationKind,
+};

@@ -5,15 +5,13 @@ use crate::diagnosis::{self, Alarms};
 use crate::effects::SensorScenario;
 use crate::noise::NoiseModel;
 use crate::registers::{self, OutputRegister, RegisterFile};
-use crate::signal_chain::{AutoNull, SensAvg, SignalChain};
-use crate::spi::{SpiPort, Violation, ViolationKind, ViolationLog};
+use crate::signal_chain::{AutoNull, SensAvg, SignalChain, Stimulus};
+use crate::spi::{BusLog, NORMAL_MODE_MAX_SMPL_PRD, Note, SpiPort, Violation, ViolationKind};
 
 /// One tick of the sample clock, 1/1638.4 s, in sixteenths of a ns: an integer, so that sample times have no rounding error.
 const TICK_SIXTEENTHS: u64 = 9_765_625;
 /// Ticks in the slow time base of SMPL_PRD, 18.921 ms.
 const SLOW_TICKS: u64 = 31;
-/// A greater SMPL_PRD selects low-power mode.
-const NORMAL_MODE_MAX_SMPL_PRD: u16 = 0x08;
 /// Data ready enabled, MSC_CTRL.
 const DATA_READY_ENABLED: u16 = 1 << 2;
 
@@ -62,8 +60,10 @@ pub struct VirtualAdis16405 {
     /// Levels that DIO1 (bit 0) to DIO4 are driven to from outside.
     pub(crate) driven: u16,
     pub(crate) latched_dac: u16,
+    /// When the external sample clock rose last, ns.
+    pub(crate) clock_rose_at_ns: Option<u64>,
     pub(crate) spi: SpiPort,
-    pub(crate) violations: ViolationLog,
+    pub(crate) bus_log: BusLog,
 }
 
 impl VirtualAdis16405 {
@@ -108,7 +108,8 @@ impl VirtualAdis16405 {
             driven: 0,
             latched_dac: 0,
             spi: SpiPort::new(),
-            violations: ViolationLog::default(),
+            bus_log: BusLog::default(),
+            clock_rose_at_ns: None,
         };
         part.reset();
         part.restart_sampling(0);
@@ -142,7 +143,7 @@ impl VirtualAdis16405 {
     /// an external clock (SMPL_PRD = 0).
     pub fn next_data_ready(&self) -> u64 {
         let enabled = self.registers.read(registers::MSC_CTRL) & DATA_READY_ENABLED != 0;
-        if enabled { self.next_sample() } else { u64::MAX }
+        if enabled && !self.is_offline() { self.next_sample() } else { u64::MAX }
     }
 
     /// The counts of the latest sample, in the order of a burst; zeros before the first.
@@ -157,16 +158,31 @@ impl VirtualAdis16405 {
 
     /// The first thousand violations of the data sheet's rules by the controller, oldest first.
     pub fn violations(&self) -> &[Violation] {
-        &self.violations.first
+        &self.bus_log.violations
     }
 
     /// Number of all violations.
     pub fn violation_count(&self) -> u64 {
-        self.violations.count
+        self.bus_log.violation_count
+    }
+
+    /// The first thousand notes on what the part has accepted although the data sheet does not show it, oldest first.
+    pub fn notes(&self) -> &[Note] {
+        &self.bus_log.notes
+    }
+
+    /// Number of all notes.
+    pub fn note_count(&self) -> u64 {
+        self.bus_log.note_count
     }
 
     fn next_sample(&self) -> u64 {
         self.next_sample_sixteenths.map_or(u64::MAX, |sixteenths| sixteenths.div_ceil(16))
+    }
+
+    /// True if the samples that the part takes reach no output.
+    fn is_offline(&self) -> bool {
+        self.activity.is_some_and(|(activity, _)| activity.is_offline())
     }
 
     pub(crate) fn is_low_power(&self) -> bool {
@@ -189,7 +205,19 @@ impl VirtualAdis16405 {
 
     /// Begins a procedure of the usual duration.
     pub(crate) fn begin(&mut self, activity: Activity) {
-        self.begin_until(activity, self.now_ns + activity.duration_ns(self.is_low_power()));
+        self.begin_until(
+            activity,
+            self.now_ns + activity.duration_ns(self.is_low_power()) * self.lengthening(activity),
+        );
+    }
+
+    /// By how much a procedure takes longer at the present sample period. That of the self-test is stated for SMPL_PRD = 0x01
+    /// (data sheet Rev. B, Table 1); it is taken as so many samples, which is the longer one elsewhere.
+    fn lengthening(&self, activity: Activity) -> u64 {
+        match (activity, self.period_sixteenths()) {
+            (Activity::SelfTest, Some(period)) => period.div_ceil(2 * TICK_SIXTEENTHS),
+            _ => 1,
+        }
     }
 
     /// Begins a procedure that ends at `until_ns`.
@@ -243,20 +271,34 @@ impl VirtualAdis16405 {
                 self.diagnosis |= self.self_test_failures | diagnosis::SELF_TEST;
             }
             Activity::FlashTest if self.flash_damaged => self.diagnosis |= diagnosis::FLASH_CHECKSUM,
-            Activity::FlashUpdate if self.flash_damaged => self.diagnosis |= diagnosis::FLASH_UPDATE,
-            Activity::FlashUpdate => {
-                let writes = self.registers.read(registers::FLASH_CNT).wrapping_add(1);
-                self.registers.store(registers::FLASH_CNT, writes);
-                self.flash.copy_flash_registers(&self.registers);
+            Activity::FlashUpdate => self.write_flash(),
+            // Each sets all sensor data to 0 and updates the flash by itself (data sheet Rev. B, page 13).
+            Activity::FactoryRestore | Activity::AutoNull | Activity::PrecisionAutoNull => {
+                match activity {
+                    Activity::FactoryRestore => self.registers.restore_calibration(),
+                    _ => self.auto_null.apply(&mut self.registers),
+                }
+                self.write_flash();
+                self.signal_chain.clear();
             }
-            Activity::FactoryRestore => self.registers.restore_calibration(),
-            Activity::AutoNull | Activity::PrecisionAutoNull => self.auto_null.apply(&mut self.registers),
             Activity::Sleep => self.begin(Activity::WakeUp),
             _ => {}
         }
         if !activity.keeps_sampling() && activity != Activity::Sleep {
             self.restart_sampling(until_ns);
         }
+    }
+
+    /// Copies the registers to the flash; it needs the supply in its window (data sheet Rev. B, page 10).
+    fn write_flash(&mut self) {
+        let has_sampled = self.samples > self.samples_at_reset;
+        if self.flash_damaged || has_sampled && diagnosis::check_supply(self.signal_chain.counts()) != 0 {
+            self.diagnosis |= diagnosis::FLASH_UPDATE;
+            return;
+        }
+        let writes = self.registers.read(registers::FLASH_CNT).wrapping_add(1);
+        self.registers.store(registers::FLASH_CNT, writes);
+        self.flash.copy_flash_registers(&self.registers);
     }
 
     /// Starts the sample clock anew, unless it is external: the first sample comes one period after `from_ns`.
@@ -278,21 +320,32 @@ impl VirtualAdis16405 {
     }
 
     fn take_sample(&mut self) {
-        if let (Some(at), Some(period)) = (self.next_sample_sixteenths, self.period_sixteenths()) {
-            self.now_ns = self.now_ns.max(at.div_ceil(16));
-            self.next_sample_sixteenths = Some(at + period);
-            self.sample(at as f64 / 16e9, period as f64 / 16e9);
+        let Some(at) = self.next_sample_sixteenths.take() else { return };
+        self.now_ns = self.now_ns.max(at.div_ceil(16));
+        match self.period_sixteenths() {
+            Some(period) => {
+                self.next_sample_sixteenths = Some(at + period);
+                self.sample(at as f64 / 16e9, period as f64 / 16e9);
+            }
+            None => self.sample_externally(),
         }
     }
 
     fn sample(&mut self, time_s: f64, period_s: f64) {
         if !SensAvg::decode(&self.registers).valid {
             let sens_avg = self.registers.read(registers::SENS_AVG);
-            self.violations.add(self.now_ns, ViolationKind::Configuration { sens_avg });
+            self.bus_log.violation(self.now_ns, ViolationKind::Configuration { sens_avg });
         }
         let slow_due = (self.samples - self.samples_at_reset).is_multiple_of(u64::from(self.slow_refresh));
-        self.signal_chain.sample(&self.registers, time_s, period_s, slow_due);
+        let stimulus = match self.activity {
+            Some((Activity::SelfTest, _)) => Some(Stimulus::Positive),
+            _ => Stimulus::manual(&self.registers),
+        };
+        self.signal_chain.sample(&self.registers, stimulus, time_s, period_s, slow_due);
         self.auto_null.add(self.signal_chain.rates());
+        if self.is_offline() {
+            return;
+        }
         for (new, channel) in self.new_data.iter_mut().zip(OutputRegister::ALL) {
             *new |= slow_due || OutputRegister::INERTIAL.contains(&channel);
         }
@@ -300,7 +353,7 @@ impl VirtualAdis16405 {
         self.sampled_at_ns = Some(self.now_ns);
         let (counts, unfiltered) = (self.signal_chain.counts(), self.signal_chain.unfiltered());
         let found = diagnosis::check_supply(counts) | self.alarms.check(&self.registers, counts, unfiltered);
-        self.diagnosis |= found | self.held_flags;
+        self.diagnosis = self.diagnosis & !diagnosis::SUPPLY_FLAGS | found | self.held_flags;
     }
 
     /// Takes a sample by the external clock; its period is the time since the sample before.

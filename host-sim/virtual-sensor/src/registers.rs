@@ -54,10 +54,10 @@ impl OutputRegister {
     /// The gyros, then the accelerometers.
     pub const INERTIAL: [Self; 6] = [Self::GyroX, Self::GyroY, Self::GyroZ, Self::AcclX, Self::AcclY, Self::AcclZ];
 
-    /// Width of the data field: 14 bits, but 12 for supply, temperature and auxiliary input.
+    /// Width of the data field: 14 bits, but 12 for temperature and auxiliary input (data sheet Rev. B, Table 9).
     pub(crate) const fn bits(self) -> u32 {
         match self {
-            Self::Supply | Self::Temp | Self::AuxAdc => 12,
+            Self::Temp | Self::AuxAdc => 12,
             _ => 14,
         }
     }
@@ -135,6 +135,7 @@ pub(crate) const MSC_CTRL: u8 = 0x34;
 pub(crate) const MSC_CTRL_UPPER: u8 = 0x35;
 pub(crate) const SMPL_PRD: u8 = 0x36;
 pub(crate) const SENS_AVG: u8 = 0x38;
+pub(crate) const SENS_AVG_UPPER: u8 = 0x39;
 pub(crate) const SLP_CNT: u8 = 0x3A;
 pub(crate) const SLP_CNT_UPPER: u8 = 0x3B;
 pub(crate) const DIAG_STAT: u8 = 0x3C;
@@ -191,8 +192,9 @@ const REGISTER_MAP: [Entry; 39] = {
     ]
 };
 
-/// Offsets, hard-iron and soft-iron corrections: the registers that a factory restore resets.
-const CALIBRATION: std::ops::RangeInclusive<u8> = XGYRO_OFF..=0x30;
+/// Offsets and hard-iron corrections, Tables 10 to 12: the registers that a factory restore sets to 0 (data sheet Rev. B, page
+/// 13, where "Figure 12" stands for Table 12).
+const CALIBRATION: std::ops::RangeInclusive<u8> = XGYRO_OFF..=0x2A;
 
 fn find(address: u8) -> Option<&'static Entry> {
     REGISTER_MAP.iter().find(|entry| entry.address == address & 0x7E)
@@ -206,6 +208,11 @@ pub(crate) fn readable(address: u8) -> bool {
 /// True if the byte at `address` exists and can be written.
 pub(crate) fn writable(address: u8) -> bool {
     find(address).is_some_and(|entry| entry.access != Access::Read && (address & 1 == 0 || entry.bits > 8))
+}
+
+/// True if `address` is that of the upper byte of a register of 8 bits that can be written.
+pub(crate) fn is_unused_byte(address: u8) -> bool {
+    address & 1 == 1 && find(address).is_some_and(|entry| entry.access != Access::Read && entry.bits <= 8)
 }
 
 /// The contents of the registers, as a read gives them: those of signed ones with their sign extended.
@@ -259,7 +266,7 @@ impl RegisterFile {
         }
     }
 
-    /// Resets offsets, hard-iron and soft-iron corrections to their factory defaults.
+    /// Resets offsets and hard-iron corrections.
     pub(crate) fn restore_calibration(&mut self) {
         for entry in REGISTER_MAP.iter().filter(|entry| CALIBRATION.contains(&entry.address)) {
             self.words[usize::from(entry.address / 2)] = entry.reset;

@@ -14,7 +14,8 @@ const ACCL_OFFSET_LSB: f64 = 3.33e-3;
 const HARD_IRON_LSB: f64 = 0.5e-3;
 /// Soft-iron factor of 1, in counts.
 const SOFT_IRON_ONE: f64 = 2048.0;
-/// Response to the stimulus of the manual self-test, °/s and g; assumed, as no source gives that of a real part.
+/// Response to the stimulus of the self-test, °/s and g. Assumed: page 15 of the data sheet (Rev. B) refers to Table 1 for it,
+/// and Table 1 has none.
 const STIMULUS: [(OutputRegister, f64); 6] = [
     (OutputRegister::GyroX, 40.0),
     (OutputRegister::GyroY, 40.0),
@@ -84,12 +85,21 @@ impl SignalChain {
         self.filters = std::array::from_fn(|_| CascadedBoxFilter::new(taps));
     }
 
-    /// Takes the sample at `time_s`. Outputs that are not inertial keep their counts unless `slow_due`. The random numbers
-    /// drawn do not depend on the registers.
-    pub(crate) fn sample(&mut self, registers: &RegisterFile, time_s: f64, period_s: f64, slow_due: bool) {
+    /// Takes the sample at `time_s`, with the sensors deflected by `stimulus`. Outputs that are not inertial keep their counts
+    /// unless `slow_due`. The random numbers drawn do not depend on the registers.
+    pub(crate) fn sample(
+        &mut self,
+        registers: &RegisterFile,
+        stimulus: Option<Stimulus>,
+        time_s: f64,
+        period_s: f64,
+        slow_due: bool,
+    ) {
         let mut values = self.noise.sample();
         self.effects.disturb(&mut values, time_s, period_s);
-        stimulate(&mut values, registers);
+        if let Some(stimulus) = stimulus {
+            stimulate(&mut values, stimulus);
+        }
         let repeated = self.effects.repeats_sample();
         let gyro_lsb = SensAvg::decode(registers).gyro_lsb;
         for (index, channel) in OutputRegister::ALL.into_iter().enumerate() {
@@ -116,15 +126,35 @@ fn quantize(channel: OutputRegister, gyro_lsb: f64, value: f64) -> i16 {
     counts.clamp(f64::from(low), f64::from(high)) as i16
 }
 
-/// Adds the manual self-test: positive stimulus for MSC_CTRL bit 8, negative for bit 9.
-fn stimulate(values: &mut [f64; 12], registers: &RegisterFile) {
-    let sign = match registers.read(registers::MSC_CTRL) >> 8 & 0b11 {
-        0b01 => 1.0,
-        0b10 => -1.0,
-        _ => return,
-    };
+/// The force that a self-test applies to the sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stimulus {
+    /// To gyros and accelerometers.
+    Positive,
+    /// To gyros: Table 22 of the data sheet (Rev. B) names no others.
+    NegativeGyros,
+}
+
+impl Stimulus {
+    /// That of the manual self-test, MSC_CTRL bits 8 and 9.
+    pub(crate) fn manual(registers: &RegisterFile) -> Option<Self> {
+        match registers.read(registers::MSC_CTRL) >> 8 & 0b11 {
+            0b01 => Some(Self::Positive),
+            0b10 => Some(Self::NegativeGyros),
+            _ => None,
+        }
+    }
+}
+
+/// Adds the response to a stimulus. By the words of Table 22 the output of a gyro rises with the negative stimulus and falls
+/// with the positive one; the sign here is that of the stimulus.
+fn stimulate(values: &mut [f64; 12], stimulus: Stimulus) {
     for (channel, response) in STIMULUS {
-        values[channel as usize] += sign * response;
+        match stimulus {
+            Stimulus::Positive => values[channel as usize] += response,
+            Stimulus::NegativeGyros if OutputRegister::GYROS.contains(&channel) => values[channel as usize] -= response,
+            Stimulus::NegativeGyros => {}
+        }
     }
 }
 
@@ -150,23 +180,28 @@ fn has_filter(channel: OutputRegister) -> bool {
     !matches!(channel, OutputRegister::Supply | OutputRegister::Temp | OutputRegister::AuxAdc)
 }
 
-/// The digital filter of one channel: two cascaded averages of 2^M samples each (Bartlett window).
+/// The digital filter of one channel: two cascaded averages of N = 2^M samples each, and a delay of one sample. Together they
+/// are the Bartlett window of 2N + 1 taps, of which the first and the last are 0, with a phase of N samples (data sheet Rev. B,
+/// Figure 15).
 #[derive(Clone, Debug)]
 pub struct CascadedBoxFilter {
     stages: [MovingAverage; 2],
+    /// The output that is due with the next sample.
+    due: Option<f64>,
 }
 
 impl CascadedBoxFilter {
-    /// `taps_log2` is M, 0 to 6 in the part; M = 0 does not filter.
+    /// `taps_log2` is M, 0 to 6 in the part; M = 0 delays alone.
     pub fn new(taps_log2: u8) -> Self {
         let stage = MovingAverage { window: vec![0.0; 1 << taps_log2], position: 0, filled: false };
-        Self { stages: [stage.clone(), stage] }
+        Self { stages: [stage.clone(), stage], due: None }
     }
 
     /// Filters one value. The first value stands for all before it as well, so there is no transient from zero.
     pub fn filter(&mut self, value: f64) -> f64 {
         let [first, second] = &mut self.stages;
-        second.push(first.push(value))
+        let filtered = second.push(first.push(value));
+        self.due.replace(filtered).unwrap_or(filtered)
     }
 }
 
@@ -206,13 +241,23 @@ impl SensAvg {
     pub(crate) fn decode(registers: &RegisterFile) -> Self {
         let sens_avg = registers.read(registers::SENS_AVG);
         let taps = (sens_avg & 0b111) as u8;
-        let (gyro_lsb, least_taps) = match sens_avg >> 8 {
-            0b100 => (0.05, 0),
-            0b010 => (0.025, 2),
-            0b001 => (0.0125, 4),
-            _ => (0.05, u8::MAX),
+        let gyro_lsb = match sens_avg >> 8 {
+            0b010 => 0.025,
+            0b001 => 0.0125,
+            _ => 0.05,
         };
-        Self { gyro_lsb, taps_log2: taps.min(6), valid: (least_taps..=6).contains(&taps) }
+        let valid = Self::least_taps_log2(sens_avg).is_some_and(|least| (least..=6).contains(&taps));
+        Self { gyro_lsb, taps_log2: taps.min(6), valid }
+    }
+
+    /// The smallest M that the range of a SENS_AVG value allows (data sheet Rev. B, Table 17); `None` for no range.
+    pub(crate) fn least_taps_log2(sens_avg: u16) -> Option<u8> {
+        match sens_avg >> 8 {
+            0b100 => Some(0),
+            0b010 => Some(2),
+            0b001 => Some(4),
+            _ => None,
+        }
     }
 }
 

@@ -1,18 +1,93 @@
-//! The SPI port: frames of 16 bits, answers one frame later, burst reads; and the checker of the bus timing.
+//! The SPI port: frames of 16 bits, answers one frame later, burst reads; and the checker of the bus timing. Limits are those
+//! of Table 2 of the data sheet (Rev. B, page 6).
 
 use crate::activity::Activity;
 use std::fmt;
 
 /// Least pause between frames in normal mode, ns.
 pub const MIN_STALL_NORMAL_NS: u64 = 9_000;
-/// Least pause between frames in low-power mode, ns; no available source confirms it.
+/// Least pause between frames in low-power mode, ns.
 const MIN_STALL_LOW_POWER_NS: u64 = 75_000;
+/// Least time from one falling edge of chip select to the next in normal mode, ns.
+pub const MIN_READ_RATE_NORMAL_NS: u64 = 40_000;
+/// The same in low-power mode, ns.
+const MIN_READ_RATE_LOW_POWER_NS: u64 = 150_000;
 /// Highest SCK in normal mode, Hz.
 pub const MAX_SCK_NORMAL_HZ: u32 = 2_000_000;
 /// Highest SCK in a burst read, Hz.
 pub const MAX_SCK_BURST_HZ: u32 = 1_000_000;
 /// Highest SCK in low-power mode, Hz.
 const MAX_SCK_LOW_POWER_HZ: u32 = 300_000;
+/// Lowest SCK, Hz.
+const MIN_SCK_HZ: u32 = 10_000;
+
+/// What the part does about a controller that does not keep the data sheet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strictness {
+    /// Every violation is recorded, and none has consequences: data are right at any clock and pause.
+    Lenient,
+    /// A transaction that comes too soon or is clocked too fast is garbled: the controller reads wrong words until chip select
+    /// rises, no frame is executed, and DIAG_STAT bit 3 is set. What drivers of the part do and the data sheet neither shows
+    /// nor forbids is accepted, with a [`Note`].
+    #[default]
+    DataSheet,
+    /// What else gets a note is a violation and has its consequences too; and chip select must be high for a time between two
+    /// frames. The data sheet gives no least time. Drivers that raise chip select between frames keep it high for the
+    /// stall; the ADIS16470 needs 1 µs.
+    Pedantic {
+        /// Least time of chip select high, ns.
+        least_high_ns: u64,
+    },
+}
+
+/// Something that the part has accepted although the data sheet does not show it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Virtual time, ns.
+    pub at_ns: u64,
+    /// What it was.
+    pub kind: NoteKind,
+}
+
+/// What the part accepts with a note.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoteKind {
+    /// Chip select stayed low between two frames; Figure 11 shows it high.
+    SelectLow,
+    /// A write of 0 to the upper byte of a register of 8 bits.
+    UnusedByte {
+        /// Address of the byte.
+        address: u8,
+    },
+    /// A frame of ones, which some controllers send to receive an answer.
+    DummyFrame,
+    /// The write of 0 to the upper byte of GLOB_CMD that follows a command, while the part is busy with it.
+    SecondCommandByte,
+    /// SCK above 300 kHz at SMPL_PRD = 0x09, which is normal mode by Tables 1 and 2 and page 13, and low-power mode by Table 7.
+    FastClockAt0x09 {
+        /// The clock, Hz.
+        sck_hz: u32,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {:.6} s: ", self.at_ns as f64 * 1e-9)?;
+        match self.kind {
+            NoteKind::SelectLow => write!(f, "chip select low between two frames"),
+            NoteKind::UnusedByte { address } => write!(f, "write of 0 to the unused byte {address:#04x}"),
+            NoteKind::DummyFrame => write!(f, "frame 0xFFFF"),
+            NoteKind::SecondCommandByte => write!(f, "second byte of GLOB_CMD while the part is busy"),
+            NoteKind::FastClockAt0x09 { sck_hz } => {
+                write!(f, "SCK of {sck_hz} Hz at SMPL_PRD = 0x09, which Table 7 of the data sheet forbids")
+            }
+        }
+    }
+}
+
+/// The greatest SMPL_PRD of normal mode by Tables 1 and 2 and by page 13. Table 7 has 0x08: see
+/// [`NoteKind::FastClockAt0x09`].
+pub(crate) const NORMAL_MODE_MAX_SMPL_PRD: u16 = 0x09;
 
 /// The answer where the data sheet defines none: after a write, in the first frame of a burst, from a register that cannot
 /// be read.
@@ -39,8 +114,15 @@ pub enum ViolationKind {
         /// The least allowed, ns.
         least_ns: u64,
     },
-    /// Chip select was high for too short a time between frames, or not at all. Checked if the part is strict
-    /// ([`set_strict_select`](crate::VirtualAdis16405::set_strict_select)).
+    /// Too short a time from one falling edge of chip select to the next.
+    ReadRate {
+        /// The time, ns.
+        interval_ns: u64,
+        /// The least allowed, ns.
+        least_ns: u64,
+    },
+    /// Chip select was high for too short a time between frames, or not at all. Checked by a part that is
+    /// [pedantic](Strictness::Pedantic).
     SelectHigh {
         /// The time, ns.
         high_ns: u64,
@@ -54,6 +136,27 @@ pub enum ViolationKind {
         /// The least that resets the part, ns.
         least_ns: u64,
     },
+    /// The pulse on chip select was too short to wake the part.
+    WakePulse {
+        /// The time of chip select low, ns.
+        low_ns: u64,
+        /// The least that wakes the part, ns.
+        least_ns: u64,
+    },
+    /// The pulse of the external sample clock was too short.
+    SyncPulse {
+        /// The time, ns.
+        high_ns: u64,
+        /// The least allowed, ns.
+        least_ns: u64,
+    },
+    /// The pulses of the external sample clock come too fast.
+    SyncPeriod {
+        /// The time from one rising edge to the next, ns.
+        period_ns: u64,
+        /// The least allowed, ns.
+        least_ns: u64,
+    },
     /// Chip select rose inside a 16-bit frame or a burst.
     FrameLength {
         /// Whole bytes since chip select fell.
@@ -65,6 +168,13 @@ pub enum ViolationKind {
         sck_hz: u32,
         /// The highest allowed, Hz.
         most_hz: u32,
+    },
+    /// SCK too slow.
+    SlowClock {
+        /// The clock, Hz.
+        sck_hz: u32,
+        /// The lowest allowed, Hz.
+        least_hz: u32,
     },
     /// Clocked without chip select.
     NotSelected,
@@ -94,6 +204,21 @@ impl fmt::Display for Violation {
             ViolationKind::Stall { stall_ns, least_ns } => {
                 write!(f, "stall of {stall_ns} ns between frames, at least {least_ns} ns needed")
             }
+            ViolationKind::ReadRate { interval_ns, least_ns } => {
+                write!(f, "chip select fell {interval_ns} ns after the frame before, at least {least_ns} ns needed")
+            }
+            ViolationKind::WakePulse { low_ns, least_ns } => {
+                write!(f, "chip select low for {low_ns} ns while asleep, at least {least_ns} ns wake the part")
+            }
+            ViolationKind::SyncPulse { high_ns, least_ns } => {
+                write!(f, "pulse of the sample clock of {high_ns} ns, at least {least_ns} ns needed")
+            }
+            ViolationKind::SyncPeriod { period_ns, least_ns } => {
+                write!(f, "period of the sample clock of {period_ns} ns, at least {least_ns} ns needed")
+            }
+            ViolationKind::SlowClock { sck_hz, least_hz } => {
+                write!(f, "SCK of {sck_hz} Hz, at least {least_hz} Hz needed")
+            }
             ViolationKind::SelectHigh { high_ns, least_ns } => {
                 write!(f, "chip select high for {high_ns} ns between frames, at least {least_ns} ns needed")
             }
@@ -117,20 +242,29 @@ impl fmt::Display for Violation {
     }
 }
 
-/// All violations, counted; the first thousand are stored.
+/// All violations and notes, counted; the first thousand of each are stored.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct ViolationLog {
-    pub(crate) first: Vec<Violation>,
-    pub(crate) count: u64,
+pub(crate) struct BusLog {
+    pub(crate) violations: Vec<Violation>,
+    pub(crate) violation_count: u64,
+    pub(crate) notes: Vec<Note>,
+    pub(crate) note_count: u64,
 }
 
-impl ViolationLog {
+impl BusLog {
     const STORED: usize = 1000;
 
-    pub(crate) fn add(&mut self, at_ns: u64, kind: ViolationKind) {
-        self.count += 1;
-        if self.first.len() < Self::STORED {
-            self.first.push(Violation { at_ns, kind });
+    pub(crate) fn violation(&mut self, at_ns: u64, kind: ViolationKind) {
+        self.violation_count += 1;
+        if self.violations.len() < Self::STORED {
+            self.violations.push(Violation { at_ns, kind });
+        }
+    }
+
+    pub(crate) fn note(&mut self, at_ns: u64, kind: NoteKind) {
+        self.note_count += 1;
+        if self.notes.len() < Self::STORED {
+            self.notes.push(Note { at_ns, kind });
         }
     }
 }
@@ -140,13 +274,18 @@ impl ViolationLog {
 pub(crate) struct SpiPort {
     /// SCK, Hz; `None` if bytes take no time and the clock is not checked.
     pub(crate) sck_hz: Option<u32>,
-    /// The least time that chip select must be high between frames, ns, if the part is strict about it.
-    pub(crate) least_high_ns: Option<u64>,
+    pub(crate) strictness: Strictness,
     selected: bool,
+    /// When chip select fell last, ns.
+    selected_at_ns: u64,
+    /// Whether chip select has fallen since the part fell asleep.
+    may_wake: bool,
+    /// When chip select fell before the latest word, ns.
+    word_select_at_ns: Option<u64>,
     deselected_at_ns: Option<u64>,
     /// How long chip select was high before it fell, ns; `None` if it was never low before.
     high_ns: Option<u64>,
-    /// A rule of the strict part was violated since chip select fell.
+    /// A rule was violated since chip select fell.
     garbled: bool,
     bytes_since_select: usize,
     /// The first byte of a frame, until the second one comes.
@@ -176,7 +315,7 @@ pub(crate) struct Deselected {
     pub(crate) in_burst: bool,
 }
 
-/// Whether a word begins within the rules of a strict part.
+/// Whether a word begins within the rules of the part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WordStart {
     Sound,
@@ -199,8 +338,11 @@ impl SpiPort {
     pub(crate) fn new() -> Self {
         Self {
             sck_hz: None,
-            least_high_ns: None,
+            strictness: Strictness::default(),
             selected: false,
+            selected_at_ns: 0,
+            may_wake: false,
+            word_select_at_ns: None,
             deselected_at_ns: None,
             high_ns: None,
             garbled: false,
@@ -217,6 +359,21 @@ impl SpiPort {
         self.selected
     }
 
+    /// The part falls asleep: chip select, which is low, must fall anew to wake it.
+    pub(crate) fn fall_asleep(&mut self) {
+        self.may_wake = false;
+    }
+
+    /// How long chip select has been low, ns; `None` if it is high, or has been low since the part fell asleep.
+    pub(crate) fn wake_pulse_ns(&self, now_ns: u64) -> Option<u64> {
+        (self.selected && self.may_wake).then(|| now_ns - self.selected_at_ns)
+    }
+
+    /// Whether what gets a note is a violation.
+    pub(crate) fn is_pedantic(&self) -> bool {
+        matches!(self.strictness, Strictness::Pedantic { .. })
+    }
+
     /// Whether the next byte is the first of a word.
     pub(crate) fn at_word_begin(&self) -> bool {
         self.upper_byte.is_none()
@@ -230,6 +387,8 @@ impl SpiPort {
     /// Chip select falls.
     pub(crate) fn select(&mut self, now_ns: u64) {
         self.selected = true;
+        self.selected_at_ns = now_ns;
+        self.may_wake = true;
         self.high_ns = self.deselected_at_ns.map(|at_ns| now_ns - at_ns);
         self.garbled = false;
         self.bytes_since_select = 0;
@@ -246,40 +405,79 @@ impl SpiPort {
         }
     }
 
-    /// Loads the word that goes out next and checks chip select, pause and clock before it.
-    pub(crate) fn begin_word(&mut self, now_ns: u64, low_power: bool, violations: &mut ViolationLog) -> WordStart {
-        if self.garbled {
-            self.outgoing = garble(self.answer);
-            return WordStart::Garbled;
+    /// Loads the word that goes out next and checks chip select, pauses and clock before it.
+    pub(crate) fn begin_word(&mut self, now_ns: u64, smpl_prd: u16, log: &mut BusLog) -> WordStart {
+        if !self.garbled {
+            let violated = match &self.burst {
+                None => self.check_frame(now_ns, smpl_prd, log),
+                Some(burst) => {
+                    let most_hz =
+                        if smpl_prd > NORMAL_MODE_MAX_SMPL_PRD { MAX_SCK_LOW_POWER_HZ } else { MAX_SCK_BURST_HZ };
+                    burst.next == 0 && self.clock_is_wrong(now_ns, most_hz, log)
+                }
+            };
+            self.garbled = violated && self.strictness != Strictness::Lenient;
         }
-        if let (None, Some(least_ns)) = (&self.burst, self.least_high_ns) {
-            let high_ns = if self.bytes_since_select > 0 { Some(0) } else { self.high_ns };
-            if let Some(high_ns) = high_ns.filter(|high_ns| *high_ns < least_ns) {
-                violations.add(now_ns, ViolationKind::SelectHigh { high_ns, least_ns });
-                self.garbled = true;
-            }
-        }
-        let (least_ns, most_hz) = match (low_power, &self.burst) {
-            (true, _) => (MIN_STALL_LOW_POWER_NS, MAX_SCK_LOW_POWER_HZ),
-            (false, None) => (MIN_STALL_NORMAL_NS, MAX_SCK_NORMAL_HZ),
-            (false, Some(_)) => (MIN_STALL_NORMAL_NS, MAX_SCK_BURST_HZ),
+        let word = self.burst.as_ref().map_or(self.answer, |burst| burst.words[burst.next]);
+        self.outgoing = if self.garbled { garble(word) } else { word };
+        if self.garbled { WordStart::Garbled } else { WordStart::Sound }
+    }
+
+    /// Checks the pauses and the clock of a frame; true if a rule is violated.
+    fn check_frame(&mut self, now_ns: u64, smpl_prd: u16, log: &mut BusLog) -> bool {
+        let is_first = self.bytes_since_select == 0;
+        let low_power = smpl_prd > NORMAL_MODE_MAX_SMPL_PRD;
+        let (least_stall_ns, least_interval_ns, most_hz) = if low_power {
+            (MIN_STALL_LOW_POWER_NS, MIN_READ_RATE_LOW_POWER_NS, MAX_SCK_LOW_POWER_HZ)
+        } else {
+            (MIN_STALL_NORMAL_NS, MIN_READ_RATE_NORMAL_NS, MAX_SCK_NORMAL_HZ)
         };
-        if let (None, Some(end_ns)) = (&self.burst, self.last_word_end_ns) {
-            let stall_ns = now_ns - end_ns;
-            if stall_ns < least_ns {
-                violations.add(now_ns, ViolationKind::Stall { stall_ns, least_ns });
-                self.garbled |= self.least_high_ns.is_some();
+        let mut violated = false;
+        let mut violation = |kind| {
+            log.violation(now_ns, kind);
+            violated = true;
+        };
+        if let Strictness::Pedantic { least_high_ns: least_ns } = self.strictness {
+            let high_ns = if is_first { self.high_ns } else { Some(0) };
+            if let Some(high_ns) = high_ns.filter(|high_ns| *high_ns < least_ns) {
+                violation(ViolationKind::SelectHigh { high_ns, least_ns });
             }
         }
-        if let Some(sck_hz) = self.sck_hz.filter(|hz| *hz > most_hz) {
-            violations.add(now_ns, ViolationKind::Clock { sck_hz, most_hz });
+        let stall_ns = self.last_word_end_ns.map(|end_ns| now_ns - end_ns);
+        if let Some(stall_ns) = stall_ns.filter(|stall_ns| *stall_ns < least_stall_ns) {
+            violation(ViolationKind::Stall { stall_ns, least_ns: least_stall_ns });
+        } else if is_first
+            && let Some(before_ns) = self.word_select_at_ns
+            && self.selected_at_ns - before_ns < least_interval_ns
+        {
+            let interval_ns = self.selected_at_ns - before_ns;
+            violation(ViolationKind::ReadRate { interval_ns, least_ns: least_interval_ns });
         }
-        if self.garbled {
-            self.outgoing = garble(self.answer);
-            return WordStart::Garbled;
+        self.word_select_at_ns = Some(self.selected_at_ns);
+        if !is_first && !self.is_pedantic() {
+            log.note(now_ns, NoteKind::SelectLow);
         }
-        self.outgoing = self.burst.as_ref().map_or(self.answer, |burst| burst.words[burst.next]);
-        WordStart::Sound
+        if let (NORMAL_MODE_MAX_SMPL_PRD, Some(sck_hz)) =
+            (smpl_prd, self.sck_hz.filter(|hz| *hz > MAX_SCK_LOW_POWER_HZ))
+        {
+            if self.is_pedantic() {
+                return self.clock_is_wrong(now_ns, MAX_SCK_LOW_POWER_HZ, log) || violated;
+            }
+            log.note(now_ns, NoteKind::FastClockAt0x09 { sck_hz });
+        }
+        self.clock_is_wrong(now_ns, most_hz, log) || violated
+    }
+
+    /// Checks the clock; true if it is beyond its limits.
+    fn clock_is_wrong(&self, now_ns: u64, most_hz: u32, log: &mut BusLog) -> bool {
+        match self.sck_hz {
+            Some(sck_hz) if sck_hz > most_hz => log.violation(now_ns, ViolationKind::Clock { sck_hz, most_hz }),
+            Some(sck_hz) if sck_hz < MIN_SCK_HZ => {
+                log.violation(now_ns, ViolationKind::SlowClock { sck_hz, least_hz: MIN_SCK_HZ });
+            }
+            _ => return false,
+        }
+        true
     }
 
     /// Exchanges a byte, the upper one of a word first.
@@ -298,11 +496,8 @@ impl SpiPort {
     /// Ends a word. Returns true if it was a frame to be executed, false if it was garbled or part of a burst.
     pub(crate) fn end_word(&mut self, now_ns: u64) -> bool {
         self.last_word_end_ns = Some(now_ns);
-        if self.garbled {
-            return false;
-        }
         let Some(burst) = &mut self.burst else {
-            return true;
+            return !self.garbled;
         };
         burst.next += 1;
         if burst.next == burst.words.len() {

@@ -1,9 +1,11 @@
 //! The real driver reads the virtual part: configuration, samples, timing and violations. Numbers are those of the data sheet.
 
-use adis16405_driver::{Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, Register, SamplePeriod};
+use adis16405_driver::{
+    Adis16405, BurstValidator, Channel, Config, Counts, Faults, GyroRange, PerClockMode, Register, SamplePeriod, Timing,
+};
 
 use virtual_sensor::{
-    Activity, EmulatedBus, NoiseModel, OutputRegister, ViolationKind, VirtualAdis16405, VirtualDelay,
+    Activity, EmulatedBus, NoiseModel, OutputRegister, Strictness, ViolationKind, VirtualAdis16405, VirtualDelay,
 };
 
 fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
@@ -38,9 +40,95 @@ fn low_power_mode_needs_a_slow_clock() {
     imu.burst().unwrap();
     assert_eq!(bus.part().violations(), []);
 
-    let (bus, _) = on_bus(NoiseModel::paper(), slow);
-    let kind = bus.part().violations()[0].kind;
-    assert_eq!(kind, ViolationKind::Clock { sck_hz: 1_000_000, most_hz: 300_000 });
+    let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::paper(), 1));
+    assert!(Adis16405::new(bus.clone(), bus.delay(), slow).init().is_err(), "garbled");
+    let clock = ViolationKind::Clock { sck_hz: 1_000_000, most_hz: 300_000 };
+    assert!(bus.part().violations().iter().any(|violation| violation.kind == clock));
+}
+
+/// Data sheet Rev. B, Table 2: from one falling edge of chip select to the next at least 40 µs in normal mode and 150 µs in low-power
+/// mode, at every clock that the mode allows.
+#[test]
+fn the_driver_keeps_the_read_rate_at_every_clock() {
+    for (smpl_prd, clocks_hz) in
+        [(0x01, &[2_000_000, 1_000_000, 656_250, 300_000, 10_000][..]), (0x0F, &[300_000, 100_000])]
+    {
+        for &sck_hz in clocks_hz {
+            for known in [false, true] {
+                let config = config(GyroRange::Dps300, 2, smpl_prd);
+                let bus = EmulatedBus::with_sck_hz(VirtualAdis16405::new(NoiseModel::noiseless(), 1), sck_hz);
+                let mut imu = Adis16405::new(bus.clone(), bus.delay(), config).with_stall_ns(9_000);
+                if known {
+                    imu = imu.with_sck_hz(sck_hz);
+                }
+                let stall_ns = PerClockMode { normal: 9_000, low_power: 75_000 };
+                let timing = imu.timing();
+                let mut imu = imu.with_timing(Timing { stall_ns, ..timing });
+                imu.init().unwrap();
+                let registers = [Register::ProdId, Register::SmplPrd, Register::SensAvg];
+                assert_eq!(imu.read_registers(registers), Ok([16405, u16::from(smpl_prd), 0x0402]), "{sck_hz} Hz");
+                assert_eq!(bus.part().violations(), [], "{sck_hz} Hz, known: {known}");
+            }
+        }
+    }
+}
+
+/// Where the data sheet contradicts itself, at SMPL_PRD = 0x09, the driver names the slow clock (Table 7).
+#[test]
+fn at_0x09_the_driver_takes_the_safe_side() {
+    let config = config(GyroRange::Dps300, 2, 0x09);
+    let sck_hz = Timing::DEFAULT.clock_mode(0x09).max_sck_hz();
+    let bus = EmulatedBus::with_sck_hz(VirtualAdis16405::new(NoiseModel::noiseless(), 1), sck_hz);
+    let mut imu = Adis16405::new(bus.clone(), bus.delay(), config);
+    imu.init().unwrap();
+    bus.wait_for_data();
+    assert!(imu.read().is_ok());
+    assert_eq!((bus.part().violations(), bus.part().notes()), (&[][..], &[][..]));
+}
+
+/// What the driver sends needs no tolerance.
+#[test]
+fn a_pedantic_part_has_nothing_to_note() {
+    let mut part = VirtualAdis16405::new(NoiseModel::paper(), 1);
+    part.set_strictness(Strictness::Pedantic { least_high_ns: 1_000 });
+    let bus = EmulatedBus::new(part);
+    let mut imu = Adis16405::new(bus.clone(), bus.delay(), config(GyroRange::Dps75, 4, 7));
+    imu.init().unwrap();
+    imu.software_reset().unwrap();
+    bus.wait_for_data();
+    imu.read().unwrap();
+    assert_eq!((bus.part().violations(), bus.part().notes()), (&[][..], &[][..]));
+}
+
+/// The outputs after the positive stimulus is switched on, 40 °/s in the gyros: the sum of the weights of the samples that the
+/// filter has taken since, which are those of the driver's filter. And after an internal self-test, which applies the same, the filter
+/// still mixes its samples.
+#[test]
+fn a_step_passes_the_filter_with_the_weights_of_the_driver() {
+    let config = config(GyroRange::Dps300, 3, 1);
+    let (bus, mut imu) = on_bus(NoiseModel::noiseless(), config);
+    bus.wait_for_data();
+    imu.write_register(Register::MscCtrl, 0x0106).unwrap();
+    let mut expected = 0.0;
+    for age in 0..20 {
+        expected += 800.0 * config.filter().weight(age);
+        bus.wait_for_data();
+        let x = imu.burst().unwrap().counts().gyro()[0];
+        assert!((f64::from(x) - expected).abs() <= 0.5 + 1e-9, "sample {age}: {x}, expected {expected}");
+    }
+    assert_eq!(expected.round(), 800.0);
+
+    let (bus, mut imu) = on_bus(NoiseModel::noiseless(), config);
+    assert!(imu.self_test().unwrap().passed());
+    let x = || {
+        bus.wait_for_data();
+        bus.part().counts()[1]
+    };
+    assert!(x() > 400, "the filter mixes the samples of the self-test");
+    for _ in 0..config.filter().length() + 2 {
+        x();
+    }
+    assert_eq!(x(), 0);
 }
 
 #[test]
@@ -80,7 +168,7 @@ fn a_new_period_counts_from_the_write() {
         part.transfer(0xB600 | smpl_prd);
         part.deselect();
         assert!(((part.next_data_ready() - part.now()) as f64 - period_ns).abs() <= 1.0, "{smpl_prd:#04x}");
-        part.advance_to(part.now() + 20_000);
+        part.advance_to(part.now() + 150_000);
     }
     part.select();
     part.transfer(0xB600);
@@ -130,7 +218,7 @@ fn answers_come_one_frame_later() {
         part.select();
         answers.push(part.transfer(word));
         part.deselect();
-        part.advance_to(part.now() + 9_000);
+        part.advance_to(part.now() + 40_000);
     }
     assert_eq!(answers[1..], [0x4015, 0x0402, 0x4015]);
     assert_eq!(part.violations(), []);
@@ -183,8 +271,11 @@ fn a_supply_alarm_sets_diag_stat_which_clears_on_read() {
 #[test]
 fn violations_of_the_bus_timing_are_recorded() {
     let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::noiseless(), 1));
-    let mut too_fast = Adis16405::new(bus.clone(), bus.delay(), Config::default()).with_stall_ns(8_999);
-    too_fast.read_register(Register::ProdId).unwrap();
+    let read_rate_ns = PerClockMode { normal: 0, low_power: 0 };
+    let stall_ns = PerClockMode { normal: 8_999, low_power: 8_999 };
+    let timing = Timing { stall_ns, read_rate_ns, ..Timing::DEFAULT };
+    let mut too_fast = Adis16405::new(bus.clone(), bus.delay(), Config::default()).with_timing(timing);
+    assert_ne!(too_fast.read_register(Register::ProdId), Ok(0x4015), "garbled");
     let kind = ViolationKind::Stall { stall_ns: 8_999, least_ns: 9_000 };
     assert_eq!(bus.part().violations().iter().map(|violation| violation.kind).collect::<Vec<_>>(), [kind]);
 
@@ -193,6 +284,7 @@ fn violations_of_the_bus_timing_are_recorded() {
     part.select();
     part.transfer_byte(0x56);
     part.deselect();
+    part.advance_to(part.now() + 40_000);
     part.select();
     part.transfer(0x3E00);
     part.transfer(0x0000);
@@ -218,10 +310,14 @@ fn violations_of_the_bus_timing_are_recorded() {
 #[test]
 fn a_sample_with_an_invalid_range_and_filter_is_a_violation() {
     let mut part = VirtualAdis16405::new(NoiseModel::noiseless(), 1);
-    part.select();
-    part.transfer(0xB901);
-    part.deselect();
-    assert_eq!(part.violations(), []);
+    // The range raises the taps to the least that it allows (page 14); a filter that is written after it does not.
+    for (word, sens_avg) in [(0xB901, 0x0104), (0xB802, 0x0102)] {
+        part.advance_to(part.now() + 40_000);
+        part.select();
+        part.transfer(word);
+        part.deselect();
+        assert_eq!(part.violations(), [], "{sens_avg:#06x}");
+    }
     part.advance_to(part.next_data_ready());
     assert_eq!(part.violations()[0].kind, ViolationKind::Configuration { sens_avg: 0x0102 });
 }

@@ -79,14 +79,15 @@ fn channels_and_seeds_are_independent_and_repeatable() {
 fn the_impulse_response_of_the_filter_is_a_triangle() {
     let mut filter = CascadedBoxFilter::new(2);
     filter.filter(0.0);
-    let response: Vec<f64> = (0..8).map(|k| 16.0 * filter.filter(if k == 0 { 1.0 } else { 0.0 })).collect();
-    assert_eq!(response, [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
+    let response: Vec<f64> = (0..10).map(|k| 16.0 * filter.filter(if k == 0 { 1.0 } else { 0.0 })).collect();
+    // 2N + 1 taps with a phase of N samples (data sheet Rev. B, Figure 15), N = 4; a Bartlett window begins and ends with 0.
+    assert_eq!(response, [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0, 0.0]);
 }
 
 #[test]
-fn a_filter_of_one_tap_changes_nothing() {
+fn a_filter_of_one_tap_delays_by_its_phase_of_one_sample() {
     let mut filter = CascadedBoxFilter::new(0);
-    assert_eq!([3.0, -1.0, 0.25].map(|value| filter.filter(value)), [3.0, -1.0, 0.25]);
+    assert_eq!([3.0, -1.0, 0.25].map(|value| filter.filter(value)), [3.0, 3.0, -1.0]);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use adis16405_driver::{
     Product, Register, Sleep, Stimulus,
 };
 
-use virtual_sensor::{BusyAnswers, EmulatedBus, NoiseModel, OutputRegister, VirtualAdis16405};
+use virtual_sensor::{BusyAnswers, EmulatedBus, NoiseModel, OutputRegister, Strictness, VirtualAdis16405};
 
 /// Runs a future that is ready at once, as all futures of the emulated bus are.
 fn block_on<T>(future: impl Future<Output = T>) -> T {
@@ -26,7 +26,7 @@ fn block_on<T>(future: impl Future<Output = T>) -> T {
 fn demanding_part(model: NoiseModel) -> VirtualAdis16405 {
     let mut part = VirtualAdis16405::cold(model, 1);
     part.set_busy_answers(BusyAnswers::Garbage);
-    part.set_strict_select(Some(1_000));
+    part.set_strictness(Strictness::Pedantic { least_high_ns: 1_000 });
     part.set_slow_refresh(4);
     part
 }
@@ -118,12 +118,12 @@ fn a_self_test_keeps_the_diagnosis_from_before() {
 }
 
 #[test]
-fn a_stimulus_moves_every_inertial_sensor_both_ways() {
-    // The virtual part moves by 40 °/s and 0.5 g: 800 and 150.15 counts.
+fn a_stimulus_moves_the_gyros_both_ways_and_the_accelerometers_one() {
+    // The virtual part moves by 40 °/s and 0.5 g: 800 and 150.15 counts. The negative stimulus is for gyros only (Table 22).
     let expected = [800, 800, 800, 150, 150, 150];
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.stimulus_response(Stimulus::Positive) => Ok(expected);
-        expect imu.stimulus_response(Stimulus::Negative) => Ok(expected.map(|counts| -counts));
+        expect imu.stimulus_response(Stimulus::Negative) => Ok([-800, -800, -800, 0, 0, 0]);
         expect imu.read_register(Register::MscCtrl) => Ok(0x0006);
     );
 }
@@ -140,6 +140,15 @@ fn auto_null_zeroes_the_rates_and_keeps_a_negative_x_bias_on_the_host() {
         then assert_eq!(sample.gyro_udps(), [0, 0, 0]);
         then assert_eq!(sample.accl_ug(), [0, 0, -999_000]);
         expect imu.gyro_offsets() => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
+        // The part has written its flash by itself (page 13): a reset loads the negative correction of x, which must neither
+        // stay there nor be applied twice.
+        expect imu.flash_writes() => Ok(1);
+        expect imu.software_reset() => Ok(Product::Adis16405);
+        expect imu.gyro_offsets() => Ok(GyroBias { part: [0, -40, 40], host_x: -40 });
+        then assert!(!imu.x_sign_at_risk());
+        then for _ in 0..8 { bus.wait_for_data(); };
+        take sample = imu.read();
+        then assert_eq!(sample.gyro_udps(), [0, 0, 0]);
     );
 }
 
@@ -151,8 +160,13 @@ fn the_precision_auto_null_averages_for_thirty_silent_seconds() {
     }
     both_shells!(model.clone(), |bus, imu|
         given before = bus.part().now();
+        given samples = bus.part().samples();
         take bias = imu.precision_auto_null();
-        then assert!(bus.part().now() - before >= 30_000_000_000);
+        then assert!(bus.part().now() - before >= 30_050_000_000);
+        // 30 s offline, then a flash update (page 13).
+        // In 31 s it has sampled for 0.95 s: 778 times.
+        then assert!((770..790).contains(&(bus.part().samples() - samples)));
+        expect imu.flash_writes() => Ok(1);
         // White noise of 0.05 °/√s over 30 s leaves 0.0091 °/s, 0.73 counts; five of these.
         then for (offset, expected) in bias.total().into_iter().zip([40, -20, 0]) { assert!((offset - expected).abs() <= 4) };
     );
@@ -160,21 +174,19 @@ fn the_precision_auto_null_averages_for_thirty_silent_seconds() {
 
 #[test]
 fn a_factory_restore_returns_the_calibration_it_erased() {
-    let lost = FactoryRestore {
-        gyro: GyroBias { part: [0, 1, -2], host_x: -3 },
-        accl: [4, -5, 6],
-        hard_iron: [-7, 8, -9],
-        soft_iron: [0x0801, 0x0000, 0x0FFF],
-    };
-    let restored =
-        FactoryRestore { gyro: GyroBias::default(), accl: [0; 3], hard_iron: [0; 3], soft_iron: [0x0800; 3] };
+    let lost =
+        FactoryRestore { gyro: GyroBias { part: [0, 1, -2], host_x: -3 }, accl: [4, -5, 6], hard_iron: [-7, 8, -9] };
+    let restored = FactoryRestore { gyro: GyroBias::default(), accl: [0; 3], hard_iron: [0; 3] };
+    let soft_iron = [0x0801, 0x0000, 0x0FFF];
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.set_gyro_offsets([-3, 1, -2]) => Ok(lost.gyro);
         expect imu.set_accl_offsets(lost.accl) => Ok(());
         expect imu.set_hard_iron(lost.hard_iron) => Ok(());
-        expect imu.set_soft_iron(lost.soft_iron) => Ok(());
+        expect imu.set_soft_iron(soft_iron) => Ok(());
         expect imu.factory_restore() => Ok(lost);
         expect imu.factory_restore() => Ok(restored);
+        expect imu.soft_iron() => Ok(soft_iron);
+        expect imu.flash_writes() => Ok(2);
     );
 }
 
@@ -290,12 +302,19 @@ fn lines_show_data_ready_and_gpio_levels() {
 #[test]
 fn an_external_clock_triggers_the_samples() {
     both_shells!(NoiseModel::noiseless(), |bus, imu|
+        // DIO4 must be an input (page 14).
+        expect imu.set_gpio(Gpio { outputs: Dio::DIO4, high: Dio::empty() }) => Ok(());
         expect imu.configure(Config::default().with_external_clock()) => Ok(());
         given taken = bus.part().samples();
         given now = bus.part().now();
         then bus.advance_to(now + 1_000_000_000);
         then assert_eq!(bus.part().samples(), taken);
-        then bus.part_mut().external_clock_edge();
+        // Data ready comes 600 µs after the rising edge (Table 2, t2).
+        then bus.part_mut().drive_pin(4, true);
+        given rose = bus.part().now();
+        then bus.advance_to(rose + 5_000);
+        then bus.part_mut().drive_pin(4, false);
+        then assert_eq!(bus.wait_for_data(), Some(rose + 600_000));
         then assert_eq!(bus.part().samples(), taken + 1);
         take burst = imu.burst();
         then assert_eq!(burst.faults(), Faults::empty());
