@@ -309,7 +309,8 @@ fn a_sensor_that_was_reset_is_configured_again() {
     assert_eq!(health.used, health.bursts);
     let lost = health.lost_edges + health.suspect;
     assert!((20..250).contains(&lost), "{health:?}");
-    assert!(u64::from(health.used + lost).abs_diff((6.0 * 204.8) as u64) < 10, "{health:?}");
+    // The self-test of the first probe takes 12 ms at 819.2 SPS (data sheet Rev. B, Table 1), 48 ms here: 10 samples.
+    assert!(u64::from(health.used + lost).abs_diff((6.0 * 204.8) as u64) < 10 + 10, "{health:?}");
 }
 
 /// An epoch accumulates, reports, fits its model and begins again. From the second on, the model of the one before is
@@ -386,6 +387,7 @@ fn a_negative_x_bias_in_the_sensor_costs_no_sample() {
         part.transfer(word);
         part.deselect();
     }
+    part.advance_to(300_000);
     let mut device = Device::new(part, Device::blank_memory());
     let health = *after(&mut device, "", 11 * SECOND).health();
     assert!(health.bursts > 2_000, "{health:?}");
