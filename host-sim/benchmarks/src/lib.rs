@@ -1,5 +1,7 @@
-//! Benchmarks of the noise analysis on simulated recordings, whose true noise and effects are known.
+//! Benchmarks of the noise analysis on recordings whose true noise, or what is hidden in it, is known.
 
+pub mod contradictions;
+pub mod filtered_noise;
 pub mod losses;
 mod parallel;
 pub mod reproduction;

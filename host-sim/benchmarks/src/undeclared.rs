@@ -15,6 +15,7 @@ mod draw;
 mod effect;
 mod environment;
 mod generator;
+mod measured;
 mod outside;
 mod outside_limit;
 mod sample_loss;
@@ -27,7 +28,11 @@ mod tests;
 
 pub use draw::{DrawnRecording, RecordingGroup};
 pub use effect::EffectKind;
-pub use generator::TrueRecording;
+pub use generator::{Sampling, TrueRecording};
+pub use measured::{
+    HiddenKind, MeasuredErrors, MeasuredNoiseError, MeasuredNoisePlan, MeasuredNoiseTable, MeasuredScore,
+    NoiseRecording,
+};
 pub use outside::{OutsideEffect, OutsideKind};
 pub use score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
 pub use table::{Proportion, STRONG, ScoreTable};

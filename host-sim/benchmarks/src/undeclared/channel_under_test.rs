@@ -2,9 +2,7 @@
 //! of an effect in it.
 
 use super::generator::TrueRecording;
-use adis16405_driver::GyroRange;
 use nalgebra::{Matrix3, Vector3};
-use simulation::SAMPLE_RATE_HZ;
 use std::f64::consts::PI;
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister};
 
@@ -35,7 +33,7 @@ pub(super) struct RecordLength {
 impl RecordLength {
     /// Of a recording.
     pub(super) fn new(recording: &TrueRecording) -> Self {
-        Self { seconds: recording.seconds, period_s: 1.0 / SAMPLE_RATE_HZ }
+        Self { seconds: recording.seconds, period_s: recording.sampling.period_s() }
     }
 }
 
@@ -48,7 +46,7 @@ pub(super) fn baseline_density(noise: &ChannelNoise, period_s: f64, frequency: f
 }
 
 /// Two-sided densities of N, B and K of 1.
-fn baseline_densities(period_s: f64, frequency: f64) -> [f64; 3] {
+pub(super) fn baseline_densities(period_s: f64, frequency: f64) -> [f64; 3] {
     // The one-sided density of B is B²/(πf), twice the two-sided one.
     [1.0, 0.5 / (PI * frequency), (period_s / (2.0 * (PI * frequency * period_s).sin())).powi(2)]
 }
@@ -223,6 +221,8 @@ impl RecordLength {
 /// parameters of these other effects.
 pub(super) struct ChannelUnderTest<'a> {
     channel: OutputRegister,
+    /// Size of a count, in the unit of the channel.
+    resolution: f64,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: RecordLength,
     others: &'a [InjectedEffect],
@@ -230,12 +230,14 @@ pub(super) struct ChannelUnderTest<'a> {
 
 impl<'a> ChannelUnderTest<'a> {
     pub(super) fn new(recording: &'a TrueRecording, channel: OutputRegister, others: &'a [InjectedEffect]) -> Self {
-        Self { channel, noise: recording.noise.channel(channel), record: RecordLength::new(recording), others }
+        let resolution = recording.sampling.resolutions[simulation::channel(channel) as usize];
+        let (noise, record) = (recording.noise.channel(channel), RecordLength::new(recording));
+        Self { channel, resolution, noise, record, others }
     }
 
     /// Size of a count, in the unit of the channel.
     pub(super) fn resolution(&self) -> f64 {
-        simulation::channel(self.channel).lsb(GyroRange::Dps300)
+        self.resolution
     }
 
     fn others(&self) -> impl Iterator<Item = &InjectedEffect> {

@@ -7,14 +7,13 @@ use super::channel_under_test::{ChannelUnderTest, RecordLength};
 use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size, strength};
 use super::effect::{EffectKind, GYROS, draw_unit, scaled, size};
 use super::environment::log_uniform;
-use super::generator::TrueRecording;
+use super::generator::{Sampling, TrueRecording};
 use super::outside::{OutsideEffect, OutsideKind};
 use super::outside_limit::with_strength as outside_with_strength;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use simulation::SAMPLE_RATE_HZ;
 use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
@@ -113,7 +112,9 @@ impl DrawnRecording {
         let environment = environment(&mut random, kinds.contains(&EffectKind::Acceleration));
         let host_clock_ratio = 1.0 + random.random_range(-HOST_CLOCK_TOLERANCE..HOST_CLOCK_TOLERANCE);
         let scenario = SensorScenario { environment, effects: Vec::new() };
-        let mut simulation = TrueRecording { seconds, seed, noise, scenario, outside: Vec::new(), host_clock_ratio };
+        let sampling = Sampling::adis16405();
+        let outside = Vec::new();
+        let mut simulation = TrueRecording { sampling, seconds, seed, noise, scenario, outside, host_clock_ratio };
         // In a moving accelerometer the motion hides any other effect.
         let channels = if environment.motion.deviation_g > 0.0 {
             &OutputRegister::INERTIAL[..3]
@@ -125,7 +126,7 @@ impl DrawnRecording {
         let shared = random.random_bool(0.5).then(|| channel(&mut random));
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
         let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
-        let (effects, strengths) = draw_effects(kinds, range, at_least, &simulation, channel, &mut random);
+        let (effects, strengths, _) = draw_effects(kinds, range, at_least, &simulation, channel, &mut random);
         simulation.scenario.effects = effects;
         Self { seed, kinds: kinds.to_vec(), strengths, simulation }
     }
@@ -143,7 +144,11 @@ impl DrawnRecording {
 
 /// A knock in all channels: in `channel` with the factor 1, in the others with half to all of that in terms of their white noise, in
 /// either direction.
-fn knock_shares(channel: OutputRegister, noise: &NoiseModel, random: &mut ChaCha8Rng) -> Vec<(OutputRegister, f64)> {
+pub(super) fn knock_shares(
+    channel: OutputRegister,
+    noise: &NoiseModel,
+    random: &mut ChaCha8Rng,
+) -> Vec<(OutputRegister, f64)> {
     let white = |of: OutputRegister| noise.channel(of).angle_random_walk;
     let mut share = |of: OutputRegister| {
         let factor = random.random_range(0.5..1.0) * if random.random_bool(0.5) { 1.0 } else { -1.0 };
@@ -155,16 +160,16 @@ fn knock_shares(channel: OutputRegister, noise: &NoiseModel, random: &mut ChaCha
 /// Effects of `kinds`, each in a channel from `channel`, with their strengths beside the other effects. The strength of an effect
 /// beside the effects before it is drawn from `range`, as far as the size of its kind has no upper limit. Sets with a strength
 /// below `at_least` are drawn again, and those of which an effect is in a channel whose noise is below a count, as no detection limit
-/// holds there, or is larger than [`LARGEST_COUNTS`].
-fn draw_effects(
+/// holds there, or is larger than [`LARGEST_COUNTS`]. The last draw is returned in any case, with whether it is as asked for.
+pub(super) fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
     at_least: f64,
     recording: &TrueRecording,
     channel: impl Fn(&mut ChaCha8Rng) -> OutputRegister,
     random: &mut ChaCha8Rng,
-) -> (Vec<InjectedEffect>, Vec<f64>) {
-    let mut drawn = (Vec::new(), Vec::new());
+) -> (Vec<InjectedEffect>, Vec<f64>, bool) {
+    let mut drawn = (Vec::new(), Vec::new(), false);
     for _ in 0..DRAWS {
         let mut effects: Vec<InjectedEffect> = Vec::new();
         for &kind in kinds {
@@ -174,7 +179,7 @@ fn draw_effects(
             let limit = smallest_size(&unit, recording, &effects);
             effects.push(with_strength(unit, strength, limit, recording));
         }
-        let strengths = (0..effects.len()).map(|at| strength_beside(&effects, at, recording)).collect();
+        let strengths: Vec<f64> = (0..effects.len()).map(|at| strength_beside(&effects, at, recording)).collect();
         let is_outside = effects.iter().any(|effect| {
             let place = |&channel: &OutputRegister| ChannelUnderTest::new(recording, channel, &effects);
             let is_large = |place: &ChannelUnderTest<'_>| {
@@ -182,8 +187,9 @@ fn draw_effects(
             };
             effect.channels().iter().map(place).any(|place| place.is_below_a_count() || is_large(&place))
         });
-        drawn = (effects, strengths);
-        if !is_outside && drawn.1.iter().all(|strength| *strength >= at_least) {
+        let is_as_asked = !is_outside && strengths.iter().all(|strength| *strength >= at_least);
+        drawn = (effects, strengths, is_as_asked);
+        if is_as_asked {
             break;
         }
     }
@@ -218,7 +224,7 @@ fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &Tr
     let squared = strength * strength * limit;
     let size = match unit {
         InjectedEffect::Quantization { channel, .. } => {
-            let white = recording.noise.channel(channel).angle_random_walk * SAMPLE_RATE_HZ.sqrt().recip();
+            let white = recording.noise.channel(channel).angle_random_walk * recording.sampling.period_s().sqrt();
             (strength * limit).min(LARGEST_QUANTUM * white / 12f64.sqrt())
         }
         InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => squared.min(LARGEST_FRACTION),

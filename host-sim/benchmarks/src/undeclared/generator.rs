@@ -28,9 +28,33 @@ const REPEATED: u64 = 33;
 const HOST: u64 = 34;
 const EFFECTS: u64 = 64;
 
+/// At which rate the outputs are sampled, and to which steps they are rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampling {
+    /// Nominal sample rate, Hz.
+    pub rate_hz: f64,
+    /// Size of a count of each channel, in its unit, in the order of the burst.
+    pub resolutions: [f64; 12],
+}
+
+impl Sampling {
+    /// Of the virtual sensor.
+    #[must_use]
+    pub fn adis16405() -> Self {
+        Self { rate_hz: SAMPLE_RATE_HZ, resolutions: Channel::ALL.map(|channel| channel.lsb(GyroRange::Dps300)) }
+    }
+
+    /// Sample period, s.
+    pub(super) fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+}
+
 /// Everything that a recording is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueRecording {
+    /// Rate and resolutions.
+    pub sampling: Sampling,
     /// Length at the nominal sample rate, s.
     pub seconds: f64,
     /// Seed of all random numbers.
@@ -54,13 +78,13 @@ impl TrueRecording {
 
     /// Number of samples that the part takes.
     pub(super) fn samples(&self) -> usize {
-        (self.seconds * SAMPLE_RATE_HZ).round() as usize
+        (self.seconds * self.sampling.rate_hz).round() as usize
     }
 
     /// The environment at each of so many samples.
     pub(super) fn environment(&self, samples: usize) -> EnvironmentCourse {
         let mut random = self.random(ENVIRONMENT);
-        EnvironmentCourse::new(&self.scenario.environment, samples, 1.0 / SAMPLE_RATE_HZ, &mut random)
+        EnvironmentCourse::new(&self.scenario.environment, samples, self.sampling.period_s(), &mut random)
     }
 
     /// The recording as a host reads it.
@@ -82,7 +106,7 @@ impl TrueRecording {
             InjectedEffect::SampleClock { ratio } => Some(*ratio),
             _ => None,
         });
-        let period_s = 1.0 / (SAMPLE_RATE_HZ * clock.unwrap_or(1.0));
+        let period_s = 1.0 / (self.sampling.rate_hz * clock.unwrap_or(1.0));
         let (mut repeats, mut host) = (self.random(REPEATED), self.random(HOST));
         let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
         let (mut shown, mut latest_s) = (0, 0.0_f64);
@@ -107,7 +131,7 @@ impl TrueRecording {
 
     /// Register counts of every channel, in the order of the burst.
     fn counts(&self, samples: usize) -> Vec<Vec<i32>> {
-        let period_s = 1.0 / SAMPLE_RATE_HZ;
+        let period_s = self.sampling.period_s();
         let taps = self.scenario.effects.iter().find_map(|effect| match effect {
             InjectedEffect::FilterBandwidth { taps_log2 } => Some(1_usize << taps_log2),
             _ => None,
@@ -120,7 +144,7 @@ impl TrueRecording {
             let output = *output;
             let channel = simulation::channel(output);
             let mut random = self.random(output as u64);
-            let mut values = baseline(self.noise.channel(output), length, &mut random);
+            let mut values = baseline(self.noise.channel(output), self.sampling.rate_hz, length, &mut random);
             let level = match channel {
                 Channel::Supply => SUPPLY_V,
                 Channel::AcclZ => GRAVITY_G,
@@ -142,7 +166,7 @@ impl TrueRecording {
             for (number, effect) in self.scenario.effects.iter().enumerate() {
                 if effect.channels().contains(&output) {
                     let mut random = self.random(EFFECTS + number as u64);
-                    add_sensed(effect, &mut values, lead, &environment, &mut random);
+                    add_sensed(effect, &mut values, (lead, period_s), &environment, &mut random);
                 }
             }
             let outside = || {
@@ -166,7 +190,7 @@ impl TrueRecording {
                     values = quantized_angle(&values, 12f64.sqrt() * coefficient, period_s);
                 }
             }
-            let lsb = channel.lsb(GyroRange::Dps300);
+            let lsb = self.sampling.resolutions[channel as usize];
             let mut counts: Vec<i32> = values.into_iter().map(|value| (value / lsb).round() as i32).collect();
             outside().for_each(|(effect, _)| effect.change_counts(&mut counts, period_s));
             counts
@@ -176,8 +200,7 @@ impl TrueRecording {
 }
 
 /// White noise, flicker noise by its spectrum, and the sum of white steps.
-fn baseline(noise: &ChannelNoise, samples: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
-    let rate_hz = SAMPLE_RATE_HZ;
+pub(super) fn baseline(noise: &ChannelNoise, rate_hz: f64, samples: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
     let mut values: Vec<f64> = match noise.bias_instability {
         0.0 => vec![0.0; samples],
         b => gaussian_noise(|frequency| flicker_density(b, frequency), rate_hz, samples, random),
@@ -191,15 +214,15 @@ fn baseline(noise: &ChannelNoise, samples: usize, random: &mut ChaCha8Rng) -> Ve
     values
 }
 
-/// Adds what an effect changes before the filter; `lead` of the values are before the first sample.
-fn add_sensed(
+/// Adds what an effect changes before the filter; `lead` of the values, which are `period_s` s apart, are before the first sample.
+pub(super) fn add_sensed(
     effect: &InjectedEffect,
     values: &mut [f64],
-    lead: usize,
+    (lead, period_s): (usize, f64),
     environment: &EnvironmentCourse,
     random: &mut ChaCha8Rng,
 ) {
-    let (length, period_s) = (values.len(), 1.0 / SAMPLE_RATE_HZ);
+    let length = values.len();
     let time_s = |at: usize| (at as f64 - lead as f64) * period_s;
     let mut add = |signal: &mut dyn FnMut(usize) -> f64| {
         values.iter_mut().enumerate().for_each(|(at, value)| *value += signal(at));
@@ -269,7 +292,7 @@ fn moving_average(values: &[f64], taps: usize) -> Vec<f64> {
 }
 
 /// The rate that is differenced from an angle which is kept in steps of `quantum`.
-fn quantized_angle(rates: &[f64], quantum: f64, period_s: f64) -> Vec<f64> {
+pub(super) fn quantized_angle(rates: &[f64], quantum: f64, period_s: f64) -> Vec<f64> {
     let (mut angle, mut shown) = (0.0, 0.0);
     let rate = |rate: &f64| {
         angle += rate * period_s;

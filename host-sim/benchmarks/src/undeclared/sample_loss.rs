@@ -20,8 +20,18 @@ pub(super) fn lose_samples(measurement: &mut Measurement, share: f64, seed: u64)
         (0..=last).map(|at| at == 0 || at == last || !random.random_bool(share.min(1.0))).collect();
     let lost = is_kept.iter().filter(|kept| !**kept).count() as u64;
     keep(&mut measurement.slots, &is_kept);
+    let mut kept_before = 0;
+    let position = |kept: &bool| {
+        let position = kept.then_some(kept_before);
+        kept_before += usize::from(*kept);
+        position
+    };
+    let moved: Vec<Option<usize>> = is_kept.iter().map(position).collect();
     for channel in &mut measurement.channels {
         keep(&mut channel.counts, &is_kept);
+        for refused in channel.refused.values_mut() {
+            *refused = refused.iter().filter_map(|&position| moved[position]).collect();
+        }
     }
     if let Some(times) = &mut measurement.times_s {
         keep(times, &is_kept);
@@ -37,12 +47,15 @@ fn keep<T>(values: &mut Vec<T>, is_kept: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::lose_samples;
+    use measurement::Measurement;
     use simulation::Simulation;
 
     #[test]
     fn the_share_is_lost_in_all_channels_and_leaves_gaps() {
         let recording = Simulation::paper(100.0, 1).run(|_| ()).unwrap();
-        let whole = recordings::time_base::measurement(&recording, None).unwrap();
+        let mut whole = recordings::time_base::measurement(&recording, None).unwrap();
+        whole.channels[0].refused.insert("spikes", vec![100, 101, 15_000]);
+        let whole = whole;
         let mut lossy = whole.clone();
         lose_samples(&mut lossy, 0.02, 7);
         let lost = whole.len() - lossy.len();
@@ -56,6 +69,14 @@ mod tests {
             let of_whole = whole.slots.binary_search(&lossy.slots[at]).unwrap();
             assert_eq!(after.counts[at], before.counts[of_whole]);
         }
+        // A refused sample is the same one, or lost.
+        let slot_of = |of: &Measurement, position: &usize| of.slots[*position];
+        let refused = |of: &Measurement| -> Vec<u64> {
+            of.channels[0].refused["spikes"].iter().map(|position| slot_of(of, position)).collect()
+        };
+        let expected: Vec<u64> = refused(&whole).into_iter().filter(|slot| lossy.slots.contains(slot)).collect();
+        assert_eq!(refused(&lossy), expected);
+        assert!(!expected.is_empty());
         let mut untouched = whole.clone();
         lose_samples(&mut untouched, 0.0, 7);
         assert_eq!(untouched, whole);

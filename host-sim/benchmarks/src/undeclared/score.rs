@@ -26,7 +26,7 @@ const RECORDED: [Channel; 8] = [
 ];
 
 /// Kind of an effect in a report that no other kind describes.
-const UNEXPLAINED: &str = "unexplained";
+pub(super) const UNEXPLAINED: &str = "unexplained";
 
 /// Why a recording could not be scored.
 #[derive(Debug, thiserror::Error)]
@@ -231,7 +231,7 @@ fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
 
 /// An effect counts as named if the report lists it in at least half of the channels that it affects; dropped and repeated samples
 /// and the sample clock count as named if they are listed in one channel.
-fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) -> EffectScore {
+pub(super) fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) -> EffectScore {
     let listing = affected.iter().filter(|report| report.effects.iter().any(|found| found.kind == kind.name())).count();
     let once = matches!(kind, EffectKind::DroppedSamples | EffectKind::RepeatedSamples | EffectKind::SampleClock);
     let named = listing >= if once { 1 } else { affected.len().div_ceil(2).max(1) };
@@ -246,7 +246,7 @@ fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) ->
 }
 
 /// The estimated parameters of `effect` in the first of its channels that lists it.
-fn score_parameters(
+pub(super) fn score_parameters(
     kind: EffectKind,
     effect: &InjectedEffect,
     scored: &[(Channel, &ChannelReport)],

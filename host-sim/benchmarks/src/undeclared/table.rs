@@ -31,7 +31,7 @@ pub struct Proportion {
 }
 
 impl Proportion {
-    fn count(cases: impl IntoIterator<Item = bool>) -> Self {
+    pub(super) fn count(cases: impl IntoIterator<Item = bool>) -> Self {
         let add = |sum: Self, yes| Self { yes: sum.yes + usize::from(yes), all: sum.all + 1 };
         cases.into_iter().fold(Self::default(), add)
     }
@@ -140,11 +140,11 @@ impl ScoreTable {
 }
 
 impl ParameterScore {
-    fn is_near(&self) -> bool {
+    pub(super) fn is_near(&self) -> bool {
         self.relative_error <= if matches!(self.name, "frequency" | "rate_hz") { 0.02 } else { 0.1 }
     }
 
-    fn is_covered(&self) -> bool {
+    pub(super) fn is_covered(&self) -> bool {
         (self.low..=self.high).contains(&self.truth)
     }
 }
@@ -384,7 +384,7 @@ fn percent(value: Option<f64>) -> String {
 }
 
 /// The smallest of `values` that at least the fraction `level` of them does not exceed.
-fn quantile(values: &[f64], level: f64) -> Option<f64> {
+pub(super) fn quantile(values: &[f64], level: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let at = (level * sorted.len() as f64).ceil() as usize;

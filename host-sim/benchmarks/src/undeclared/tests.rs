@@ -9,6 +9,7 @@ use super::detection_limit::{
     waveform_test,
 };
 use super::effect::{draw_unit, scaled, size};
+use super::generator::Sampling;
 use super::score::compare;
 use super::truth::{TrueModelErrors, true_model_errors};
 use super::{DrawnRecording, EffectKind, OutsideKind, RecordingGroup, TrueRecording, UndeclaredPlan};
@@ -35,7 +36,8 @@ fn gyro() -> ChannelNoise {
 /// Half an hour of noise in a constant environment.
 fn quiet(noise: NoiseModel) -> TrueRecording {
     let scenario = SensorScenario::default();
-    TrueRecording { seconds: RECORD.seconds, seed: 1, noise, scenario, outside: Vec::new(), host_clock_ratio: 1.0 }
+    let (sampling, outside) = (Sampling::adis16405(), Vec::new());
+    TrueRecording { sampling, seconds: RECORD.seconds, seed: 1, noise, scenario, outside, host_clock_ratio: 1.0 }
 }
 
 /// The densities of this module and of the terms of the fit are independent implementations.

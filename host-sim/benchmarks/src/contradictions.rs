@@ -1,0 +1,145 @@
+//! Benchmark of the sentences under "Contradicted": how often each of them stands in the report of a record whose noise is N, B and K
+//! and nothing else, in a constant environment.
+
+use crate::parallel;
+use crate::undeclared::{DrawnRecording, RecordingGroup, ScoreError};
+use adis16405_driver::Channel;
+use noise_analysis::analysis::analyze;
+use recordings::time_base::measurement;
+use serde::Serialize;
+use std::io::{self, Write};
+use virtual_sensor::SensorScenario;
+
+/// What each sentence has that no other one has (docs/findings.md), with its row in the table.
+const SENTENCES: [(&str, &str); 3] = [
+    ("against the model", "… at τ = …: measured … against the model"),
+    ("the spectrum gives N", "…: the spectrum gives N … than the fit"),
+    ("too sure of itself", "a filter with these models would be too sure of itself in …"),
+];
+
+/// Which records to examine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContradictionPlan {
+    /// Number of records, each of six gyros and accelerometers.
+    pub records: u64,
+    /// Length of a record, s.
+    pub seconds: f64,
+    /// Seed of the first record.
+    pub first_seed: u64,
+    /// Number of threads.
+    pub jobs: usize,
+}
+
+/// What the report of one record says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ContradictedRecord {
+    /// Seed of the record.
+    pub seed: u64,
+    /// Every sentence under "Contradicted".
+    pub sentences: Vec<String>,
+}
+
+/// The records, in the order of their seeds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ContradictionTable {
+    /// One a seed.
+    pub records: Vec<ContradictedRecord>,
+}
+
+impl ContradictionPlan {
+    /// Generates and analyses every record. `progress` is called with the number of finished records and of all.
+    ///
+    /// # Errors
+    /// That of the first record that has no timeline.
+    pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ContradictionTable, ScoreError> {
+        let seeds: Vec<u64> = (self.first_seed..self.first_seed + self.records).collect();
+        let work = |&seed: &u64| {
+            let mut drawn = DrawnRecording::from_group(RecordingGroup::Nothing, self.seconds, seed);
+            drawn.simulation.scenario = SensorScenario::default();
+            let mut recording = drawn.simulation.record();
+            recording.channels.retain(|channel| Channel::INERTIAL.contains(channel));
+            let samples = measurement(&recording, None).map_err(|reason| ScoreError::Timeline { seed, reason })?;
+            let sentences = reports::summary::contradictions(&analyze(&samples));
+            Ok(ContradictedRecord { seed, sentences })
+        };
+        Ok(ContradictionTable { records: parallel::map(&seeds, self.jobs, work, progress)? })
+    }
+}
+
+impl ContradictionTable {
+    /// Writes the table as text: of each sentence the share of the records that have it, and how often it stands there. Sentences that
+    /// the table does not know are printed as they are.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let all = self.records.len();
+        writeln!(out, "Sentences under \"Contradicted\", nothing hidden, {all} records\n")?;
+        writeln!(out, "{:<64}{:>10}{:>12}{:>12}", "", "records", "", "sentences")?;
+        let mut row = |title: &str, is_it: &dyn Fn(&str) -> bool| {
+            let of = |record: &ContradictedRecord| record.sentences.iter().filter(|sentence| is_it(sentence)).count();
+            let records = self.records.iter().filter(|record| of(record) > 0).count();
+            let sentences: usize = self.records.iter().map(of).sum();
+            let percent = format!("{:.1} %", 100.0 * records as f64 / all.max(1) as f64);
+            writeln!(out, "{title:<64}{:>10}{percent:>12}{sentences:>12}", format!("{records}/{all}"))
+        };
+        for (part, title) in SENTENCES {
+            row(title, &|sentence| sentence.contains(part))?;
+        }
+        row("any", &|_| true)?;
+        let is_unknown = |sentence: &&String| SENTENCES.iter().all(|(part, _)| !sentence.contains(part));
+        for sentence in self.records.iter().flat_map(|record| &record.sentences).filter(is_unknown) {
+            writeln!(out, "  not in the table: {sentence}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_sentence_is_counted_once_and_an_unknown_one_is_printed() {
+        let sentences = |of: &[&str]| of.iter().map(|sentence| (*sentence).to_owned()).collect();
+        let records = vec![
+            ContradictedRecord { seed: 1, sentences: Vec::new() },
+            ContradictedRecord {
+                seed: 2,
+                sentences: sentences(&[
+                    "gyro z at τ = 80 s: measured +9 % against the model (4 σ)",
+                    "gyro x at τ = 8 s: measured −9 % against the model (5 σ)",
+                    "gyro z: the spectrum gives N 3 % higher than the fit",
+                    "a new sentence",
+                ]),
+            },
+        ];
+        let mut text = Vec::new();
+        ContradictionTable { records }.write(&mut text).expect("text");
+        let text = String::from_utf8(text).expect("text");
+        let row = |title: &str| {
+            let line = text.lines().find(|line| line.contains(title)).unwrap_or_else(|| panic!("{title}: {text}"));
+            line.split_whitespace().rev().take(4).map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(row("against the model"), ["2", "%", "50.0", "1/2"]);
+        assert_eq!(row("gives N"), ["1", "%", "50.0", "1/2"]);
+        assert_eq!(row("too sure"), ["0", "%", "0.0", "0/2"]);
+        assert!(text.contains("not in the table: a new sentence"), "{text}");
+    }
+
+    /// The documentation has every sentence of the program, one a row, and the table of this benchmark each of them.
+    #[test]
+    fn the_table_has_every_sentence_of_the_documentation() {
+        let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/findings.md");
+        let text = std::fs::read_to_string(docs).expect("docs/findings.md");
+        let section = text.split("\n## ").find(|section| section.starts_with("What the data contradicts"));
+        let rows = section.expect("the section").lines().filter(|line| line.starts_with("| ")).skip(1);
+        let first_cell = |row: &str| row.split('|').nth(1).unwrap_or_default().to_owned();
+        let sentences: Vec<String> = rows.map(first_cell).collect();
+        assert_eq!(sentences.len(), SENTENCES.len(), "{sentences:?}");
+        for sentence in &sentences {
+            let known = SENTENCES.iter().filter(|(part, _)| sentence.contains(part)).count();
+            assert_eq!(known, 1, "{sentence}");
+        }
+    }
+}

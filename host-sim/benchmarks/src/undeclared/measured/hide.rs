@@ -1,0 +1,116 @@
+//! An effect in samples that were measured.
+
+use super::no_environment;
+use crate::undeclared::effect::EffectKind;
+use crate::undeclared::generator::{add_sensed, quantized_angle};
+use crate::undeclared::outside::OutsideEffect;
+use crate::undeclared::sample_loss::lose_samples;
+use adis16405_driver::Channel;
+use measurement::{MeasuredChannel, Measurement};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use virtual_sensor::{InjectedEffect, OutputRegister};
+
+/// Random streams of a seed: that of the effect, that of the repeated samples; the dither of channel `n` has `DITHER + n`.
+const EFFECT: u64 = 1 << 32;
+const REPEATED: u64 = EFFECT + 1;
+const DITHER: u64 = EFFECT + 2;
+
+/// An effect that is hidden.
+pub(super) enum HiddenEffect {
+    /// With its kind.
+    Known(EffectKind, InjectedEffect),
+    Outside(OutsideEffect),
+}
+
+impl HiddenEffect {
+    /// Whether it is in `channel`; an effect without channels concerns the samples of all.
+    pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
+        match self {
+            Self::Known(_, effect) => effect.channels().is_empty() || effect.channels().contains(&channel),
+            Self::Outside(effect) => effect.shows_in(channel),
+        }
+    }
+}
+
+/// `stretch` with an effect. The counts of a channel that it is in are made continuous by a uniform dither of one count, and are
+/// rounded again: an effect of size 0 changes none.
+pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> Measurement {
+    let mut changed = stretch.clone();
+    match effect {
+        HiddenEffect::Known(_, InjectedEffect::DroppedSamples { fraction }) => {
+            lose_samples(&mut changed, *fraction, seed);
+            return changed;
+        }
+        HiddenEffect::Known(_, InjectedEffect::RepeatedSamples { fraction }) => {
+            repeat_samples(&mut changed, *fraction, seed);
+            return changed;
+        }
+        _ => {}
+    }
+    for channel in Channel::INERTIAL {
+        let output = simulation::output_register(channel);
+        let own = changed.channels.iter_mut().find(|of| of.profile.name == channel.name());
+        if let Some(own) = own.filter(|_| effect.shows_in(output)) {
+            change_channel(own, &stretch.slots, stretch.period_s(), effect, output, seed);
+        }
+    }
+    changed
+}
+
+fn random(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
+    random
+}
+
+/// Adds the effect to the counts of one channel, which were taken in the sample periods `slots`.
+fn change_channel(
+    channel: &mut MeasuredChannel,
+    slots: &[u64],
+    period_s: f64,
+    effect: &HiddenEffect,
+    output: OutputRegister,
+    seed: u64,
+) {
+    let lsb = channel.profile.lsb;
+    let mut dither = random(seed, DITHER + output as u64);
+    let continuous = |count: i32, dither: &mut ChaCha8Rng| lsb * (f64::from(count) + dither.random_range(-0.5..0.5));
+    // One value for each sample period: in a gap the last one before it.
+    let mut values: Vec<f64> = Vec::new();
+    for (&slot, &count) in slots.iter().zip(&channel.counts) {
+        let value = continuous(count, &mut dither);
+        let last = values.last().copied().unwrap_or(value);
+        values.resize(slot as usize, last);
+        values.push(value);
+    }
+    let rounded = |values: &[f64]| -> Vec<i32> { values.iter().map(|value| (value / lsb).round() as i32).collect() };
+    let counts = match effect {
+        HiddenEffect::Known(_, InjectedEffect::Quantization { coefficient, .. }) => {
+            rounded(&quantized_angle(&values, 12f64.sqrt() * coefficient, period_s))
+        }
+        HiddenEffect::Known(_, effect) => {
+            add_sensed(effect, &mut values, (0, period_s), &no_environment(), &mut random(seed, EFFECT));
+            rounded(&values)
+        }
+        HiddenEffect::Outside(effect) => {
+            let share = effect.shares.iter().find(|(of, _)| *of == output).map_or(0.0, |(_, share)| *share);
+            let signal = effect.signal(&no_environment(), values.len(), period_s);
+            values.iter_mut().zip(signal).for_each(|(value, added)| *value += share * added);
+            let mut counts = rounded(&values);
+            effect.change_counts(&mut counts, period_s);
+            counts
+        }
+    };
+    channel.counts = slots.iter().map(|&slot| counts[slot as usize]).collect();
+}
+
+/// Replaces each sample with the probability `share` by the one before, in every channel.
+fn repeat_samples(measurement: &mut Measurement, share: f64, seed: u64) {
+    let mut random = random(seed, REPEATED);
+    for at in 1..measurement.len() {
+        if random.random_bool(share.clamp(0.0, 1.0)) {
+            measurement.channels.iter_mut().for_each(|channel| channel.counts[at] = channel.counts[at - 1]);
+        }
+    }
+}

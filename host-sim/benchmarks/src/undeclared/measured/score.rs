@@ -1,0 +1,175 @@
+//! The score of an effect that is hidden in a stretch of measured noise.
+
+use super::hide::{HiddenEffect, hide};
+use super::{HiddenKind, Stretch};
+use crate::undeclared::score::{ParameterScore, UNEXPLAINED, score_effect, score_parameters};
+use adis16405_driver::Channel;
+use noise_analysis::analysis::analyze;
+use noise_analysis::report::{ChannelReport, Effect, ModelReport, Report};
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// Deviances per point on the unseen half of the stretch, in the first channel that the effect is in; absent where there are too few
+/// samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MeasuredErrors {
+    /// Of N, B and K, with the effect.
+    pub before: Option<f64>,
+    /// Of the model with the added terms, with the effect.
+    pub after: Option<f64>,
+    /// The same two without what the rules of the first half exclude.
+    pub excluding: [Option<f64>; 2],
+    /// Of the curve of the first half taken for a model, with the effect.
+    pub first_half_curve: Option<f64>,
+    /// Of N, B and K, untouched.
+    pub untouched_before: Option<f64>,
+    /// Of the model with the added terms, untouched.
+    pub untouched_after: Option<f64>,
+}
+
+/// The score of an effect in a stretch.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeasuredScore {
+    /// The recording.
+    pub recording: String,
+    /// Start of the stretch, s from the first sample of the recording.
+    pub from_s: f64,
+    /// What was hidden.
+    pub kind: HiddenKind,
+    /// Names of the channels that it is in.
+    pub channels: Vec<&'static str>,
+    /// Size over the detection limit.
+    pub strength: f64,
+    /// Whether it was named; of an effect that the analysis was not made for, whether it is reported as unexplained or by a name that
+    /// describes it.
+    pub named: bool,
+    /// Names that the report gives and the report of the untouched stretch does not, other than the right one, as `channel: kind`.
+    pub wrong_names: Vec<String>,
+    /// Parameters of an effect that was named.
+    pub estimates: Vec<ParameterScore>,
+    /// On the unseen half.
+    pub errors: MeasuredErrors,
+}
+
+/// Hides an effect in a stretch, analyses it and scores the report.
+pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEffect, strength: f64) -> MeasuredScore {
+    let report = analyze(&hide(&stretch.samples, effect, stretch.seed));
+    let is_in = |channel: &Channel| {
+        let output = simulation::output_register(*channel);
+        stretch.channels.contains(&output) && effect.shows_in(output)
+    };
+    let own: Vec<Channel> = Channel::INERTIAL.into_iter().filter(is_in).collect();
+    let (named, right, estimates) = answer(kind, effect, strength, &own, &report, &stretch.report);
+    let errors = own.first().map_or_else(MeasuredErrors::none, |first| errors(*first, &report, &stretch.report));
+    MeasuredScore {
+        recording: stretch.recording.to_owned(),
+        from_s: stretch.from_s,
+        kind,
+        channels: own.iter().map(|channel| channel.name()).collect(),
+        strength,
+        named,
+        wrong_names: wrong_names(&own, &right, &report, &stretch.report),
+        estimates,
+        errors,
+    }
+}
+
+fn channel_report(report: &Report, channel: Channel) -> Option<&ChannelReport> {
+    report.channels.iter().find(|of| of.name == channel.name())
+}
+
+/// Whether the effect was named, the names that are right, and its parameters.
+fn answer(
+    kind: HiddenKind,
+    effect: &HiddenEffect,
+    strength: f64,
+    own: &[Channel],
+    report: &Report,
+    untouched: &Report,
+) -> (bool, Vec<&'static str>, Vec<ParameterScore>) {
+    let only_new = |channel: &Channel| {
+        let mut of = channel_report(report, *channel)?.clone();
+        let before = channel_report(untouched, *channel);
+        of.effects.retain(|effect| before.is_none_or(|before| is_new(effect, &before.effects)));
+        Some((*channel, of))
+    };
+    let shown: Vec<(Channel, ChannelReport)> = own.iter().filter_map(only_new).collect();
+    let scored: Vec<(Channel, &ChannelReport)> = shown.iter().map(|(channel, report)| (*channel, report)).collect();
+    match effect {
+        HiddenEffect::Known(kind, effect) => {
+            let affected: Vec<&ChannelReport> = scored.iter().map(|(_, report)| *report).collect();
+            let named = score_effect(*kind, strength, &affected).named;
+            let estimates = if named { score_parameters(*kind, effect, &scored, 0.0) } else { Vec::new() };
+            (named, vec![kind.name(), UNEXPLAINED], estimates)
+        }
+        HiddenEffect::Outside(_) => {
+            let HiddenKind::Outside(kind) = kind else { return (false, Vec::new(), Vec::new()) };
+            let right: Vec<&'static str> = kind.right_names().iter().copied().chain([UNEXPLAINED]).collect();
+            let mut found = scored.iter().flat_map(|(_, report)| &report.effects);
+            (found.any(|found| right.contains(&found.kind.as_str())), right, Vec::new())
+        }
+    }
+}
+
+/// Whether none of `others` is of the same kind with parameters whose intervals meet those of `effect`.
+fn is_new(effect: &Effect, others: &[Effect]) -> bool {
+    let is_same = |other: &&Effect| {
+        let meets = |(name, parameter): (&String, &noise_analysis::report::Parameter)| {
+            let of_other = other.parameters.get(name);
+            of_other.is_none_or(|of| of.low <= parameter.high && parameter.low <= of.high)
+        };
+        other.kind == effect.kind && effect.parameters.iter().all(meets)
+    };
+    others.iter().find(is_same).is_none()
+}
+
+/// The names of `report` that neither `untouched` has in the same channel nor are `right` in one of the channels `own`.
+fn wrong_names(own: &[Channel], right: &[&str], report: &Report, untouched: &Report) -> Vec<String> {
+    let names = |report: &Report| -> BTreeSet<(Channel, String)> {
+        let of_channel = |channel: Channel| {
+            let effects = channel_report(report, channel).map(|of| of.effects.as_slice()).unwrap_or_default();
+            effects.iter().map(move |effect| (channel, effect.kind.clone())).collect::<Vec<_>>()
+        };
+        Channel::INERTIAL.into_iter().flat_map(of_channel).collect()
+    };
+    let known = names(untouched);
+    let is_right = |channel: &Channel, kind: &str| own.contains(channel) && right.contains(&kind);
+    let new = names(report).into_iter().filter(|name| !known.contains(name));
+    let wrong = new.filter(|(channel, kind)| !is_right(channel, kind));
+    wrong.map(|(channel, kind)| format!("{}: {kind}", channel.name())).collect()
+}
+
+fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErrors {
+    let (Some(report), Some(untouched)) = (channel_report(report, channel), channel_report(untouched, channel)) else {
+        return MeasuredErrors::none();
+    };
+    let raw = |model: &ModelReport| model.unseen.deviance_per_point;
+    let excluding = |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
+    MeasuredErrors {
+        before: raw(&report.before),
+        after: raw(&report.after),
+        excluding: [excluding(&report.before), excluding(&report.after)],
+        first_half_curve: report.first_half_curve.deviance_per_point,
+        untouched_before: raw(&untouched.before),
+        untouched_after: raw(&untouched.after),
+    }
+}
+
+impl MeasuredErrors {
+    const fn none() -> Self {
+        Self {
+            before: None,
+            after: None,
+            excluding: [None; 2],
+            first_half_curve: None,
+            untouched_before: None,
+            untouched_after: None,
+        }
+    }
+
+    /// Whether the model with the added terms is farther from the unseen half, as it was recorded, than N, B and K, and fails there.
+    #[must_use]
+    pub fn grew(&self) -> bool {
+        self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(super::table::FAILS))
+    }
+}

@@ -1,0 +1,69 @@
+//! The parts of a recording, the effects in its counts, and the whole benchmark, on generated noise in place of a recording.
+
+use super::hide::{HiddenEffect, hide};
+use super::recording::part;
+use super::*;
+use crate::undeclared::{DrawnRecording, RecordingGroup};
+use virtual_sensor::InjectedEffect;
+
+/// Noise of the benchmark's own generator, as a recording.
+fn recorded(seconds: f64, seed: u64) -> NoiseRecording {
+    let mut drawn = DrawnRecording::from_group(RecordingGroup::Nothing, seconds, seed);
+    drawn.simulation.scenario = SensorScenario::default();
+    let samples = recordings::time_base::measurement(&drawn.simulation.record(), None).expect("a time base");
+    NoiseRecording { name: format!("noise {seed}"), samples }
+}
+
+fn sinusoid(amplitude: f64) -> HiddenEffect {
+    let channel = OutputRegister::GyroY;
+    let effect = InjectedEffect::Sinusoid { channel, frequency_hz: 20.0, amplitude, phase_rad: 0.3 };
+    HiddenEffect::Known(EffectKind::Sinusoid, effect)
+}
+
+#[test]
+fn an_effect_of_size_0_changes_no_count_and_a_larger_one_its_channel_alone() {
+    let samples = recorded(20.0, 1).samples;
+    assert_eq!(hide(&samples, &sinusoid(0.0), 7), samples);
+    let changed = hide(&samples, &sinusoid(0.5), 7);
+    for (before, after) in samples.channels.iter().zip(&changed.channels) {
+        assert_eq!(before.counts == after.counts, before.profile.name != "gyro_y", "{}", before.profile.name);
+    }
+    let [before, after] = [&samples, &changed].map(|of| of.channels.iter().find(|of| of.profile.name == "gyro_y"));
+    let (before, after) = (before.expect("gyro y"), after.expect("gyro y"));
+    // The difference is the sinusoid with the error of rounding the sum: 0.5 °/s are 10 counts, ½·10² + 1/12 in the mean square, of
+    // which a dither and the count below it add as much again.
+    let squares = before.counts.iter().zip(&after.counts).map(|(a, b)| f64::from(b - a).powi(2));
+    let mean = squares.sum::<f64>() / before.counts.len() as f64;
+    assert!((mean - 50.0).abs() < 1.0, "{mean}");
+}
+
+#[test]
+fn a_part_has_its_own_periods_and_gaps() {
+    let mut whole = recorded(20.0, 2).samples;
+    // 100 periods are missing after the sample of period 999.
+    whole.slots[1000..].iter_mut().for_each(|slot| *slot += 100);
+    let cut = part(&whole, 900..1300);
+    assert_eq!((cut.len(), cut.periods(), cut.dropped["gap"]), (300, 400, 100));
+    assert_eq!(cut.channels[1].counts[0], whole.channels[1].counts[900]);
+    assert_eq!(cut.channels[1].counts[299], whole.channels[1].counts[1199]);
+    // A hidden effect goes on through the gap.
+    let changed = hide(&cut, &sinusoid(0.5), 3);
+    assert_eq!(changed.slots, cut.slots);
+}
+
+/// Every kind is drawn at its strength, or counted as not hidden.
+#[test]
+fn every_kind_is_hidden_in_every_stretch_or_counted() {
+    let recordings = vec![recorded(60.0, 3)];
+    let plan = MeasuredNoisePlan { recordings, stretches: 1, seconds: 40.0, strength: 3.0, seed: 11, jobs: 2 };
+    let table = plan.run(|_, _| ());
+    assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::ALL.len());
+    assert!(table.not_hidden.len() <= 3, "{:?}", table.not_hidden);
+    assert!(table.scores.iter().all(|score| score.strength >= 0.95 * 3.0));
+    // Of eleven effects of three times the limit the analysis names at least half.
+    assert!(2 * table.named().yes >= table.named().all, "{:?}", table.named());
+    let mut text = Vec::new();
+    table.write(&mut text).expect("text");
+    let text = String::from_utf8(text).expect("text");
+    assert!(HiddenKind::ALL.iter().all(|kind| text.contains(kind.name())), "{text}");
+}
