@@ -18,7 +18,8 @@ use recordings::time_base::{StampQuality, time_base};
 use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
 use serde::Serialize;
 use simulation::Replay;
-use std::fs;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Name of the sensor whose register counts need no profile.
@@ -32,6 +33,8 @@ const KEPT: KeptInMemory = KeptInMemory {
     most_lost: MOST_LOST,
     irregular: true,
 };
+/// Longest profile file.
+const PROFILE_BYTES: u64 = 1 << 20;
 /// Name of a sensor without a data sheet.
 const GENERIC: &str = "generic";
 
@@ -287,7 +290,9 @@ fn sensor_profile(name: &str) -> Result<SensorProfile> {
             }
         }
     }
-    let text = fs::read_to_string(name).with_context(|| {
+    let mut text = String::new();
+    let read = |file: File| file.take(PROFILE_BYTES + 1).read_to_string(&mut text);
+    File::open(name).and_then(read).with_context(|| {
         let included: Vec<&str> = profile_file::included_names().collect();
         format!(
             "sensor {}: neither {ADIS16405}, {GENERIC}, {} nor a profile file",
@@ -295,5 +300,8 @@ fn sensor_profile(name: &str) -> Result<SensorProfile> {
             included.join(", ")
         )
     })?;
+    if text.len() as u64 > PROFILE_BYTES {
+        bail!("{}: a profile is not longer than {PROFILE_BYTES} bytes", Printable(name));
+    }
     profile_file::parse(&text).with_context(|| Printable(name).to_string())
 }

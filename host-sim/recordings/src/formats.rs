@@ -1,13 +1,20 @@
 //! Files of any sensor, by format.
 
 mod ardupilot_log;
+mod array_topics;
+mod betaflight;
 pub mod file_format;
-mod imu_message;
+mod foreign_format;
+mod hdf5;
 mod matlab;
+mod mcap_bag;
 mod mcap_file;
-mod message_table;
-mod named_arrays;
+mod message_layout;
 pub(crate) mod numpy;
 mod ros_bag;
+mod ros_definition;
+mod ros_message;
+mod sqlite_bag;
 pub(crate) mod text_table;
+mod topics;
 mod ulog;

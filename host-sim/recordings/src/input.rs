@@ -1,5 +1,6 @@
 //! Bytes and lines of a recording as they are read, and what is wrong with them.
 
+pub(crate) mod budget;
 pub(crate) mod delimited_text;
 pub(crate) mod gzip_members;
 pub(crate) mod input_error;

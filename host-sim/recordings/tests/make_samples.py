@@ -3,9 +3,9 @@
 
     python3 make_samples.py FOLDER
 
-Needs numpy, scipy, rosbags, mcap, mcap-ros2-support, pyulog and pymavlink, and sigrok-cli for its SPI decoder. The writers are those of the formats' own
-projects (numpy, scipy, rosbags, mcap). ULog and ArduPilot logs have no writer in Python: the bytes are written here and read
-back by pyulog and pymavlink, which must find every sample. FOLDER/truth.json says what each file holds: arguments, rate in
+Needs numpy, scipy, h5py, rosbags, mcap, mcap-ros2-support, pyulog, pymavlink and orangebox, and sigrok-cli for its SPI decoder. The writers are
+those of the formats' own projects (numpy, scipy, h5py, rosbags, mcap). ULog, ArduPilot and blackbox logs have no writer in Python: the bytes
+are written here and read back by pyulog, pymavlink and orangebox, which must find every sample. FOLDER/truth.json says what each file holds: arguments, rate in
 Hz, rows, samples that are missing between them, the angle random walk of each channel in deg/s/sqrt(Hz) or g/sqrt(Hz) that was
 drawn from, and, computed by numpy from the samples that were written, the Allan deviation of neighbours in deg/s or g and the
 angle random walk sigma/sqrt(rate), the maximum-likelihood estimate for white noise.
@@ -209,7 +209,8 @@ def ulog(folder, truth):
         header = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
         flags = message("B", bytes(40))
         head = b"".join(message("F", text.encode()) for text in formats)
-        head += b"".join(message("A", struct.pack("<BH", 0, number) + name.encode()) for number, name in subscriptions)
+        for number, name, *instance in subscriptions:
+            head += message("A", struct.pack("<BH", *(instance or [0]), number) + name.encode())
         return header + flags + head + b"".join(message("D", payload) for payload in data)
 
     single = "{}:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float x;float y;float z;"
@@ -226,6 +227,17 @@ def ulog(folder, truth):
     # Both messages have the same times: they are read as one.
     truth.add("single.ulg", both(gyro, accl), kept=KEPT)
     truth.add("single.ulg", dict(zip(ACCL, accl.T / GRAVITY)), ["--topic", "sensor_accel"], kept=KEPT)
+
+    # Two publishers of one message, the second with other noise and other times.
+    second = samples(25)
+    data = [(time, struct.pack("<HQQIfff", 0, time + 700, time, 1, *rate)) for time, rate in zip(micros, gyro)]
+    later = (second[0] - START_NS) // 1000 + 1_001_000
+    data += [(time, struct.pack("<HQQIfff", 1, time + 700, time, 2, *rate)) for time, rate in zip(later, 2 * second[1])]
+    data = [payload for _, payload in sorted(data)]
+    (folder / "instances.ulg").write_bytes(log(formats[:1], [(0, "sensor_gyro"), (1, "sensor_gyro", 1)], data))
+    truth.add("instances.ulg", rates(gyro), kept=KEPT)
+    known = truth.add("instances.ulg", rates(2 * second[1]), ["--topic", "sensor_gyro:1"], kept=KEPT)
+    known["angle_random_walk"] = {name: 2 * walk for name, walk in noise(GYRO).items()}
 
     # FIFO: 8 samples of 16 bits a message at 8 kHz; three messages are lost. The range is small enough that the step, a seventh
     # of the noise, adds no more than 0.2 % to its variance.
@@ -361,11 +373,242 @@ def spi_captures(folder, truth):
     add("saleae_words.csv")
 
 
+def drawn_messages(folder, truth):
+    """Bags whose types of messages, nesting and order of fields are drawn at random; somewhere in them are two Vector3."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    rows = 1500
+    kept = np.setdiff1d(np.arange(rows), LOST)
+    numbers = dict(bool=bool, int8=np.int8, uint8=np.uint8, int16=np.int16, uint16=np.uint16, int32=np.int32)
+    numbers |= dict(uint32=np.uint32, int64=np.int64, uint64=np.uint64, float32=np.float32, float64=np.float64)
+
+    def drawn(random, kind, shape=None):
+        if kind is bool:
+            return random.integers(0, 2, shape).astype(bool) if shape else bool(random.integers(0, 2))
+        if np.issubdtype(kind, np.floating):
+            value = random.normal(0, 1e3, shape).astype(kind) if shape else float(kind(random.normal(0, 1e3)))
+            return value
+        low, high = np.iinfo(kind).min // 2, np.iinfo(kind).max // 2
+        return random.integers(low, high, shape, dtype=kind) if shape else int(random.integers(low, high, dtype=kind))
+
+    def write(case, version):
+        random = np.random.default_rng([case, version])
+        store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+        package = f"drawn{case}"
+        letters = list("bcdfghklmnpqrtuvz")
+        word = lambda: "".join(random.choice(letters, random.integers(3, 9))) + str(random.integers(0, 100))
+
+        def fillers():
+            """Pairs of a field's definition and a function that draws its value."""
+            found = []
+            for _ in range(random.integers(1, 6)):
+                name, kind = word(), str(random.choice(list(numbers)))
+                count = int(random.integers(1, 6))
+                form = random.integers(0, 5)
+                if form == 0:
+                    found.append((f"string {name}", name, lambda: "x" * int(random.integers(0, 9))))
+                elif form == 1:
+                    found.append((f"{kind}[{count}] {name}", name, lambda kind=kind, count=count: drawn(random, numbers[kind], (count,))))
+                elif form == 2:
+                    found.append((f"{kind}[] {name}", name, lambda kind=kind: drawn(random, numbers[kind], (int(random.integers(1, 5)),))))
+                elif form == 3:
+                    found.append((f"string[] {name}", name, lambda: ["y" * int(random.integers(0, 5))] * int(random.integers(0, 3))))
+                else:
+                    found.append((f"{kind} {name}", name, lambda kind=kind: drawn(random, numbers[kind])))
+            # A constant is no field; a comment is none either.
+            return found + [("uint8 LIMIT=3  # not in the message", None, None)]
+
+        vector = "geometry_msgs/Vector3"
+        has_header, depth = case % 4 != 3, int(random.integers(0, 4))
+        header_level = int(random.integers(0, depth + 1))
+        types, inner = [], None
+        for level in range(depth + 1):
+            fields = fillers()
+            if level == 0:
+                fields += [(f"{vector} angular_velocity", "angular_velocity", "rate"), (f"{vector} linear_acceleration", "linear_acceleration", "force")]
+            else:
+                name = word()
+                fields.append((f"{package}/{types[-1][0]} {name}", name, "inner"))
+            if has_header and level == header_level:
+                name = str(random.choice(["header", "Header"]))
+                fields.append((f"std_msgs/Header {name}", name, "header"))
+            random.shuffle(fields)
+            types.append((f"Level{level}", fields))
+        definitions = {}
+        for name, fields in types:
+            text = "\n".join(definition for definition, *_ in fields)
+            definitions |= get_types_from_msg(text, f"{package}/msg/{name}")
+        store.register(definitions)
+        times, gyro, accl = samples(100 + case, rows)
+
+        def message(level, time, rate, force):
+            name, fields = types[level]
+            values = {}
+            for _, field, value in fields:
+                if field is None:
+                    continue
+                if value in ("rate", "force"):
+                    value = store.types["geometry_msgs/msg/Vector3"](*map(float, rate if value == "rate" else force))
+                elif value == "inner":
+                    value = message(level - 1, time, rate, force)
+                elif value == "header":
+                    extra = dict(seq=0) if version == 1 else {}
+                    stamp = store.types["builtin_interfaces/msg/Time"](sec=int(time // 10**9), nanosec=int(time % 10**9))
+                    value = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="f" * int(random.integers(0, 7)), **extra)
+                else:
+                    value = value()
+                values[field] = value
+            return store.types[f"{package}/msg/{name}"](**values)
+
+        if version == 1:
+            file, writer = f"drawn{case}.bag", Writer1(folder / f"drawn{case}.bag")
+            serialize = store.serialize_ros1
+        else:
+            plugin, ending = [(StoragePlugin.MCAP, "mcap"), (StoragePlugin.SQLITE3, "db3")][case % 2]
+            file, writer = f"drawn{case}/drawn{case}.{ending}", Writer2(folder / f"drawn{case}", version=9, storage_plugin=plugin)
+            serialize = store.serialize_cdr
+        kind = f"{package}/msg/{types[-1][0]}"
+        with writer:
+            connection = writer.add_connection("/" + word(), kind, typestore=store)
+            for time, rate, force in zip(times, gyro, accl):
+                late = 3_000_000 if has_header else 0
+                writer.write(connection, int(time) + late, serialize(message(depth, time, rate, force), kind))
+        truth.add(file, both(gyro, accl), kept=kept)
+
+    for case in range(6):
+        write(case, 1)
+    for case in range(10, 18):
+        write(case, 2)
+
+
+def matlab_structures(folder, truth):
+    times, gyro, accl = samples(20)
+    column = lambda values: np.asarray(values)[:, None]
+    board = dict(t=column((times - times[0]) / 1e9), wb=gyro, fb=accl, mb=np.zeros((len(gyro), 3)), name="left")
+    for file, compressed in [("structure.mat", False), ("structure_compressed.mat", True)]:
+        scipy.io.savemat(folder / file, dict(setup=dict(note="bench", board=board)), do_compression=compressed)
+        truth.add(file, both(gyro, accl), kept=KEPT)
+    named = ",".join(f"{channel}_{axis}=setup.board.{field}.{at}" for channel, field in [("gyro", "wb"), ("accl", "fb")] for at, axis in enumerate("xyz"))
+    truth.add("structure.mat", both(gyro, accl), ["--columns", f"time=setup.board.t,{named}", "--units", "s,rad/s,m/s^2"], kept=KEPT)
+    # Two sensors in one file: each is read by its name.
+    second = samples(21)
+    other = dict(t=column((second[0] - second[0][0]) / 1e9), gyro=np.degrees(second[1]).astype(np.float32), acc=second[2] / GRAVITY)
+    scipy.io.savemat(folder / "two_structures.mat", dict(first=board, second=other))
+    truth.add("two_structures.mat", both(gyro, accl), ["--topic", "first"], kept=KEPT)
+    truth.add("two_structures.mat", both(*second[1:]), ["--topic", "second", "--units", "deg/s,g"], kept=KEPT)
+
+
+def hdf5(folder, truth):
+    import h5py
+
+    times, gyro, accl = samples(22)
+    # The rate and the units are attributes; without time stamps the lost samples are not seen.
+    with h5py.File(folder / "attributes.h5", "w") as file:
+        group = file.create_group("run 1/imu")
+        group.attrs["sampling_rate"] = RATE
+        group.create_dataset("gyro", data=gyro.astype(np.float32), chunks=(512, 3), compression="gzip", shuffle=True).attrs["unit"] = "rad/s"
+        group.create_dataset("acc", data=accl.astype(">f8")).attrs["units"] = np.bytes_("m/s^2")
+        file.create_dataset("image", data=np.zeros((4, 4, 3)))
+        file.create_dataset("text", data="bench")
+    truth.add("attributes.h5", both(gyro.astype(np.float32), accl))
+    # A table of records, with times in ns since 1970; and a matrix of which each column is a row of the file, as MATLAB has it.
+    names = [*"abcdef"]
+    table = np.zeros(len(times), [("stamp", "<i8"), *((name, "<f4" if name in "abc" else "<f8") for name in names), ("flag", "u1")])
+    table["stamp"] = times
+    for name, values in zip(names, [*gyro.T, *accl.T]):
+        table[name] = values
+    with h5py.File(folder / "table.h5", "w", userblock_size=512) as file:
+        file.create_dataset("log/rows", data=table, chunks=(700,), compression="gzip", fletcher32=True)
+        file.create_dataset("log/matrix", data=np.c_[(times - times[0]) / 1e9, gyro].T)
+    # The user block is where MATLAB writes its own header.
+    with open(folder / "table.h5", "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(512))
+    rows = ",".join(f"{channel}=log/rows.{name}" for channel, name in zip(GYRO + ACCL, names))
+    truth.add("table.h5", both(gyro.astype(np.float32), accl), ["--columns", f"time=log/rows.stamp,{rows}", "--units", "rad/s,m/s^2"], kept=KEPT)
+    matrix = ",".join(f"{channel}=log/matrix.{at + 1}" for at, channel in enumerate(GYRO))
+    truth.add("table.h5", rates(gyro), ["--columns", f"time=log/matrix.0,{matrix}", "--units", "s,rad/s"], kept=KEPT)
+
+
+def old_ardupilot(folder, truth):
+    """As logs of 2014 are: the time in ms, no number of the sensor; pymavlink reads it back."""
+    from pymavlink import DFReader
+
+    times, gyro, accl = samples(23)
+    millis = (times - START_NS) // 1_000_000 + 60_000
+    def fmt(kind, length, name, types, labels):
+        return b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, length, name.encode(), types.encode(), labels.encode())
+    log = fmt(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")
+    log += fmt(10, 3 + 4 + 24, "IMU", "Iffffff", "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    for time, rate, force in zip(millis, gyro, accl):
+        log += bytes([0xA3, 0x95, 10]) + struct.pack("<I6f", time, *rate, *force)
+    (folder / "imu_2014.bin").write_bytes(log)
+    reader = DFReader.DFReader_binary(str(folder / "imu_2014.bin"))
+    found = [message for message in iter(lambda: reader.recv_match(type="IMU"), None)]
+    assert len(found) == len(times) and found[5].TimeMS == millis[5]
+    truth.add("imu_2014.bin", both(gyro, accl), kept=KEPT)
+
+
+def blackbox(folder, truth):
+    """Betaflight's log by its own header lines; orangebox reads it back."""
+    from orangebox import Parser
+
+    rate, acc_1g = 1000.0, 2048
+    kept = np.setdiff1d(np.arange(ROWS), LOST)
+    random = np.random.default_rng(24)
+    sigma = np.array([9, 11, 14, 30, 40, 50])
+    counts = np.round(random.normal(0, sigma, (ROWS, 6)) + [3, -2, 1, 50, -20, acc_1g]).astype(int)[kept]
+    names = "loopIteration,time,gyroADC[0],gyroADC[1],gyroADC[2],accSmooth[0],accSmooth[1],accSmooth[2]"
+    lines = [
+        "Product:Blackbox flight data recorder by Nicholas Sherlock", "Data version:2", f"Field I name:{names}",
+        "Field I signed:0,0,1,1,1,1,1,1", "Field I predictor:0,0,0,0,0,0,0,0", "Field I encoding:1,1,0,0,0,0,0,0",
+        "Field P predictor:6,2,1,1,1,1,1,1", "Field P encoding:9,0,0,0,0,0,0,0", "Field S name:flightModeFlags,stateFlags,failsafePhase",
+        "Field S signed:0,0,0", "Field S predictor:0,0,0", "Field S encoding:1,1,1", "Firmware type:Cleanflight",
+        "Firmware revision:Betaflight 4.4.2 (23d066d08) STM32F411", "Firmware date:Jun  1 2023 18:17:04", "I interval:32",
+        "P interval:1", "P ratio:32", "minthrottle:1070", "maxthrottle:2000", "gyro_scale:0x3f800000", "motorOutput:158,2047",
+        f"acc_1G:{acc_1g}", "vbatref:1604", "looptime:1000", "gyro_sync_denom:1", "pid_process_denom:1", "debug_mode:0",
+        "features:541130760", "fields_disabled_mask:0", "motor_pwm_protocol:5",
+    ]
+    log = "".join(f"H {line}\n" for line in lines).encode()
+
+    def unsigned(value):
+        out = bytearray()
+        while value > 127:
+            out.append(value & 127 | 128)
+            value >>= 7
+        return bytes(out) + bytes([value])
+
+    def signed(value):
+        return unsigned((value << 1 ^ value >> 31) & 0xFFFFFFFF)
+
+    times = 5_000_000 + kept * 1000
+    before = []
+    for at, (iteration, time, row) in enumerate(zip(kept, times, counts)):
+        # A frame on its own where the one before is missing, as after a dropout.
+        if at % 32 == 0 or kept[at - 1] != iteration - 1 or len(before) < 2:
+            log += b"I" + unsigned(int(iteration)) + unsigned(int(time)) + b"".join(signed(int(value)) for value in row)
+            before = [(int(time), row)]
+            before = before * 2
+        else:
+            (last, values), (earlier, _) = before
+            log += b"P" + signed(int(time) - (2 * last - earlier)) + b"".join(signed(int(value)) for value in row - values)
+            before = [(int(time), row), (last, values)]
+    log += b"E\xffEnd of log\0"
+    (folder / "blackbox.bbl").write_bytes(log)
+    frames = list(Parser.load(str(folder / "blackbox.bbl")).frames())
+    assert len(frames) == len(kept) and frames[77].data[1:5] == (times[77], *counts[77, :3])
+    scale = np.array([1, 1, 1, 1 / acc_1g, 1 / acc_1g, 1 / acc_1g])
+    known = truth.add("blackbox.bbl", dict(zip(GYRO + ACCL, (counts * scale).T)), rate=rate, kept=kept)
+    known["angle_random_walk"] = {name: float(deviation / np.sqrt(rate)) for name, deviation in zip(GYRO + ACCL, sigma * scale)}
+
+
 def main():
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     truth = Truth()
-    for write in [tables, numpy_arrays, matlab, ros_bags, ulog, ardupilot, spi_captures]:
+    writers = [tables, numpy_arrays, matlab, matlab_structures, hdf5, ros_bags, drawn_messages, ulog, ardupilot, old_ardupilot]
+    for write in writers + [blackbox, spi_captures]:
         write(folder, truth)
     (folder / "truth.json").write_text(json.dumps(truth, indent=1))
 

@@ -3,6 +3,7 @@
 use crate::program::{host_sim, json_of, write};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use recordings::file_format::InputFile;
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -185,6 +186,33 @@ fn every_format_is_converted() {
     }
     let output = host_sim(&["convert", bag, back, "--to", "frames"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("register counts of an ADIS16405"));
+}
+
+/// Structures of a `.mat`, topics of a bag and publishers of a log are several sensors; one that is recorded by several messages is not.
+#[test]
+fn several_sensors_of_a_file_have_a_name_each() {
+    let Some(samples) = samples("several_sensors_of_a_file_have_a_name_each") else { return };
+    for (file, expected) in [
+        ("two_structures.mat", &["first", "second"][..]),
+        ("two.bag", &["/imu/data", "/imu/other"]),
+        ("instances.ulg", &["sensor_gyro", "sensor_gyro:1"]),
+        ("structure.mat", &[]),
+        ("one.bag", &[]),
+        ("single.ulg", &[]),
+        ("imu.bin", &[]),
+        ("attributes.h5", &[]),
+        ("units.csv", &[]),
+    ] {
+        let input = InputFile::open(&samples.join(file)).expect(file);
+        assert_eq!(input.sensors().expect(file), expected, "{file}");
+        let topics = input.contents().expect(file);
+        for name in expected {
+            assert!(topics.iter().any(|topic| topic.sensors.iter().any(|sensor| sensor == name)), "{file}: {name}");
+        }
+    }
+    let topics = InputFile::open(&samples.join("attributes.h5")).expect("HDF5").contents().expect("HDF5");
+    let acc = topics.iter().find(|topic| topic.name == "run 1/imu/acc").expect("a dataset");
+    assert_eq!(acc.columns[2], ("run 1/imu/acc.2".to_owned(), Some("m/s^2")));
 }
 
 /// Every format with its bytes cut off or flipped: a result, or one line of error that names the file, in bounded time and memory,

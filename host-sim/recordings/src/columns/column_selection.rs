@@ -142,6 +142,21 @@ impl ColumnSelection {
         self.assignments.is_empty() && self.units.is_empty()
     }
 
+    /// Whether the user assigns columns.
+    pub(crate) fn has_columns(&self) -> bool {
+        !self.assignments.is_empty()
+    }
+
+    /// Whether the user states units.
+    pub(crate) fn has_units(&self) -> bool {
+        !self.units.is_empty()
+    }
+
+    /// Whether every column that the user names is one of `available`.
+    pub(crate) fn is_covered(&self, available: &[AvailableColumn]) -> bool {
+        self.assignments.iter().all(|(_, wanted)| available.iter().any(|column| column.name == *wanted))
+    }
+
     /// The columns to read of `available`: time, index, and the channels in the order of `sensor`.
     pub(crate) fn choose(
         &self,
@@ -265,6 +280,18 @@ fn names(available: &[AvailableColumn]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
+/// The columns whose names say what they are: the name of a channel of any sensor, `time` or `sample`, and the position. `None` where
+/// two columns look like one channel.
+pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'static str, usize)>> {
+    let named = by_name(available, &SensorProfile::generic()).ok()?;
+    let name = |(role, position)| match role {
+        Role::Time => ("time", position),
+        Role::Index => ("sample", position),
+        Role::Channel(profile) => (profile.name, position),
+    };
+    Some(named.into_iter().map(name).collect())
+}
+
 /// The columns whose names say what they are.
 fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<(Role, usize)>, SelectionError> {
     let mut named: Vec<(Role, usize)> = Vec::new();
@@ -305,10 +332,23 @@ enum NamedRole {
 }
 
 /// The usual names, in small letters with `_` for other signs and without the axis.
-const GYROSCOPE: [&str; 11] =
-    ["gyro", "gyr", "gyroscope", "w", "g", "omega", "rate", "angular_velocity", "angular_rate", "w_rs_s", "gyro_rad"];
-const ACCELEROMETER: [&str; 11] = [
+const GYROSCOPE: [&str; 12] = [
+    "gyro",
+    "gyr",
+    "gyroscope",
+    "w",
+    "wb",
+    "g",
+    "omega",
+    "rate",
+    "angular_velocity",
+    "angular_rate",
+    "w_rs_s",
+    "gyro_rad",
+];
+const ACCELEROMETER: [&str; 12] = [
     "accl",
+    "fb",
     "acc",
     "accel",
     "accelerometer",
@@ -320,7 +360,7 @@ const ACCELEROMETER: [&str; 11] = [
     "accelerometer_m_s2",
     "force",
 ];
-const MAGNETOMETER: [&str; 6] = ["magn", "mag", "magnetometer", "m", "b", "magnetic_field"];
+const MAGNETOMETER: [&str; 7] = ["magn", "mag", "magnetometer", "m", "mb", "b", "magnetic_field"];
 const AXES: [(&str, [&str; 3]); 3] = [
     ("gyro", ["gyro_x", "gyro_y", "gyro_z"]),
     ("accl", ["accl_x", "accl_y", "accl_z"]),

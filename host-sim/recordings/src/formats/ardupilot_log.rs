@@ -2,10 +2,11 @@
 //!
 //! The crate `ardupilot-binlog` 0.2 is not used because a format message that states a length below 3 bytes makes it panic.
 
-use crate::formats::message_table::{ACCELEROMETER, Fields, GYROSCOPE, MessageTable, choose_topic};
+use crate::columns::column_selection::AvailableColumn;
+use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::input::budget::{Budget, Metered};
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable};
+use crate::tables::sensor_table::Number;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
@@ -24,66 +25,135 @@ pub(crate) const MAGIC: [u8; 3] = [START[0], START[1], FMT];
 /// Samples in an ISBD message.
 const BATCH_SAMPLES: usize = 32;
 
-/// What an IMU message has beside its time, and its labels in the log.
-const IMU: &[Fields] = &[GYROSCOPE, ACCELEROMETER, &[("temp", "degC")]];
-const IMU_LABELS: [&str; 8] = ["TimeUS", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ", "T"];
-/// Unit of the times.
-const TIME_UNIT: &str = "us";
+/// Labels of an inertial sensor in whatever message, with their channels and units.
+const VECTORS: [([&str; 3], [&str; 3], &str); 2] =
+    [(["GyrX", "GyrY", "GyrZ"], GYROSCOPE, "rad/s"), (["AccX", "AccY", "AccZ"], ACCELEROMETER, "m/s^2")];
+/// Label of a sensor's temperature beside them, degC.
+const TEMPERATURE: &str = "T";
+/// Labels of times, with their units; the first that a message has is that of its samples.
+const TIMES: [(&str, &str); 4] = [("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"), ("TimeS", "s")];
+/// Label of the number of a sensor among several.
+const INSTANCE: &str = "I";
 
-/// A source of samples in a log; the first that a log has is read where the user names none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Topic {
+/// What the rows of a topic are made of. Of topics whose sensor is known the least is read where the user names none.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Rows {
     GyroscopeBatches(i64),
-    Imu(i64),
+    /// Messages by their name, and the number of the sensor where they have one.
+    Messages(String, Option<i64>),
     AccelerometerBatches(i64),
 }
 
-impl Topic {
-    fn name(self) -> String {
+impl Rows {
+    fn name(&self) -> String {
         match self {
             Self::GyroscopeBatches(instance) => format!("gyro_batches:{instance}"),
-            Self::Imu(instance) => format!("IMU:{instance}"),
+            Self::Messages(name, Some(instance)) => format!("{name}:{instance}"),
+            Self::Messages(name, None) => name.clone(),
             Self::AccelerometerBatches(instance) => format!("accel_batches:{instance}"),
         }
     }
 
-    fn fields(self) -> &'static [Fields] {
-        match self {
-            Self::GyroscopeBatches(_) => &[GYROSCOPE],
-            Self::Imu(_) => IMU,
-            Self::AccelerometerBatches(_) => &[ACCELEROMETER],
+    /// The topic of a batch, of samples with a time and three axes, or of messages of this format.
+    fn topic(&self, format: Option<&MessageFormat>, rows: u64) -> Topic {
+        let topic = Topic { name: self.name(), rows: Some(rows), ..Topic::default() };
+        let mut sensor = TopicSensor::default();
+        let (Self::Messages(name, _), Some(format)) = (self, format) else {
+            let is_gyroscope = matches!(self, Self::GyroscopeBatches(_));
+            let (_, channels, unit) = VECTORS[usize::from(!is_gyroscope)];
+            sensor.columns.push(("time", 0, None));
+            sensor.add_axes(channels, [1, 2, 3], unit);
+            let axes = ["x", "y", "z"].map(|axis| AvailableColumn { name: axis.to_owned(), unit: None });
+            let columns = std::iter::once(AvailableColumn::known("time", "us")).chain(axes).collect();
+            let kind = if is_gyroscope { "gyro_batches" } else { "accel_batches" };
+            return Topic { kind: kind.to_owned(), columns, sensors: vec![sensor], ..topic };
+        };
+        let at = |label: &str| format.fields.iter().position(|(known, ..)| known == label);
+        if let Some(time) = TIMES.iter().find_map(|(label, _)| at(label)) {
+            sensor.columns.push(("time", time, None));
+            for (labels, channels, unit) in VECTORS {
+                if let [Some(x), Some(y), Some(z)] = labels.map(at) {
+                    sensor.add_axes(channels, [x, y, z], unit);
+                }
+            }
         }
+        let is_sensor = sensor.columns.len() > 1;
+        if let Some(temperature) = at(TEMPERATURE).filter(|_| is_sensor) {
+            sensor.columns.push(("temp", temperature, crate::columns::unit::Unit::parse("degC")));
+        }
+        let column = |(label, ..): &(String, char, usize)| match TIMES.iter().find(|(known, _)| known == label) {
+            Some((_, unit)) => AvailableColumn::known(label, unit),
+            None => AvailableColumn { name: label.clone(), unit: None },
+        };
+        let columns = format.fields.iter().map(column).collect();
+        let sensors = Some(sensor).filter(|_| is_sensor).into_iter().collect();
+        Topic { kind: name.clone(), columns, sensors, ..topic }
     }
 }
 
-/// Reads a log.
-pub(crate) fn read(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let mut counted: BTreeMap<Topic, u64> = BTreeMap::new();
-    for_each_sample(file, |topic, _| {
-        *counted.entry(topic).or_insert(0) += 1;
-        Ok(())
-    })?;
-    let topics: Vec<(String, Topic)> = counted.keys().map(|&topic| (topic.name(), topic)).collect();
-    let wanted = options.topic.as_deref().or(topics.first().map(|(name, _)| name.as_str()));
-    let (name, chosen) = choose_topic(FORMAT, &topics, wanted).map_err(fail)?;
-    let mut table = MessageTable::new(file, TIME_UNIT, chosen.fields(), options)?;
-    let skipped = for_each_sample(file, |topic, row| if topic == *chosen { table.push(row) } else { Ok(()) })?;
-    let mut table = table.finish(None)?;
-    let others: Vec<&str> = topics.iter().map(|(name, _)| name.as_str()).filter(|other| other != name).collect();
-    if options.topic.is_none() && !others.is_empty() {
-        table.notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
+/// An open log.
+pub(crate) struct ArduPilotSource<'a> {
+    file: &'a Path,
+    topics: Vec<Topic>,
+    rows: Vec<Rows>,
+    preferred: Option<String>,
+    budget: Budget,
+}
+
+impl<'a> ArduPilotSource<'a> {
+    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+        let mut counted: BTreeMap<Rows, u64> = BTreeMap::new();
+        let Log { formats, .. } = for_each_sample(file, budget, &mut |rows, _| {
+            match counted.get_mut(rows) {
+                Some(count) => *count += 1,
+                None => _ = counted.insert(rows.clone(), 1),
+            }
+            Ok(())
+        })?;
+        let format = |rows: &Rows| match rows {
+            Rows::Messages(name, _) => formats.values().find(|format| format.name == *name),
+            _ => None,
+        };
+        let topics: Vec<Topic> = counted.iter().map(|(rows, count)| rows.topic(format(rows), *count)).collect();
+        let rows: Vec<Rows> = counted.into_keys().collect();
+        let preferred = topics.iter().find(|topic| !topic.sensors.is_empty()).map(|topic| topic.name.clone());
+        Ok(Self { file, topics, rows, preferred, budget })
     }
-    if skipped > 0 {
-        table.notes.push(format!("{skipped} bytes of the log are no message and are skipped"));
+}
+
+impl Source for ArduPilotSource<'_> {
+    fn format(&self) -> &'static str {
+        FORMAT
     }
-    Ok(table)
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn preferred(&self) -> Option<&str> {
+        self.preferred.as_deref()
+    }
+
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
+        let wanted = &self.rows[topic];
+        let mut picked = Vec::new();
+        let Log { skipped, .. } = for_each_sample(self.file, self.budget, &mut |rows, row| {
+            if rows != wanted {
+                return Ok(());
+            }
+            picked.clear();
+            picked.extend(columns.iter().map(|&at| row(at)));
+            each(&picked)
+        })?;
+        let note = format!("{skipped} bytes of the log are no message and are skipped");
+        Ok(Ending { damage: None, notes: Some(note).filter(|_| skipped > 0).into_iter().collect(), rate_hz: None })
+    }
 }
 
 /// The header of a batch: what its samples are and when they were taken.
 struct Batch {
     number: i64,
-    topic: Topic,
+    rows: Rows,
     /// Counts per unit.
     multiplier: f64,
     start_us: i64,
@@ -95,35 +165,40 @@ impl Batch {
     /// From an ISBH message; `None` if it is of no known sensor or has no scale or rate.
     fn from_header(header: &LogMessage) -> Option<Self> {
         let instance = header.integer("instance")?;
-        let topic = match header.integer("type")? {
-            0 => Topic::AccelerometerBatches(instance),
-            1 => Topic::GyroscopeBatches(instance),
+        let rows = match header.integer("type")? {
+            0 => Rows::AccelerometerBatches(instance),
+            1 => Rows::GyroscopeBatches(instance),
             _ => return None,
         };
         let (multiplier, rate_hz) = (header.number("mul")?.value(), header.number("smp_rate")?.value());
         let (number, start_us) = (header.integer("N")?, header.integer("SampleUS")?);
         let is_usable = multiplier > 0.0 && rate_hz > 0.0 && rate_hz.is_finite();
-        is_usable.then_some(Self { number, topic, multiplier, start_us, rate_hz, samples: 0 })
+        is_usable.then_some(Self { number, rows, multiplier, start_us, rate_hz, samples: 0 })
     }
 }
 
-/// Gives every sample with its topic to `each`; returns the bytes that are no message.
-fn for_each_sample(
-    file: &Path,
-    mut each: impl FnMut(Topic, &[Number]) -> Result<(), InputError>,
-) -> Result<u64, InputError> {
-    let fail = |error| InputError::file(file, Reason::Io(error));
-    let mut messages = Messages::new(BufReader::new(File::open(file).map_err(fail)?));
+/// What a way through a log leaves.
+struct Log {
+    formats: BTreeMap<u8, MessageFormat>,
+    /// Bytes that are no message.
+    skipped: u64,
+}
+
+/// Takes what a row belongs to, and gives its numbers by the positions of their columns.
+type EachSample<'a> = dyn FnMut(&Rows, &dyn Fn(usize) -> Number) -> Result<(), InputError> + 'a;
+
+/// Gives every sample to `each`.
+fn for_each_sample(file: &Path, budget: Budget, each: &mut EachSample) -> Result<Log, InputError> {
+    let fail = |error| InputError::file(file, Reason::from_io(error));
+    let input = BufReader::new(File::open(file).map_err(fail)?);
+    let mut messages = Messages::new(Metered::new(input, budget.meter()));
     let mut batch: Option<Batch> = None;
+    // Of each type of message: its name with the instance that was seen last.
+    let mut known: BTreeMap<u8, Rows> = BTreeMap::new();
     while let Some(message) = messages.next().map_err(fail)? {
         match message.format.name.as_str() {
-            "IMU" => {
-                let row = IMU_LABELS.map(|label| message.number(label).unwrap_or(Number::Real(f64::NAN)));
-                each(Topic::Imu(message.integer("I").unwrap_or(0)), &row)?;
-            }
-            "ISBH" => {
-                batch = Batch::from_header(&message);
-            }
+            "FMT" => {}
+            "ISBH" => batch = Batch::from_header(&message),
             "ISBD" => {
                 // A message is lost where the sequence number is not the next one: its samples are a gap.
                 let (Some(batch), Some(sequence)) = (batch.as_mut(), message.integer("seqno")) else { continue };
@@ -137,18 +212,25 @@ fn for_each_sample(
                     let axis = |label: &str| {
                         message.element(label, at).map_or(f64::NAN, |count| f64::from(count) / batch.multiplier)
                     };
-                    // Integers keep every digit of a time since the start; the fraction of a microsecond is below its tick.
-                    let time = Number::Real(batch.start_us as f64 + after_us);
-                    each(
-                        batch.topic,
-                        &[time, Number::Real(axis("x")), Number::Real(axis("y")), Number::Real(axis("z"))],
-                    )?;
+                    each(&batch.rows, &|column| match column {
+                        // Integers keep every digit of a time since the start; the fraction of a microsecond is below its tick.
+                        0 => Number::Real(batch.start_us as f64 + after_us),
+                        column => Number::Real(axis(["x", "y", "z"][(column - 1).min(2)])),
+                    })?;
                 }
             }
-            _ => {}
+            name => {
+                let instance = message.integer(INSTANCE);
+                let new = || Rows::Messages(name.to_owned(), instance);
+                let rows = known.entry(message.bytes[2]).or_insert_with(new);
+                if !matches!(rows, Rows::Messages(_, of) if *of == instance) {
+                    *rows = new();
+                }
+                each(rows, &|column| message.number_at(column).unwrap_or(Number::Real(f64::NAN)))?;
+            }
         }
     }
-    Ok(messages.skipped)
+    Ok(Log { formats: messages.formats, skipped: messages.skipped })
 }
 
 /// A type of message as the log describes it.
@@ -174,7 +256,12 @@ impl LogMessage<'_> {
     }
 
     fn number(&self, label: &str) -> Option<Number> {
-        let (kind, bytes) = self.field(label)?;
+        self.number_at(self.format.fields.iter().position(|(known, ..)| known == label)?)
+    }
+
+    fn number_at(&self, position: usize) -> Option<Number> {
+        let (_, kind, offset) = self.format.fields.get(position)?;
+        let (kind, bytes) = (*kind, self.bytes.get(*offset..)?);
         let integer = match kind {
             'b' => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
             'B' | 'M' => i64::from(*bytes.first()?),
@@ -184,7 +271,11 @@ impl LogMessage<'_> {
             'I' => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
             'q' => i64::from_le_bytes(*bytes.first_chunk()?),
             'Q' => i64::try_from(u64::from_le_bytes(*bytes.first_chunk()?)).ok()?,
+            'L' => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
             // Hundredths.
+            'C' => return Some(Number::Real(f64::from(u16::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
+            'e' => return Some(Number::Real(f64::from(i32::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
+            'E' => return Some(Number::Real(f64::from(u32::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
             'c' => return Some(Number::Real(f64::from(i16::from_le_bytes(*bytes.first_chunk()?)) / 100.0)),
             'f' => return Some(Number::Real(f64::from(f32::from_le_bytes(*bytes.first_chunk()?)))),
             'd' => return Some(Number::Real(f64::from_le_bytes(*bytes.first_chunk()?))),

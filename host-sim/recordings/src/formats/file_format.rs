@@ -3,7 +3,19 @@
 use crate::counts::count_table;
 use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
-use crate::formats::{ardupilot_log, matlab, numpy, ros_bag, text_table, ulog};
+use crate::formats::ardupilot_log::{self, ArduPilotSource};
+use crate::formats::betaflight::{self, BlackboxSource};
+use crate::formats::hdf5::{self, Hdf5Reader};
+use crate::formats::matlab::MatReader;
+use crate::formats::mcap_bag::McapSource;
+use crate::formats::numpy::{NpyReader, NpzReader};
+use crate::formats::ros_bag::RosBagSource;
+use crate::formats::sqlite_bag::SqliteSource;
+pub use crate::formats::topics::TopicDescription;
+use crate::formats::topics::{self, Source};
+use crate::formats::ulog::UlogSource;
+use crate::formats::{foreign_format, text_table};
+use crate::input::budget::{Budget, Metered};
 use crate::input::delimited_text::Lines;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
@@ -47,6 +59,10 @@ pub enum FileFormat {
     Ulog,
     /// A DataFlash log of ArduPilot.
     ArduPilot,
+    /// HDF5, which is also MATLAB 7.3.
+    Hdf5,
+    /// A blackbox log of Betaflight or INAV.
+    Blackbox,
 }
 
 impl FileFormat {
@@ -57,7 +73,7 @@ impl FileFormat {
 }
 
 /// First bytes of the binary formats.
-const MAGICS: [(&[u8], FileFormat); 8] = [
+const MAGICS: [(&[u8], FileFormat); 9] = [
     (b"\x93NUMPY", FileFormat::Npy),
     (b"PK\x03\x04", FileFormat::Npz),
     (b"MATLAB 5.0 MAT-file", FileFormat::Mat),
@@ -66,6 +82,7 @@ const MAGICS: [(&[u8], FileFormat); 8] = [
     (b"SQLite format 3\0", FileFormat::Sqlite),
     (b"ULog\x01\x12\x35", FileFormat::Ulog),
     (&ardupilot_log::MAGIC, FileFormat::ArduPilot),
+    (betaflight::MAGIC, FileFormat::Blackbox),
 ];
 
 /// An input that can be read more than once: a file, or a copy of what came through a pipe or was compressed.
@@ -76,6 +93,7 @@ pub struct InputFile {
     copy: Option<NamedTempFile>,
     format: FileFormat,
     monitor: ReadMonitor,
+    budget: Budget,
 }
 
 impl InputFile {
@@ -107,6 +125,9 @@ impl InputFile {
                 copy = Some(copied_pipe(File::open(name).map_err(fail)?, monitor).map_err(fail)?);
             }
         }
+        let budget = Budget::of_file(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
+        // Of compressed text, what is in it.
+        let mut text = None;
         let mut head = head(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
         if head.starts_with(&GZIP_MAGIC) {
             let compressed = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
@@ -115,8 +136,11 @@ impl InputFile {
             // Damage is reported with its line where the whole is read.
             let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
             if binary_format(&start).is_some() {
-                copy = Some(copied(start.as_slice().chain(inner)).map_err(fail)?);
+                let whole = Metered::new(start.as_slice().chain(inner), budget.meter());
+                copy = Some(copied(whole).map_err(|error| InputError::file(name, Reason::from_io(error)))?);
                 head = start;
+            } else {
+                text = Some(start);
             }
         }
         let format = match binary_format(&head) {
@@ -128,11 +152,14 @@ impl InputFile {
                 copy = Some(log);
                 FileFormat::FrameLog
             }
+            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head)) => {
+                return Err(InputError::file(name, foreign_format::refusal(text.as_ref().unwrap_or(&head))));
+            }
             None => {
                 text_format(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(|error| renamed(error, name))?
             }
         };
-        Ok(Self { name: name.to_owned(), copy, format, monitor: monitor.clone() })
+        Ok(Self { name: name.to_owned(), copy, format, monitor: monitor.clone(), budget })
     }
 
     /// What was recognised.
@@ -158,22 +185,63 @@ impl InputFile {
     /// Reads the recording of any sensor.
     ///
     /// # Errors
-    /// The file is damaged, its columns cannot be chosen, or it is a log of the SPI bus.
+    /// The file is damaged, its topic or columns cannot be chosen, or it is a log of the SPI bus.
     pub fn read(&self, options: &ReadOptions) -> Result<SensorRecording, InputError> {
         let path = self.path();
         let table = match self.format {
             FileFormat::CountTable | FileFormat::TextTable => text_table::read(path, options, &self.monitor),
             FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(path, Reason::FrameLog)),
-            FileFormat::Npy => numpy::read_npy(path, options),
-            FileFormat::Npz => numpy::read_npz(path, options),
-            FileFormat::Mat => matlab::read(path, options),
-            FileFormat::RosBag => ros_bag::read_ros1(path, options),
-            FileFormat::Mcap => ros_bag::read_mcap(path, options),
-            FileFormat::Sqlite => ros_bag::read_sqlite(path, options),
-            FileFormat::Ulog => ulog::read(path, options),
-            FileFormat::ArduPilot => ardupilot_log::read(path, options),
+            _ => {
+                let budget = self.budget.again();
+                self.source(budget).and_then(|mut source| topics::read(path, source.as_mut(), options, budget))
+            }
         };
         table.map(|table| SensorRecording::new(table, &options.sensor)).map_err(|error| self.rename(error))
+    }
+
+    /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,
+    /// without a known one, or of text.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn sensors(&self) -> Result<Vec<String>, InputError> {
+        if self.format.is_text() {
+            return Ok(Vec::new());
+        }
+        let source = self.source(self.budget.again()).map_err(|error| self.rename(error))?;
+        Ok(topics::names_of_several(source.as_ref()))
+    }
+
+    /// What is in the file: topics of messages, groups of arrays or the only array, with their columns; nothing of text.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn contents(&self) -> Result<Vec<TopicDescription>, InputError> {
+        if self.format.is_text() {
+            return Ok(Vec::new());
+        }
+        let source = self.source(self.budget.again()).map_err(|error| self.rename(error))?;
+        Ok(source.topics().iter().map(TopicDescription::from).collect())
+    }
+
+    /// The topics of a binary format.
+    fn source(&self, budget: Budget) -> Result<Box<dyn Source + '_>, InputError> {
+        let path = self.path();
+        Ok(match self.format {
+            FileFormat::CountTable | FileFormat::TextTable | FileFormat::FrameLog | FileFormat::SpiExport => {
+                return Err(InputError::file(path, Reason::NoTopic { format: "text" }));
+            }
+            FileFormat::Npy => Box::new(NpyReader::open(path, budget)?),
+            FileFormat::Npz => Box::new(NpzReader::open(path, budget)?),
+            FileFormat::Mat => Box::new(MatReader::open(path, budget)?),
+            FileFormat::RosBag => Box::new(RosBagSource::open(path, budget)?),
+            FileFormat::Mcap => Box::new(McapSource::open(path, budget)?),
+            FileFormat::Sqlite => Box::new(SqliteSource::open(path, budget)?),
+            FileFormat::Ulog => Box::new(UlogSource::open(path, budget)?),
+            FileFormat::ArduPilot => Box::new(ArduPilotSource::open(path, budget)?),
+            FileFormat::Hdf5 => Box::new(Hdf5Reader::open(path, budget)?),
+            FileFormat::Blackbox => Box::new(BlackboxSource::open(path)?),
+        })
     }
 }
 
@@ -246,6 +314,9 @@ fn head(file: &Path) -> io::Result<Vec<u8>> {
 }
 
 fn binary_format(head: &[u8]) -> Option<FileFormat> {
+    if hdf5::is_hdf5(head) {
+        return Some(FileFormat::Hdf5);
+    }
     MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)
 }
 

@@ -1,138 +1,359 @@
-//! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`.
+//! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`, with those in structures and cells (MAT-File Format,
+//! chapter 1). Of the crates that read them, `matfile` knows no structure, and prints to the terminal.
 
 use crate::counts::recording::MAX_SAMPLES;
-use crate::formats::named_arrays::{self, NamedArray};
+use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
+use crate::formats::message_layout::Scalar;
+use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable};
+use crate::tables::sensor_table::Number;
 use flate2::read::ZlibDecoder;
-use matfile::{Array, MatFile, NumericData};
-use std::io::Read;
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "MATLAB level 5";
 
 /// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: usize = 1024;
+/// Elements of an array of structures or of cells, and fields of a structure, beyond which it is no recording.
+const MAX_CHILDREN: usize = 1024;
+/// Arrays of a file.
+const MAX_ARRAYS: usize = 1 << 16;
+/// Bytes of a name.
+const MAX_NAME: u64 = 256;
+/// Bytes that are decoded at once; a multiple of every number's.
+const BUFFER_BYTES: usize = 1 << 13;
 
-/// Bytes of all arrays together, uncompressed.
-const MAX_BYTES: u64 = 1 << 30;
-
-/// Bytes before the first data element, and of the tag of an element: type and length (MAT-File Format, "Level 5").
+/// Bytes before the first data element, and of the tag of an element: type and length.
 const HEADER_BYTES: usize = 128;
 const TAG_BYTES: usize = 8;
 /// Types of data elements.
-const ARRAY_DIMENSIONS: u32 = 5;
-const ARRAY_FLAGS: u32 = 6;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
-/// Classes of arrays of numbers, double to uint64.
-const NUMERIC_CLASSES: std::ops::RangeInclusive<u32> = 6..=15;
+/// Classes of arrays: cells, structures, and numbers from double to uint64.
+const CELL: u32 = 1;
+const STRUCTURE: u32 = 2;
+const NUMERIC: std::ops::RangeInclusive<u32> = 6..=15;
 
-/// Reads a `.mat` file. It is held in memory as a whole.
-pub(crate) fn read(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let bytes = std::fs::read(file).map_err(|error| fail(Reason::Io(error)))?;
-    let numeric = numeric_arrays(&bytes).map_err(fail)?;
-    let parsed = MatFile::parse(numeric.as_slice())
-        .map_err(|error| fail(Reason::Format { format: FORMAT, error: error.to_string().into() }))?;
-    let shape = |array: &Array| match *array.size().as_slice() {
-        [rows, columns] if rows.min(columns) <= MAX_COLUMNS => {
-            Some((rows.max(columns), rows.min(columns), rows >= columns))
-        }
-        _ => None,
-    };
-    let usable: Vec<(&Array, (usize, usize, bool))> =
-        parsed.arrays().iter().filter_map(|array| Some((array, shape(array)?))).collect();
-    if usable.iter().any(|(_, (rows, ..))| *rows as u64 > MAX_SAMPLES) {
-        return Err(fail(Reason::TooManySamples));
+/// An open `.mat` file, which is read from its beginning for each array.
+pub(crate) struct MatReader {
+    file: PathBuf,
+    /// Lengths of the two sides of each array.
+    sides: Vec<[usize; 2]>,
+    budget: Budget,
+}
+
+impl MatReader {
+    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let mut listing = Walk::new(budget);
+        listing.file(file).map_err(fail)?;
+        let array = |(group, name, [rows, columns]): &(String, String, [usize; 2])| {
+            NamedArray::matrix(group, name, (*rows).max(*columns), (*rows).min(*columns))
+        };
+        let arrays = listing.arrays.iter().map(array).collect();
+        let sides = listing.arrays.into_iter().map(|(.., sides)| sides).collect();
+        Ok(ArraySource::new(file, Self { file: file.to_owned(), sides, budget }, arrays, budget))
     }
-    let arrays: Vec<NamedArray> =
-        usable.iter().map(|(array, (rows, columns, _))| NamedArray::matrix(array.name(), *rows, *columns)).collect();
-    named_arrays::read(file, &arrays, options, |number, columns| {
-        let (array, (rows, width, first_is_time)) = &usable[number];
+}
+
+impl ArrayReader for MatReader {
+    const FORMAT: &'static str = FORMAT;
+
+    fn read(
+        &mut self,
+        array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        let rows = self.sides[array][0].max(self.sides[array][1]) as u64;
+        if rows > MAX_SAMPLES {
+            return Err(Reason::TooManySamples);
+        }
+        add(rows * columns.len() as u64)?;
+        let mut walk = Walk { wanted: Some((array, columns)), ..Walk::new(self.budget) };
+        walk.file(&self.file)?;
+        walk.values.ok_or(Reason::Truncated { format: FORMAT })
+    }
+}
+
+/// A way through all data elements of a file: to list its arrays, or to read one of them.
+struct Walk<'a> {
+    /// Number of the array that is read, and its columns.
+    wanted: Option<(usize, &'a [usize])>,
+    /// Group, name and sides of each array until now.
+    arrays: Vec<(String, String, [usize; 2])>,
+    values: Option<Vec<Vec<Number>>>,
+    is_big_endian: bool,
+    meter: Meter,
+}
+
+impl Walk<'_> {
+    fn new(budget: Budget) -> Self {
+        Self { wanted: None, arrays: Vec::new(), values: None, is_big_endian: false, meter: budget.meter() }
+    }
+
+    fn file(&mut self, file: &Path) -> Result<(), Reason> {
+        let mut input = BufReader::new(File::open(file).map_err(Reason::Io)?);
+        let mut header = [0; HEADER_BYTES];
+        input.read_exact(&mut header).map_err(ended)?;
+        self.is_big_endian = header.ends_with(b"MI");
+        let mut bytes = [0; TAG_BYTES];
+        while self.values.is_none() && input.read_exact(&mut bytes).is_ok() {
+            let tag = Tag::read(&mut bytes.as_slice(), self.is_big_endian)?;
+            let mut element = input.by_ref().take(u64::from(tag.length));
+            let mut padding = 0;
+            if tag.kind == COMPRESSED {
+                let budget = self.meter.budget();
+                let meter = std::mem::replace(&mut self.meter, budget.meter());
+                let mut expanded = Metered::new(ZlibDecoder::new(&mut element), meter);
+                let walked = self.element(&mut expanded);
+                self.meter = expanded.into_meter();
+                walked?;
+            } else if tag.held.is_none() {
+                self.element(&mut bytes.as_slice().chain(&mut element))?;
+                // Elements that are not compressed begin at multiples of 8 bytes.
+                padding = tag.rest() - u64::from(tag.length);
+            } else {
+                element.set_limit(0);
+            }
+            io::copy(&mut element, &mut io::sink()).map_err(ended)?;
+            if element.limit() > 0 && self.values.is_none() {
+                return Err(Reason::Truncated { format: FORMAT });
+            }
+            io::copy(&mut input.by_ref().take(padding), &mut io::sink()).map_err(ended)?;
+        }
+        Ok(())
+    }
+
+    /// A data element of the outermost level, which is an array or is left out.
+    fn element(&mut self, input: &mut dyn Read) -> Result<(), Reason> {
+        let mut input = Counted { input, at: 0 };
+        let tag = Tag::read(&mut input, self.is_big_endian)?;
+        if tag.kind == MATRIX { self.matrix(&mut input, tag, "", None, 0) } else { Ok(()) }
+    }
+
+    /// An array after its tag, with all in it. `name` is that of a field, which has none of its own.
+    fn matrix(
+        &mut self,
+        input: &mut Counted,
+        tag: Tag,
+        group: &str,
+        name: Option<String>,
+        level: usize,
+    ) -> Result<(), Reason> {
+        Budget::check_depth(level)?;
+        let end = input.at + u64::from(tag.length);
+        if tag.length == 0 {
+            return Ok(());
+        }
+        let flags = self.small(input, 8)?;
+        let class = flags.first().copied().map_or(0, |word| word & 0xFF);
+        let dimensions = self.small(input, 64)?;
+        let own = self.text(input)?;
+        let name = name.unwrap_or(own);
+        let sides: Vec<usize> = dimensions.iter().map(|&side| side as usize).collect();
+        let elements = sides.iter().try_fold(1usize, |product, side| product.checked_mul(*side)).unwrap_or(usize::MAX);
+        match (class, sides.as_slice()) {
+            (class, &[rows, columns])
+                if NUMERIC.contains(&class) && rows.min(columns) <= MAX_COLUMNS && elements > 0 =>
+            {
+                let is_wanted = self.wanted.is_some_and(|(wanted, _)| wanted == self.arrays.len());
+                if is_wanted {
+                    self.values = Some(self.numbers(input, [rows, columns])?);
+                }
+                self.arrays.push((group.to_owned(), name, [rows, columns]));
+                if self.arrays.len() > MAX_ARRAYS {
+                    return Err(Reason::Array(format!("more than {MAX_ARRAYS} arrays")));
+                }
+            }
+            (STRUCTURE, _) if elements <= MAX_CHILDREN => {
+                let fields = self.fields(input)?;
+                for element in 0..elements {
+                    let inner =
+                        if elements == 1 { format!("{group}{name}.") } else { format!("{group}{name}.{element}.") };
+                    for field in &fields {
+                        self.child(input, &inner, field.clone(), level)?;
+                    }
+                }
+            }
+            (CELL, _) if elements <= MAX_CHILDREN => {
+                for element in 0..elements {
+                    self.child(input, &format!("{group}{name}."), element.to_string(), level)?;
+                }
+            }
+            _ => {}
+        }
+        if self.values.is_some() {
+            return Ok(());
+        }
+        input.skip(end.saturating_sub(input.at))
+    }
+
+    fn child(&mut self, input: &mut Counted, group: &str, name: String, level: usize) -> Result<(), Reason> {
+        if self.values.is_some() {
+            return Ok(());
+        }
+        let tag = Tag::read(input, self.is_big_endian)?;
+        if tag.kind == MATRIX { self.matrix(input, tag, group, Some(name), level + 1) } else { input.skip(tag.rest()) }
+    }
+
+    /// Names of the fields of a structure.
+    fn fields(&mut self, input: &mut Counted) -> Result<Vec<String>, Reason> {
+        let length = self.small(input, 4)?.first().map_or(0, |length| *length as usize);
+        let tag = Tag::read(input, self.is_big_endian)?;
+        if length == 0 || u64::from(tag.length) > (MAX_CHILDREN * length) as u64 || length as u64 > MAX_NAME {
+            return Err(Reason::Format { format: FORMAT, error: "names of fields are too long".into() });
+        }
+        let names = self.content(input, tag)?;
+        let name = |bytes: &[u8]| {
+            let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+            String::from_utf8_lossy(&bytes[..end]).into_owned()
+        };
+        Ok(names.chunks(length).map(name).collect())
+    }
+
+    /// An element of words of 32 bits, of which there are `most` bytes at most.
+    fn small(&mut self, input: &mut Counted, most: u64) -> Result<Vec<u32>, Reason> {
+        let tag = Tag::read(input, self.is_big_endian)?;
+        if u64::from(tag.length) > most {
+            return Err(Reason::Format { format: FORMAT, error: "an array has too many dimensions".into() });
+        }
+        let bytes = self.content(input, tag)?;
+        Ok(bytes.chunks_exact(4).map(|word| number(word, self.is_big_endian) as u32).collect())
+    }
+
+    fn text(&mut self, input: &mut Counted) -> Result<String, Reason> {
+        let tag = Tag::read(input, self.is_big_endian)?;
+        if u64::from(tag.length) > MAX_NAME {
+            return Err(Reason::Format { format: FORMAT, error: "the name of an array is too long".into() });
+        }
+        Ok(String::from_utf8_lossy(&self.content(input, tag)?).into_owned())
+    }
+
+    /// The bytes of an element whose length was checked.
+    fn content(&self, input: &mut Counted, tag: Tag) -> Result<Vec<u8>, Reason> {
+        let mut bytes = tag.held.map_or_else(Vec::new, |held| held[..tag.length as usize].to_vec());
+        if tag.held.is_none() {
+            bytes.resize(tag.length as usize, 0);
+            input.read_exact(&mut bytes).map_err(ended)?;
+            input.skip(tag.rest() - u64::from(tag.length))?;
+        }
+        Ok(bytes)
+    }
+
+    /// The wanted columns of the element of the real parts.
+    fn numbers(&mut self, input: &mut Counted, [rows, columns]: [usize; 2]) -> Result<Vec<Vec<Number>>, Reason> {
+        let wanted = self.wanted.map_or(&[][..], |(_, columns)| columns);
+        let tag = Tag::read(input, self.is_big_endian)?;
+        let unknown = || Reason::Format { format: FORMAT, error: "an array has numbers of an unknown type".into() };
+        let scalar = match tag.kind {
+            1 => Scalar::Signed(1),
+            2 => Scalar::Unsigned(1),
+            3 => Scalar::Signed(2),
+            4 => Scalar::Unsigned(2),
+            5 => Scalar::Signed(4),
+            6 => Scalar::Unsigned(4),
+            7 => Scalar::Float(4),
+            9 => Scalar::Float(8),
+            12 => Scalar::Signed(8),
+            13 => Scalar::Unsigned(8),
+            _ => return Err(unknown()),
+        };
+        let size = scalar.bytes();
+        let mut values: Vec<Vec<Number>> = vec![Vec::new(); wanted.len()];
         // The first index varies fastest.
-        let at = |row: usize, column: usize| if *first_is_time { column * rows + row } else { row * width + column };
-        let column = |&column: &usize| (0..*rows).map(|row| number_at(array.data(), at(row, column))).collect();
-        Ok(columns.iter().map(column).collect())
-    })
-}
-
-/// `file` with its arrays of numbers alone, uncompressed. The crate `matfile` prints to the terminal where it meets other elements or
-/// damaged compressed ones, and has no limit for their length.
-fn numeric_arrays(file: &[u8]) -> Result<Vec<u8>, Reason> {
-    let damaged = |error: std::io::Error| Reason::Format { format: FORMAT, error: error.to_string().into() };
-    let truncated = || Reason::Truncated { format: FORMAT };
-    let (header, mut rest) = file.split_at_checked(HEADER_BYTES).ok_or_else(truncated)?;
-    let is_big_endian = header.ends_with(b"MI");
-    let mut kept = header.to_vec();
-    while let (Some(kind), Some(length)) = (word(rest, 0, is_big_endian), word(rest, 4, is_big_endian)) {
-        let end = TAG_BYTES + length as usize;
-        let element = rest.get(..end).ok_or_else(truncated)?;
-        let room = MAX_BYTES.saturating_sub(kept.len() as u64);
-        if kind == COMPRESSED {
-            let mut expanded = Vec::new();
-            ZlibDecoder::new(&element[TAG_BYTES..]).take(room + 1).read_to_end(&mut expanded).map_err(damaged)?;
-            if expanded.len() as u64 > room {
-                return Err(Reason::TooManySamples);
+        let is_by_column = rows >= columns;
+        let mut at = 0;
+        let mut take = |bytes: &[u8]| {
+            for word in bytes.chunks_exact(size) {
+                let column = if is_by_column { at / rows } else { at % rows };
+                at += 1;
+                for (values, _) in values.iter_mut().zip(wanted).filter(|(_, wanted)| **wanted == column) {
+                    values.push(scalar.number(number(word, self.is_big_endian)));
+                }
             }
-            if is_numeric(&expanded, is_big_endian) {
-                kept.append(&mut expanded);
+        };
+        let mut left =
+            u64::from(tag.length).min((rows as u64).saturating_mul(columns as u64).saturating_mul(size as u64));
+        if let Some(held) = tag.held {
+            take(&held[..left as usize]);
+            left = 0;
+        }
+        let mut buffer = [0; BUFFER_BYTES];
+        while left > 0 {
+            let count = left.min(BUFFER_BYTES as u64) as usize;
+            input.read_exact(&mut buffer[..count]).map_err(ended)?;
+            take(&buffer[..count]);
+            left -= count as u64;
+        }
+        Ok(values)
+    }
+}
+
+/// A number of up to 8 bytes.
+fn number(bytes: &[u8], is_big_endian: bool) -> u64 {
+    let join = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
+    if is_big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) }
+}
+
+fn ended(error: io::Error) -> Reason {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => {
+            Reason::Format { format: FORMAT, error: error.to_string().into() }
+        }
+        _ => Reason::from_io(error),
+    }
+}
+
+/// Type and length of a data element. Of up to 4 bytes the content may lie in the tag.
+#[derive(Clone, Copy)]
+struct Tag {
+    kind: u32,
+    length: u32,
+    held: Option<[u8; 4]>,
+}
+
+impl Tag {
+    fn read(input: &mut impl Read, is_big_endian: bool) -> Result<Self, Reason> {
+        let mut bytes = [0; TAG_BYTES];
+        input.read_exact(&mut bytes).map_err(ended)?;
+        let word = |at: usize| number(&bytes[at..at + 4], is_big_endian) as u32;
+        let (kind, length) = (word(0), word(4));
+        match kind >> 16 {
+            0 => Ok(Self { kind, length, held: None }),
+            small @ 1..=4 => {
+                let [.., a, b, c, d] = bytes;
+                Ok(Self { kind: kind & 0xFFFF, length: small, held: Some([a, b, c, d]) })
             }
-        } else if is_numeric(element, is_big_endian) {
-            kept.extend(element);
+            _ => Err(Reason::Format { format: FORMAT, error: "an element is longer than its tag".into() }),
         }
-        // Uncompressed elements begin at multiples of 8 bytes.
-        kept.resize(kept.len().next_multiple_of(TAG_BYTES), 0);
-        let next = if kind == COMPRESSED { end } else { end.next_multiple_of(TAG_BYTES) };
-        rest = rest.get(next..).unwrap_or(&[]);
     }
-    Ok(kept)
-}
 
-/// Whether a data element is an array of numbers whose length fits the type that counts it.
-fn is_numeric(element: &[u8], is_big_endian: bool) -> bool {
-    let word = |at: usize| word(element, at, is_big_endian);
-    // The tag of the matrix, its flags with their tag, and the tag of its dimensions.
-    let (flags, dimensions) = (TAG_BYTES, 3 * TAG_BYTES);
-    let is_of = |at: usize, kind: u32| word(at) == Some(kind);
-    let class = word(flags + TAG_BYTES).map(|flags| flags & 0xFF);
-    let count = word(dimensions + 4).map_or(0, |bytes| bytes as usize / 4);
-    let elements = (0..count).try_fold(1_i32, |product, dimension| {
-        let length = word(dimensions + TAG_BYTES + 4 * dimension)?;
-        product.checked_mul(i32::try_from(length).ok()?)
-    });
-    is_of(0, MATRIX)
-        && is_of(flags, ARRAY_FLAGS)
-        && class.is_some_and(|class| NUMERIC_CLASSES.contains(&class))
-        && is_of(dimensions, ARRAY_DIMENSIONS)
-        && elements.is_some()
-}
-
-/// The word at `at`; `None` beyond the end.
-fn word(bytes: &[u8], at: usize, is_big_endian: bool) -> Option<u32> {
-    let word = *bytes.get(at..)?.first_chunk()?;
-    Some(if is_big_endian { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
-}
-
-/// The number at `at`; NaN beyond the end of damaged data.
-fn number_at(data: &NumericData, at: usize) -> Number {
-    fn integer<T: Copy + Into<i64>>(real: &[T], at: usize) -> Option<Number> {
-        real.get(at).map(|&value| Number::Integer(value.into()))
+    /// Bytes of the content after the tag, with those that fill it up to a multiple of 8.
+    fn rest(self) -> u64 {
+        if self.held.is_some() { 0 } else { u64::from(self.length).next_multiple_of(TAG_BYTES as u64) }
     }
-    let number = match data {
-        NumericData::Int8 { real, .. } => integer(real, at),
-        NumericData::UInt8 { real, .. } => integer(real, at),
-        NumericData::Int16 { real, .. } => integer(real, at),
-        NumericData::UInt16 { real, .. } => integer(real, at),
-        NumericData::Int32 { real, .. } => integer(real, at),
-        NumericData::UInt32 { real, .. } => integer(real, at),
-        NumericData::Int64 { real, .. } => integer(real, at),
-        NumericData::UInt64 { real, .. } => {
-            real.get(at).map(|&value| i64::try_from(value).map_or(Number::Real(value as f64), Number::Integer))
-        }
-        NumericData::Single { real, .. } => real.get(at).map(|&value| Number::Real(f64::from(value))),
-        NumericData::Double { real, .. } => real.get(at).map(|&value| Number::Real(value)),
-    };
-    number.unwrap_or(Number::Real(f64::NAN))
+}
+
+/// An input that knows how much was read of it.
+struct Counted<'a> {
+    input: &'a mut dyn Read,
+    at: u64,
+}
+
+impl Counted<'_> {
+    fn skip(&mut self, bytes: u64) -> Result<(), Reason> {
+        io::copy(&mut self.by_ref().take(bytes), &mut io::sink()).map(|_| ()).map_err(ended)
+    }
+}
+
+impl Read for Counted<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.input.read(buffer)?;
+        self.at += count as u64;
+        Ok(count)
+    }
 }

@@ -3,6 +3,7 @@
 //! The crate `mcap` decompresses the chunks. Its own reader is not used for the rest because damaged lengths make it allocate gigabytes
 //! before it reads a byte, and overflow where a record ends after its chunk.
 
+use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -24,9 +25,24 @@ const COMPRESSION_AT: usize = 8 + 8 + 8 + 4;
 /// The records that tell what messages there are, and the messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum McapRecord<'a> {
-    Schema { id: u16, name: &'a str },
-    Channel { id: u16, schema: u16, topic: &'a str, encoding: &'a str },
-    Message { channel: u16, data: &'a [u8] },
+    Schema {
+        id: u16,
+        name: &'a str,
+        encoding: &'a str,
+        definition: &'a [u8],
+    },
+    Channel {
+        id: u16,
+        schema: u16,
+        topic: &'a str,
+        encoding: &'a str,
+    },
+    /// `log_ns` is when it was recorded.
+    Message {
+        channel: u16,
+        log_ns: u64,
+        data: &'a [u8],
+    },
 }
 
 impl<'a> McapRecord<'a> {
@@ -34,7 +50,7 @@ impl<'a> McapRecord<'a> {
     fn decode(opcode: u8, bytes: &'a [u8]) -> Result<Option<Self>, Reason> {
         let mut fields = Fields(bytes);
         let record = match opcode {
-            op::SCHEMA => fields.number().zip(fields.text()).map(|(id, name)| Self::Schema { id, name }),
+            op::SCHEMA => fields.schema(),
             op::CHANNEL => {
                 let numbers = fields.number().zip(fields.number());
                 let texts = fields.text().zip(fields.text());
@@ -45,11 +61,7 @@ impl<'a> McapRecord<'a> {
                     encoding,
                 })
             }
-            op::MESSAGE => {
-                // Its number, and the times at which it was logged and published.
-                let channel = fields.number();
-                channel.zip(fields.take(4 + 8 + 8)).map(|(channel, _)| Self::Message { channel, data: fields.0 })
-            }
+            op::MESSAGE => fields.message(),
             _ => return Ok(None),
         };
         record.map(Some).ok_or_else(|| damaged("a record is cut off"))
@@ -68,6 +80,19 @@ impl<'a> Fields<'a> {
 
     fn number(&mut self) -> Option<u16> {
         Some(u16::from_le_bytes(*self.take(2)?.first_chunk()?))
+    }
+
+    fn schema(&mut self) -> Option<McapRecord<'a>> {
+        let (id, name, encoding) = (self.number()?, self.text()?, self.text()?);
+        let length = u32::from_le_bytes(*self.take(4)?.first_chunk()?);
+        Some(McapRecord::Schema { id, name, encoding, definition: self.take(length as usize)? })
+    }
+
+    fn message(&mut self) -> Option<McapRecord<'a>> {
+        let (channel, _sequence) = (self.number()?, self.take(4)?);
+        let log_ns = u64::from_le_bytes(*self.take(8)?.first_chunk()?);
+        let _published = self.take(8)?;
+        Some(McapRecord::Message { channel, log_ns, data: self.0 })
     }
 
     fn text(&mut self) -> Option<&'a str> {
@@ -102,9 +127,14 @@ impl From<Reason> for Stop {
 /// Gives every record to `each`; and why there are no more where the file is damaged or ends early.
 pub(crate) fn for_each_record(
     file: &Path,
+    budget: Budget,
     mut each: impl FnMut(McapRecord) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
-    let mut each = |opcode: u8, bytes: &[u8]| match McapRecord::decode(opcode, bytes) {
+    let mut meter = budget.meter();
+    let mut each = |opcode: u8, bytes: &[u8]| match meter
+        .add_bytes(bytes.len() as u64)
+        .and_then(|()| McapRecord::decode(opcode, bytes))
+    {
         Ok(record) => record.map_or(Ok(()), |record| each(record).map_err(Stop::Refusal)),
         Err(reason) => Err(Stop::Damage(reason)),
     };
@@ -190,6 +220,7 @@ fn compressed(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) ->
 #[cfg(test)]
 mod tests {
     use super::{McapRecord, for_each_record};
+    use crate::input::budget::Budget;
     use std::io::Write;
 
     fn record(opcode: u8, parts: &[&[u8]]) -> Vec<u8> {
@@ -207,7 +238,7 @@ mod tests {
         file.write_all(b"\x89MCAP0\r\n").expect("written");
         file.write_all(&records.concat()).expect("written");
         let mut found = Vec::new();
-        let damage = for_each_record(file.path(), |record: McapRecord| {
+        let damage = for_each_record(file.path(), Budget::new(0), |record: McapRecord| {
             found.push(format!("{record:?}"));
             Ok(())
         });
@@ -217,12 +248,14 @@ mod tests {
     /// Lengths that lie: of a text (4 GiB), of a record (beyond its chunk, beyond the file, 16 EiB).
     #[test]
     fn lengths_that_lie_are_damage_after_what_came_before() {
-        let schema = record(3, &[&1u16.to_le_bytes(), &text("sensor_msgs/msg/Imu")]);
+        let schema = record(3, &[&1u16.to_le_bytes(), &text("a/msg/B"), &text("ros2msg"), &text("bool x")]);
         let message = record(5, &[&7u16.to_le_bytes(), &[0; 20], b"data"]);
         let chunk = |records: &[u8]| record(6, &[&[0; 28], &text(""), &(records.len() as u64).to_le_bytes(), records]);
         let footer = record(2, &[&[0; 20]]);
-        let whole =
-            ["Schema { id: 1, name: \"sensor_msgs/msg/Imu\" }", "Message { channel: 7, data: [100, 97, 116, 97] }"];
+        let whole = [
+            "Schema { id: 1, name: \"a/msg/B\", encoding: \"ros2msg\", definition: [98, 111, 111, 108, 32, 120] }",
+            "Message { channel: 7, log_ns: 0, data: [100, 97, 116, 97] }",
+        ];
         let (found, damage) = read(&[schema.clone(), chunk(&message), footer.clone()]);
         assert_eq!((found.as_slice(), damage), (whole.map(str::to_owned).as_slice(), None));
         let long_text = record(3, &[&2u16.to_le_bytes(), &u32::MAX.to_le_bytes(), b"short"]);

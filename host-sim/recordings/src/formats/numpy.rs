@@ -3,11 +3,12 @@
 use crate::columns::column_selection::ChosenColumn;
 use crate::columns::unit::Unit;
 use crate::counts::recording::MAX_SAMPLES;
-use crate::formats::named_arrays::{self, NamedArray};
+use crate::formats::array_topics::{self, ArrayReader, ArraySource, NamedArray};
+use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
+use crate::tables::sensor_table::{Number, TableBuilder};
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -17,12 +18,39 @@ use zip::ZipArchive;
 /// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: u64 = 1024;
 
-/// Reads an `.npy` file.
-pub(crate) fn read_npy(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let mut input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
-    let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
-    named_arrays::read(file, &[layout.array()], options, |_, columns| layout.columns(&mut input, columns))
+/// Brackets within brackets in the header of an array; fields within fields, which are not read, have five.
+const MOST_BRACKETS: usize = 8;
+/// Bytes of the header of an array of [`MAX_COLUMNS`] named fields, with room.
+const MOST_HEADER_BYTES: u64 = 1 << 20;
+
+/// An open `.npy` file.
+pub(crate) struct NpyReader {
+    input: BufReader<File>,
+    layout: ArrayLayout,
+}
+
+impl NpyReader {
+    /// Opens a file whose numbers are held in memory.
+    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let mut input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+        let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+        let arrays = vec![layout.array()];
+        Ok(ArraySource::new(file, Self { input, layout }, arrays, budget))
+    }
+}
+
+impl ArrayReader for NpyReader {
+    const FORMAT: &'static str = "NumPy array";
+
+    fn read(
+        &mut self,
+        _array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        self.layout.columns(&mut self.input, columns, add)
+    }
 }
 
 /// Rows of an array that are read at once.
@@ -52,7 +80,7 @@ impl NpyRows {
         monitor.begin();
         let mut input = Counted::new(File::open(file).map_err(io)?, monitor);
         let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
-        let chosen = named_arrays::choose(&layout.array(), options).map_err(fail)?;
+        let chosen = array_topics::choose(&layout.array(), options).map_err(fail)?;
         let start = input.stream_position().map_err(io)?;
         let buffers = vec![Vec::new(); if layout.by_column { chosen.len() } else { 1 }];
         let (file, monitor, row) = (file.to_owned(), monitor.clone(), Vec::with_capacity(chosen.len()));
@@ -113,28 +141,59 @@ impl NpyRows {
     }
 }
 
-/// Reads an `.npz` file.
-pub(crate) fn read_npz(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
-    let mut archive = ZipArchive::new(input).map_err(|error| fail(damaged(error)))?;
-    let mut layouts: Vec<(usize, ArrayLayout)> = Vec::new();
-    for number in 0..archive.len() {
-        if let Some(layout) = entry_layout(&mut archive, number).map_err(fail)? {
-            layouts.push((number, layout));
+/// An open `.npz` file.
+pub(crate) struct NpzReader {
+    archive: ZipArchive<BufReader<File>>,
+    /// Number of the entry and layout of each array.
+    layouts: Vec<(usize, ArrayLayout)>,
+    meter: Meter,
+}
+
+impl NpzReader {
+    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+        let mut archive = ZipArchive::new(input).map_err(|error| fail(damaged(error)))?;
+        let mut layouts: Vec<(usize, ArrayLayout)> = Vec::new();
+        for number in 0..archive.len() {
+            budget.check_time().map_err(fail)?;
+            if let Some(layout) = entry_layout(&mut archive, number).map_err(fail)? {
+                layouts.push((number, layout));
+            }
         }
+        if layouts.is_empty() {
+            // Spreadsheets are archives too.
+            let what = if archive.index_for_name("[Content_Types].xml").is_some() {
+                "a spreadsheet"
+            } else {
+                "a ZIP archive without an array"
+            };
+            let how = "give the table in it, as CSV";
+            return Err(fail(Reason::Foreign { what, how }));
+        }
+        let mut arrays: Vec<NamedArray> = layouts.iter().map(|(_, layout)| layout.array()).collect();
+        // An only array needs no name.
+        if let [array] = arrays.as_mut_slice() {
+            array.name.clear();
+        }
+        Ok(ArraySource::new(file, Self { archive, layouts, meter: budget.meter() }, arrays, budget))
     }
-    let mut arrays: Vec<NamedArray> = layouts.iter().map(|(_, layout)| layout.array()).collect();
-    // An only array needs no name.
-    if let [array] = arrays.as_mut_slice() {
-        array.name.clear();
-    }
-    named_arrays::read(file, &arrays, options, |array, columns| {
-        let (number, layout) = &layouts[array];
-        let mut entry = archive.by_index(*number).map_err(damaged)?;
+}
+
+impl ArrayReader for NpzReader {
+    const FORMAT: &'static str = "NumPy .npz";
+
+    fn read(
+        &mut self,
+        array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        let (number, layout) = &self.layouts[array];
+        let mut entry = self.archive.by_index(*number).map_err(damaged)?;
         ArrayLayout::read(&mut entry, &layout.name)?;
-        layout.columns(&mut BufReader::new(entry), columns)
-    })
+        layout.columns(&mut BufReader::new(Metered::new(entry, &mut self.meter)), columns, add)
+    }
 }
 
 /// The layout of an entry of an archive; `None` for what is no array of numbers: text and objects are left out.
@@ -161,6 +220,42 @@ struct FieldLayout {
     encoding: TypeStr,
 }
 
+/// The bytes up to the numbers, checked for what its parser does not survive: it takes twice the time for each level of brackets.
+fn checked_header(input: &mut impl Read) -> Result<Vec<u8>, Reason> {
+    let damaged = |error: io::Error| Reason::Format { format: "NumPy array", error: error.to_string().into() };
+    let truncated = || Reason::Truncated { format: "NumPy array" };
+    let mut bytes = Vec::new();
+    let mut take = |count: u64, bytes: &mut Vec<u8>| {
+        let read = input.by_ref().take(count).read_to_end(bytes).map_err(damaged)?;
+        if read as u64 == count { Ok(()) } else { Err(truncated()) }
+    };
+    // The magic and two numbers of the version; then the length of the rest, of two bytes in version 1.
+    take(8, &mut bytes)?;
+    let length_bytes = if bytes[6] == 1 { 2 } else { 4 };
+    take(length_bytes, &mut bytes)?;
+    let mut length = [0; 8];
+    length[..bytes.len() - 8].copy_from_slice(&bytes[8..]);
+    let length = u64::from_le_bytes(length);
+    if length > MOST_HEADER_BYTES {
+        return Err(Reason::Array(format!("the header of the array has {length} bytes")));
+    }
+    let start = bytes.len();
+    take(length, &mut bytes)?;
+    let (mut open, mut quoted) = (0usize, false);
+    for byte in &bytes[start..] {
+        match byte {
+            b'\'' | b'"' => quoted = !quoted,
+            b'[' | b'(' | b'{' if !quoted => open += 1,
+            b']' | b')' | b'}' if !quoted => open = open.saturating_sub(1),
+            _ => {}
+        }
+        if open > MOST_BRACKETS {
+            return Err(Reason::TooDeep { most: MOST_BRACKETS });
+        }
+    }
+    Ok(bytes)
+}
+
 /// How an array lies in its file.
 #[derive(Debug, Clone, PartialEq)]
 struct ArrayLayout {
@@ -179,7 +274,7 @@ impl ArrayLayout {
     fn read(input: &mut impl Read, name: &str) -> Result<Self, Reason> {
         let damaged = |error: io::Error| Reason::Format { format: "NumPy array", error: error.to_string().into() };
         let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
-        let header = NpyHeader::from_reader(input).map_err(damaged)?;
+        let header = NpyHeader::from_reader(checked_header(input)?.as_slice()).map_err(damaged)?;
         let (outer, inner, first_is_time) = match *header.shape() {
             [rows] => (rows, 1, true),
             [rows, columns] => (rows.max(columns), rows.min(columns), rows >= columns),
@@ -221,20 +316,26 @@ impl ArrayLayout {
 
     fn array(&self) -> NamedArray {
         let columns = self.fields.iter().map(|field| field.name.clone()).collect();
-        NamedArray { name: self.name.clone(), rows: self.rows, columns, unit: self.unit }
+        NamedArray { name: self.name.clone(), rows: self.rows, columns, unit: self.unit, ..NamedArray::default() }
     }
 
     /// The numbers of `columns`, from the end of the header on.
-    fn columns(&self, input: &mut impl Read, columns: &[usize]) -> Result<Vec<Vec<Number>>, Reason> {
+    fn columns(
+        &self,
+        input: &mut impl Read,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
         if self.rows as u64 > MAX_SAMPLES {
             return Err(Reason::TooManySamples);
         }
+        add(self.rows as u64 * columns.len() as u64)?;
         let mut values: Vec<Vec<Number>> = columns.iter().map(|_| Vec::new()).collect();
         let mut bytes = vec![0; self.stride];
         let mut read = |bytes: &mut [u8]| {
             input.read_exact(bytes).map_err(|error| match error.kind() {
                 io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
-                _ => Reason::Io(error),
+                _ => Reason::from_io(error),
             })
         };
         if self.by_column {

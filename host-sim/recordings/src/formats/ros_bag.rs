@@ -1,59 +1,117 @@
-//! Bags of ROS 1 (`.bag`, format 2.0) and of ROS 2 (MCAP and SQLite), with `sensor_msgs/Imu`.
+//! Bags of ROS 1 (`.bag`, format 2.0): the definition of each type of message is in the connection of its topic.
 
-use crate::formats::imu_message::{FIELDS, TIME_UNIT, TYPES, decode_cdr, decode_ros1};
-use crate::formats::mcap_file::{self, McapRecord};
-use crate::formats::message_table::{MessageTable, choose_topic};
+use crate::formats::message_layout::{Encoding, MessageLayout};
+use crate::formats::ros_definition::{self, RosVersion};
+use crate::formats::ros_message::{self, RosRows};
+use crate::formats::topics::{EachRow, Ending, Source, Topic};
+use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable};
 use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
-use rusqlite::{Connection, OpenFlags};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-const ROS1: &str = "ROS 1 bag";
-const SQLITE: &str = "ROS 2 SQLite bag";
+const FORMAT: &str = "ROS 1 bag";
 
 /// Where the bag header of ROS 1 states the position of the index, in the first bytes of the file.
 const BAG_HEADER: u64 = 4096 + 64;
 const INDEX_POSITION: &[u8] = b"index_pos=";
 
-/// Reads a bag of ROS 1.
-pub(crate) fn read_ros1(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let damaged = |error: rosbag::Error| Reason::Format { format: ROS1, error: error.to_string().into() };
-    check_index(file).map_err(fail)?;
-    let bag = RosBag::new(file).map_err(|error| fail(Reason::Io(error)))?;
-    let mut topics: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-    for record in bag.index_records() {
-        if let IndexRecord::Connection(connection) = record.map_err(|error| fail(damaged(error)))?
-            && TYPES.contains(&connection.tp)
-        {
-            topics.entry(connection.storage_topic.to_owned()).or_default().insert(connection.id);
-        }
-    }
-    let topics: Vec<(String, BTreeSet<u32>)> = topics.into_iter().collect();
-    let (_, connections) = choose_topic(ROS1, &topics, options.topic.as_deref()).map_err(fail)?;
-    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
-    for chunk in bag.chunk_records() {
-        let chunk = match chunk {
-            Ok(ChunkRecord::Chunk(chunk)) => chunk,
-            Ok(ChunkRecord::IndexData(_)) => continue,
-            Err(error) => return table.finish(Some(damaged(error))),
-        };
-        for message in chunk.messages() {
-            match message {
-                Ok(MessageRecord::MessageData(message)) if connections.contains(&message.conn_id) => {
-                    table.push(&decoded(decode_ros1(message.data)))?;
+/// An open bag.
+pub(crate) struct RosBagSource<'a> {
+    file: &'a Path,
+    bag: RosBag,
+    topics: Vec<Topic>,
+    /// Of each topic.
+    layouts: Vec<MessageLayout>,
+    connections: Vec<BTreeSet<u32>>,
+    budget: Budget,
+}
+
+impl<'a> RosBagSource<'a> {
+    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        check_index(file).map_err(fail)?;
+        let bag = RosBag::new(file).map_err(|error| fail(Reason::Io(error)))?;
+        let mut found: BTreeMap<String, (String, String, BTreeSet<u32>)> = BTreeMap::new();
+        let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
+        for record in bag.index_records() {
+            match record.map_err(|error| fail(damaged(error)))? {
+                IndexRecord::Connection(connection) => {
+                    let new = || (connection.tp.to_owned(), connection.message_definition.to_owned(), BTreeSet::new());
+                    let (kind, _, ids) = found.entry(connection.storage_topic.to_owned()).or_insert_with(new);
+                    // A topic has one type; of another only the first is read.
+                    if kind == connection.tp {
+                        ids.insert(connection.id);
+                    }
                 }
-                Ok(_) => {}
-                Err(error) => return table.finish(Some(damaged(error))),
+                IndexRecord::ChunkInfo(chunk) => {
+                    for entry in chunk.entries() {
+                        *counts.entry(entry.conn_id).or_insert(0) += u64::from(entry.count);
+                    }
+                }
+                IndexRecord::IndexData(_) => {}
             }
         }
+        let (mut topics, mut layouts, mut connections) = (Vec::new(), Vec::new(), Vec::new());
+        for (name, (kind, definition, ids)) in found {
+            // A definition that cannot be understood leaves its topic out.
+            let Ok(layout) = ros_definition::layout(&kind, &definition, RosVersion::Ros1) else { continue };
+            let rows = ids.iter().filter_map(|id| counts.get(id)).sum();
+            topics.push(ros_message::topic(&name, &kind, &layout, Some(rows)));
+            layouts.push(layout);
+            connections.push(ids);
+        }
+        Ok(Self { file, bag, topics, layouts, connections, budget })
     }
-    table.finish(None)
+}
+
+fn damaged(error: rosbag::Error) -> Reason {
+    Reason::Format { format: FORMAT, error: error.to_string().into() }
+}
+
+impl Source for RosBagSource<'_> {
+    fn format(&self) -> &'static str {
+        FORMAT
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
+        let mut rows = RosRows::new(&self.layouts[topic], Encoding::Packed, columns);
+        let mut meter = self.budget.meter();
+        let mut damage = None;
+        'chunks: for chunk in self.bag.chunk_records() {
+            let chunk = match chunk {
+                Ok(ChunkRecord::Chunk(chunk)) => chunk,
+                Ok(ChunkRecord::IndexData(_)) => continue,
+                Err(error) => {
+                    damage = Some(damaged(error));
+                    break;
+                }
+            };
+            for message in chunk.messages() {
+                match message {
+                    Ok(MessageRecord::MessageData(message)) => {
+                        let add = meter.add_bytes(message.data.len() as u64);
+                        add.map_err(|reason| InputError::file(self.file, reason))?;
+                        if self.connections[topic].contains(&message.conn_id) {
+                            each(rows.row(message.data, i64::try_from(message.time).ok()))?;
+                        }
+                    }
+                    Ok(_) => {}
+                    Err(error) => {
+                        damage = Some(damaged(error));
+                        break 'chunks;
+                    }
+                }
+            }
+        }
+        Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+    }
 }
 
 /// Refuses a bag without an index, which the reader of bags does not survive: that of a recording that was interrupted.
@@ -66,74 +124,4 @@ fn check_index(file: &Path) -> Result<(), Reason> {
     let bytes = at.and_then(|at| head.get(at + INDEX_POSITION.len()..)?.first_chunk::<8>());
     let position = bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes));
     if (BAG_HEADER - 64..=length).contains(&position) { Ok(()) } else { Err(Reason::NoIndex) }
-}
-
-/// Reads MCAP, record by record.
-pub(crate) fn read_mcap(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let mut topics: BTreeMap<String, BTreeSet<u16>> = BTreeMap::new();
-    let mut schemas: BTreeSet<u16> = BTreeSet::new();
-    let mut ros1: BTreeSet<u16> = BTreeSet::new();
-    // Channels may be declared anywhere: the topics are known after a first pass.
-    let early = mcap_file::for_each_record(file, |record| {
-        match record {
-            McapRecord::Schema { id, name } if TYPES.contains(&name) => {
-                schemas.insert(id);
-            }
-            McapRecord::Channel { id, schema, topic, encoding } if schemas.contains(&schema) => {
-                topics.entry(topic.to_owned()).or_default().insert(id);
-                if encoding == "ros1" {
-                    ros1.insert(id);
-                }
-            }
-            _ => {}
-        }
-        Ok(())
-    })?;
-    let topics: Vec<(String, BTreeSet<u16>)> = topics.into_iter().collect();
-    let (_, channels) = match (topics.as_slice(), early) {
-        ([], Some(damage)) => return Err(fail(damage)),
-        (topics, _) => choose_topic(mcap_file::FORMAT, topics, options.topic.as_deref()).map_err(fail)?,
-    };
-    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
-    let damage = mcap_file::for_each_record(file, |record| match record {
-        McapRecord::Message { channel, data } if channels.contains(&channel) => {
-            table.push(&decoded(if ros1.contains(&channel) { decode_ros1(data) } else { decode_cdr(data) }))
-        }
-        _ => Ok(()),
-    })?;
-    table.finish(damage)
-}
-
-/// Reads a bag of ROS 2 in SQLite.
-pub(crate) fn read_sqlite(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let damaged = |error: rusqlite::Error| Reason::Format { format: SQLITE, error: error.to_string().into() };
-    let failed = |error| fail(damaged(error));
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let database = Connection::open_with_flags(file, flags).map_err(failed)?;
-    let mut query = database.prepare("SELECT name, id, type FROM topics ORDER BY id").map_err(failed)?;
-    let rows = query.query_map((), |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).map_err(failed)?;
-    let topics: Vec<(String, i64, String)> = rows.collect::<Result<_, _>>().map_err(failed)?;
-    let is_imu = |(name, id, kind): (String, i64, String)| TYPES.contains(&kind.as_str()).then_some((name, id));
-    let topics: Vec<(String, i64)> = topics.into_iter().filter_map(is_imu).collect();
-    let (_, topic) = choose_topic(SQLITE, &topics, options.topic.as_deref()).map_err(fail)?;
-    let mut table = MessageTable::new(file, TIME_UNIT, &FIELDS, options)?;
-    let mut query = database.prepare("SELECT data FROM messages WHERE topic_id = ? ORDER BY id").map_err(failed)?;
-    let mut rows = query.query((topic,)).map_err(failed)?;
-    loop {
-        match rows.next() {
-            Ok(Some(row)) => {
-                let data = row.get_ref(0).map_err(failed)?;
-                table.push(&decoded(data.as_blob().ok().and_then(decode_cdr)))?;
-            }
-            Ok(None) => return table.finish(None),
-            Err(error) => return table.finish(Some(damaged(error))),
-        }
-    }
-}
-
-/// The numbers of a message. One that cannot be decoded has no time, which ends the reading with an error that names it.
-fn decoded(message: Option<[Number; 7]>) -> [Number; 7] {
-    message.unwrap_or([Number::Real(f64::NAN); 7])
 }

@@ -1,66 +1,87 @@
-//! ULog of PX4: gyroscopes and accelerometers, one sample a message or a FIFO of samples a message.
+//! ULog of PX4: gyroscopes and accelerometers, one sample a message or a FIFO of samples a message, and any other message by its columns.
+//!
+//! The crate `px4-ulog` is not used: it follows formats within formats to any depth, in time that grows with the square of it until the
+//! stack ends.
 
-use crate::formats::message_table::{ACCELEROMETER, Fields, GYROSCOPE, MessageTable, choose_topic};
+use crate::columns::column_selection::AvailableColumn;
+use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
+use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable};
-use px4_ulog::stream_parser::model::FlattenedFieldType;
-use px4_ulog::stream_parser::{DataMessage, LogParser};
-use std::collections::BTreeMap;
+use crate::tables::sensor_table::Number;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::Path;
+use std::rc::Rc;
 
 const FORMAT: &str = "PX4 ULog";
 
-/// Bytes that are read at a time.
-const BUFFER_BYTES: usize = 1 << 16;
-
+/// Bytes before the first message.
+const HEADER_BYTES: u64 = 16;
 /// Samples of a FIFO message.
 const FIFO_SAMPLES: usize = 32;
-
-/// The messages that are read: name, and what they have beside their time.
-const MESSAGES: [(&str, &[Fields]); 5] = [
-    ("sensor_gyro_fifo", &[GYROSCOPE]),
-    ("sensor_gyro", &[GYROSCOPE]),
-    ("sensor_combined", &[GYROSCOPE, ACCELEROMETER]),
-    ("sensor_accel_fifo", &[ACCELEROMETER]),
-    ("sensor_accel", &[ACCELEROMETER]),
-];
-/// Positions in [`MESSAGES`] of gyroscope and accelerometer, which drivers of one part publish with the same times.
-const PAIRS: [[usize; 2]; 2] = [[0, 3], [1, 4]];
 /// Unit of the times, which are those of the samples.
 const TIME_UNIT: &str = "us";
+const GYROSCOPE_UNIT: &str = "rad/s";
+const ACCELEROMETER_UNIT: &str = "m/s^2";
+
+/// Messages of sensors: name, and the fields of its axes.
+type Axes = ([&'static str; 3], Vector);
+const XYZ: [&str; 3] = ["x", "y", "z"];
+const SENSORS: [(&str, &[Axes]); 3] = [
+    ("sensor_gyro", &[(XYZ, Vector::Rate)]),
+    (
+        "sensor_combined",
+        &[
+            (["gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]"], Vector::Rate),
+            (["accelerometer_m_s2[0]", "accelerometer_m_s2[1]", "accelerometer_m_s2[2]"], Vector::Force),
+        ],
+    ),
+    ("sensor_accel", &[(XYZ, Vector::Force)]),
+];
+/// Messages with the samples of a FIFO.
+const FIFOS: [(&str, Vector); 2] = [("sensor_gyro_fifo", Vector::Rate), ("sensor_accel_fifo", Vector::Force)];
+/// Messages of gyroscope and accelerometer, which drivers of one part publish with the same times.
+const PAIRS: [[&str; 2]; 2] = [["sensor_gyro_fifo", "sensor_accel_fifo"], ["sensor_gyro", "sensor_accel"]];
 
 /// Samples that wait for that of the other sensor at most.
 const MOST_WAITING: usize = 1024;
 /// Share of the samples that must have the time of one of the other sensor if both are to be read as one.
 const MIN_PAIRED: f64 = 0.9;
 
-/// Samples that a log has: of a message by its position in [`MESSAGES`], or of a gyroscope with its accelerometer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Topic {
-    Single { message: usize, instance: u8 },
-    Pair { pair: [usize; 2], instance: u8 },
+/// What a vector measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Vector {
+    Rate,
+    Force,
 }
 
-impl Topic {
-    fn name(self) -> String {
-        let (name, instance) = match self {
-            Self::Single { message, instance } => (MESSAGES[message].0.to_owned(), instance),
-            Self::Pair { pair: [gyroscope, accelerometer], instance } => {
-                (format!("{}+{}", MESSAGES[gyroscope].0, MESSAGES[accelerometer].0), instance)
-            }
-        };
-        if instance == 0 { name } else { format!("{name}:{instance}") }
-    }
-
-    fn fields(self) -> &'static [Fields] {
+impl Vector {
+    fn add_to(self, sensor: &mut TopicSensor, positions: [usize; 3]) {
         match self {
-            Self::Single { message, .. } => MESSAGES[message].1,
-            Self::Pair { .. } => &[GYROSCOPE, ACCELEROMETER],
+            Self::Rate => sensor.add_axes(GYROSCOPE, positions, GYROSCOPE_UNIT),
+            Self::Force => sensor.add_axes(ACCELEROMETER, positions, ACCELEROMETER_UNIT),
         }
     }
+}
+
+/// A message and the number of its publisher.
+type Key = (String, u8);
+
+/// What the rows of a topic are made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Rows {
+    /// Messages, with all their columns.
+    Messages(Key),
+    /// Samples of a FIFO.
+    Fifo(Key),
+    /// Samples of a gyroscope, each with that of the accelerometer at the same time.
+    Pair([&'static str; 2], u8),
+}
+
+fn name_of(name: &str, instance: u8) -> String {
+    if instance == 0 { name.to_owned() } else { format!("{name}:{instance}") }
 }
 
 /// Samples of a gyroscope and an accelerometer that wait for one of the other sensor at the same time.
@@ -98,159 +119,226 @@ impl Pairing {
     }
 }
 
-/// What a first pass over a log finds.
-struct Contents {
-    topics: Vec<(String, Topic)>,
+/// An open log.
+pub(crate) struct UlogSource<'a> {
+    file: &'a Path,
+    topics: Vec<Topic>,
+    rows: Vec<Rows>,
     /// The gyroscope with the most samples, with its accelerometer; the accelerometer with the most where there is no gyroscope.
     preferred: Option<String>,
-    damage: Option<Reason>,
+    budget: Budget,
 }
 
-impl Contents {
-    fn of(file: &Path) -> Result<Self, InputError> {
-        let mut counted: BTreeMap<(usize, u8), u64> = BTreeMap::new();
-        let mut pairings: BTreeMap<([usize; 2], u8), Pairing> = BTreeMap::new();
-        let damage = for_each_sample(file, |message, instance, sample| {
-            *counted.entry((message, instance)).or_insert(0) += 1;
-            if let (Some((pair, sensor)), Ok(sample)) = (sensor_of_pair(message), sample.try_into()) {
-                pairings.entry((pair, instance)).or_default().add(sensor, sample);
-            }
-            Ok(())
+impl<'a> UlogSource<'a> {
+    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+        let mut layouts: BTreeMap<Key, Rc<MessageLayout>> = BTreeMap::new();
+        let mut messages: BTreeMap<Key, u64> = BTreeMap::new();
+        let mut samples: BTreeMap<Key, u64> = BTreeMap::new();
+        let mut pairings: BTreeMap<([&'static str; 2], u8), Pairing> = BTreeMap::new();
+        let mut row = Vec::new();
+        let damage = for_each_message(file, budget, |message| {
+            let key = (message.name.to_owned(), message.instance);
+            layouts.entry(key.clone()).or_insert_with(|| Rc::clone(message.layout));
+            *messages.entry(key.clone()).or_insert(0) += 1;
+            let Some((pair, sensor)) = pair_of(message.name) else { return Ok(()) };
+            for_each_sample(&message, &mut row, &mut |sample| {
+                *samples.entry(key.clone()).or_insert(0) += 1;
+                pairings.entry((pair, message.instance)).or_default().add(sensor, sample);
+                Ok(())
+            })
         })?;
-        let samples = |message: usize, instance: u8| counted.get(&(message, instance)).copied().unwrap_or(0);
-        let is_whole = |(pair, instance): ([usize; 2], u8), pairing: &Pairing| {
-            let most = pair.iter().map(|&message| samples(message, instance)).max().unwrap_or(0);
+        let mut source = Self { file, topics: Vec::new(), rows: Vec::new(), preferred: None, budget };
+        let count = |key: &Key| samples.get(key).or(messages.get(key)).copied().unwrap_or(0);
+        for (key, layout) in &layouts {
+            source.add(key, layout, count(key));
+        }
+        let is_whole = |(pair, instance): &([&'static str; 2], u8), pairing: &Pairing| {
+            let most = pair.iter().map(|name| count(&((*name).to_owned(), *instance))).max().unwrap_or(0);
             pairing.paired > 0 && pairing.paired as f64 >= MIN_PAIRED * most as f64
         };
-        let pairs = pairings.iter().filter(|(key, pairing)| is_whole(**key, pairing)).map(|(key, _)| *key);
-        let pairs: Vec<([usize; 2], u8)> = pairs.collect();
-        let singles = counted.keys().map(|&(message, instance)| Topic::Single { message, instance });
-        let topics: Vec<Topic> =
-            singles.chain(pairs.iter().map(|&(pair, instance)| Topic::Pair { pair, instance })).collect();
+        let pairs: Vec<([&'static str; 2], u8)> =
+            pairings.iter().filter(|(key, pairing)| is_whole(key, pairing)).map(|(key, _)| *key).collect();
+        for (pair, instance) in &pairs {
+            source.add_pair(*pair, *instance, pairings[&(*pair, *instance)].paired);
+        }
         // The message that both sensors share before others with as many samples, and the first instance.
-        let has_gyroscope = |message: usize| MESSAGES[message].1.contains(&GYROSCOPE);
-        let rank = |(key, samples): &(&(usize, u8), &u64)| {
-            (has_gyroscope(key.0), **samples, MESSAGES[key.0].1.len(), std::cmp::Reverse(**key))
+        let rank = |(at, topic): &(usize, &Topic)| {
+            let sensor = topic.sensors.first();
+            let has = |axes: [&str; 3]| sensor.is_some_and(|sensor| sensor.has(axes[0]));
+            (has(GYROSCOPE), topic.rows, has(ACCELEROMETER), std::cmp::Reverse(*at))
         };
-        let preferred = counted.iter().max_by_key(rank).map(|(&(message, instance), _)| {
-            let with_other = pairs.iter().find(|(pair, of)| pair.contains(&message) && *of == instance);
-            with_other.map_or(Topic::Single { message, instance }, |&(pair, instance)| Topic::Pair { pair, instance })
+        let is_single = |at: &usize| !matches!(source.rows[*at], Rows::Pair(..));
+        let known = source.topics.iter().enumerate().filter(|(at, topic)| !topic.sensors.is_empty() && is_single(at));
+        let best = known.max_by_key(rank).map(|(at, topic)| match &source.rows[at] {
+            Rows::Messages((name, instance)) | Rows::Fifo((name, instance)) => {
+                let with_other = pairs.iter().find(|(pair, of)| pair.contains(&name.as_str()) && of == instance);
+                with_other.map_or_else(|| topic.name.clone(), |(pair, instance)| pair_name(*pair, *instance))
+            }
+            Rows::Pair(..) => topic.name.clone(),
         });
-        Ok(Self {
-            topics: topics.into_iter().map(|topic| (topic.name(), topic)).collect(),
-            preferred: preferred.map(Topic::name),
-            damage,
-        })
+        source.preferred = best;
+        match damage {
+            Some(damage) if source.topics.is_empty() => Err(InputError::file(file, damage)),
+            _ => Ok(source),
+        }
     }
+
+    /// A message of its own, and the samples of a FIFO.
+    fn add(&mut self, key: &Key, layout: &MessageLayout, rows: u64) {
+        let (name, instance) = key;
+        let topic = Topic { name: name_of(name, *instance), kind: name.clone(), rows: Some(rows), ..Topic::default() };
+        if let Some((_, vector)) = FIFOS.iter().find(|(fifo, _)| fifo == name) {
+            let columns = sample_columns(&XYZ);
+            let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
+            vector.add_to(&mut sensor, [1, 2, 3]);
+            self.topics.push(Topic { columns, sensors: vec![sensor], ..topic });
+            self.rows.push(Rows::Fifo(key.clone()));
+            return;
+        }
+        let available = |name: &str| {
+            if name.starts_with("timestamp") {
+                AvailableColumn::known(name, TIME_UNIT)
+            } else {
+                AvailableColumn { name: name.to_owned(), unit: None }
+            }
+        };
+        let columns = layout.columns();
+        let own = columns.iter().map(|column| available(&column.name));
+        let all = own.chain([AvailableColumn::known("time", TIME_UNIT)]).collect();
+        let mut sensor = TopicSensor { columns: vec![("time", columns.len(), None)], ..TopicSensor::default() };
+        for (axes, vector) in SENSORS.iter().find(|(known, _)| known == name).map_or(&[][..], |(_, axes)| axes) {
+            let [x, y, z] = axes.map(|axis| columns.iter().position(|column| column.name == axis));
+            if let (Some(x), Some(y), Some(z)) = (x, y, z) {
+                vector.add_to(&mut sensor, [x, y, z]);
+            }
+        }
+        let sensors = Some(sensor).filter(|sensor| sensor.columns.len() > 1).into_iter().collect();
+        self.topics.push(Topic { columns: all, sensors, ..topic });
+        self.rows.push(Rows::Messages(key.clone()));
+    }
+
+    fn add_pair(&mut self, pair: [&'static str; 2], instance: u8, rows: u64) {
+        let columns = sample_columns(&[GYROSCOPE, ACCELEROMETER].concat());
+        let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
+        Vector::Rate.add_to(&mut sensor, [1, 2, 3]);
+        Vector::Force.add_to(&mut sensor, [4, 5, 6]);
+        let (name, kind, rows) = (pair_name(pair, instance), pair.join("+"), Some(rows));
+        self.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor] });
+        self.rows.push(Rows::Pair(pair, instance));
+    }
+}
+
+fn pair_name(pair: [&str; 2], instance: u8) -> String {
+    name_of(&pair.join("+"), instance)
+}
+
+/// The time, and then these columns.
+fn sample_columns(names: &[&str]) -> Vec<AvailableColumn> {
+    let values = names.iter().map(|name| AvailableColumn { name: (*name).to_owned(), unit: None });
+    std::iter::once(AvailableColumn::known("time", TIME_UNIT)).chain(values).collect()
 }
 
 /// The pair that a message belongs to, and whether it is its first or second.
-fn sensor_of_pair(message: usize) -> Option<([usize; 2], usize)> {
+fn pair_of(message: &str) -> Option<([&'static str; 2], usize)> {
     PAIRS.iter().find_map(|pair| Some((*pair, pair.iter().position(|of| *of == message)?)))
 }
 
-/// Reads a log: the topic that the user names, or the one that is preferred.
-pub(crate) fn read(file: &Path, options: &ReadOptions) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let Contents { topics, preferred, damage } = Contents::of(file)?;
-    let wanted = options.topic.as_deref().or(preferred.as_deref());
-    let (name, chosen) = match (wanted, damage) {
-        (None, Some(damage)) => return Err(fail(damage)),
-        _ => choose_topic(FORMAT, &topics, wanted).map_err(fail)?,
-    };
-    let mut table = MessageTable::new(file, TIME_UNIT, chosen.fields(), options)?;
-    let mut pairing = Pairing::default();
-    let damage = for_each_sample(file, |message, instance, sample| match *chosen {
-        Topic::Single { .. } if *chosen == (Topic::Single { message, instance }) => table.push(sample),
-        Topic::Pair { pair, instance: of } if of == instance => {
-            let sensor = pair.iter().position(|member| *member == message);
-            match (sensor, sample.try_into()) {
-                (Some(sensor), Ok(sample)) => pairing.add(sensor, sample).map_or(Ok(()), |both| table.push(&both)),
-                _ => Ok(()),
+impl Source for UlogSource<'_> {
+    fn format(&self) -> &'static str {
+        FORMAT
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn preferred(&self) -> Option<&str> {
+        self.preferred.as_deref()
+    }
+
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
+        let rows = &self.rows[topic];
+        let mut pairing = Pairing::default();
+        let (mut decoded, mut picked) = (Vec::new(), Vec::new());
+        let mut pick = |row: &[Number]| {
+            picked.clear();
+            picked.extend(columns.iter().map(|&at| row.get(at).copied().unwrap_or(Number::Real(f64::NAN))));
+            each(&picked)
+        };
+        let is = |message: &Message, (name, instance): &Key| message.name == name && message.instance == *instance;
+        let damage = for_each_message(self.file, self.budget, |message| match rows {
+            Rows::Messages(key) if is(&message, key) => {
+                let time = decode(&message, &mut decoded);
+                decoded.push(time);
+                pick(&decoded)
             }
-        }
-        _ => Ok(()),
-    })?;
-    let mut table = table.finish(damage)?;
-    let alone = pairing.alone + pairing.waiting.len() as u64;
-    if alone > 0 {
-        table.notes.push(format!(
-            "{alone} samples of {name} have no sample of the other sensor at their time and are left out"
-        ));
+            Rows::Fifo(key) if is(&message, key) => {
+                for_each_sample(&message, &mut decoded, &mut |sample| pick(&sample))
+            }
+            Rows::Pair(pair, instance) if *instance == message.instance => {
+                let Some(sensor) = pair.iter().position(|member| *member == message.name) else { return Ok(()) };
+                for_each_sample(&message, &mut decoded, &mut |sample| {
+                    pairing.add(sensor, sample).map_or(Ok(()), |both| pick(&both))
+                })
+            }
+            _ => Ok(()),
+        })?;
+        let alone = pairing.alone + pairing.waiting.len() as u64;
+        let name = &self.topics[topic].name;
+        let note =
+            format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out");
+        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).into_iter().collect(), rate_hz: None })
     }
-    let others: Vec<&str> = topics.iter().map(|(name, _)| name.as_str()).filter(|other| other != name).collect();
-    if options.topic.is_none() && !others.is_empty() {
-        table.notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
-    }
-    Ok(table)
 }
 
-/// Gives each sample of [`MESSAGES`] with the instance of its message to `each`; and why there are no more where the file is damaged.
+/// A message of data.
+struct Message<'a> {
+    name: &'a str,
+    instance: u8,
+    layout: &'a Rc<MessageLayout>,
+    data: &'a [u8],
+}
+
+/// Decodes the columns of a message into `row`; and its time, which is that of the sample where the log has it.
+fn decode(message: &Message, row: &mut Vec<Number>) -> Number {
+    // Padding at the end is not logged: a message may be shorter than its format.
+    let _ = message.layout.decode(message.data, Encoding::Packed, row);
+    let columns = message.layout.columns();
+    let number = |name: &str| columns.iter().position(|column| column.name == name).map(|at| row[at]);
+    let sampled = number("timestamp_sample").filter(|time| time.value() > 0.0);
+    sampled.or_else(|| number("timestamp")).unwrap_or(Number::Real(f64::NAN))
+}
+
+/// Gives the samples of a message of one vector to `each`: the time and three axes.
 fn for_each_sample(
-    file: &Path,
-    mut each: impl FnMut(usize, u8, &[Number]) -> Result<(), InputError>,
-) -> Result<Option<Reason>, InputError> {
-    let fail = |error| InputError::file(file, Reason::Io(error));
-    let mut input = File::open(file).map_err(fail)?;
-    let mut failure = None;
-    let mut on_message = |message: &DataMessage| {
-        let name = message.flattened_format.message_name();
-        if failure.is_none()
-            && let Some(number) = MESSAGES.iter().position(|(known, _)| *known == name)
-        {
-            let instance = message.multi_id.value();
-            failure = samples(message, |sample| each(number, instance, sample)).err();
-        }
-    };
-    let mut parser = LogParser::default();
-    parser.set_data_message_callback(&mut on_message);
-    let mut buffer = vec![0; BUFFER_BYTES];
-    let damage = loop {
-        let read = input.read(&mut buffer).map_err(fail)?;
-        if read == 0 {
-            break parser.has_leftover().then_some(Reason::Truncated { format: FORMAT });
-        }
-        if let Err(error) = parser.consume_bytes(&buffer[..read]) {
-            break Some(Reason::Format { format: FORMAT, error: error.to_string().into() });
-        }
-    };
-    drop(parser);
-    failure.map_or(Ok(damage), Err)
-}
-
-/// Gives the samples of a message to `each`: the time, then the fields of [`MESSAGES`].
-fn samples(message: &DataMessage, mut each: impl FnMut(&[Number]) -> Result<(), InputError>) -> Result<(), InputError> {
-    let values = MessageValues(message);
-    // Older logs have the time of the message alone.
-    let time =
-        values.number("timestamp_sample").filter(|time| time.value() > 0.0).or_else(|| values.number("timestamp"));
-    let time = time.unwrap_or(Number::Real(f64::NAN));
-    let value = |name: &str| values.number(name).map_or(f64::NAN, Number::value);
-    match message.flattened_format.message_name() {
-        "sensor_gyro_fifo" | "sensor_accel_fifo" => {
-            let (interval_us, scale) = (value("dt"), value("scale"));
-            let samples = value("samples");
-            // Also false for NaN.
-            if !(samples >= 0.0 && samples <= FIFO_SAMPLES as f64) {
-                return each(&[]);
-            }
-            let samples = samples as usize;
-            for at in 0..samples {
-                // The time of the message is that of its last sample.
-                let before_us = (samples - 1 - at) as f64 * interval_us;
-                let axis = |axis: char| Number::Real(scale * value(&format!("{axis}[{at}]")));
-                each(&[earlier(time, before_us), axis('x'), axis('y'), axis('z')])?;
-            }
-            Ok(())
-        }
-        "sensor_combined" => {
-            let axes = ["gyro_rad", "accelerometer_m_s2"];
-            let names = axes.into_iter().flat_map(|name| (0..3).map(move |axis| format!("{name}[{axis}]")));
-            let row: Vec<Number> = std::iter::once(time).chain(names.map(|name| Number::Real(value(&name)))).collect();
-            each(&row)
-        }
-        _ => each(&[time, Number::Real(value("x")), Number::Real(value("y")), Number::Real(value("z"))]),
+    message: &Message,
+    row: &mut Vec<Number>,
+    each: &mut dyn FnMut([Number; 4]) -> Result<(), InputError>,
+) -> Result<(), InputError> {
+    let time = decode(message, row);
+    let columns = message.layout.columns();
+    let value =
+        |name: &str| columns.iter().position(|column| column.name == name).map_or(f64::NAN, |at| row[at].value());
+    if FIFOS.iter().all(|(name, _)| *name != message.name) {
+        return each([time, Number::Real(value("x")), Number::Real(value("y")), Number::Real(value("z"))]);
     }
+    let (interval_us, scale, samples) = (value("dt"), value("scale"), value("samples"));
+    // Also false for NaN.
+    if !(samples >= 0.0 && samples <= FIFO_SAMPLES as f64) {
+        return each([Number::Real(f64::NAN); 4]);
+    }
+    let first = ["x[0]", "y[0]", "z[0]"].map(|name| columns.iter().position(|column| column.name == name));
+    let samples = samples as usize;
+    for at in 0..samples {
+        // The time of the message is that of its last sample.
+        let before_us = (samples - 1 - at) as f64 * interval_us;
+        let axis = |axis: usize| {
+            let count = first[axis].and_then(|first| row.get(first + at)).map_or(f64::NAN, |count| count.value());
+            Number::Real(scale * count)
+        };
+        each([earlier(time, before_us), axis(0), axis(1), axis(2)])?;
+    }
+    Ok(())
 }
 
 /// `time`, in µs, less `before_us`.
@@ -261,31 +349,105 @@ fn earlier(time: Number, before_us: f64) -> Number {
     }
 }
 
-/// The fields of a message by their names.
-struct MessageValues<'a>(&'a DataMessage<'a>);
-
-impl MessageValues<'_> {
-    /// A field of any type of number; `None` where it is missing or cut off.
-    fn number(&self, name: &str) -> Option<Number> {
-        use FlattenedFieldType as Type;
-        let format = self.0.flattened_format;
-        let field = format.field_iter().find(|field| field.flattened_field_name == name)?;
-        let bytes = self.0.data.get(usize::from(field.offset)..)?;
-        let integer = match field.field_type {
-            Type::Int8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-            Type::UInt8 => i64::from(*bytes.first()?),
-            Type::Int16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-            Type::UInt16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-            Type::Int32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-            Type::UInt32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-            Type::Int64 => i64::from_le_bytes(*bytes.first_chunk()?),
-            Type::UInt64 => i64::try_from(u64::from_le_bytes(*bytes.first_chunk()?)).ok()?,
-            Type::Float => return Some(Number::Real(f64::from(f32::from_le_bytes(*bytes.first_chunk()?)))),
-            Type::Double => return Some(Number::Real(f64::from_le_bytes(*bytes.first_chunk()?))),
-            _ => return None,
+/// Gives each message of data to `each`; and why there are no more where the file is damaged.
+fn for_each_message(
+    file: &Path,
+    budget: Budget,
+    mut each: impl FnMut(Message) -> Result<(), InputError>,
+) -> Result<Option<Reason>, InputError> {
+    let fail = |error| InputError::file(file, Reason::Io(error));
+    let mut input = BufReader::new(File::open(file).map_err(fail)?);
+    let mut meter = budget.meter();
+    let mut formats: Definitions = HashMap::new();
+    let mut layouts: HashMap<String, Rc<MessageLayout>> = HashMap::new();
+    let mut subscriptions: HashMap<u16, (String, u8, Rc<MessageLayout>)> = HashMap::new();
+    // A format that cannot be understood leaves its messages out.
+    let mut refused = None;
+    let mut bytes = Vec::new();
+    let mut next = |count: u64, bytes: &mut Vec<u8>| {
+        bytes.clear();
+        input.by_ref().take(count).read_to_end(bytes).map(|read| read as u64 == count).map_err(fail)
+    };
+    next(HEADER_BYTES, &mut bytes)?;
+    loop {
+        let is_whole = next(3, &mut bytes)?;
+        let [low, high, kind] = match bytes.as_slice() {
+            [] => return Ok(refused),
+            &[low, high, kind] if is_whole => [low, high, kind],
+            _ => return Ok(Some(Reason::Truncated { format: FORMAT })),
         };
-        Some(Number::Integer(integer))
+        let length = u16::from_le_bytes([low, high]);
+        if !next(u64::from(length), &mut bytes)? {
+            return Ok(Some(Reason::Truncated { format: FORMAT }));
+        }
+        if let Err(reason) = meter.add_bytes(3 + u64::from(length)) {
+            return Ok(Some(reason));
+        }
+        match kind {
+            b'F' => {
+                if let Some((name, fields)) = format(&bytes) {
+                    formats.insert(name, fields);
+                }
+            }
+            b'A' => {
+                let Some((&[instance, low, high], name)) = bytes.split_first_chunk() else { continue };
+                let name = String::from_utf8_lossy(name).into_owned();
+                let layout = match layouts.get(&name) {
+                    Some(layout) => Rc::clone(layout),
+                    None => match MessageLayout::new(&name, &formats) {
+                        Ok(layout) => Rc::clone(layouts.entry(name.clone()).or_insert(Rc::new(layout))),
+                        Err(reason) => {
+                            refused.get_or_insert(reason);
+                            continue;
+                        }
+                    },
+                };
+                subscriptions.insert(u16::from_le_bytes([low, high]), (name, instance, layout));
+            }
+            b'D' => {
+                let Some((&[low, high], data)) = bytes.split_first_chunk() else { continue };
+                if let Some((name, instance, layout)) = subscriptions.get(&u16::from_le_bytes([low, high])) {
+                    each(Message { name, instance: *instance, layout, data })?;
+                }
+            }
+            b'B' | b'I' | b'M' | b'P' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
+            _ => {
+                let error = format!("a message of unknown type {kind:#04x}").into();
+                return Ok(Some(Reason::Format { format: FORMAT, error }));
+            }
+        }
     }
+}
+
+/// Name and fields of a format such as `sensor_gyro:uint64_t timestamp;float[3] xyz;`; `None` for other texts.
+fn format(text: &[u8]) -> Option<(String, Vec<Field>)> {
+    let (name, fields) = std::str::from_utf8(text).ok()?.split_once(':')?;
+    let field = |text: &str| {
+        let (kind, name) = text.trim().split_once(' ')?;
+        let (kind, repeat) = match kind.split_once('[') {
+            Some((kind, count)) => (kind, Repeat::Times(count.strip_suffix(']')?.parse().ok()?)),
+            None => (kind, Repeat::Once),
+        };
+        let scalar = match kind {
+            "int8_t" => Scalar::Signed(1),
+            "int16_t" => Scalar::Signed(2),
+            "int32_t" => Scalar::Signed(4),
+            "int64_t" => Scalar::Signed(8),
+            "uint8_t" | "bool" | "char" => Scalar::Unsigned(1),
+            "uint16_t" => Scalar::Unsigned(2),
+            "uint32_t" => Scalar::Unsigned(4),
+            "uint64_t" => Scalar::Unsigned(8),
+            "float" => Scalar::Float(4),
+            "double" => Scalar::Float(8),
+            other => {
+                let kind = FieldType::Nested(other.to_owned());
+                return Some(Field { name: name.to_owned(), kind, repeat });
+            }
+        };
+        Some(Field { name: name.to_owned(), kind: FieldType::Scalar(scalar), repeat })
+    };
+    let fields: Option<Vec<Field>> = fields.split(';').filter(|text| !text.trim().is_empty()).map(field).collect();
+    Some((name.to_owned(), fields?))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! The crate `csv` is not used because the line number that it reports is wrong after a blank line and in files with CR LF
 //! line ends.
 
+use crate::input::budget::{Budget, Metered};
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_ahead::ReadAhead;
@@ -57,7 +58,10 @@ impl Lines {
         let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
         let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
         let bytes: Box<dyn Read + Send> = if compressed {
-            Box::new(ReadAhead::new(GzipMembers::new(whole)).map_err(|e| fail(Reason::Io(e)))?)
+            // The time is that of the caller, who works on the lines while they are read.
+            let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?.without_time();
+            let members = Metered::new(GzipMembers::new(whole), budget.meter());
+            Box::new(ReadAhead::new(members).map_err(|e| fail(Reason::Io(e)))?)
         } else {
             Box::new(whole)
         };
@@ -150,7 +154,7 @@ fn read_failure(error: io::Error) -> Reason {
         io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
         io::ErrorKind::InvalidInput => Reason::DamagedGzip(error),
         io::ErrorKind::InvalidData => Reason::TrailingBytes,
-        _ => Reason::Io(error),
+        _ => Reason::from_io(error),
     }
 }
 

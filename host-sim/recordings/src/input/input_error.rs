@@ -51,6 +51,49 @@ pub enum Reason {
     /// More samples than are held in memory.
     #[error("more than 33554432 samples: give the recording in parts")]
     TooManySamples,
+    /// Compressed data that are far larger than noise can be compressed from.
+    #[error(
+        "its data are more than {bytes} bytes, far more than a recording of this size has; decompress it or save it uncompressed"
+    )]
+    Expands {
+        /// Bytes that are read at most.
+        bytes: u64,
+    },
+    /// Far more numbers than a file of its size has of a sensor.
+    #[error("more than {values} numbers, far more than a recording of this size has; save it uncompressed")]
+    TooManyValues {
+        /// Numbers that are read at most.
+        values: u64,
+    },
+    /// Definitions, structures or groups within others.
+    #[error("nested more than {most} levels deep")]
+    TooDeep {
+        /// Levels that are read.
+        most: usize,
+    },
+    /// A reading without an end.
+    #[error("not read within {seconds} s, far longer than a recording of this size takes")]
+    TooSlow {
+        /// Time for a file of this size, s.
+        seconds: u64,
+    },
+    /// A binary format that is known and not read.
+    #[error("{what}, which is not read; {how}")]
+    Foreign {
+        /// What it is.
+        what: &'static str,
+        /// How to convert it.
+        how: &'static str,
+    },
+    /// A binary format that is not known.
+    #[error(
+        "of no known format: it begins with {begins}; known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog, DataFlash \
+         and blackbox logs; write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)"
+    )]
+    UnknownBinary {
+        /// The first bytes.
+        begins: String,
+    },
     /// Bytes that are not UTF-8.
     #[error("not UTF-8 text")]
     NotText,
@@ -167,12 +210,29 @@ pub enum Reason {
         /// Such rows.
         rows: u64,
     },
-    /// A log without a message that this program reads.
-    #[error("no message of an inertial sensor in this {format}")]
+    /// A log without a message, or an archive without an array.
+    #[error("there is nothing to read in this {format}")]
     NoTopic {
         /// Name of the format.
         format: &'static str,
     },
+    /// A log or an archive in which no inertial sensor is known.
+    #[error(
+        "no inertial sensor is known in this {format}; say which columns with --topic and --columns: it has {topics}"
+    )]
+    NoSensor {
+        /// Name of the format.
+        format: &'static str,
+        /// Names and types of its topics.
+        topics: String,
+    },
+    /// A topic, with its type, of which the file has no definition.
+    #[error(
+        "the messages of {} cannot be decoded: the file has no definition of {}; where that package is installed, `ros2 bag convert` to MCAP \
+         writes it along",
+        .0.0, .0.1
+    )]
+    NoDefinition(Box<(String, String)>),
     /// A topic that the log does not have: as given, and the names of the topics.
     #[error("--topic {}: not in the file; it has {}", .0.0, .0.1)]
     UnknownTopic(Box<(String, String)>),
@@ -202,6 +262,16 @@ pub enum Reason {
     /// The driver refused the replayed transaction.
     #[error("replay over the bus: {0}")]
     Bus(String),
+}
+
+impl Reason {
+    /// Why reading failed: what a [`Metered`](crate::input::budget::Metered) input refused, or the error itself.
+    pub(crate) fn from_io(error: io::Error) -> Self {
+        match error.downcast::<Self>() {
+            Ok(reason) => reason,
+            Err(error) => Self::Io(error),
+        }
+    }
 }
 
 impl InputError {

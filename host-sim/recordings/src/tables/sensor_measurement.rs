@@ -22,8 +22,9 @@ pub(crate) fn time_base(
     sensor: &SensorProfile,
     stated_hz: Option<f64>,
 ) -> Result<(EstimatedTimeBase, Vec<String>), TimeBaseError> {
+    let stated_hz = stated_hz.or(table.rate_hz);
     let repeated = leave_out_repeated(&mut table, stated_hz);
-    let SensorTable { times_s, indices, columns, mut dropped, mut notes } = table;
+    let SensorTable { times_s, indices, columns, mut dropped, mut notes, rate_hz: _ } = table;
     let rows = columns.first().map_or(0, |column| column.values.len());
     let base = SampleSlots::new(rows, times_s.as_deref(), indices.as_deref(), stated_hz)?;
     dropped.extend(Some(("repeated", repeated)).filter(|_| repeated > 0));

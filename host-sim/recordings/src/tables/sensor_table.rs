@@ -3,6 +3,7 @@
 use crate::columns::column_selection::{ChosenColumn, Role};
 use crate::columns::unit::{SECOND, Unit};
 use crate::counts::recording::MAX_SAMPLES;
+use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::Reason;
 use measurement::ChannelProfile;
 use std::collections::BTreeMap;
@@ -66,6 +67,8 @@ pub(crate) struct SensorTable {
     pub(crate) dropped: BTreeMap<&'static str, u64>,
     /// What the user should know, one sentence each.
     pub(crate) notes: Vec<String>,
+    /// The sample rate that the file states beside its rows, Hz.
+    pub(crate) rate_hz: Option<f64>,
 }
 
 /// Builds a [`SensorTable`] row by row.
@@ -82,6 +85,8 @@ pub(crate) struct TableBuilder {
     rows: u64,
     /// Rows that are held at most.
     most_rows: u64,
+    /// What the file may cost.
+    meter: Option<Meter>,
     backwards: u64,
     /// The first row whose time went back: number of the row, and by how much.
     first_backwards: Option<(u64, f64)>,
@@ -111,9 +116,15 @@ impl TableBuilder {
             last_index: None,
             rows: 0,
             most_rows: MAX_SAMPLES,
+            meter: None,
             backwards: 0,
             first_backwards: None,
         }
+    }
+
+    /// The same for rows of a file with this budget.
+    pub(crate) fn within(self, budget: Budget) -> Self {
+        Self { meter: Some(budget.meter()), ..self }
     }
 
     /// The same for a reader that [takes the rows](Self::take_rows) in blocks.
@@ -139,6 +150,9 @@ impl TableBuilder {
         self.rows += 1;
         if self.rows > self.most_rows {
             return Err((0, Reason::TooManySamples));
+        }
+        if let Some(meter) = &mut self.meter {
+            meter.add_values(row.len() as u64).map_err(|reason| (0, reason))?;
         }
         for (position, (column, &number)) in self.chosen.iter().zip(row).enumerate() {
             match column.role {
@@ -244,6 +258,7 @@ impl TableBuilder {
             times_s: (!times.is_empty()).then_some(times),
             dropped,
             notes,
+            rate_hz: None,
         })
     }
 }

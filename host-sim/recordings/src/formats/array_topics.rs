@@ -1,0 +1,238 @@
+//! Arrays of numbers with names, as NumPy, MATLAB and HDF5 keep them: which of them are columns of one table.
+
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, known_by_name};
+use crate::columns::unit::Unit;
+use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::input::budget::Budget;
+use crate::input::input_error::{InputError, Reason};
+use crate::tables::any_sensor::ReadOptions;
+use crate::tables::sensor_table::Number;
+use std::path::Path;
+
+/// Names of vectors whose unit is a matter of course, as in NaveGo and in textbooks on strapdown navigation.
+const UNITS_BY_NAME: [(&str, &str); 2] = [("wb", "rad/s"), ("fb", "m/s^2")];
+
+/// An array of a file: a vector, or a matrix whose longer side is the time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct NamedArray {
+    /// Where it lies, with the sign that comes before its own name: `imu1.` or `/run/`; empty for the outermost.
+    pub(crate) group: String,
+    /// Its name; empty where the file has one array without a name.
+    pub(crate) name: String,
+    /// Length of the longer side.
+    pub(crate) rows: usize,
+    /// Names of the columns, or their numbers, from 0.
+    pub(crate) columns: Vec<String>,
+    /// Unit of the numbers, where the file says it.
+    pub(crate) unit: Option<Unit>,
+    /// Sample rate, Hz, where the file says it, and what says it.
+    pub(crate) rate: Option<(f64, String)>,
+}
+
+impl NamedArray {
+    /// A matrix of `rows` by `columns` whose columns have numbers.
+    pub(crate) fn matrix(group: &str, name: &str, rows: usize, columns: usize) -> Self {
+        let columns = (0..columns).map(|number| number.to_string()).collect();
+        Self { group: group.to_owned(), name: name.to_owned(), rows, columns, ..Self::default() }
+    }
+
+    fn path(&self) -> String {
+        format!("{}{}", self.group, self.name)
+    }
+
+    /// The name of a column: `gyro.0` of the matrix `gyro`, the name alone of a vector, the number alone where the array has no name.
+    fn column_name(&self, path: &str, column: usize) -> String {
+        match (path, self.columns.len()) {
+            ("", _) => self.columns[column].clone(),
+            (path, 1) => path.to_owned(),
+            (path, _) => format!("{path}.{}", self.columns[column]),
+        }
+    }
+
+    /// A column of the table under this name.
+    fn available(&self, path: &str, column: usize) -> AvailableColumn {
+        let name = self.column_name(path, column);
+        let heading = AvailableColumn::from_heading(&name);
+        AvailableColumn {
+            unit: self.unit.or(heading.unit),
+            name: if heading.unit.is_some() { heading.name } else { name },
+        }
+    }
+}
+
+/// The columns to read of the only array of a file.
+pub(crate) fn choose(array: &NamedArray, options: &ReadOptions) -> Result<Vec<ChosenColumn>, Reason> {
+    let is_named = options.topic.as_ref().is_none_or(|topic| *topic == array.name);
+    let columns = (0..array.columns.len()).filter(|_| is_named);
+    let available: Vec<AvailableColumn> = columns.map(|column| array.available(&array.name, column)).collect();
+    options.choose(&available).map_err(|error| Reason::Selection(Box::new(error)))
+}
+
+/// The numbers in the arrays of a file.
+pub(crate) trait ArrayReader {
+    /// Name of the format.
+    const FORMAT: &'static str;
+
+    /// The columns, by their numbers, of the array at `array`. `add` is called with how many numbers are about to be held.
+    fn read(
+        &mut self,
+        array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason>;
+}
+
+/// A file with named arrays.
+pub(crate) struct ArraySource<'a, R> {
+    file: &'a Path,
+    reader: R,
+    arrays: Vec<NamedArray>,
+    topics: Vec<Topic>,
+    /// Array and column of each column of the whole file, and those columns of each topic.
+    places: Vec<(usize, usize)>,
+    members: Vec<Vec<usize>>,
+    budget: Budget,
+}
+
+impl<'a, R: ArrayReader> ArraySource<'a, R> {
+    /// The first topic has all arrays; each group and each array is one of its own.
+    pub(crate) fn new(file: &'a Path, reader: R, arrays: Vec<NamedArray>, budget: Budget) -> Self {
+        let places: Vec<(usize, usize)> = arrays
+            .iter()
+            .enumerate()
+            .flat_map(|(number, array)| (0..array.columns.len()).map(move |column| (number, column)))
+            .collect();
+        let mut source = Self { file, reader, arrays, topics: Vec::new(), places, members: Vec::new(), budget };
+        source.add_topic(String::new(), |_| true);
+        let mut groups: Vec<String> = Vec::new();
+        for array in &source.arrays {
+            if !groups.contains(&array.group) {
+                groups.push(array.group.clone());
+            }
+        }
+        for group in groups {
+            let name = group.trim_end_matches(['.', '/']).to_owned();
+            let topic =
+                if name.is_empty() { 0 } else { source.add_topic(name, |array| array.group.starts_with(&group)) };
+            source.topics[topic].sensors = source.sensor(&group, topic).into_iter().collect();
+        }
+        let paths: Vec<String> = source.arrays.iter().map(NamedArray::path).collect();
+        for path in paths.into_iter().filter(|path| !path.is_empty()) {
+            source.add_topic(path.clone(), |array| array.path() == path);
+        }
+        source
+    }
+
+    fn add_topic(&mut self, name: String, is_member: impl Fn(&NamedArray) -> bool) -> usize {
+        let members: Vec<usize> =
+            (0..self.places.len()).filter(|&at| is_member(&self.arrays[self.places[at].0])).collect();
+        let available = |&at: &usize| {
+            let (number, column) = self.places[at];
+            self.arrays[number].available(&self.arrays[number].path(), column)
+        };
+        let columns = members.iter().map(available).collect();
+        let rows = members.first().map(|&at| self.arrays[self.places[at].0].rows as u64);
+        self.topics.push(Topic { name, rows, columns, ..Topic::default() });
+        self.members.push(members);
+        self.topics.len() - 1
+    }
+
+    /// The sensor that the arrays directly in `group` are, by their names.
+    fn sensor(&self, group: &str, topic: usize) -> Option<TopicSensor> {
+        let own: Vec<usize> = (0..self.members[topic].len())
+            .filter(|&at| self.arrays[self.places[self.members[topic][at]].0].group == group)
+            .collect();
+        let place = |at: usize| self.places[self.members[topic][at]];
+        let available: Vec<AvailableColumn> = own
+            .iter()
+            .map(|&at| {
+                let (array, column) = place(at);
+                self.arrays[array].available(&self.arrays[array].name, column)
+            })
+            .collect();
+        let known = known_by_name(&available)?;
+        let has = |axes: [&str; 3]| axes.iter().all(|axis| known.iter().any(|(name, _)| name == axis));
+        if !has(GYROSCOPE) && !has(ACCELEROMETER) {
+            return None;
+        }
+        let mut sensor = TopicSensor::default();
+        let mut by_convention: Vec<String> = Vec::new();
+        for (channel, at) in known {
+            let is_needed = channel == "time"
+                || channel == "sample"
+                || GYROSCOPE.contains(&channel)
+                || ACCELEROMETER.contains(&channel);
+            if !is_needed && available[at].unit.is_none() {
+                // A magnetometer or a thermometer is no reason to ask for a unit.
+                continue;
+            }
+            let position = own[at];
+            let array = &self.arrays[place(position).0];
+            let usual = UNITS_BY_NAME.iter().find(|(name, _)| array.name.eq_ignore_ascii_case(name));
+            let usual = usual.filter(|_| available[at].unit.is_none());
+            if let Some((_, unit)) = usual {
+                let told = format!("{} in {unit}", array.path());
+                if !by_convention.contains(&told) {
+                    by_convention.push(told);
+                }
+            }
+            sensor.columns.push((channel, position, usual.and_then(|(_, unit)| Unit::parse(unit))));
+        }
+        if !by_convention.is_empty() {
+            let taken = by_convention.join(" and ");
+            sensor.note = Some(format!("{taken}, as is usual for arrays of these names; --units says otherwise"));
+        }
+        Some(sensor)
+    }
+}
+
+impl<R: ArrayReader> Source for ArraySource<'_, R> {
+    fn format(&self) -> &'static str {
+        R::FORMAT
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn whole(&self) -> Option<usize> {
+        Some(0)
+    }
+
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
+        let file = self.file;
+        let fail = |reason| InputError::file(file, reason);
+        let places: Vec<(usize, usize)> =
+            columns.iter().map(|&column| self.places[self.members[topic][column]]).collect();
+        let first = places.first().map_or(0, |(array, _)| *array);
+        let mut values: Vec<Vec<Number>> = vec![Vec::new(); places.len()];
+        let mut meter = self.budget.meter();
+        let mut rate: Option<&(f64, String)> = None;
+        for (number, array) in self.arrays.iter().enumerate() {
+            let own: Vec<usize> = (0..places.len()).filter(|&at| places[at].0 == number).collect();
+            if own.is_empty() {
+                continue;
+            }
+            if array.rows != self.arrays[first].rows {
+                let [one, other] = [&self.arrays[first], array]
+                    .map(|array| format!("array {:?} has {} rows", array.path(), array.rows));
+                return Err(fail(Reason::Array(format!("{one}, {other}"))));
+            }
+            let columns: Vec<usize> = own.iter().map(|&at| places[at].1).collect();
+            let read = self.reader.read(number, &columns, &mut |values| meter.add_values(values)).map_err(fail)?;
+            for (at, column) in own.into_iter().zip(read) {
+                values[at] = column;
+            }
+            rate = rate.or(array.rate.as_ref());
+        }
+        let rows = values.iter().map(Vec::len).min().unwrap_or(0);
+        let mut row = Vec::with_capacity(values.len());
+        for at in 0..rows {
+            row.clear();
+            row.extend(values.iter().map(|column| column[at]));
+            each(&row)?;
+        }
+        let note = |(hz, by): &(f64, String)| format!("the file states a rate of {hz} Hz ({by})");
+        Ok(Ending { damage: None, notes: rate.map(note).into_iter().collect(), rate_hz: rate.map(|(hz, _)| *hz) })
+    }
+}

@@ -1,0 +1,95 @@
+//! Binary files that are not read: what they look like, and how to convert them.
+
+use crate::input::input_error::Reason;
+use std::fmt::Write;
+
+/// First bytes, what they begin, and how to convert it.
+const FOREIGN: &[(&[u8], &str, &str)] = &[
+    (b"RDX2\n", R_WORKSPACE, IN_R),
+    (b"RDX3\n", R_WORKSPACE, IN_R),
+    (b"RDA2\n", R_WORKSPACE, IN_R),
+    (b"RDA3\n", R_WORKSPACE, IN_R),
+    (b"X\n\0\0\0", "an R object", "in R: x <- readRDS(\"FILE\"); write.csv(x, \"FILE.csv\", row.names = FALSE)"),
+    (b"PAR1", "a Parquet table", "in Python: pandas.read_parquet(\"FILE\").to_csv(\"FILE.csv\", index=False)"),
+    (b"ARROW1", "an Arrow table", "in Python: pandas.read_feather(\"FILE\").to_csv(\"FILE.csv\", index=False)"),
+    (b"FEA1", "a Feather table", "in Python: pandas.read_feather(\"FILE\").to_csv(\"FILE.csv\", index=False)"),
+    (b"TDSm", "a TDMS file of LabVIEW", "in Python: nptdms.TdmsFile(\"FILE\").as_dataframe().to_csv(\"FILE.csv\")"),
+    (b"MDF     ", "a measurement file of ASAM MDF", "in Python: asammdf.MDF(\"FILE\").export(\"csv\", \"FILE.csv\")"),
+    (b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1", "a file of an old Microsoft Office", "save the sheet as CSV"),
+    (b"\xFD7zXZ\0", "compressed by xz", "unxz FILE, and give the result"),
+    (b"BZh", "compressed by bzip2", "bunzip2 FILE, and give the result; if it is an R workspace, write.csv in R"),
+    (b"\x28\xB5\x2F\xFD", "compressed by Zstandard", "unzstd FILE, and give the result"),
+    (b"7z\xBC\xAF\x27\x1C", "a 7-Zip archive", "unpack it, and give the recording in it"),
+    (b"Rar!\x1A\x07", "a RAR archive", "unpack it, and give the recording in it"),
+    (b"\xFF\xFE", "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE > FILE.csv"),
+    (b"\xFE\xFF", "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE > FILE.csv"),
+    (b"\x80\x04\x95", "a Python pickle", "in Python: load it, and numpy.save(\"FILE.npy\", array)"),
+    (
+        b"\xAA\x44\x12",
+        "a binary log of a NovAtel receiver",
+        "convert its RAWIMU messages to CSV with NovAtel's program",
+    ),
+    (b"\xB5\x62", "a binary log of a u-blox receiver (UBX)", "convert its ESF-MEAS messages to CSV"),
+    (b"%PDF-", "a PDF document", "give the recording itself"),
+    (b"\x89PNG", "a picture", "give the recording itself"),
+    (b"\x7FELF", "a program", "give the recording itself"),
+];
+const R_WORKSPACE: &str = "an R workspace";
+const IN_R: &str = "in R: load(\"FILE\"); ls(); write.csv(NAME, \"NAME.csv\", row.names = FALSE)";
+
+/// A part of the letters of a text that may be control characters: 1 in 64 and more are none.
+const MOST_CONTROLS: usize = 64;
+/// Bytes that an error shows.
+const SHOWN: usize = 16;
+
+/// Whether the first bytes of a file are no text.
+pub(crate) fn is_binary(head: &[u8]) -> bool {
+    let is_foreign = FOREIGN.iter().any(|(magic, ..)| head.starts_with(magic));
+    let is_control = |byte: &&u8| byte.is_ascii_control() && !byte.is_ascii_whitespace() && **byte != 0x1B;
+    let controls = head.iter().filter(is_control).count();
+    is_foreign || head.contains(&0) || controls * MOST_CONTROLS > head.len()
+}
+
+/// What a binary file looks like, and how to convert it.
+pub(crate) fn refusal(head: &[u8]) -> Reason {
+    match FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic)) {
+        Some((_, what, how)) => Reason::Foreign { what, how },
+        None => Reason::UnknownBinary { begins: shown(head) },
+    }
+}
+
+/// The first bytes as hexadecimal digits and as text.
+fn shown(head: &[u8]) -> String {
+    let head = &head[..head.len().min(SHOWN)];
+    let mut text = String::new();
+    for byte in head {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02X} ");
+    }
+    let letter = |byte: &u8| if byte.is_ascii_graphic() { char::from(*byte) } else { '.' };
+    format!("{text}({})", head.iter().map(letter).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{is_binary, refusal};
+
+    #[test]
+    fn text_is_told_from_binary_and_binary_by_its_first_bytes() {
+        for text in
+            [&b"t,gx\n0,1\n"[..], "t;°/s\n".as_bytes(), b"t\tx\r\n1\t2\r\n", b"gx [\xB0/s]\n1\n", b"\x1b[0mt x\n0 1\n"]
+        {
+            assert!(!is_binary(text), "{text:?}");
+        }
+        for (head, words) in [
+            (&b"RDX3\nX\n\0\0\0\x03"[..], ["R workspace", "write.csv"]),
+            (b"PAR1\x15\x04", ["Parquet", "read_parquet"]),
+            (b"\xFF\xFEt\0,\0", ["UTF-16", "iconv"]),
+            (b"\x01\x02\x03\x04sensor\0\0", ["01 02 03 04 73", "(....sensor..)"]),
+        ] {
+            assert!(is_binary(head));
+            let text = refusal(head).to_string();
+            assert!(words.iter().all(|word| text.contains(word)), "{text}");
+        }
+    }
+}

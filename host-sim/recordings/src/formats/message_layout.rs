@@ -1,0 +1,314 @@
+//! Messages of which a definition says the fields: names, types, arrays and nesting, as ROS and PX4 write them.
+//!
+//! A [`MessageLayout`] lists every number of a message as a column, such as `imu.angular_velocity.x` or `gyro[2]`, and decodes messages
+//! to a number for each column. Numbers in arrays of variable length, or of more than 64 elements, are no columns and are skipped.
+
+use crate::input::budget::Budget;
+use crate::input::input_error::Reason;
+use crate::tables::sensor_table::Number;
+use std::collections::HashMap;
+
+/// Elements of an array that are columns of their own.
+const MOST_ELEMENTS: usize = 64;
+/// Steps of a layout, of which there are some for every column: definitions that use each other can ask for any number.
+const MOST_STEPS: usize = 1 << 14;
+
+/// A number as it is encoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scalar {
+    /// Signed, of so many bytes.
+    Signed(u8),
+    /// Unsigned, of so many bytes.
+    Unsigned(u8),
+    /// A float of 4 or 8 bytes.
+    Float(u8),
+}
+
+impl Scalar {
+    pub(crate) fn bytes(self) -> usize {
+        let (Self::Signed(bytes) | Self::Unsigned(bytes) | Self::Float(bytes)) = self;
+        usize::from(bytes)
+    }
+
+    /// The number in `word`, of which [`bytes`](Self::bytes) are used.
+    pub(crate) fn number(self, word: u64) -> Number {
+        let unused = 64 - 8 * self.bytes() as u32;
+        match self {
+            Self::Signed(_) => Number::Integer((word << unused).cast_signed() >> unused),
+            Self::Unsigned(_) => i64::try_from(word).map_or(Number::Real(word as f64), Number::Integer),
+            Self::Float(4) => Number::Real(f64::from(f32::from_bits(word as u32))),
+            Self::Float(_) => Number::Real(f64::from_bits(word)),
+        }
+    }
+}
+
+/// What a field holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum FieldType {
+    Scalar(Scalar),
+    /// Seconds and nanoseconds of 32 bits each; a column in ns.
+    Time,
+    /// A length of 32 bits and as many bytes.
+    Text,
+    /// Fields of another definition, by its name.
+    Nested(String),
+    /// What is not decoded, by its name: the message cannot be read beyond it.
+    Unknown(String),
+}
+
+/// How many of a field there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Repeat {
+    Once,
+    Times(usize),
+    /// A length of 32 bits comes before them.
+    Any,
+}
+
+/// A field of a definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Field {
+    pub(crate) name: String,
+    pub(crate) kind: FieldType,
+    pub(crate) repeat: Repeat,
+}
+
+/// Definitions by their names.
+pub(crate) type Definitions = HashMap<String, Vec<Field>>;
+
+/// How fields follow each other in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Encoding {
+    /// Little endian, without padding: ROS 1 and PX4.
+    Packed,
+    /// CDR with its own header of 4 bytes, of either byte order: ROS 2. A number is aligned to its size, counted from the header on.
+    Cdr,
+}
+
+/// A step of decoding.
+#[derive(Debug, Clone)]
+enum Step {
+    /// A number, which is a column where one is given.
+    Number(Scalar, Option<usize>),
+    Time(Option<usize>),
+    Text,
+    /// The same steps again and again; none of their numbers is a column.
+    Repeat(Repeat, Vec<Step>),
+    /// The end of what can be decoded.
+    Unknown,
+}
+
+/// A column of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct MessageColumn {
+    /// Names of the fields from the outermost on, with `.` between them.
+    pub(crate) name: String,
+    /// Whether it is a time in ns.
+    pub(crate) is_time: bool,
+    pub(crate) is_float: bool,
+}
+
+/// The columns of a type of message, and how it is decoded.
+#[derive(Debug, Clone)]
+pub(crate) struct MessageLayout {
+    columns: Vec<MessageColumn>,
+    steps: Vec<Step>,
+}
+
+impl MessageLayout {
+    /// The layout of the definition `root`.
+    ///
+    /// # Errors
+    /// A definition that is missing, that contains itself or is nested too deeply, or too many fields.
+    pub(crate) fn new(root: &str, definitions: &Definitions) -> Result<Self, Reason> {
+        let mut builder = Builder { definitions, columns: Vec::new(), steps: 0 };
+        let steps = builder.steps_of(root, "", true, 0)?;
+        Ok(Self { columns: builder.columns, steps })
+    }
+
+    /// The columns, in the order of the message.
+    pub(crate) fn columns(&self) -> &[MessageColumn] {
+        &self.columns
+    }
+
+    /// Decodes a message to one number for each column. `None` if it is too short or its header says another encoding; what was
+    /// decoded until then is in `row`, and NaN in the rest.
+    pub(crate) fn decode(&self, bytes: &[u8], encoding: Encoding, row: &mut Vec<Number>) -> Option<()> {
+        row.clear();
+        row.resize(self.columns.len(), Number::Real(f64::NAN));
+        let mut cursor = Cursor::new(bytes, encoding)?;
+        run(&self.steps, &mut cursor, row)
+    }
+}
+
+struct Builder<'a> {
+    definitions: &'a Definitions,
+    columns: Vec<MessageColumn>,
+    steps: usize,
+}
+
+impl Builder<'_> {
+    /// The steps of a definition whose fields are named after `prefix`; they are columns if `named`.
+    fn steps_of(&mut self, name: &str, prefix: &str, named: bool, level: usize) -> Result<Vec<Step>, Reason> {
+        Budget::check_depth(level)?;
+        let definitions = self.definitions;
+        let Some(fields) = definitions.get(name) else {
+            return Err(Reason::Array(format!("no definition of {name:?} in the file")));
+        };
+        let mut steps = Vec::new();
+        for field in fields {
+            let path = if prefix.is_empty() { field.name.clone() } else { format!("{prefix}.{}", field.name) };
+            match field.repeat {
+                Repeat::Once => self.add(&mut steps, &field.kind, &path, named, level)?,
+                Repeat::Times(count) if named && count <= MOST_ELEMENTS && field.kind != FieldType::Text => {
+                    for element in 0..count {
+                        self.add(&mut steps, &field.kind, &format!("{path}[{element}]"), true, level)?;
+                    }
+                }
+                repeat => {
+                    let mut each = Vec::new();
+                    self.add(&mut each, &field.kind, &path, false, level)?;
+                    self.count()?;
+                    steps.push(Step::Repeat(repeat, each));
+                }
+            }
+        }
+        Ok(steps)
+    }
+
+    fn add(
+        &mut self,
+        steps: &mut Vec<Step>,
+        kind: &FieldType,
+        path: &str,
+        named: bool,
+        level: usize,
+    ) -> Result<(), Reason> {
+        self.count()?;
+        let mut column = |is_time: bool, is_float: bool| {
+            named.then(|| {
+                self.columns.push(MessageColumn { name: path.to_owned(), is_time, is_float });
+                self.columns.len() - 1
+            })
+        };
+        match kind {
+            FieldType::Scalar(scalar) => {
+                steps.push(Step::Number(*scalar, column(false, matches!(scalar, Scalar::Float(_)))));
+            }
+            FieldType::Time => steps.push(Step::Time(column(true, false))),
+            FieldType::Text => steps.push(Step::Text),
+            FieldType::Nested(name) => steps.extend(self.steps_of(name, path, named, level + 1)?),
+            FieldType::Unknown(_) => steps.push(Step::Unknown),
+        }
+        Ok(())
+    }
+
+    fn count(&mut self) -> Result<(), Reason> {
+        self.steps += 1;
+        let most = MOST_STEPS;
+        let too_many = || Reason::Array(format!("a message is defined to have more than {most} fields"));
+        if self.steps > most { Err(too_many()) } else { Ok(()) }
+    }
+}
+
+fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
+    for step in steps {
+        match step {
+            Step::Number(scalar, column) => {
+                let word = cursor.word(scalar.bytes())?;
+                if let Some(column) = column {
+                    row[*column] = scalar.number(word);
+                }
+            }
+            Step::Time(column) => {
+                let (seconds, nanoseconds) = (cursor.word(4)?, cursor.word(4)?);
+                // Signed in ROS 2; unsigned seconds of ROS 1 end in 2106.
+                let seconds = i64::from((seconds as u32).cast_signed());
+                if let Some(column) = column {
+                    row[*column] = Number::Integer(seconds * 1_000_000_000 + nanoseconds.cast_signed());
+                }
+            }
+            Step::Text => {
+                let length = cursor.word(4)?;
+                cursor.skip(usize::try_from(length).ok()?)?;
+            }
+            Step::Repeat(repeat, each) => {
+                let count = match repeat {
+                    Repeat::Once => 1,
+                    Repeat::Times(count) => *count,
+                    Repeat::Any => usize::try_from(cursor.word(4)?).ok()?,
+                };
+                if let [Step::Number(scalar, _)] = each.as_slice() {
+                    if count > 0 {
+                        cursor.align(scalar.bytes());
+                        cursor.skip(scalar.bytes().checked_mul(count)?)?;
+                    }
+                    continue;
+                }
+                for _ in 0..count {
+                    let before = cursor.at;
+                    run(each, cursor, row)?;
+                    if cursor.at == before {
+                        // Definitions without a field take no bytes, however many there are.
+                        break;
+                    }
+                }
+            }
+            Step::Unknown => return None,
+        }
+    }
+    Some(())
+}
+
+/// Reads fields one after the other.
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    /// Where alignment counts from, and its largest step.
+    origin: usize,
+    most: usize,
+    is_big: bool,
+}
+
+impl<'a> Cursor<'a> {
+    fn new(bytes: &'a [u8], encoding: Encoding) -> Option<Self> {
+        const ENCAPSULATION: usize = 4;
+        let (most, is_big) = match encoding {
+            Encoding::Packed => return Some(Self { bytes, at: 0, origin: 0, most: 1, is_big: false }),
+            // Plain CDR of version 1 and 2 (DDS-XTypes 1.3, table 60), which differ in the alignment of 8 bytes.
+            Encoding::Cdr => match bytes.get(..2)? {
+                [0, 0] => (8, true),
+                [0, 1] => (8, false),
+                [0, 6] => (4, true),
+                [0, 7] => (4, false),
+                _ => return None,
+            },
+        };
+        bytes.get(..ENCAPSULATION)?;
+        Some(Self { bytes, at: ENCAPSULATION, origin: ENCAPSULATION, most, is_big })
+    }
+
+    fn align(&mut self, size: usize) {
+        self.at = self.origin + (self.at - self.origin).next_multiple_of(size.min(self.most));
+    }
+
+    fn skip(&mut self, bytes: usize) -> Option<()> {
+        self.at = self.at.checked_add(bytes).filter(|at| *at <= self.bytes.len())?;
+        Some(())
+    }
+
+    /// The next `size` bytes as a number.
+    fn word(&mut self, size: usize) -> Option<u64> {
+        self.align(size);
+        let own = self.bytes.get(self.at..self.at.checked_add(size)?)?;
+        self.at += size;
+        let mut word = [0; 8];
+        for (to, from) in word.iter_mut().zip(own) {
+            *to = *from;
+        }
+        if self.is_big {
+            word[..size].reverse();
+        }
+        Some(u64::from_le_bytes(word))
+    }
+}

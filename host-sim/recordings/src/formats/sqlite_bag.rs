@@ -1,0 +1,119 @@
+//! Bags of ROS 2 in SQLite (`.db3`): the definition of each type of message is in the table `message_definitions`, which bags before
+//! ROS 2 Iron do not have; of those the types of ROS itself are read.
+
+use crate::formats::message_layout::{Encoding, MessageLayout};
+use crate::formats::ros_definition::{self, RosVersion};
+use crate::formats::ros_message::{self, RosRows};
+use crate::formats::topics::{EachRow, Ending, Source, Topic};
+use crate::input::budget::Budget;
+use crate::input::input_error::{InputError, Reason};
+use rusqlite::{Connection, OpenFlags};
+use std::collections::HashMap;
+use std::path::Path;
+
+const FORMAT: &str = "ROS 2 SQLite bag";
+
+/// Instructions of the database between two looks at the clock.
+const INSTRUCTIONS: i32 = 100_000;
+
+/// An open bag.
+pub(crate) struct SqliteSource<'a> {
+    file: &'a Path,
+    database: Connection,
+    topics: Vec<Topic>,
+    /// Of each topic: its number in the database, and its layout where that is known.
+    layouts: Vec<(i64, Option<MessageLayout>)>,
+    budget: Budget,
+}
+
+impl<'a> SqliteSource<'a> {
+    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+        let fail = |error| InputError::file(file, damaged(error, budget));
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let mut database = Connection::open_with_flags(file, flags).map_err(fail)?;
+        // A query over tables that the file defines may never end.
+        database.progress_handler(INSTRUCTIONS, Some(move || budget.check_time().is_err())).map_err(fail)?;
+        if !has_table(&database, "topics").map_err(fail)? || !has_table(&database, "messages").map_err(fail)? {
+            let topics = tables(&database).map_err(fail)?;
+            return Err(InputError::file(file, Reason::NoSensor { format: "SQLite database", topics }));
+        }
+        let mut query = database.prepare("SELECT id, name, type FROM topics ORDER BY id").map_err(fail)?;
+        let rows = query.query_map((), |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).map_err(fail)?;
+        let listed: Vec<(i64, String, String)> = rows.collect::<Result<_, _>>().map_err(fail)?;
+        drop(query);
+        let definitions = definitions(&database).map_err(fail)?;
+        let (mut topics, mut layouts) = (Vec::new(), Vec::new());
+        for (id, name, kind) in listed {
+            let defined =
+                definitions.get(&kind).and_then(|text| ros_definition::layout(&kind, text, RosVersion::Ros2).ok());
+            let layout = defined.or_else(|| ros_definition::known_layout(&kind, RosVersion::Ros2));
+            topics.push(match &layout {
+                Some(layout) => ros_message::topic(&name, &kind, layout, None),
+                None => Topic { name, kind, ..Topic::default() },
+            });
+            layouts.push((id, layout));
+        }
+        Ok(Self { file, database, topics, layouts, budget })
+    }
+}
+
+/// Whether the database has this table; a view is none.
+fn has_table(database: &Connection, name: &str) -> rusqlite::Result<bool> {
+    let mut query = database.prepare("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?")?;
+    query.exists((name,))
+}
+
+/// Names of the tables and views; of many the first.
+fn tables(database: &Connection) -> rusqlite::Result<String> {
+    let mut query = database.prepare("SELECT name FROM sqlite_master WHERE type IN ('table', 'view') LIMIT 24")?;
+    let names: Vec<String> = query.query_map((), |row| row.get(0))?.collect::<Result<_, _>>()?;
+    Ok(if names.is_empty() { "no table".to_owned() } else { format!("the tables {}", names.join(", ")) })
+}
+
+/// Definitions in the language of ROS, by type.
+fn definitions(database: &Connection) -> rusqlite::Result<HashMap<String, String>> {
+    if !has_table(database, "message_definitions")? {
+        return Ok(HashMap::new());
+    }
+    let columns = "topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'";
+    let mut query = database.prepare(&format!("SELECT {columns}"))?;
+    query.query_map((), |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
+}
+
+fn damaged(error: rusqlite::Error, budget: Budget) -> Reason {
+    match budget.check_time() {
+        Err(too_slow) => too_slow,
+        Ok(()) => Reason::Format { format: FORMAT, error: error.to_string().into() },
+    }
+}
+
+impl Source for SqliteSource<'_> {
+    fn format(&self) -> &'static str {
+        FORMAT
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
+        let Self { file, database, layouts, budget, .. } = self;
+        let fail = |error| InputError::file(file, damaged(error, *budget));
+        let (id, Some(layout)) = &layouts[topic] else { return Ok(Ending::default()) };
+        let mut rows = RosRows::new(layout, Encoding::Cdr, columns);
+        let text = "SELECT data, timestamp FROM messages WHERE topic_id = ? ORDER BY id";
+        let mut query = database.prepare(text).map_err(fail)?;
+        let mut messages = query.query((id,)).map_err(fail)?;
+        let damage = loop {
+            match messages.next() {
+                Ok(Some(message)) => {
+                    let data = message.get_ref(0).map_err(fail)?.as_blob().unwrap_or_default();
+                    each(rows.row(data, message.get(1).ok()))?;
+                }
+                Ok(None) => break None,
+                Err(error) => break Some(damaged(error, *budget)),
+            }
+        };
+        Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+    }
+}

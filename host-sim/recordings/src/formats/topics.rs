@@ -1,0 +1,300 @@
+//! What a file of several sources offers, and the table of one of them: topics of messages, groups of arrays, a log's sensors.
+//!
+//! A format implements [`Source`]: it lists its topics with all their columns, marks those that it knows to be of an inertial sensor, and
+//! gives the rows of a topic one after the other. Which topic and which columns are read is decided here, for every format alike.
+
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection};
+use crate::columns::unit::Unit;
+use crate::input::budget::Budget;
+use crate::input::input_error::{InputError, Reason};
+use crate::tables::any_sensor::ReadOptions;
+use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
+use std::path::Path;
+
+/// Channels of a gyroscope and of an accelerometer, in the order of their axes.
+pub(crate) const GYROSCOPE: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+pub(crate) const ACCELEROMETER: [&str; 3] = ["accl_x", "accl_y", "accl_z"];
+
+/// A source of rows in a file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Topic {
+    /// As `--topic` takes it.
+    pub(crate) name: String,
+    /// Its type in the file; empty where there is none.
+    pub(crate) kind: String,
+    /// Rows, where the format says how many without reading them.
+    pub(crate) rows: Option<u64>,
+    /// All that can be read of it.
+    pub(crate) columns: Vec<AvailableColumn>,
+    /// What is known to be an inertial sensor in it.
+    pub(crate) sensors: Vec<TopicSensor>,
+}
+
+/// An inertial sensor whose columns are known without the user.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct TopicSensor {
+    /// What tells it from the others of its topic; empty where there is one.
+    pub(crate) name: String,
+    /// Channel of the sensor, or `time` or `sample`; position of the column; and the unit, where the column does not say it.
+    pub(crate) columns: Vec<(&'static str, usize, Option<Unit>)>,
+    /// Why the units are those, where the file does not say them.
+    pub(crate) note: Option<String>,
+}
+
+impl TopicSensor {
+    /// Whether it has such a channel.
+    pub(crate) fn has(&self, channel: &str) -> bool {
+        self.columns.iter().any(|(name, ..)| *name == channel)
+    }
+
+    /// Adds the three axes, which are in `unit`.
+    pub(crate) fn add_axes(&mut self, channels: [&'static str; 3], positions: [usize; 3], unit: &str) {
+        let unit = Unit::parse(unit);
+        self.columns.extend(channels.into_iter().zip(positions).map(|(channel, at)| (channel, at, unit)));
+    }
+}
+
+/// A source of rows in a file: a topic of messages, a group of arrays, or an array.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TopicDescription {
+    /// As [`ReadOptions::topic`] takes it; empty for all arrays of a file.
+    pub name: String,
+    /// Its type in the file, such as `sensor_msgs/Imu`; empty where there is none.
+    pub kind: String,
+    /// Rows, where the format says how many without reading them.
+    pub rows: Option<u64>,
+    /// Names of the columns, each with its unit where the file says it. Without a column the messages cannot be decoded.
+    pub columns: Vec<(String, Option<&'static str>)>,
+    /// Names of the sensors in it that are read without options, each for [`ReadOptions::topic`].
+    pub sensors: Vec<String>,
+}
+
+impl From<&Topic> for TopicDescription {
+    fn from(topic: &Topic) -> Self {
+        let column = |column: &AvailableColumn| (column.name.clone(), column.unit.map(|unit| unit.name));
+        Self {
+            name: topic.name.clone(),
+            kind: topic.kind.clone(),
+            rows: topic.rows,
+            columns: topic.columns.iter().map(column).collect(),
+            sensors: topic.sensors.iter().map(|sensor| sensor_name(topic, sensor)).collect(),
+        }
+    }
+}
+
+/// How the reading of a topic ended.
+#[derive(Debug, Default)]
+pub(crate) struct Ending {
+    /// Why there are no more rows, where the file is damaged or ends early.
+    pub(crate) damage: Option<Reason>,
+    /// What the user should know, one sentence each.
+    pub(crate) notes: Vec<String>,
+    /// The rate that the file states, Hz.
+    pub(crate) rate_hz: Option<f64>,
+}
+
+/// Takes the numbers of a row, one for each of the columns that were asked for.
+pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + 'a;
+
+/// A file with several sources of rows.
+pub(crate) trait Source {
+    /// Name of the format.
+    fn format(&self) -> &'static str;
+
+    /// All that there is.
+    fn topics(&self) -> &[Topic];
+
+    /// The name of the sensor that is read where the user says nothing; `None` where the user has to say.
+    fn preferred(&self) -> Option<&str> {
+        None
+    }
+
+    /// The topic that has the columns of all others.
+    fn whole(&self) -> Option<usize> {
+        None
+    }
+
+    /// Gives every row of the topic at `topic`, with the `columns` at these positions.
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError>;
+}
+
+/// A topic, and a sensor of it where one is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Choice {
+    topic: usize,
+    sensor: Option<usize>,
+}
+
+/// The name of a sensor for `--topic`: that of its topic, and its own where a topic has several.
+fn sensor_name(topic: &Topic, sensor: &TopicSensor) -> String {
+    match (topic.name.as_str(), sensor.name.as_str()) {
+        (name, "") | ("", name) => name.to_owned(),
+        (name, own) => format!("{name}:{own}"),
+    }
+}
+
+/// Every known sensor with its name.
+fn sensors(topics: &[Topic]) -> Vec<(String, Choice)> {
+    let of_topic = |(number, topic)| {
+        let topic: &Topic = topic;
+        (topic.sensors.iter().enumerate())
+            .map(move |(at, sensor)| (sensor_name(topic, sensor), Choice { topic: number, sensor: Some(at) }))
+    };
+    topics.iter().enumerate().flat_map(of_topic).collect()
+}
+
+/// Names of the sensors of a file that are of one kind with the one that is read first, for `--topic`; none of a file with one sensor or
+/// without a known one.
+pub(crate) fn names_of_several(source: &dyn Source) -> Vec<String> {
+    let topics = source.topics();
+    let all = sensors(topics);
+    let kind = |choice: &Choice| (topics[choice.topic].kind.as_str(), shape(&topics[choice.topic], choice.sensor));
+    let first = all.iter().find(|(name, _)| source.preferred().is_none_or(|preferred| preferred == name));
+    let Some(first) = first.map(|(_, choice)| kind(choice)) else { return Vec::new() };
+    // Where the user would have to choose, all are offered; where one is preferred, those of its kind.
+    let is_offered = |choice: &Choice| source.preferred().is_none() || kind(choice) == first;
+    let names: Vec<String> = all.into_iter().filter(|(_, choice)| is_offered(choice)).map(|(name, _)| name).collect();
+    if names.len() > 1 { names } else { Vec::new() }
+}
+
+/// The channels that a sensor has.
+fn shape(topic: &Topic, sensor: Option<usize>) -> Vec<&'static str> {
+    sensor.map_or_else(Vec::new, |at| topic.sensors[at].columns.iter().map(|(channel, ..)| *channel).collect())
+}
+
+/// The topic that the options name, or the only one that they can mean.
+fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> {
+    let (topics, format) = (source.topics(), source.format());
+    let known = sensors(topics);
+    let names = |of: &[(String, Choice)]| of.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    if topics.is_empty() {
+        return Err(Reason::NoTopic { format });
+    }
+    if let Some(wanted) = &options.topic {
+        let sensor = known.iter().find(|(name, _)| name == wanted).map(|(_, choice)| *choice);
+        let topic = || topics.iter().position(|topic| topic.name == *wanted);
+        let unknown = || {
+            let all = if known.is_empty() { describe(topics) } else { names(&known) };
+            Reason::UnknownTopic(Box::new((wanted.clone(), all)))
+        };
+        return sensor.or_else(|| topic().map(|topic| Choice { topic, sensor: None })).ok_or_else(unknown);
+    }
+    if options.selection.has_columns() {
+        if let Some(topic) = source.whole() {
+            return Ok(Choice { topic, sensor: None });
+        }
+        // Those that have the columns that are named.
+        let has = |topic: &Topic| options.selection.is_covered(&topic.columns);
+        let able: Vec<usize> = (0..topics.len()).filter(|&at| has(&topics[at])).collect();
+        let preferred = known.iter().find(|(name, _)| Some(name.as_str()) == source.preferred());
+        return match (able.as_slice(), preferred) {
+            ([topic], _) => Ok(Choice { topic: *topic, sensor: None }),
+            ([], _) if topics.len() == 1 => Ok(Choice { topic: 0, sensor: None }),
+            // The columns of the only sensor are those that the user looks for.
+            ([], None) if known.len() == 1 => Ok(Choice { sensor: None, ..known[0].1 }),
+            (able, Some((_, choice))) if able.contains(&choice.topic) => Ok(Choice { sensor: None, ..*choice }),
+            ([], _) => Err(Reason::NoSensor { format, topics: describe(topics) }),
+            (able, _) => {
+                let able: Vec<&str> = able.iter().map(|&at| topics[at].name.as_str()).collect();
+                Err(Reason::SeveralTopics(able.join(", ")))
+            }
+        };
+    }
+    if let Some((_, choice)) = known.iter().find(|(name, _)| Some(name.as_str()) == source.preferred()) {
+        return Ok(*choice);
+    }
+    match (known.as_slice(), topics) {
+        ([(_, choice)], _) => Ok(*choice),
+        ([], [_]) => Ok(Choice { topic: 0, sensor: None }),
+        ([], _) if source.whole().is_some() => Ok(Choice { topic: source.whole().unwrap_or(0), sensor: None }),
+        ([], _) => Err(Reason::NoSensor { format, topics: describe(topics) }),
+        (several, _) => Err(Reason::SeveralTopics(names(several))),
+    }
+}
+
+/// Topics with their types, in a message; of many the first.
+fn describe(topics: &[Topic]) -> String {
+    const SHOWN: usize = 24;
+    let one = |topic: &Topic| match (topic.kind.as_str(), topic.columns.is_empty()) {
+        ("", _) => topic.name.clone(),
+        (kind, false) => format!("{} ({kind})", topic.name),
+        (kind, true) => format!("{} ({kind}, without a definition)", topic.name),
+    };
+    let shown: Vec<String> = topics.iter().take(SHOWN).map(one).collect();
+    let more = if topics.len() > SHOWN { ", …" } else { "" };
+    format!("{}{more}", shown.join(", "))
+}
+
+/// The columns to read, with their positions in the topic.
+fn choose_columns(
+    topic: &Topic,
+    sensor: Option<&TopicSensor>,
+    options: &ReadOptions,
+) -> Result<Vec<ChosenColumn>, Reason> {
+    let refused = |error| Reason::Selection(Box::new(error));
+    let Some(sensor) = sensor.filter(|_| !options.selection.has_columns()) else {
+        return options.choose(&topic.columns).map_err(refused);
+    };
+    let known = |&(name, at, unit): &(&'static str, usize, Option<Unit>)| AvailableColumn {
+        name: name.to_owned(),
+        unit: unit.or(topic.columns[at].unit),
+    };
+    let available: Vec<AvailableColumn> = sensor.columns.iter().map(known).collect();
+    let mut chosen = options.choose(&available).map_err(refused)?;
+    for column in &mut chosen {
+        column.position = sensor.columns[column.position].1;
+        column.label.clone_from(&topic.columns[column.position].name);
+    }
+    Ok(chosen)
+}
+
+/// The table of the topic that the options choose.
+pub(crate) fn read(
+    file: &Path,
+    source: &mut dyn Source,
+    options: &ReadOptions,
+    budget: Budget,
+) -> Result<SensorTable, InputError> {
+    let fail = |reason| InputError::file(file, reason);
+    let choice = choose(source, options).map_err(fail)?;
+    let topic = &source.topics()[choice.topic];
+    if topic.columns.is_empty() {
+        return Err(fail(Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone())))));
+    }
+    let sensor = choice.sensor.map(|at| &topic.sensors[at]);
+    let chosen = choose_columns(topic, sensor, options).map_err(fail)?;
+    let mut notes: Vec<String> = Vec::new();
+    let states_units = |selection: &ColumnSelection| selection.has_units();
+    notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
+    let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
+    if options.topic.is_none() && source.preferred() == Some(name.as_str()) {
+        let all = sensors(source.topics());
+        let others: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).filter(|other| *other != name).collect();
+        if !others.is_empty() {
+            notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
+        }
+    }
+    let columns: Vec<usize> = chosen.iter().map(|column| column.position).collect();
+    let mut builder = TableBuilder::new(chosen).within(budget);
+    let mut rows = 0u64;
+    let ending = source.read(choice.topic, &columns, &mut |row| {
+        rows += 1;
+        builder.push(row).map_err(|(at, reason)| {
+            let label = builder.chosen().get(at).map_or("", |column| column.label.as_str());
+            InputError::row(file, rows, label, reason)
+        })
+    })?;
+    let Ending { damage, notes: more, rate_hz } = ending;
+    match damage {
+        Some(reason) if rows == 0 => Err(fail(reason)),
+        damage => {
+            let mut table = builder.finish().map_err(fail)?;
+            // Time stamps say more than a stated rate.
+            table.rate_hz = rate_hz.filter(|_| table.times_s.is_none());
+            table.notes.extend(damage.map(|reason| format!("{reason}; the {rows} rows before that are used")));
+            table.notes.extend(more);
+            table.notes.extend(notes);
+            Ok(table)
+        }
+    }
+}

@@ -1,0 +1,75 @@
+#!/usr/bin/env python3
+"""Allan deviations of a recording by other programs: its reader, and allantools.
+
+    python3 reference_curves.py READER FILE [ARGUMENT]
+
+Prints in JSON by channel the overlapping Allan deviation at 1, 2, 4 and 8 samples, in deg/s or g, of a recording without gaps; with them, of
+the samples between which the time is less than 1.5 times the median, at 1 sample.
+"""
+
+import json
+import sys
+
+import allantools
+import numpy as np
+
+GRAVITY = 9.80665
+CHANNELS = ["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"]
+
+
+def ros1_bag(file, topic):
+    from rosbags.highlevel import AnyReader
+    from pathlib import Path
+
+    with AnyReader([Path(file)]) as reader:
+        connections = [found for found in reader.connections if found.topic == topic]
+        rows = []
+        for connection, _, data in reader.messages(connections):
+            message = reader.deserialize(data, connection.msgtype)
+            rate, force = message.angular_velocity, message.linear_acceleration
+            rows.append([rate.x, rate.y, rate.z, force.x, force.y, force.z])
+    rows = np.array(rows)
+    return None, np.c_[np.degrees(rows[:, :3]), rows[:, 3:] / GRAVITY]
+
+
+def matlab_structure(file, name):
+    import scipy.io
+
+    board = scipy.io.loadmat(file, struct_as_record=False, squeeze_me=True)[name]
+    return None, np.c_[np.degrees(board.wb), board.fb / GRAVITY]
+
+
+def hdf5(file, dataset):
+    import h5py
+
+    with h5py.File(file) as opened:
+        return None, np.asarray(opened[dataset])[1:4].T
+
+
+def blackbox(file, _):
+    from orangebox import Parser
+
+    parser = Parser.load(file)
+    at = [parser.field_names.index(name) for name in ["time", *(f"gyroADC[{axis}]" for axis in range(3)), *(f"accSmooth[{axis}]" for axis in range(3))]]
+    rows = np.array([[frame.data[column] for column in at] for frame in parser.frames()], float)
+    rows[:, 4:] /= parser.headers["acc_1G"]
+    return rows[:, 0], rows[:, 1:]
+
+
+def main():
+    reader, file, *rest = sys.argv[1:]
+    times, values = globals()[reader](file, *(rest or [None]))
+    found = {}
+    channels = CHANNELS if values.shape[1] == 6 else CHANNELS[3:]
+    for channel, column in zip(channels, values.T):
+        if times is None:
+            _, deviations, _, _ = allantools.oadev(column, rate=1.0, data_type="freq", taus=[1, 2, 4, 8])
+        else:
+            steps = np.diff(times)
+            near = (steps > 0) & (steps < 1.5 * np.median(steps))
+            deviations = [np.sqrt(np.mean(np.diff(column)[near] ** 2) / 2)]
+        found[channel] = [float(deviation) for deviation in deviations]
+    print(json.dumps(dict(rows=len(values), curves=found)))
+
+
+main()
