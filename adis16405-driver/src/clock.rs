@@ -304,7 +304,7 @@ pub struct Timing {
     pub sck_hz: Option<u32>,
     /// Level of chip select during the stall.
     pub stall_select: SelectDuringStall,
-    /// Least time that chip select is high between two frames, ns. No source at hand gives it for this part; the
+    /// Least time that chip select is high between two frames, ns. The data sheet gives none; the
     /// ADIS16470 needs 1 µs. With [`SelectDuringStall::High`] chip select is high for at least the stall anyway.
     pub select_high_ns: u32,
     /// Pause between the words of a burst, ns. The data sheet asks for one SCK period, 1 µs at 1 MHz (Table 2 and page

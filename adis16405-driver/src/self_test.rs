@@ -55,7 +55,9 @@ impl FlashTest {
 pub enum Stimulus {
     /// Positive, MSC_CTRL bit 8: gyros and accelerometers.
     Positive,
-    /// Negative, MSC_CTRL bit 9. The data sheet (Rev. B, Table 22) describes it for the gyros alone.
+    /// Negative, MSC_CTRL bit 9. The data sheet (Rev. B, Table 22) describes it for the gyros alone, and contradicts itself on
+    /// the sign: by its words the output of a gyro rises with the negative stimulus and falls with the positive one. Compare
+    /// magnitudes.
     Negative,
 }
 

@@ -6,13 +6,13 @@ use crate::part::VirtualAdis16405;
 use crate::registers::{self, OutputRegister};
 use crate::spi::{Strictness, ViolationKind};
 
-/// Shortest low pulse on the reset line that resets the part, ns. Assumed: no source at hand gives it.
+/// Shortest low pulse on the reset line that resets the part, ns. Assumed: the data sheet gives none.
 const LEAST_RESET_PULSE_NS: u64 = 10_000;
 
 /// Behaviour that the data sheet leaves open.
 impl VirtualAdis16405 {
     /// Refreshes supply, magnetometers, temperature and auxiliary input only with every n-th sample (0 is taken as 1, the
-    /// default): in between their words keep their counts, and once read they show no new data. No source at hand tells
+    /// default): in between their words keep their counts, and once read they show no new data. The data sheet does not tell
     /// at which rate the real part refreshes them.
     pub fn set_slow_refresh(&mut self, samples: u32) {
         self.slow_refresh = samples.max(1);

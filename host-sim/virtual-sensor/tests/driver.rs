@@ -419,3 +419,13 @@ fn no_sample_is_taken_between_range_and_filter_of_a_new_configuration() {
     assert!(taken_between > 10, "the phases must meet the time of the writes: {taken_between}");
     assert_eq!(bus.part().violations(), []);
 }
+
+/// Data sheet Rev. B, Table 9: SUPPLY_OUT has 14 bits of 2.418 mV. 4500 counts, 10.881 V, are more than 12 bits hold.
+#[test]
+fn the_supply_has_14_bits() {
+    let mut model = NoiseModel::noiseless();
+    model.channel_mut(OutputRegister::Supply).bias = 10.881;
+    let (bus, mut imu) = on_bus(model, Config::default());
+    bus.wait_for_data();
+    assert_eq!(imu.burst().unwrap().counts().get(Channel::Supply), 4500);
+}
