@@ -14,27 +14,44 @@ const STALL_US: u32 = 75;
 /// Time in µs after which a burst is abandoned: the longest one, at 164 kHz with gaps of 16 µs, takes 1.5 ms.
 const BURST_US: u32 = 5_000;
 
-/// Times of the sensor's bus that the board keeps. The stall after a frame is the driver's
-/// (`adis16405_driver::Timing::stall_ns`); the board keeps it while chip select is high.
+/// Times of chip select between two frames in one of the sensor's power modes, in ns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SelectTiming {
+    /// Least time that chip select is high.
+    pub high_ns: u32,
+    /// Least time from one falling edge of chip select to the next, t_READRATE.
+    pub read_ns: u32,
+}
+
+/// Times of the sensor's bus that the board keeps whatever the driver does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BusTiming {
-    /// Least time that chip select is high between two frames, in ns.
-    pub select_high_ns: u32,
-    /// The same at a serial clock of at most 300 kHz: the sensor is, or may be, in low-power mode.
-    pub low_power_select_high_ns: u32,
+    /// Between two frames in normal mode.
+    pub normal: SelectTiming,
+    /// At a serial clock of at most 300 kHz: the sensor is, or may be, in low-power mode.
+    pub low_power: SelectTiming,
     /// Pause between two words of a burst in ns; 0 for none. With a pause every word is a DMA transfer of its own, with an
     /// interrupt at its end.
     pub word_gap_ns: u32,
 }
 
 impl BusTiming {
-    /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the driver's stall in
-    /// low-power mode. Bursts have no pauses, as with the drivers of Linux and PX4.
-    pub const SAFE: Self = Self { select_high_ns: 16_000, low_power_select_high_ns: 75_000, word_gap_ns: 0 };
+    /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the stall of low-power mode;
+    /// frames begin 40 or 150 µs apart (ADIS16400/ADIS16405 data sheet Rev. B, Table 2). Bursts have no pauses, as with the
+    /// drivers of Linux and PX4.
+    pub const SAFE: Self = Self {
+        normal: SelectTiming { high_ns: 16_000, read_ns: 40_000 },
+        low_power: SelectTiming { high_ns: 75_000, read_ns: 150_000 },
+        word_gap_ns: 0,
+    };
 
     /// For a sensor that answers wrongly with [`SAFE`](Self::SAFE): chip select is high for 50 µs, as with the driver of
     /// Linux, and every word of a burst is followed by the stall of a frame. A burst takes 0.45 ms at 656 kHz.
-    pub const CAREFUL: Self = Self { select_high_ns: 50_000, low_power_select_high_ns: 100_000, word_gap_ns: 9_000 };
+    pub const CAREFUL: Self = Self {
+        normal: SelectTiming { high_ns: 50_000, read_ns: 40_000 },
+        low_power: SelectTiming { high_ns: 100_000, read_ns: 150_000 },
+        word_gap_ns: 9_000,
+    };
 
     /// The times that the image was built with: [`CAREFUL`](Self::CAREFUL) with feature `careful-bus`.
     pub const CONFIGURED: Self = if cfg!(feature = "careful-bus") { Self::CAREFUL } else { Self::SAFE };

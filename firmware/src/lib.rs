@@ -9,6 +9,7 @@
 //! | module | content |
 //! |---|---|
 //! | `board`, `microcontroller` | what the application needs of a board; what the images of all boards share |
+//! | `bus_frame` | frames on the sensor's bus: times of chip select, operations |
 //! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
 //! | [`sensor`] | serial clock, probing, auto-null |
 //! | `sample_intake` | the path of every sample into the statistics, health counters |
@@ -35,6 +36,8 @@
 pub mod acquisition;
 mod app;
 mod board;
+#[cfg(any(test, all(target_os = "none", feature = "microcontroller")))]
+mod bus_frame;
 mod channel_validity;
 mod channels;
 pub mod command;
@@ -63,7 +66,9 @@ mod transmit;
 
 pub use acquisition::{BurstQueue, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
-pub use board::{Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, SensorBus, Uptime, WatchdogExtension};
+pub use board::{
+    Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, SelectTiming, SensorBus, Uptime, WatchdogExtension,
+};
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;

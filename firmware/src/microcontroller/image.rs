@@ -80,7 +80,7 @@ macro_rules! observatory {
                 Blinker, ESTIMATOR_CYCLES, Interrupts, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
             };
             use $crate::microcontroller::{
-                BoardParts, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer, UartPort as _, UartQueues,
+                BoardParts, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, MicrosecondCounter as _, ReceiveBuffer, UartPort as _, UartQueues,
             };
             use $crate::{
                 BoardContext, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, Sampler, Start, Statistics,

@@ -37,6 +37,17 @@ const TCIE: u64 = 1 << 4;
 const EN: u64 = 1;
 /// Option bytes (RM0090 section 3.9.10).
 pub(crate) const FLASH_OPTCR: u64 = 0x4002_3C14;
+/// Control register 1 of SPI1, whose bits 0 and 1 are CPHA and CPOL (RM0090 section 28.5.1).
+pub(crate) const SPI1_CR1: u64 = 0x4001_3000;
+/// Which port each of the lines 0 to 7 of the external interrupt controller is connected to (RM0090 section 9.2).
+pub(crate) const SYSCFG_EXTICR: [u64; 2] = [0x4001_3808, 0x4001_380C];
+/// Lines that raise an interrupt, and those whose rising and whose falling edges do (RM0090 section 12.3).
+pub(crate) const EXTI_IMR: u64 = 0x4001_3C00;
+pub(crate) const EXTI_RTSR: u64 = 0x4001_3C08;
+pub(crate) const EXTI_FTSR: u64 = 0x4001_3C0C;
+/// Registers that a run returns beside the pulls.
+const CONFIGURATION: [u64; 7] =
+    [FLASH_OPTCR, SPI1_CR1, SYSCFG_EXTICR[0], SYSCFG_EXTICR[1], EXTI_IMR, EXTI_RTSR, EXTI_FTSR];
 /// Longest time that the emulator runs between two looks at the sensor's clock and the events.
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
@@ -148,6 +159,8 @@ impl Board for Bench {
 pub(crate) enum Event {
     /// The sensor resets itself, as after a dip of its supply.
     SensorReset,
+    /// The sensor is put to sleep, without end.
+    SensorSleep,
     /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
     /// So many of the next data-ready edges do not reach the processor.
@@ -213,6 +226,11 @@ impl Plant {
                 sensor.part.transfer(0xBE80); // GLOB_CMD bit 7
                 sensor.part.deselect();
             }
+            Event::SensorSleep => {
+                sensor.part.select();
+                sensor.part.transfer(0xBB01); // SLP_CNT bit 8
+                sensor.part.deselect();
+            }
             Event::Stuck(byte) => sensor.stuck_at = byte,
             Event::LoseEdges(edges) => self.edges_to_lose = u64::from(edges),
             Event::Unplugged(out) => {
@@ -245,7 +263,8 @@ impl Driver<Bench> for Plant {
         let led_level = read(session, host, gpio(port, ODR)) >> pin & 1;
         self.led_changes += u32::from(std::mem::replace(&mut self.led_level, led_level) != led_level);
         if now >= self.end {
-            for address in [gpio(0, PUPDR), gpio(1, PUPDR), gpio(2, PUPDR), FLASH_OPTCR] {
+            let pulls = [gpio(0, PUPDR), gpio(1, PUPDR), gpio(2, PUPDR)];
+            for address in pulls.into_iter().chain(CONFIGURATION) {
                 self.registers.insert(address, read(session, host, address));
             }
             return None;
@@ -315,7 +334,7 @@ pub(crate) struct Outcome {
     pub(crate) work: Vec<Work>,
     /// Changes of the LED's level.
     pub(crate) led_changes: u32,
-    /// Registers at the end, by address: pulls of ports A to C, option bytes.
+    /// Registers at the end, by address: pulls of ports A to C, and those of [`CONFIGURATION`].
     pub(crate) registers: BTreeMap<u64, u64>,
 }
 

@@ -1,6 +1,9 @@
 //! What the boards differ in, and what their documents demand: crystal, pins, the 5 V of the sensor, brown-out, log.
 
-use crate::bench::{FEATHER, FLASH_OPTCR, H405, Outcome, PUPDR, Scenario, feather_image, gpio, image, run};
+use crate::bench::{
+    EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_OPTCR, H405, Outcome, PUPDR, SPI1_CR1, SYSCFG_EXTICR, Scenario,
+    feather_image, gpio, image, run,
+};
 use crate::costs::{Costs, Memory, assert_within_budget, counter};
 use crate::decoded::Decoded;
 use crate::images;
@@ -29,6 +32,14 @@ fn each_board_samples_with_its_crystal_and_pins() {
         for (port, pin) in [(0, 6), wiring.data_ready] {
             assert_eq!(registers[&gpio(port, PUPDR)] >> (2 * pin) & 3, 0, "{name}: port {port}, pin {pin}");
         }
+        // SPI mode 3: CPOL and CPHA are set.
+        assert_eq!(registers[&SPI1_CR1] & 0b11, 0b11, "{name}: SPI mode");
+        // The line of the data-ready pin is connected to its port, and interrupts at rising edges alone.
+        let (port, line) = wiring.data_ready;
+        let routed = registers[&SYSCFG_EXTICR[usize::from(line) / 4]] >> (4 * (line % 4)) & 0xF;
+        assert_eq!(routed, port as u64, "{name}: line {line}");
+        let edges = [EXTI_IMR, EXTI_RTSR, EXTI_FTSR].map(|register| registers[&register]);
+        assert_eq!(edges, [1 << line, 1 << line, 0], "{name}: lines, rising and falling edges");
         // BOR_LEV = 00: level 3 (RM0090 section 3.9.10).
         assert_eq!(registers[&FLASH_OPTCR] >> 2 & 3, 0, "{name}: brown-out level");
     }
@@ -82,6 +93,8 @@ fn chip_select_is_high_for_the_stall_and_words_are_apart_as_set() {
         let sensor = sensor.expect("a sensor");
         assert_eq!(sensor.part.violations(), []);
         println!("chip select high for {} ns, gap of {} ns", sensor.shortest_high_ns, sensor.shortest_gap_ns);
+        // Data sheet Rev. B, Table 2: frames of low-power mode begin 150 us apart.
+        assert!(sensor.shortest_read_ns >= 150_000, "{} ns", sensor.shortest_read_ns);
         // Up to 2 us more by the resolution of the counter, and the time of the code between.
         assert!((high_us * 1000..(high_us + 4) * 1000).contains(&sensor.shortest_high_ns), "{high_us} us");
         assert!((gap_us * 1000..(gap_us + 4) * 1000).contains(&sensor.shortest_gap_ns), "{gap_us} us");

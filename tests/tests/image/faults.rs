@@ -243,3 +243,21 @@ fn a_stack_overflow_faults_and_is_recorded() {
     assert!(counter("lost_edges") == 0 && counter("bursts") > 300, "{lines:?}");
     assert!(sensor.is_some_and(|sensor| sensor.part.violations().is_empty()));
 }
+
+/// A sensor that sleeps without end is woken by the pulse of the second step of recovery, which is as long as the data sheet
+/// asks for (Rev. B, Table 1: 20 us), or by a frame of the first.
+#[test]
+fn a_sleeping_sensor_is_woken() {
+    let keys = vec![(0.1, b"i 0\r".to_vec()), (6.0, b"r".to_vec())];
+    let events = vec![(2.0, Event::SensorSleep)];
+    let sensor = Some(Sensor::published(26));
+    let Outcome { sensor, received, .. } =
+        run(image(), Scenario { sensor, keys, events, seconds: 8.0, ..Scenario::default() });
+    let (sensor, decoded) = (sensor.expect("a sensor"), Decoded::decode(&received));
+    println!("{:#?}, pulses of {:?} ns", decoded.logs(), sensor.pulses_ns);
+    assert!(sensor.pulses_ns.iter().all(|&pulse| pulse >= 20_000), "{:?}", sensor.pulses_ns);
+    let health = **decoded.healths().last().expect("a report");
+    assert_eq!((health.recoveries, health.bus_resets <= 1, health.sensor_resets), (1, true, 0), "{health:?}");
+    // Two seconds before, and at least two of the four after: steps come once a second.
+    assert!(f64::from(health.used) > 4.0 * RATE_HZ, "{health:?}");
+}

@@ -25,6 +25,10 @@ pub(crate) struct Sensor {
     pub(crate) shortest_gap_ns: u64,
     /// Shortest time for which chip select was high between two frames, in ns.
     pub(crate) shortest_high_ns: u64,
+    /// Shortest time from one falling edge of chip select to the next, in ns.
+    pub(crate) shortest_read_ns: u64,
+    /// Times for which chip select was low without a clock, in ns.
+    pub(crate) pulses_ns: Vec<u64>,
     /// Byte at which the data line to the processor is held.
     pub(crate) stuck_at: Option<u8>,
     /// Words of another width than eight bits.
@@ -52,6 +56,8 @@ impl Sensor {
             shortest_byte_ns: u64::MAX,
             shortest_gap_ns: u64::MAX,
             shortest_high_ns: u64::MAX,
+            shortest_read_ns: u64::MAX,
+            pulses_ns: Vec::new(),
             deselected_at: None,
             stuck_at: None,
             odd_words: 0,
@@ -105,8 +111,9 @@ impl spi::Peer for Sensor {
         self.part.advance_to(context.now().0);
         self.part.select();
         self.selected = true;
-        self.selected_at = context.now().0;
+        let selected_before = std::mem::replace(&mut self.selected_at, context.now().0);
         if let Some(deselected_at) = self.deselected_at {
+            self.shortest_read_ns = self.shortest_read_ns.min(self.selected_at - selected_before);
             self.shortest_high_ns = self.shortest_high_ns.min(self.selected_at - deselected_at);
         }
         self.frame.clear();
@@ -118,6 +125,9 @@ impl spi::Peer for Sensor {
         self.part.deselect();
         self.selected = false;
         self.deselected_at = Some(context.now().0);
+        if self.frame.is_empty() {
+            self.pulses_ns.push(context.now().0 - self.selected_at);
+        }
         let burst_requested = self.frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
         let answers: Vec<u8> = self.frame.iter().map(|&(_, miso)| miso).collect();
         if burst_requested && let Ok(burst) = answers.try_into() {

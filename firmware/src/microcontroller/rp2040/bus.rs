@@ -2,7 +2,8 @@
 
 use super::start::Rp2040;
 use crate::board::{BusTiming, SensorBus};
-use crate::microcontroller::{BurstBus, BurstEnd, BusFault, ByteExchange, ChipSelect, transfer, wait_for, wait_ns};
+use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, transfer, wait_for, wait_ns};
+use crate::microcontroller::{BurstBus, BurstEnd};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use core::convert::Infallible;
 use core::sync::atomic::{Ordering, compiler_fence};

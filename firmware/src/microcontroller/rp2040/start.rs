@@ -2,7 +2,7 @@
 
 use crate::board::WatchdogExtension;
 use crate::microcontroller::processor::WAKE_HZ;
-use crate::microcontroller::{DataReadyPin, Microcontroller};
+use crate::microcontroller::{DataReadyPin, Microcontroller, MicrosecondCounter};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use embedded_hal::digital::StatefulOutputPin;
 use link::BootCause;
@@ -111,12 +111,14 @@ fn crystal_starts(crystal: &XOSC) -> bool {
     (0..CRYSTAL_READINGS).any(|_| crystal.status().read().stable().bit_is_set())
 }
 
-impl Microcontroller for Rp2040 {
+impl MicrosecondCounter for Rp2040 {
     fn counter() -> u32 {
         // SAFETY: a read without side effects.
         unsafe { (*TIMER::ptr()).timerawl().read().bits() }
     }
+}
 
+impl Microcontroller for Rp2040 {
     fn feed(&mut self) {
         self.watchdog.feed();
         FEEDINGS.store(FEEDINGS.load(Relaxed).wrapping_add(1), Relaxed);

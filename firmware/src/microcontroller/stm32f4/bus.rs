@@ -2,7 +2,8 @@
 
 use super::start::Stm32f4;
 use crate::board::{BusTiming, SensorBus};
-use crate::microcontroller::{BurstBus, BurstEnd, BusFault, ByteExchange, ChipSelect, transfer, wait_for, wait_ns};
+use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, transfer, wait_for, wait_ns};
+use crate::microcontroller::{BurstBus, BurstEnd};
 use crate::sensor::{BURST_LIMIT_HZ, largest_clock_hz, prescaled_clock_hz};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use core::convert::Infallible;

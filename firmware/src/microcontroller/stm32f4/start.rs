@@ -1,6 +1,7 @@
 //! Start of an STM32F4: cause, watchdog, brown-out level, clocks; and the data-ready input.
 
-use crate::microcontroller::{DataReadyPin, Microcontroller, wait_for};
+use crate::bus_frame::wait_for;
+use crate::microcontroller::{DataReadyPin, Microcontroller, MicrosecondCounter};
 use cortex_m::peripheral::SCB;
 use link::{BootCause, ClockSource};
 use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Pin};
@@ -117,12 +118,14 @@ fn set_brown_out_level(flash: &FLASH) {
     flash.optcr().modify(|_, w| w.optlock().set_bit());
 }
 
-impl Microcontroller for Stm32f4 {
+impl MicrosecondCounter for Stm32f4 {
     fn counter() -> u32 {
         // SAFETY: a read without side effects.
         unsafe { (*TIM2::ptr()).cnt().read().cnt().bits() }
     }
+}
 
+impl Microcontroller for Stm32f4 {
     fn feed(&mut self) {
         self.watchdog.feed();
     }
