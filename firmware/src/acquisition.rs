@@ -203,10 +203,11 @@ impl DataReadyMonitor {
         self.suspicion = 0;
     }
 
-    /// Mean sample rate in Hz; `None` before the second edge.
+    /// Mean sample rate in Hz; `None` before 64 periods. An edge is timed to within some microseconds, so that the error is
+    /// below 10⁻⁴ at 819.2 Hz, and falls with the time.
     #[must_use]
     pub fn measured_hz(&self) -> Option<f64> {
-        (self.elapsed_us > 0).then(|| self.periods as f64 * 1e6 / self.elapsed_us as f64)
+        (self.periods >= SETTLED_PERIODS).then(|| self.periods as f64 * 1e6 / self.elapsed_us as f64)
     }
 
     fn mean_period_q8(&self) -> u64 {

@@ -10,6 +10,7 @@ use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
 use crate::report_frames::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
+use crate::scale::Scale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
 use crate::status_flags::StatusFlags;
@@ -108,6 +109,7 @@ impl App {
                 bad_commands: 0,
                 recovery: SensorRecovery::default(),
                 status_flags: StatusFlags::new(),
+                report_scale: Scale::new(config, None),
             },
             retained,
             parser: CommandParser::default(),
@@ -216,11 +218,7 @@ impl App {
                 board.estimators(|estimators| estimators.set_raw_stream(on));
                 self.print(board, format_args!("stream of raw bursts {}", if on { "on" } else { "off" }));
             }
-            DeviceCommand::SelfTest => {
-                board.set_sampling(false);
-                self.state.recovery.tested = false;
-                self.state.request_probe(now_us);
-            }
+            DeviceCommand::SelfTest => self.state.request_check(now_us, board),
             DeviceCommand::ArmAutoNull => {
                 self.armed_until_us = now_us + ARMED_US;
                 self.print(board, format_args!("keep the sensor still; autonull within 10 s nulls its bias"));
@@ -374,17 +372,17 @@ impl App {
     /// Fits the model of a channel to the finished epoch, servicing everything else meanwhile, and sends it.
     fn learn(&mut self, board: &mut impl Board, index: usize) {
         let Some(epoch) = self.state.learner.finished.take() else { return };
-        let config = self.state.config;
-        if let Some(regressors) = estimate_regressors(epoch, index, config, &mut || self.service_during_fit(board)) {
+        let scale = epoch.scale(self.state.config);
+        if let Some(regressors) = estimate_regressors(epoch, index, scale, &mut || self.service_during_fit(board)) {
             self.fit_model(board, epoch, index, regressors);
         }
         self.state.learner.finished = Some(epoch);
     }
 
     fn fit_model(&mut self, board: &mut impl Board, epoch: &FinishedEpoch, index: usize, regressors: Regressors) {
-        let config = self.state.config;
+        let scale = epoch.scale(self.state.config);
         let mut fit = EpochFit::new(regressors);
-        if !fit.run(epoch, index, config, &mut || self.service_during_fit(board)) {
+        if !fit.run(epoch, index, scale, &mut || self.service_during_fit(board)) {
             return;
         }
         self.state.learner.learn(&fit, epoch, index);

@@ -1,7 +1,12 @@
 //! The channels that a burst refuses, by the driver's rule, as channels that are estimated.
 
 use crate::channels::{CHANNELS, ChannelSet};
-use adis16405_driver::{Faults, Validity};
+use adis16405_driver::{Burst, Faults, Validity};
+
+/// Whether a burst is one that a sensor has sent, by itself: no fault but a warning or one of single channels.
+pub(crate) fn is_frame_sound(burst: &Burst) -> bool {
+    (Faults::WARNINGS | Faults::OF_CHANNELS).contains(burst.faults())
+}
 
 /// The estimated channels that are refused.
 pub(crate) fn refused_channels(validity: Validity) -> ChannelSet {

@@ -22,7 +22,7 @@ pub const OVERLAP: usize = 8;
 pub type ChannelEstimator = Cascade<OCTAVES, OVERLAP>;
 
 /// A set of [`CHANNELS`], by index.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct ChannelSet(pub(crate) u8);
 
 impl ChannelSet {

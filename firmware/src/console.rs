@@ -195,6 +195,7 @@ fn counter_line(health: &Health, index: usize) -> AnswerLine {
         ("bus_resets", health.bus_resets),
         ("sensor_resets", health.sensor_resets),
         ("reset_lines", health.reset_lines),
+        ("settling", health.settling),
     ];
     match counters.get(index) {
         Some((name, count)) => (*count > 0).then(|| text_line(format_args!("{name} {count}"))).into(),

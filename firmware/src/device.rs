@@ -2,11 +2,13 @@
 //! trouble, and its status register is read when it reports an error.
 
 use crate::board::Board;
+use crate::channels::{CHANNELS, ChannelSet};
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
 use crate::retained::RetainedSettings;
 use crate::sample_intake::SensorTrouble;
-use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, probe, read_diagnosis};
+use crate::scale::Scale;
+use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdentity, probe, read_diagnosis};
 use crate::status_flags::StatusFlags;
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
 use core::fmt::Arguments;
@@ -52,6 +54,8 @@ pub(crate) struct DeviceState {
     pub(crate) bad_commands: u32,
     pub(crate) recovery: SensorRecovery,
     pub(crate) status_flags: StatusFlags,
+    /// Scale of the report that is being sent.
+    pub(crate) report_scale: Scale,
 }
 
 /// Whether the sensor is in use.
@@ -69,8 +73,12 @@ pub(crate) enum SensorState {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SensorRecovery {
     ladder: RecoveryLadder,
-    /// The sensor has passed its self-test since the start, or since a test was requested.
+    /// The sensor has been tested since the start, or since a test was requested.
     pub(crate) tested: bool,
+    /// Channels that have failed their last self-test; their samples are used.
+    pub(crate) failed_test: ChannelSet,
+    /// The result of the next self-test was asked for.
+    check_requested: bool,
     /// Times that the sensor was lost after it had delivered samples.
     recoveries: u32,
     rereads: u32,
@@ -82,7 +90,8 @@ pub(crate) struct SensorRecovery {
 impl SensorRecovery {
     /// Resets the counters.
     pub(crate) fn reset_counters(&mut self) {
-        *self = Self { ladder: self.ladder, tested: self.tested, ..Self::default() };
+        let Self { ladder, tested, failed_test, check_requested, .. } = *self;
+        *self = Self { ladder, tested, failed_test, check_requested, ..Self::default() };
     }
 }
 
@@ -209,16 +218,7 @@ impl DeviceState {
         self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {
             Ok(identity) => {
-                self.product_id = identity.product.prod_id();
-                self.recovery.tested = true;
-                let product = self.product_id;
-                match identity.test {
-                    Some(test) => {
-                        let (ran, diagnosis) = (if test.ran { "passed" } else { "did not run" }, test.diagnosis.bits());
-                        log(board, format_args!("sensor: ADIS{product}, self-test {ran}, DIAG_STAT {diagnosis:#06x}"));
-                    }
-                    None => log(board, format_args!("sensor: ADIS{product}, configured")),
-                }
+                self.report_identity(identity, board);
                 let now_us = board.now_us();
                 board.estimators(|estimators| estimators.mark_probed(now_us));
                 board.set_sampling(true);
@@ -229,6 +229,34 @@ impl DeviceState {
                 self.take_step(retry_us, board, format_args!("{error}"));
             }
         }
+    }
+
+    /// Logs what a probe has found, and marks the channels that have failed the self-test.
+    fn report_identity(&mut self, identity: SensorIdentity, board: &mut impl Board) {
+        let product = identity.product.prod_id();
+        self.product_id = product;
+        let requested = core::mem::take(&mut self.recovery.check_requested);
+        let Some(test) = identity.test else {
+            return log(board, format_args!("sensor: ADIS{product}, configured"));
+        };
+        self.recovery.tested = true;
+        self.recovery.failed_test = ChannelSet::EMPTY;
+        for channel in test.failed_sensors() {
+            let index = CHANNELS.iter().position(|&other| other == channel);
+            self.recovery.failed_test.insert_if(index.unwrap_or(0), index.is_some());
+        }
+        log(board, format_args!("sensor: ADIS{product}, self-test {test}"));
+        if requested {
+            let verdict = if test.passed() { "passed" } else { "FAILED; keep the sensor still and repeat it" };
+            log(board, format_args!("check: {verdict}"));
+        }
+    }
+
+    /// Has the sensor tested, because that was requested.
+    pub(crate) fn request_check(&mut self, now_us: u64, board: &mut impl Board) {
+        board.set_sampling(false);
+        (self.recovery.tested, self.recovery.check_requested) = (false, true);
+        self.request_probe(now_us);
     }
 
     /// Disables sampling and sets a serial clock that the sensor takes with `config`; the probe that follows sets it again.

@@ -5,6 +5,7 @@
 //! `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`, so that no second estimator is needed.
 
 use crate::sample_intake::Estimators;
+use crate::scale::Scale;
 use crate::statistics::{
     AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
 };
@@ -19,6 +20,8 @@ use link::{MAX_COVARIATES, ReportedShift};
 pub struct FinishedEpoch {
     /// Number of the epoch: epochs finished before it.
     pub number: u32,
+    /// Measured sample rate in Hz; `None` if too few samples have come.
+    pub measured_hz: Option<f64>,
     /// The sums of [`CHANNELS`].
     pub(crate) sums: [ChannelSums; CHANNELS.len()],
     pub(crate) covariances: AllanCovariances,
@@ -26,17 +29,28 @@ pub struct FinishedEpoch {
 
 impl FinishedEpoch {
     /// An epoch of no samples.
-    pub const EMPTY: Self =
-        Self { number: 0, sums: [const { ChannelSums::EMPTY }; CHANNELS.len()], covariances: AllanCovariances::EMPTY };
+    pub const EMPTY: Self = Self {
+        number: 0,
+        measured_hz: None,
+        sums: [const { ChannelSums::EMPTY }; CHANNELS.len()],
+        covariances: AllanCovariances::EMPTY,
+    };
 
     /// Ends the running epoch of `estimators` and overwrites this value with its statistics.
     pub fn fill(&mut self, estimators: &mut Estimators<'_>) {
+        self.measured_hz = estimators.measured_hz();
         estimators.end_epoch(|statistics| {
             for (sums, estimator) in self.sums.iter_mut().zip(&statistics.estimators) {
                 *sums = ChannelSums::from_estimator(estimator);
             }
             self.covariances.fill(&statistics.cross_sums);
         });
+    }
+
+    /// The scale of the samples, which were taken with this configuration.
+    #[must_use]
+    pub fn scale(&self, config: Config) -> Scale {
+        Scale::new(config, self.measured_hz)
     }
 
     /// The sums of [`CHANNELS`]`[index]`; `None` if there is no such channel.
@@ -52,8 +66,8 @@ impl FinishedEpoch {
     }
 
     /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
-    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, config: Config) {
-        self.sums[index].rebuild_curve(curve, CHANNELS[index], config);
+    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, scale: Scale) {
+        self.sums[index].rebuild_curve(curve, CHANNELS[index], scale);
     }
 
     /// The covariances of the channels; `None` if they do not cover all samples of the channels, as after a restart.
@@ -90,20 +104,20 @@ type Candidates = Vec<usize, MAX_COVARIATES>;
 pub fn estimate_regressors(
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> Option<Regressors> {
     let Some(covariances) = epoch.covariances() else { return Some(Regressors::new()) };
     let mut candidates: Candidates = candidates(index).collect();
     let mut channel = Curve::empty();
-    epoch.rebuild_curve(&mut channel, index, config);
+    epoch.rebuild_curve(&mut channel, index, scale);
     let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
     for &candidate in &candidates {
         if !keep_on() {
             return None;
         }
         // There is room for as many covariates as there are candidates.
-        let _ = covariates.push(covariate(epoch, candidate, config, true));
+        let _ = covariates.push(covariate(epoch, candidate, scale, true));
     }
     let sensitivities = loop {
         let covariance = |with: Option<usize>, covariate: usize, n: u64| {
@@ -111,12 +125,12 @@ pub fn estimate_regressors(
                 covariances,
                 (with.map_or(index, |other| candidates[other]), candidates[covariate]),
                 n,
-                config,
+                scale,
             )
         };
         let regression = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
         let sensitivities = regression.sensitivities_while(keep_on)?;
-        let degrades = || degrades(epoch, &candidates, config, &sensitivities, &regression);
+        let degrades = || degrades(epoch, &candidates, scale, &sensitivities, &regression);
         // Sensitivities are chosen by falling significance: the last one is the weakest.
         let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
         candidates.remove(weakest.covariate);
@@ -124,7 +138,7 @@ pub fn estimate_regressors(
     };
     let with_reference = |sensitivity: &Sensitivity| {
         let covariate = candidates[sensitivity.covariate];
-        let reference = covariances.means[covariate] * lsb(covariate, config) + CHANNELS[covariate].offset();
+        let reference = covariances.means[covariate] * lsb(covariate, scale) + CHANNELS[covariate].offset();
         Regressor { covariate, value: sensitivity.value, error: sensitivity.error, reference }
     };
     Some(sensitivities.iter().map(with_reference).take(MAX_COVARIATES).collect())
@@ -137,11 +151,11 @@ pub(crate) fn rebuild_compensated_curve(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
     regressors: &[Regressor],
 ) -> Option<()> {
-    epoch.rebuild_curve(curve, index, config);
-    if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, config, regressors) }
+    epoch.rebuild_curve(curve, index, scale);
+    if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, scale, regressors) }
 }
 
 /// Subtracts the regressors' share from the curve of the stream itself; `None` without covariances.
@@ -149,24 +163,19 @@ fn subtract(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
     regressors: &[Regressor],
 ) -> Option<()> {
     let covariances = epoch.covariances()?;
     let candidates: Candidates = regressors.iter().map(|regressor| regressor.covariate).collect();
     let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
     for &candidate in &candidates {
-        let _ = covariates.push(covariate(epoch, candidate, config, false));
+        let _ = covariates.push(covariate(epoch, candidate, scale, false));
     }
     let exact = |(covariate, regressor): (usize, &Regressor)| Sensitivity::exact(covariate, regressor.value);
     let sensitivities: Vec<Sensitivity, MAX_COVARIATES> = regressors.iter().enumerate().map(exact).collect();
     let covariance = |with: Option<usize>, covariate: usize, n: u64| {
-        scaled_covariance(
-            covariances,
-            (with.map_or(index, |other| candidates[other]), candidates[covariate]),
-            n,
-            config,
-        )
+        scaled_covariance(covariances, (with.map_or(index, |other| candidates[other]), candidates[covariate]), n, scale)
     };
     let channel = &curve.clone();
     CovariateRegression { channel, covariates: &covariates, covariance: &covariance }
@@ -180,12 +189,12 @@ fn subtract(
 pub(crate) fn mean_shift(
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
     regressors: &[Regressor],
     before: &ChannelMeans,
 ) -> Option<ReportedShift> {
     let means = &epoch.covariances()?.means;
-    let change = |index: usize| (means[index] - before[index]) * CHANNELS[index].lsb(config.range());
+    let change = |index: usize| (means[index] - before[index]) * scale.lsb(CHANNELS[index]);
     let raw = change(index);
     let correction = regressors.iter().map(|regressor| regressor.value * change(regressor.covariate)).sum::<f64>();
     Some(ReportedShift { raw, compensated: raw - correction })
@@ -200,24 +209,24 @@ fn candidates(index: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Allan covariance of two channels at averaging factor `n`, in the product of their units.
-fn scaled_covariance(covariances: &AllanCovariances, (a, b): (usize, usize), n: u64, config: Config) -> Option<f64> {
-    Some(covariances.covariance(a, b, n)? * lsb(a, config) * lsb(b, config))
+fn scaled_covariance(covariances: &AllanCovariances, (a, b): (usize, usize), n: u64, scale: Scale) -> Option<f64> {
+    Some(covariances.covariance(a, b, n)? * lsb(a, scale) * lsb(b, scale))
 }
 
 /// The covariate [`CHANNELS`]`[index]` at the octaves of the cross sums, with its own noise modelled (`modelled`, for an
 /// estimate) or as measured (for a subtraction).
-fn covariate(epoch: &FinishedEpoch, index: usize, config: Config, modelled: bool) -> Covariate<CROSS_OCTAVES> {
+fn covariate(epoch: &FinishedEpoch, index: usize, scale: Scale, modelled: bool) -> Covariate<CROSS_OCTAVES> {
     let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, config);
+    epoch.rebuild_curve(&mut curve, index, scale);
     if modelled {
-        Covariate::new(&curve, lsb(index, config), 1 << FIRST_CROSS_OCTAVE)
+        Covariate::new(&curve, lsb(index, scale), 1 << FIRST_CROSS_OCTAVE)
     } else {
         Covariate::as_measured(&curve, 1 << FIRST_CROSS_OCTAVE)
     }
 }
 
-fn lsb(index: usize, config: Config) -> f64 {
-    CHANNELS[index].lsb(config.range())
+fn lsb(index: usize, scale: Scale) -> f64 {
+    scale.lsb(CHANNELS[index])
 }
 
 /// Whether the subtraction would raise the Allan variance at any octave by more than twice its standard error.
@@ -227,14 +236,14 @@ fn lsb(index: usize, config: Config) -> f64 {
 fn degrades(
     epoch: &FinishedEpoch,
     candidates: &Candidates,
-    config: Config,
+    scale: Scale,
     sensitivities: &[Sensitivity],
     regression: &CovariateRegression<'_, OCTAVES, CROSS_OCTAVES>,
 ) -> bool {
     let mut added = [0.0; OCTAVES];
     let mut covariate = Curve::empty();
     for sensitivity in sensitivities {
-        epoch.rebuild_curve(&mut covariate, candidates[sensitivity.covariate], config);
+        epoch.rebuild_curve(&mut covariate, candidates[sensitivity.covariate], scale);
         for (added, point) in added.iter_mut().zip(covariate.points()).take(FIRST_CROSS_OCTAVE) {
             *added += sensitivity.value * sensitivity.value * point.avar;
         }

@@ -14,10 +14,10 @@ const OCTAVE_WORDS: usize = 10;
 pub(crate) const SUMS_WORDS: usize = 4 + OCTAVES * OCTAVE_WORDS;
 /// Largest sum that is stored.
 pub(crate) const MAX_SUM: u128 = (1 << 96) - 1;
-/// Words of an epoch: its number, the sums, whether the covariances are complete, and their means and pairs of 64 bits each.
-const EPOCH_WORDS: usize = 2 + CHANNELS.len() * SUMS_WORDS + 2 * (CHANNELS.len() + PAIRS.len() * CROSS_OCTAVES);
+/// Words of an epoch: its number, the measured sample rate, the sums, whether the covariances are complete, and their means and pairs of 64 bits each.
+const EPOCH_WORDS: usize = 4 + CHANNELS.len() * SUMS_WORDS + 2 * (CHANNELS.len() + PAIRS.len() * CROSS_OCTAVES);
 /// Marks a record, in its first word. Changes with the layout.
-const MAGIC: u32 = 0xAD17_E002;
+const MAGIC: u32 = 0xAD17_E003;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -98,7 +98,9 @@ impl EpochRecord {
         let covariances = &epoch.covariances;
         let floats = covariances.means.iter().chain(covariances.pairs.as_flattened()).map(|value| value.to_bits());
         let head = [MAGIC, epoch.number, u32::from(covariances.complete)];
-        let words = head.into_iter().chain(epoch.sums.iter().flat_map(sums_words)).chain(floats.flat_map(halves));
+        let rate = halves(epoch.measured_hz.unwrap_or(0.0).to_bits());
+        let words =
+            head.into_iter().chain(rate).chain(epoch.sums.iter().flat_map(sums_words)).chain(floats.flat_map(halves));
         for (cell, word) in self.0[..=EPOCH_WORDS].iter().zip(words) {
             cell.store(word, Relaxed);
         }
@@ -115,6 +117,8 @@ impl EpochRecord {
         }
         epoch.number = words.next().unwrap_or(0);
         let complete = words.next() == Some(1);
+        let rate_hz = Reader(words.by_ref()).float();
+        epoch.measured_hz = (rate_hz > 0.0).then_some(rate_hz);
         for sums in &mut epoch.sums {
             *sums = sums_from_words(words.by_ref().take(SUMS_WORDS));
         }
@@ -155,7 +159,7 @@ mod tests {
         covariances.complete = true;
         covariances.means = covariances.means.map(|_| -(next() as f64));
         covariances.pairs.as_flattened_mut().fill_with(|| 1.0 / next() as f64);
-        FinishedEpoch { number: 77, sums, covariances }
+        FinishedEpoch { number: 77, measured_hz: Some(203.9), sums, covariances }
     }
 
     #[test]

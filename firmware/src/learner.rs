@@ -3,6 +3,7 @@
 
 use crate::epoch::{FinishedEpoch, Regressor, Regressors, mean_shift, rebuild_compensated_curve};
 use crate::report_messages::{model_error, reported_term};
+use crate::scale::Scale;
 use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL};
 use adis16405_driver::Config;
 use allan_core::confidence::NORMAL_975;
@@ -44,8 +45,8 @@ impl EpochModel {
 
     /// N, B and K of the stream itself; `None` before the first fit.
     #[must_use]
-    pub(crate) fn baseline(&self, config: Config) -> Option<Model> {
-        Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), config))
+    pub(crate) fn baseline(&self, scale: Scale) -> Option<Model> {
+        Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), scale))
     }
 
     /// The terms of the compensated stream beyond N, B and K, with their coefficients.
@@ -55,13 +56,13 @@ impl EpochModel {
 
     /// All terms of the compensated stream; `None` before the first fit.
     #[must_use]
-    fn full(&self, config: Config) -> Option<Model> {
-        (!self.full.is_empty()).then(|| model(self.full.iter().copied(), config))
+    fn full(&self, scale: Scale) -> Option<Model> {
+        (!self.full.is_empty()).then(|| model(self.full.iter().copied(), scale))
     }
 }
 
-fn model(terms: impl Iterator<Item = (NoiseTerm, f64)>, config: Config) -> Model {
-    Model::new(1.0 / config.sample_period().hz(), terms.map(|(kind, value)| FittedTerm::exact(kind, value)))
+fn model(terms: impl Iterator<Item = (NoiseTerm, f64)>, scale: Scale) -> Model {
+    Model::new(scale.period_s(), terms.map(|(kind, value)| FittedTerm::exact(kind, value)))
 }
 
 fn baseline_coefficients(model: &Model) -> Option<BaselineCoefficients> {
@@ -109,29 +110,23 @@ impl EpochFit {
         &mut self,
         epoch: &FinishedEpoch,
         index: usize,
-        config: Config,
+        scale: Scale,
         keep_on: &mut dyn FnMut() -> bool,
     ) -> bool {
-        let done = self.search(epoch, index, config, keep_on);
+        let done = self.search(epoch, index, scale, keep_on);
         self.baseline = if self.regressors.is_empty() {
             baseline_coefficients(&self.trace.before)
         } else {
-            refit_baseline(epoch, index, config)
+            refit_baseline(epoch, index, scale)
         };
         done
     }
 
     /// Traces what N, B and K lack in the compensated stream. Returns false if it was cancelled.
-    fn search(
-        &mut self,
-        epoch: &FinishedEpoch,
-        index: usize,
-        config: Config,
-        keep_on: &mut dyn FnMut() -> bool,
-    ) -> bool {
+    fn search(&mut self, epoch: &FinishedEpoch, index: usize, scale: Scale, keep_on: &mut dyn FnMut() -> bool) -> bool {
         let mut curve = Curve::empty();
         // Without covariances there are no regressors, and the curve is that of the stream itself.
-        let _ = rebuild_compensated_curve(&mut curve, epoch, index, config, &self.regressors);
+        let _ = rebuild_compensated_curve(&mut curve, epoch, index, scale, &self.regressors);
         self.trace.fit_baseline(&curve);
         let sufficient = self.trace.before_goodness.p_value > P_VALUE_SUFFICIENT;
         sufficient || trace_while(&mut self.trace, &curve, LineCandidates::Curve, &FILTERS, keep_on)
@@ -159,9 +154,9 @@ impl EpochFit {
     }
 }
 
-fn refit_baseline(epoch: &FinishedEpoch, index: usize, config: Config) -> Option<BaselineCoefficients> {
+fn refit_baseline(epoch: &FinishedEpoch, index: usize, scale: Scale) -> Option<BaselineCoefficients> {
     let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, config);
+    epoch.rebuild_curve(&mut curve, index, scale);
     baseline_coefficients(&fit(&curve, &NoiseTerm::BASELINE))
 }
 
@@ -173,17 +168,17 @@ pub fn validate(
     means: Option<&ChannelMeans>,
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
 ) -> Option<ValidationMessage> {
     let mut message = ValidationMessage {
         channel: CHANNELS[index] as u8,
         epoch: epoch.number,
-        before: baseline_error(model, epoch, index, config)?,
+        before: baseline_error(model, epoch, index, scale)?,
         after: None,
-        shift: means.and_then(|means| mean_shift(epoch, index, config, &model.regressors, means)),
+        shift: means.and_then(|means| mean_shift(epoch, index, scale, &model.regressors, means)),
         drift: Vec::new(),
     };
-    fill_compensated(model, epoch, index, config, &mut message)?;
+    fill_compensated(model, epoch, index, scale, &mut message)?;
     Some(message)
 }
 
@@ -192,11 +187,11 @@ fn baseline_error(
     model: &EpochModel,
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
 ) -> Option<Option<ReportedModelError>> {
     let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, config);
-    Some(model_error(&model.baseline(config)?, &curve))
+    epoch.rebuild_curve(&mut curve, index, scale);
+    Some(model_error(&model.baseline(scale)?, &curve))
 }
 
 /// Fills in the error of the full model on the compensated stream, and the Allan deviations of both streams.
@@ -204,17 +199,17 @@ fn fill_compensated(
     model: &EpochModel,
     epoch: &FinishedEpoch,
     index: usize,
-    config: Config,
+    scale: Scale,
     message: &mut ValidationMessage,
 ) -> Option<()> {
     let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, config);
+    epoch.rebuild_curve(&mut curve, index, scale);
     let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE).take(MAX_DEVIATIONS);
     message.drift.extend(slow.map(|raw| ReportedDeviations { n: raw.n, raw: libm::sqrt(raw.avar), compensated: 0.0 }));
-    rebuild_compensated_curve(&mut curve, epoch, index, config, &model.regressors)?;
+    rebuild_compensated_curve(&mut curve, epoch, index, scale, &model.regressors)?;
     let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE);
     message.drift.iter_mut().zip(slow).for_each(|(drift, point)| drift.compensated = libm::sqrt(point.avar));
-    message.after = model_error(&model.full(config)?, &curve);
+    message.after = model_error(&model.full(scale)?, &curve);
     Some(())
 }
 
@@ -260,13 +255,15 @@ pub(crate) struct ValidationResult {
     pub(crate) deviance_per_point: (f64, f64),
     /// Allan deviations at the longest averaging time that the epoch holds eight times.
     pub(crate) drift: ReportedDeviations,
+    /// That averaging time in s.
+    pub(crate) tau_s: f64,
 }
 
 impl ValidationResult {
-    fn from_message(message: &ValidationMessage, samples: u64) -> Option<Self> {
+    fn from_message(message: &ValidationMessage, samples: u64, scale: Scale) -> Option<Self> {
         let deviance_per_point = (message.before?.deviance_per_point, message.after?.deviance_per_point);
         let drift = *message.drift.iter().rfind(|drift| drift.n <= samples / 8)?;
-        Some(Self { deviance_per_point, drift })
+        Some(Self { deviance_per_point, drift, tau_s: drift.n as f64 * scale.period_s() })
     }
 }
 
@@ -296,9 +293,10 @@ impl Learner {
     /// Validates the model of a channel on the finished epoch.
     pub(crate) fn validate(&mut self, index: usize, config: Config) -> Option<ValidationMessage> {
         let epoch = self.finished.as_deref()?;
-        let message = validate(&self.models[index], self.means.as_ref(), epoch, index, config);
+        let scale = epoch.scale(config);
+        let message = validate(&self.models[index], self.means.as_ref(), epoch, index, scale);
         self.results[index] =
-            message.as_ref().and_then(|message| ValidationResult::from_message(message, epoch.samples(index)));
+            message.as_ref().and_then(|message| ValidationResult::from_message(message, epoch.samples(index), scale));
         message
     }
 

@@ -15,6 +15,7 @@
 //! | `sample_intake` | the path of every sample into the statistics, health counters |
 //! | `channel_validity` | which channels of a burst are refused, by its faults |
 //! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve and baseline model made of them |
+//! | `scale` | the unit of a count and the measured time between two samples |
 //! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
 //! | `device` | state of the device, supervision of the sensor |
@@ -58,6 +59,7 @@ mod report_messages;
 mod report_text;
 pub mod retained;
 mod sample_intake;
+mod scale;
 pub mod sensor;
 mod statistics;
 mod status_flags;
@@ -74,5 +76,6 @@ pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;
 pub use retained::RetainedRam;
 pub use sample_intake::{Estimators, estimate};
+pub use scale::Scale;
 pub use statistics::{CHANNELS, ChannelEstimator, ChannelSums, OCTAVES, OVERLAP, Statistics};
 pub use transmit::{TransmitBuffer, TransmitQueue};

@@ -4,9 +4,9 @@
 use crate::board::Board;
 use crate::device::DeviceState;
 use crate::learner::EpochModel;
+use crate::scale::Scale;
 use crate::statistics::{CHANNELS, ChannelSums, INERTIAL};
 use adis16405_driver::{Channel, GyroRange};
-use allan_core::Model;
 use link::{Hello, MessageRef, ReportedModelError};
 
 /// Version of the firmware, from the manifest.
@@ -25,8 +25,15 @@ const fn decimal(digits: &str) -> u8 {
 }
 
 impl DeviceState {
-    /// Device and settings, for a report on the finished epoch (`ends_epoch`) or on the running one.
-    fn hello(&self, ends_epoch: bool, board: &mut impl Board) -> Hello {
+    /// Device and settings, for a report on the finished epoch (`ends_epoch`) or on the running one. The measured rate is the
+    /// one that the whole report is made with.
+    fn hello(&mut self, ends_epoch: bool, board: &mut impl Board) -> Hello {
+        let finished = self.learner.finished().filter(|_| ends_epoch);
+        let (number, finished_hz) =
+            finished.map_or((self.settings.epoch, None), |epoch| (epoch.number, epoch.measured_hz));
+        let measured_hz =
+            if ends_epoch { finished_hz } else { board.estimators(|estimators| estimators.measured_hz()) };
+        self.report_scale = Scale::new(self.config, measured_hz);
         Hello {
             firmware: VERSION,
             product_id: self.product_id,
@@ -37,17 +44,17 @@ impl DeviceState {
             },
             filter_taps_log2: self.config.filter_taps_log2(),
             sample_rate_hz: self.config.sample_period().hz(),
-            measured_rate_hz: board.estimators(|estimators| estimators.measured_hz()),
+            measured_rate_hz: measured_hz,
             spi_clock_hz: self.spi_clock_hz,
             uptime_us: board.now_us(),
             sampling: self.is_sampled(),
-            epoch: self.learner.finished().filter(|_| ends_epoch).map_or(self.settings.epoch, |epoch| epoch.number),
+            epoch: number,
             epoch_s: self.settings.epoch_s,
             boot: self.boot.clone(),
         }
     }
 
-    pub(crate) fn send_hello(&self, ends_epoch: bool, board: &mut impl Board) {
+    pub(crate) fn send_hello(&mut self, ends_epoch: bool, board: &mut impl Board) {
         let hello = self.hello(ends_epoch, board);
         send(board, MessageRef::Hello(&hello));
     }
@@ -61,10 +68,12 @@ impl DeviceState {
         let (channel, sums) = (CHANNELS[index], &self.reported_sums(index, ends_epoch, board));
         let model = self.learner.models.get(index);
         let unseen_error = model.and_then(|model| self.unseen_error(model, channel, sums));
-        let baseline = model.map(|_| sums.fit_baseline(channel, self.config));
+        let baseline = model.map(|_| sums.fit_baseline(channel, self.report_scale));
         let losses = board.estimators(|estimators| estimators.losses(ends_epoch));
-        let lost = (losses.lost, losses.refused[index]);
-        send_channel_message(board, channel, sums, lost, baseline.as_ref(), unseen_error);
+        let mut report = sums.report(channel, baseline.as_ref(), unseen_error);
+        (report.lost, report.refused) = (losses.lost, losses.refused[index]);
+        report.self_test_failed = self.recovery.failed_test.contains(index);
+        send(board, MessageRef::Channel(&report));
     }
 
     fn reported_sums(&self, index: usize, ends_epoch: bool, board: &mut impl Board) -> ChannelSums {
@@ -76,7 +85,7 @@ impl DeviceState {
 
     /// Error of the previous epoch's N, B and K on the sums.
     fn unseen_error(&self, model: &EpochModel, channel: Channel, sums: &ChannelSums) -> Option<ReportedModelError> {
-        sums.error_of(&model.baseline(self.config)?, channel, self.config)
+        sums.error_of(&model.baseline(self.report_scale)?, channel, self.report_scale)
     }
 
     /// Validates the model of an inertial channel on the finished epoch and sends the result, if there is one.
@@ -85,19 +94,6 @@ impl DeviceState {
             send(board, MessageRef::Validation(&message));
         }
     }
-}
-
-fn send_channel_message(
-    board: &mut impl Board,
-    channel: Channel,
-    sums: &ChannelSums,
-    (lost, refused): (u64, u64),
-    baseline: Option<&Model>,
-    unseen_error: Option<ReportedModelError>,
-) {
-    let mut report = sums.report(channel, baseline, unseen_error);
-    (report.lost, report.refused) = (lost, refused);
-    send(board, MessageRef::Channel(&report));
 }
 
 /// The sums of [`CHANNELS`]`[index]` of the running epoch.

@@ -1,8 +1,9 @@
 //! The messages of a report that are made of one channel's sums: octaves and coefficients, and the error of a model.
 
 use crate::channels::{ChannelEstimator, OCTAVES};
+use crate::scale::Scale;
 use crate::statistics::ChannelSums;
-use adis16405_driver::{Channel, Config};
+use adis16405_driver::Channel;
 use allan_core::{Curve, Model, NoiseTerm, model};
 use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
@@ -10,9 +11,9 @@ use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOcta
 impl ChannelSums {
     /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
     #[must_use]
-    pub(crate) fn error_of(&self, model: &Model, channel: Channel, config: Config) -> Option<ReportedModelError> {
+    pub(crate) fn error_of(&self, model: &Model, channel: Channel, scale: Scale) -> Option<ReportedModelError> {
         let mut curve = Curve::empty();
-        self.rebuild_curve(&mut curve, channel, config);
+        self.rebuild_curve(&mut curve, channel, scale);
         model_error(model, &curve)
     }
 
@@ -33,6 +34,7 @@ impl ChannelSums {
             unseen_error,
             lost: 0,
             refused: 0,
+            self_test_failed: false,
             replaced: self.gaps.iter().map(|gaps| u64::from(gaps.replaced())).sum(),
         };
         let mut curve = Curve::empty();

@@ -35,13 +35,15 @@ enum Section {
     Coefficients(usize),
     Findings,
     Health,
+    /// Channels that have failed their self-test, if there are any.
+    SelfTest,
     Advice,
     /// A row an octave.
     Curve,
 }
 
 /// The sections, each with its lines at most.
-const SECTIONS: [(Section, usize); 15] = [
+const SECTIONS: [(Section, usize); 16] = [
     (Section::Headline, 1),
     (Section::Record, 1),
     (Section::Text(""), 1),
@@ -54,6 +56,7 @@ const SECTIONS: [(Section, usize); 15] = [
     (Section::Text("What was found"), 1),
     (Section::Findings, 2 * MOST_FINDINGS),
     (Section::Health, 1),
+    (Section::SelfTest, 1),
     (Section::Advice, 1),
     (Section::Text(""), 1),
     (Section::Curve, OCTAVES + 2),
@@ -86,6 +89,7 @@ pub(crate) fn line(state: &DeviceState, board: &mut impl Board, mut index: usize
                 Section::Findings if index.is_multiple_of(2) => finding(state, index / 2),
                 Section::Findings => compensation(state, index / 2),
                 Section::Health => Some(health(state, board)),
+                Section::SelfTest => self_test(state),
                 Section::Advice => Some(advice(state)),
                 Section::Curve => curve(board, index),
             }
@@ -108,7 +112,7 @@ fn labelled(label: &str, text: core::fmt::Arguments<'_>) -> TextLine {
 }
 
 fn headline(state: &DeviceState, board: &mut impl Board) -> TextLine {
-    let hz = state.config.sample_period().hz();
+    let hz = board.estimators(|estimators| estimators.scale()).rate_hz();
     let epoch = state.settings.epoch;
     let samples = board.estimators(|estimators| estimators.channel(0).map_or(0, |estimator| estimator.len()));
     let (count, length, rate) = (Count(samples), Span(samples as f64 / hz), Decimal::significant(hz, 4));
@@ -140,7 +144,8 @@ fn coefficients(state: &DeviceState, board: &mut impl Board, index: usize) -> Te
     let channel = CHANNELS[index];
     // From deg/s and g to the units in the table.
     let factors = if index < GYROS { [1.0, 1e3, 1e3] } else { [1e6; 3] };
-    let model = running_sums(board, index).fit_baseline(channel, state.config);
+    let scale = board.estimators(|estimators| estimators.scale());
+    let model = running_sums(board, index).fit_baseline(channel, scale);
     let cells: [TextLine; 3] = core::array::from_fn(|column| match model.terms().get(column) {
         Some(term) => {
             let factor = factors[column];
@@ -205,7 +210,7 @@ fn findings(state: &DeviceState) -> impl Iterator<Item = (usize, Cause)> {
 
 fn finding(state: &DeviceState, number: usize) -> Option<TextLine> {
     let Some((first, cause)) = findings(state).nth(number) else {
-        let nothing = match state.learner.models[0].baseline(state.config) {
+        let nothing = match state.learner.models[0].baseline(state.report_scale) {
             Some(_) => "Nothing: no term beyond N, B and K was added.",
             None => "Nothing yet: effects are searched for at the end of an epoch.",
         };
@@ -225,8 +230,8 @@ fn compensation(state: &DeviceState, number: usize) -> Option<TextLine> {
     let (index, _) = findings(state).nth(number).filter(|(_, cause)| matches!(cause, Cause::Covariate(_)))?;
     let is_first =
         number.checked_sub(1).and_then(|before| findings(state).nth(before)).is_none_or(|(of, _)| of != index);
-    let drift = state.learner.results[index].filter(|_| is_first)?.drift;
-    let tau = Span(drift.n as f64 / state.config.sample_period().hz());
+    let result = state.learner.results[index].filter(|_| is_first)?;
+    let (drift, tau) = (result.drift, Span(result.tau_s));
     let unit = CHANNELS[index].unit();
     let (raw, compensated) = (EstimateInUnit::new(drift.raw, unit), EstimateInUnit::new(drift.compensated, unit));
     Some(labelled("", format_args!("Subtracted, unseen epoch: {raw} at {tau} -> {compensated}.")))
@@ -310,6 +315,14 @@ fn health(state: &DeviceState, board: &mut impl Board) -> TextLine {
     text_line(format_args!("Health   {used} of {bursts} bursts used; {recoveries}; awake {awake} %; start {starts}."))
 }
 
+/// The channels that have failed the self-test.
+fn self_test(state: &DeviceState) -> Option<TextLine> {
+    let failed = state.recovery.failed_test;
+    let list = || channel_list(failed);
+    (!failed.is_empty())
+        .then(|| labelled("Self-test failed", format_args!("{}; they are used. Repeat it at rest: check", list())))
+}
+
 /// The next step: for the first finding that has one, or towards a first model.
 fn advice(state: &DeviceState) -> TextLine {
     let far_off = state.learner.results.iter().flatten().any(|result| result.deviance_per_point.1 > HIGH_DEVIANCE);
@@ -348,16 +361,16 @@ fn octave_cells(tau: &str, [a, b, c, d, e, f]: [&str; INERTIAL]) -> TextLine {
 
 /// The Allan deviations of the inertial channels at one octave; `None` where no channel has a value.
 fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
-    let config = estimators.config();
+    let scale = estimators.scale();
     let n = (1_u64 << octave.min(OCTAVES)) as f64;
     let deviation = |index: usize| {
         let variance = estimators.channel(index)?.allan_variance(octave)?;
         let factor = if index < GYROS { 1.0 } else { 1e3 };
-        Some(factor * CHANNELS[index].lsb(config.range()) * libm::sqrt(variance))
+        Some(factor * scale.lsb(CHANNELS[index]) * libm::sqrt(variance))
     };
     let deviations: [Option<f64>; INERTIAL] = core::array::from_fn(deviation);
     let cells =
         deviations.map(|value| text_line(format_args!("{}", Decimal::significant(value.unwrap_or(f64::NAN), 4))));
-    let tau = text_line(format_args!("{}", Decimal::significant(n / config.sample_period().hz(), 4)));
+    let tau = text_line(format_args!("{}", Decimal::significant(n * scale.period_s(), 4)));
     deviations.iter().any(Option::is_some).then(|| octave_cells(&tau, cells.each_ref().map(|cell| cell.as_str())))
 }

@@ -1,8 +1,9 @@
 //! The path of every sample: data-ready monitor, burst validation, statistics; and the counters of samples not used.
 
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
-use crate::channel_validity::{is_marked, refused_channels};
+use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
 use crate::channels::ChannelSet;
+use crate::scale::Scale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
 use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults};
@@ -21,6 +22,19 @@ const FROZEN_BURSTS: u32 = 16;
 /// Bursts used since the sensor was probed from which on it is known to work; behind a long filter twice as many as a frozen
 /// sensor delivers before it is found out.
 const SETTLED_BURSTS: u32 = 100;
+
+/// Time for which the analogue part of a sensor's channel remembers what it saw, in µs. Its two poles at 330 Hz (data sheet
+/// Rev. B, Table 1, taken as two, the slower reading) have a time constant of 0.48 ms; a step by the whole range of ±6,000 counts
+/// has decayed to half a count after x = 12.7 of them, (1 + x)·exp(−x) = 0.5 / 12,000.
+const ANALOGUE_SETTLING_US: u64 = 6_200;
+
+/// Samples after a probe that hold something of what was before: of a self-test, which displaces the outputs (data sheet
+/// Rev. B, page 15), of the time before a reset, or of another range or filter. The filter of 2N + 1 taps mixes 2N samples of
+/// before with its newest one (Fig. 15; N = 2^M), and the channel before it settles meanwhile.
+fn settling_samples(config: Config) -> u32 {
+    let analogue = (ANALOGUE_SETTLING_US as f64 * 1e-6 * config.sample_period().hz()) as u32 + 1;
+    (2 << config.filter_taps_log2()) + analogue
+}
 
 /// Why the sensor must be probed before its samples are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +66,8 @@ pub struct Estimators<'m> {
     unusable_cause: &'static str,
     /// Bursts in a row whose inertial words equal those of the burst before.
     repeated: u32,
+    /// Bursts still to come that the sensor's filter mixes with what was before the probe.
+    settling: u32,
     /// Bursts used since the sensor was probed.
     used_since_probe: u32,
     /// The latest burst that a sensor can have sent had its error flag set.
@@ -76,6 +92,7 @@ impl<'m> Estimators<'m> {
             unusable: 0,
             unusable_cause: "",
             repeated: 0,
+            settling: 0,
             used_since_probe: 0,
             error_flag: false,
             processed: 0,
@@ -153,10 +170,12 @@ impl<'m> Estimators<'m> {
         self.processed
     }
 
-    /// Clears the suspicion, so that samples are used again: the sensor was probed and configured at `now_us`.
+    /// Clears the suspicion, so that samples are used again as soon as the sensor's filter has settled: the sensor was probed
+    /// and configured at `now_us`.
     pub fn mark_probed(&mut self, now_us: u64) {
         self.monitor.mark_probed(now_us);
         self.unusable = 0;
+        self.settling = settling_samples(self.config);
         self.used_since_probe = 0;
         self.error_flag = false;
     }
@@ -215,10 +234,16 @@ impl<'m> Estimators<'m> {
         self.config
     }
 
-    /// Sample rate in Hz, measured with the microcontroller's clock.
+    /// Sample rate in Hz, measured with the microcontroller's clock; `None` before 64 sample periods.
     #[must_use]
     pub fn measured_hz(&self) -> Option<f64> {
         self.monitor.measured_hz()
+    }
+
+    /// What turns counts and numbers of samples into units.
+    #[must_use]
+    pub fn scale(&self) -> Scale {
+        Scale::new(self.config, self.measured_hz())
     }
 
     /// The counters of sampling and estimating; those of the application and the board are 0.
@@ -252,6 +277,15 @@ impl<'m> Estimators<'m> {
         if self.is_suspect() {
             add(&mut self.health.suspect, 1);
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
+            return;
+        }
+        if self.settling > 0 && is_frame_sound(burst) {
+            self.settling -= 1;
+            add(&mut self.health.settling, 1);
+            // Before the first sample there is no gap.
+            if self.statistics.has_samples() {
+                self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
+            }
             return;
         }
         let mut validity = self.validator.validate(burst);

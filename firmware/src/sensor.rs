@@ -1,6 +1,6 @@
 //! The sensor's bus apart from sampling: serial clock, probing (identify, test, configure), auto-null.
 
-use adis16405_driver::{Adis16405, Config, Diagnosis, DioSignal, Error, Product, Register, SelfTest, Timing};
+use adis16405_driver::{Adis16405, Channel, Config, Diagnosis, DioSignal, Error, Product, Register, Timing};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -48,29 +48,48 @@ pub struct SensorIdentity {
     /// Product that answered.
     pub product: Product,
     /// The self-test, if it was requested.
-    pub test: Option<SelfTest>,
+    pub test: Option<TestOutcome>,
 }
 
-/// Why a probe has failed.
+/// How a self-test has ended. None of the outcomes says that samples are of no use: a test fails under motion too (data sheet
+/// Rev. B, page 15: zero motion gives results that are more reliable).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ProbeError<E> {
-    /// The bus failed, another product answered, or a register did not take its value.
-    Driver(Error<E>),
-    /// The self-test failed.
-    SelfTest(Diagnosis),
+pub enum TestOutcome {
+    /// It has ended with these flags, those of failed sensors among them.
+    Ended(Diagnosis),
+    /// It was not seen to run; these are the flags.
+    NotSeen(Diagnosis),
+    /// It did not end.
+    Endless,
 }
 
-impl<E> From<Error<E>> for ProbeError<E> {
-    fn from(error: Error<E>) -> Self {
-        Self::Driver(error)
+impl TestOutcome {
+    /// Whether it has run and no sensor has failed.
+    #[must_use]
+    pub fn passed(self) -> bool {
+        matches!(self, Self::Ended(diagnosis) if !diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES))
+    }
+
+    /// The sensors that have failed.
+    pub fn failed_sensors(self) -> impl Iterator<Item = Channel> {
+        let diagnosis = match self {
+            Self::Ended(diagnosis) | Self::NotSeen(diagnosis) => diagnosis,
+            Self::Endless => Diagnosis::empty(),
+        };
+        diagnosis.failed_sensors()
     }
 }
 
-impl<E: fmt::Debug> fmt::Display for ProbeError<E> {
+impl fmt::Display for TestOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Driver(error) => error.fmt(f),
-            Self::SelfTest(diagnosis) => write!(f, "self-test failed, DIAG_STAT {:#06x}", diagnosis.bits()),
+            Self::Ended(diagnosis) if self.passed() => write!(f, "passed, DIAG_STAT {:#06x}", diagnosis.bits()),
+            Self::Ended(diagnosis) => {
+                write!(f, "failed, DIAG_STAT {:#06x}:", diagnosis.bits())?;
+                self.failed_sensors().try_for_each(|channel| write!(f, " {}", channel.name()))
+            }
+            Self::NotSeen(diagnosis) => write!(f, "did not run, DIAG_STAT {:#06x}", diagnosis.bits()),
+            Self::Endless => write!(f, "did not end"),
         }
     }
 }
@@ -79,12 +98,12 @@ impl<E: fmt::Debug> fmt::Display for ProbeError<E> {
 /// active high. A negative bias of gyro x is moved from the sensor to the host.
 ///
 /// # Errors
-/// As [`ProbeError`] lists them.
+/// The bus failed, another product answered, or a register did not take its value. A self-test that fails is none.
 pub fn probe<SPI: SpiDevice<u8>>(
     (bus, delay): (SPI, impl DelayNs),
     config: Config,
     scope: ProbeScope,
-) -> Result<SensorIdentity, ProbeError<SPI::Error>> {
+) -> Result<SensorIdentity, Error<SPI::Error>> {
     // The sensor may be in low-power mode until it is configured.
     let mut sensor = Adis16405::new(bus, delay, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power);
     if scope.pulse {
@@ -92,16 +111,22 @@ pub fn probe<SPI: SpiDevice<u8>>(
         let _ = sensor.wake();
     }
     let product = if scope.reset { sensor.software_reset()? } else { sensor.init()? };
-    let test = if scope.self_test { Some(sensor.self_test()?) } else { None };
-    if let Some(test) = test.filter(|test| test.diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES)) {
-        return Err(ProbeError::SelfTest(test.diagnosis));
-    }
+    let test = if scope.self_test { Some(self_test(&mut sensor)?) } else { None };
     // With such a bias, bursts lose the sign of negative x rates (erratum). The Allan variance does not depend on the bias.
     if sensor.x_sign_at_risk() {
         sensor.keep_negative_x_bias_on_host()?;
     }
     sensor.set_data_ready(Some(DioSignal::default()))?;
     Ok(SensorIdentity { product, test })
+}
+
+fn self_test<SPI: SpiDevice<u8>>(sensor: &mut Adis16405<SPI, impl DelayNs>) -> Result<TestOutcome, Error<SPI::Error>> {
+    match sensor.self_test() {
+        Ok(test) if test.ran => Ok(TestOutcome::Ended(test.diagnosis)),
+        Ok(test) => Ok(TestOutcome::NotSeen(test.diagnosis)),
+        Err(Error::Deadline { .. }) => Ok(TestOutcome::Endless),
+        Err(error) => Err(error),
+    }
 }
 
 /// Reads DIAG_STAT, which clears it. `None` if the sensor does not answer: the bus failed, or all bits are set, of which one

@@ -7,7 +7,8 @@ pub(crate) use crate::cross_sums::{AllanCovariances, CROSS_OCTAVES, ChannelMeans
 
 use crate::channels::ChannelSet;
 use crate::cross_sums::CrossSums;
-use adis16405_driver::{Channel, Config};
+use crate::scale::Scale;
+use adis16405_driver::Channel;
 use allan_core::{Cascade, Curve, Interpolation, Model, NoiseTerm, OctaveSums, fit::fit};
 
 /// The statistics of the running epoch.
@@ -69,6 +70,11 @@ impl Statistics {
                 estimator.push(count);
             }
         }
+    }
+
+    /// Whether a channel has taken a sample.
+    pub(crate) fn has_samples(&self) -> bool {
+        self.estimators.iter().any(|estimator| estimator.len() > 0)
     }
 
     /// A number of samples of all channels never arrived.
@@ -139,17 +145,16 @@ impl ChannelSums {
     }
 
     /// Rebuilds the Allan variance curve of a channel in its unit.
-    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, config: Config) {
-        let period = 1.0 / config.sample_period().hz();
-        ChannelEstimator::rebuild_curve(curve, period, self.samples, |octave| self.octave(octave));
-        curve.scale(channel.lsb(config.range()));
+    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, scale: Scale) {
+        ChannelEstimator::rebuild_curve(curve, scale.period_s(), self.samples, |octave| self.octave(octave));
+        curve.scale(scale.lsb(channel));
     }
 
     /// Fits the baseline model (N, B and K) to the curve of a channel, in its unit.
     #[must_use]
-    pub fn fit_baseline(&self, channel: Channel, config: Config) -> Model {
+    pub fn fit_baseline(&self, channel: Channel, scale: Scale) -> Model {
         let mut curve = Curve::empty();
-        self.rebuild_curve(&mut curve, channel, config);
+        self.rebuild_curve(&mut curve, channel, scale);
         fit(&curve, &NoiseTerm::BASELINE)
     }
 

@@ -1,8 +1,9 @@
 //! Sampling and estimating without a board: order, gaps and counters by cause, the raw stream.
 
-use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts, OutputWord};
+use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts, GyroRange, OutputWord, SamplePeriod};
 use firmware::{
-    BurstQueue, CHANNELS, Estimators, Sampler, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
+    BurstQueue, CHANNELS, ChannelSums, Estimators, Sampler, Statistics, TimedBurst, TransmitBuffer, TransmitQueue,
+    estimate,
 };
 use link::{Decoder, Health, Message, RawMessage, Received};
 
@@ -10,6 +11,10 @@ use link::{Decoder, Health, Message, RawMessage, Received};
 const PERIOD_US: f64 = 1e6 / 819.2;
 /// The supply in counts of 2.418 mV: 5.00 V.
 const SUPPLY: i16 = 2068;
+
+/// Samples that the default filter, of 2^2 taps a stage, mixes with what was before: 2N = 8, and 6.2 ms for the analogue part,
+/// 5.1 periods and the one that they begin in.
+const SETTLING: u32 = 8 + 6;
 
 /// A valid burst whose inertial counts depend on `k`.
 fn burst(k: i16) -> Burst {
@@ -89,18 +94,19 @@ fn a_spurious_edge_is_no_sample() {
 fn after_a_silence_samples_are_not_used_before_the_probe() {
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, Config::default());
-    estimators.mark_probed(0);
     estimators.process(timed(0, Some(burst(1))), 0);
     for (period, k) in [(100, 2), (101, 3)] {
         estimators.process(timed(period, Some(burst(k))), 0);
         assert!(estimators.is_suspect());
     }
     estimators.mark_probed(at_us(101) + 1);
-    estimators.process(timed(102, Some(burst(4))), 0);
+    for period in 102..=102 + SETTLING {
+        estimators.process(timed(period, Some(burst(4))), 0);
+    }
     let estimator = estimators.channel(0).unwrap();
-    assert_eq!((estimator.len(), estimator.missing()), (2, 101));
+    assert_eq!((estimator.len(), estimator.missing()), (2, 101 + u64::from(SETTLING)));
     let health = estimators.health();
-    assert_eq!((health.lost_edges, health.suspect, health.used), (99, 2, 2));
+    assert_eq!((health.lost_edges, health.suspect, health.used, health.settling), (99, 2, 2, SETTLING));
 }
 
 #[test]
@@ -300,4 +306,85 @@ fn scattered_unusable_bursts_are_no_trouble() {
         })
     };
     assert_eq!([2, 4, 819].map(suspect_with_one_in), [true, false, false]);
+}
+
+/// Two averages of `taps` samples each, as in the sensor (data sheet Rev. B, Fig. 15).
+struct Filter {
+    stages: [std::collections::VecDeque<f64>; 2],
+}
+
+impl Filter {
+    fn new(taps: usize) -> Self {
+        Self { stages: core::array::from_fn(|_| vec![0.0; taps].into()) }
+    }
+
+    fn push(&mut self, value: f64) -> f64 {
+        self.stages.iter_mut().fold(value, |value, stage| {
+            stage.pop_front();
+            stage.push_back(value);
+            stage.iter().sum::<f64>() / stage.len() as f64
+        })
+    }
+}
+
+/// A self-test displaces the outputs (data sheet Rev. B, page 15), and the filter holds the displacement for 2N samples. A
+/// sensor at rest is tested every two seconds: no sample of the displacement reaches the statistics, and the samples of the gap
+/// are no more than the filter and 7 ms of the analogue part take.
+#[test]
+fn samples_that_the_filter_mixes_with_a_self_test_are_a_gap() {
+    for taps_log2 in [0, 2, 4, 6] {
+        let config = Config::new(GyroRange::Dps300, taps_log2, SamplePeriod::nearest(819.2).unwrap()).unwrap();
+        let mut statistics = Statistics::new();
+        let mut estimators = Estimators::new(&mut statistics, config);
+        let mut filter = Filter::new(1 << taps_log2);
+        let (tests, mut period) = (5, 0);
+        for _ in 0..tests {
+            // The test takes 12 ms, in which nothing is read.
+            for _ in 0..10 {
+                filter.push(800.0);
+                period += 1;
+            }
+            estimators.mark_probed(at_us(period) - 1);
+            for _ in 0..1638 {
+                let mut counts = AT_REST;
+                // So that the sensor does not look frozen.
+                counts[2] = (period % 7) as i16;
+                counts[1] = filter.push(0.0).round() as i16;
+                estimators.process(timed(period, Some(Burst::from_counts(&Counts::new(counts)))), 0);
+                period += 1;
+            }
+        }
+        let (estimator, health) = (estimators.channel(0).unwrap(), estimators.health());
+        assert_eq!(estimator.sum_of_squares(0).map(|(squares, _)| squares), Some(0), "2^{taps_log2} taps");
+        let most = tests * ((2 << taps_log2) + (0.007 * 819.2) as u32 + 1);
+        assert!((1..=most).contains(&health.settling), "2^{taps_log2} taps: {health:?}");
+        assert_eq!(health.used + health.settling, tests * 1638, "{health:?}");
+    }
+}
+
+/// The clock of a part is within 3 % of its nominal rate (data sheet Rev. B, Table 1). The same counts from a part that is 3 %
+/// slow have averaging times 3 % longer, and with white noise N is larger by the root of that.
+#[test]
+fn averaging_times_are_by_the_measured_rate() {
+    let config = Config::default();
+    let mut state = 1_u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as i16 % 64
+    };
+    let counts: Vec<i16> = (0..4096).map(|_| noise()).collect();
+    let random_walk = |clock: f64| {
+        let mut statistics = Statistics::new();
+        let mut estimators = Estimators::new(&mut statistics, config);
+        for (period, &k) in (0..).zip(&counts) {
+            let at_us = (f64::from(period) * PERIOD_US / clock) as u64;
+            estimators.process(TimedBurst { at_us, dropped: 0, burst: Some(burst(k)) }, 0);
+        }
+        let sums = ChannelSums::from_estimator(estimators.channel(0).unwrap());
+        let scale = estimators.scale();
+        assert!((scale.rate_hz() / (819.2 * clock) - 1.0).abs() < 1e-5, "{scale:?}");
+        sums.fit_baseline(Channel::GyroX, scale).terms()[0].value
+    };
+    let ratio = random_walk(0.97) / random_walk(1.0);
+    assert!((ratio / (1.0_f64 / 0.97).sqrt() - 1.0).abs() < 1e-3, "{ratio}");
 }

@@ -61,7 +61,8 @@ impl MessageFormatter {
                 if report.epoch < self.epoch {
                     self.regressions.clear(); // the device restarted without its regressions
                 }
-                (self.sample_rate_hz, self.epoch) = (Some(report.sample_rate_hz), report.epoch);
+                self.sample_rate_hz = Some(report.measured_rate_hz.unwrap_or(report.sample_rate_hz));
+                self.epoch = report.epoch;
                 hello(report)
             }
             Message::Channel(report) => vec![channel(report)],
@@ -148,6 +149,9 @@ fn channel(report: &ChannelMessage) -> String {
     if report.missing > 0 {
         let ChannelMessage { lost, refused, replaced, .. } = report;
         text += &format!(" ({lost} lost, {refused} refused; {replaced} replaced in the curve)");
+    }
+    if report.self_test_failed {
+        text += ", failed its self-test";
     }
     for coefficient in &report.coefficients {
         let (value, low, high) = (coefficient.value, coefficient.low, coefficient.high);

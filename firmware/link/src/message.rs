@@ -79,7 +79,8 @@ pub struct Hello {
     pub filter_taps_log2: u8,
     /// Programmed sample rate in Hz.
     pub sample_rate_hz: f64,
-    /// Sample rate in Hz measured with the microcontroller's clock; `None` before the second sample.
+    /// Sample rate in Hz, measured with the microcontroller's clock, with which this report is made; `None`, and the report made
+    /// with the programmed one, before 64 samples.
     pub measured_rate_hz: Option<f64>,
     /// Serial clock of the sensor's bus as set in the hardware, in Hz.
     pub spi_clock_hz: u32,
@@ -160,6 +161,8 @@ pub struct ChannelMessage {
     pub refused: u64,
     /// Missing samples that the curve replaces: those in gaps that its longer octaves bridge.
     pub replaced: u64,
+    /// Whether the channel has failed its last self-test, which also happens in motion. Its samples are used.
+    pub self_test_failed: bool,
 }
 
 /// Sums of one averaging factor of one channel, as exact integers.
@@ -439,4 +442,7 @@ pub struct Health {
     pub sensor_resets: u32,
     /// Steps of recovery: the sensor was reset by its RST line.
     pub reset_lines: u32,
+    /// Bursts not used because the sensor's filter still mixed them with what was before a self-test, a reset or a change of
+    /// settings.
+    pub settling: u32,
 }

@@ -53,6 +53,7 @@ fn longest_channel() -> Message {
         lost: u64::MAX,
         refused: u64::MAX,
         replaced: u64::MAX,
+        self_test_failed: true,
     })
 }
 

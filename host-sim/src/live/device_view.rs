@@ -101,7 +101,7 @@ impl LatestMessages {
         };
         let first = self.channels.values().find(|report| report.channel == Channel::GyroX as u8);
         let samples = first.map_or(0, |report| report.samples);
-        let length = span((samples + first.map_or(0, |report| report.missing)) as f64 / hello.sample_rate_hz);
+        let length = span((samples + first.map_or(0, |report| report.missing)) as f64 / rate_hz(hello));
         let rate = plain(hello.sample_rate_hz, 4);
         let epoch = match hello.epoch_s {
             0 => "The epoch has no end: no model is learned. e 3600 makes epochs of an hour.".to_owned(),
@@ -131,7 +131,7 @@ impl LatestMessages {
                 count(samples)
             ),
             sentences: format!("{lost} {epoch}{measured}"),
-            tables: tables_of_channels(&self.coefficients(), hello.sample_rate_hz),
+            tables: tables_of_channels(&self.coefficients(), rate_hz(hello)),
             curves: self.channels.values().filter_map(|report| curve(report, hello)).collect(),
             findings: findings.iter().map(finding_text::describe).collect(),
             unexplained: None,
@@ -192,6 +192,11 @@ fn channel_at(position: u8) -> Option<Channel> {
     Channel::ALL.get(usize::from(position)).copied()
 }
 
+/// The sample rate with which a report was made.
+fn rate_hz(hello: &Hello) -> f64 {
+    hello.measured_rate_hz.unwrap_or(hello.sample_rate_hz)
+}
+
 /// The Allan deviation of a channel in its unit; `None` for temperature and supply.
 fn curve(report: &ChannelMessage, hello: &Hello) -> Option<LiveCurve> {
     let channel = channel_at(report.channel).filter(|channel| Channel::INERTIAL.contains(channel))?;
@@ -203,7 +208,7 @@ fn curve(report: &ChannelMessage, hello: &Hello) -> Option<LiveCurve> {
     let point = |octave: &link::ReportedOctave| {
         let n = octave.n as f64;
         let variance = octave.sum as f64 / (2.0 * n * n * octave.count as f64) - f64::from(octave.interpolation);
-        (n / hello.sample_rate_hz, channel.lsb(range) * variance.max(0.0).sqrt())
+        (n / rate_hz(hello), channel.lsb(range) * variance.max(0.0).sqrt())
     };
     let points = report.octaves.iter().map(point).collect();
     Some(LiveCurve { channel: channel.name().to_owned(), unit: channel.unit().to_owned(), points })

@@ -71,7 +71,8 @@ fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
             _ => {}
         }
     }
-    let expected = on_host(&sensor.bursts, samples);
+    let rates: Vec<Option<f64>> = decoded.hellos().iter().map(|hello| hello.measured_rate_hz).collect();
+    let expected = on_host(&sensor.bursts, samples, &rates);
     assert_eq!((&learned, &validated), (&expected.0, &expected.1), "bit for bit");
     let times = |wanted: fn(&Received) -> bool| -> Vec<f64> {
         let mut decoder = Decoder::new();
@@ -87,8 +88,12 @@ fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
 }
 
 /// The same messages, computed on the host from the bursts that the sensor sent. `samples` are those of one epoch or two,
-/// channel by channel.
-fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
+/// channel by channel, and `rates` the sample rates that the microcontroller has measured in each.
+fn on_host(
+    bursts: &[(u64, [u8; BURST_BYTES])],
+    samples: &[u64],
+    rates: &[Option<f64>],
+) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
     assert_eq!(FIRST_CONFIG.sample_period(), SamplePeriod::nearest(RATE_HZ).expect("a rate"));
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
@@ -96,28 +101,36 @@ fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], samples: &[u64]) -> (Vec<Learned
     estimators.mark_probed(at_us(bursts[0].0));
     let mut bursts = bursts.iter();
     let mut epochs = Vec::new();
-    for (number, samples) in (0..).zip(samples.chunks(CHANNELS.len())) {
+    for ((number, samples), rate_hz) in (0..).zip(samples.chunks(CHANNELS.len())).zip(rates) {
         assert!(
             samples.iter().all(|other| *other == samples[0]),
             "all channels of an epoch have taken the same samples"
         );
-        for (sample, bytes) in bursts.by_ref().take(samples[0] as usize) {
+        // The first bursts after the start are not used: the filter settles.
+        while estimators.channel(0).is_some_and(|estimator| estimator.len() < samples[0])
+            && let Some((sample, bytes)) = bursts.next()
+        {
             let arrival = TimedBurst { at_us: at_us(*sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) };
             estimators.process(arrival, 0);
         }
         let mut epoch = FinishedEpoch::EMPTY;
         epoch.number = number;
         epoch.fill(&mut estimators);
+        epoch.measured_hz = *rate_hz;
         epochs.push(epoch);
     }
     let (first, second) = (&epochs[0], epochs.get(1));
     let means = first.covariances().expect("no restart").means;
+    let scale = first.scale(FIRST_CONFIG);
     let fit = |index: usize| {
-        let mut fit = EpochFit::new(estimate_regressors(first, index, FIRST_CONFIG, &mut || true)?);
-        fit.run(first, index, FIRST_CONFIG, &mut || true).then_some(fit)
+        let mut fit = EpochFit::new(estimate_regressors(first, index, scale, &mut || true)?);
+        fit.run(first, index, scale, &mut || true).then_some(fit)
     };
     let fits: Vec<EpochFit> = (0..6).map(|index| fit(index).expect("a fit that is not cancelled")).collect();
-    let validation = |index: usize| validate(&fits[index].model(), Some(&means), second?, index, FIRST_CONFIG);
+    let validation = |index: usize| {
+        let second = second?;
+        validate(&fits[index].model(), Some(&means), second, index, second.scale(FIRST_CONFIG))
+    };
     let learned = fits.iter().enumerate().map(|(index, fit)| fit.message(index, first.number)).collect();
     (learned, (0..6).filter_map(validation).collect())
 }
@@ -202,7 +215,9 @@ fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
         learned.filter_map(|m| if let Message::Learned(m) = m { Some(m.clone()) } else { None }).collect()
     };
     assert!(learned(&before).len() < 6, "the reset came too late");
-    assert_eq!(learned(&after), on_host(&bursts, &samples).0, "bit for bit");
+    // The epoch was finished, and its rate measured, before the reset.
+    let rates: Vec<Option<f64>> = before.hellos().iter().map(|hello| hello.measured_rate_hz).collect();
+    assert_eq!(learned(&after), on_host(&bursts, &samples, &rates).0, "bit for bit");
 
     let running = after.channels()[after.channels().len() - CHANNELS.len()].samples as f64;
     let sampled_s = running / RATE_HZ;

@@ -1,7 +1,7 @@
 //! The output of an image, decoded by the host's decoder, and the report that the host computes from the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
-use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, Statistics, TimedBurst};
+use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, Scale, Statistics, TimedBurst};
 use link::{ChannelMessage, Decoder, DecoderCounters, Health, Hello, Message, RawMessage, Received};
 
 pub(crate) struct Decoded {
@@ -64,17 +64,18 @@ impl Decoded {
 }
 
 /// The report of a channel that the firmware's estimators make on the host from the first bursts, until they have taken
-/// as many samples as `report`.
-pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], rate_hz: f64, report: &ChannelMessage) -> ChannelMessage {
-    in_stretches(&[bursts], rate_hz, report)
+/// as many samples as `report`, which belongs to `hello`.
+pub(crate) fn on_host(bursts: &[(u64, [u8; BURST_BYTES])], hello: &Hello, report: &ChannelMessage) -> ChannelMessage {
+    in_stretches(&[bursts], hello, report)
 }
 
 /// [`on_host`] with bursts in several stretches; each but the first starts as the image does after a restart.
 pub(crate) fn in_stretches(
     stretches: &[&[(u64, [u8; BURST_BYTES])]],
-    rate_hz: f64,
+    hello: &Hello,
     report: &ChannelMessage,
 ) -> ChannelMessage {
+    let rate_hz = hello.sample_rate_hz;
     let index = CHANNELS.iter().position(|&channel| channel as u8 == report.channel).expect("a channel");
     let period = SamplePeriod::nearest(rate_hz).expect("a rate");
     let config = adis16405_driver::Config::new(GyroRange::Dps300, 0, period).expect("no filter");
@@ -96,6 +97,6 @@ pub(crate) fn in_stretches(
     }
     let channel = CHANNELS[index];
     let sums = ChannelSums::from_estimator(&estimator);
-    let model = (index < 6).then(|| sums.fit_baseline(channel, config));
+    let model = (index < 6).then(|| sums.fit_baseline(channel, Scale::new(config, hello.measured_rate_hz)));
     sums.report(channel, model.as_ref(), None)
 }

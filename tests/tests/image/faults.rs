@@ -94,7 +94,7 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     let hello =
         before.iter().rev().find_map(|message| if let Message::Hello(hello) = message { Some(hello) } else { None });
     let periods = (hello.expect("a report begins with its hello").uptime_us as f64 * 1e-6 - CONFIGURED_S) * rate_hz;
-    let counted = f64::from(flood.bursts + flood.lost_edges + flood.suspect);
+    let counted = f64::from(flood.bursts + flood.lost_edges + flood.suspect + flood.settling);
     assert!(
         (periods - 0.07 * rate_hz..periods + 2.0 * rate_hz).contains(&counted),
         "{counted} of {periods}: {flood:?}"
@@ -125,7 +125,7 @@ fn a_reset_by_pin_costs_at_most_a_second_of_statistics() {
         // The report is made channel by channel while sampling continues, so a channel may lack the latest samples.
         let kept = (0..used).map(|fewer| report.samples as usize - (used - fewer)).find(|&kept| {
             let stretches = [&before[..kept.min(before.len())], after];
-            kept <= before.len() && in_stretches(&stretches, 204.8, report).octaves == report.octaves
+            kept <= before.len() && in_stretches(&stretches, &hello, report).octaves == report.octaves
         });
         let kept = kept.expect("the sums of two stretches");
         assert!((before.len() - kept) as f64 <= 1.2 * 204.8, "{kept} of {} samples kept", before.len());
@@ -148,7 +148,7 @@ fn report_after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
     assert!(hello.sampling, "{hello:?}");
     assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{health:?}");
     let up_s = hello.uptime_us as f64 * 1e-6;
-    let counted_s = f64::from(health.bursts) / RATE_HZ;
+    let counted_s = f64::from(health.bursts + health.settling) / RATE_HZ;
     assert!((up_s - 0.07..up_s + REPORT_S).contains(&counted_s), "{counted_s} s of bursts, up for {up_s} s");
     assert!(sensor.is_some_and(|sensor| sensor.bursts.len() as u32 >= health.bursts));
     (hello, health)

@@ -65,10 +65,11 @@ fn assert_no_sample_lost_in(seconds: f64) {
     let health = **decoded.healths().last().expect("a report");
     assert_eq!((health.used, health.lost_edges + health.spurious_edges + health.queue_full), (health.bursts, 0));
     assert_eq!((health.recoveries, health.raw_dropped, health.serial_overruns), (0, 0, 0), "{health:?}");
-    let channels = decoded.channels();
+    let (channels, hellos) = (decoded.channels(), decoded.hellos());
+    let hello = hellos.last().expect("a report");
     for report in &channels[channels.len() - 8..] {
         assert_eq!(report.missing, 0);
-        assert_eq!(**report, on_host(bursts, RATE_HZ, report), "bit for bit");
+        assert_eq!(**report, on_host(bursts, hello, report), "bit for bit");
     }
     let measured = decoded.hellos().last().and_then(|hello| hello.measured_rate_hz).expect("a rate");
     assert!((measured / RATE_HZ - 1.0).abs() < 1e-6, "{measured} Hz");

@@ -81,7 +81,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
         let factors: Vec<u64> = (0..24).map(|octave| 1 << octave).filter(|n| 2 * n <= report.samples).collect();
         assert!(report.octaves.iter().map(|point| point.n).eq(factors));
         assert_eq!(report.coefficients.len(), if channel.unit() == "degC" || channel.unit() == "V" { 0 } else { 3 });
-        assert_eq!(*report, on_host(&sensor.bursts, 204.8, report), "bit for bit");
+        assert_eq!(*report, on_host(&sensor.bursts, hello, report), "bit for bit");
     }
     assert_eq!(channels.len(), 8);
 

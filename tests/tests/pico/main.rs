@@ -45,7 +45,7 @@ fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
     assert_eq!(decoded.channels().len(), 8, "a whole report");
     for report in decoded.channels() {
         assert!(report.samples as f64 > 1.6 * RATE_HZ && report.missing == 0, "{report:?}");
-        assert_eq!(*report, on_host(bursts, RATE_HZ, report), "bit for bit");
+        assert_eq!(*report, on_host(bursts, hello, report), "bit for bit");
     }
     let health = decoded.healths()[0];
     assert_eq!((health.used, health.lost_edges, health.queue_full), (health.bursts, 0, 0), "{health:?}");

@@ -1,0 +1,37 @@
+//! What turns counts and numbers of samples into units: the size of a count, and the time between two samples.
+
+use adis16405_driver::{Channel, Config};
+
+/// Configuration and sample rate of a stream of samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    config: Config,
+    rate_hz: f64,
+}
+
+impl Scale {
+    /// With the measured rate in Hz, or the programmed one where none was measured. The sensor's clock is within 3 % of its
+    /// nominal rate (ADIS16400/ADIS16405 data sheet Rev. B, Table 1), and σ(τ) scales N by the root of that error.
+    #[must_use]
+    pub fn new(config: Config, measured_hz: Option<f64>) -> Self {
+        Self { config, rate_hz: measured_hz.unwrap_or(config.sample_period().hz()) }
+    }
+
+    /// Samples a second.
+    #[must_use]
+    pub fn rate_hz(self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Time between two samples in s.
+    #[must_use]
+    pub fn period_s(self) -> f64 {
+        1.0 / self.rate_hz
+    }
+
+    /// Size of a count of a channel in its unit.
+    #[must_use]
+    pub fn lsb(self, channel: Channel) -> f64 {
+        channel.lsb(self.config.range())
+    }
+}
