@@ -1,6 +1,8 @@
-//! Hands the linker the board's memory map; does nothing for a host build.
+//! Gives the program the hash of what it is built from, and hands the linker the board's memory map.
 
-use std::{env, fs, path::PathBuf};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 /// Feature of each board, as cargo spells it here, and its memory map.
 const BOARDS: [(&str, &str); 3] = [
@@ -9,8 +11,21 @@ const BOARDS: [(&str, &str); 3] = [
     ("CARGO_FEATURE_BOARD_PICO", "memory/rp2040.x"),
 ];
 
+/// Folders and files that a program is built from, seen from this package: what it retains over a restart is not for a program of
+/// other sources.
+const SOURCES: [&str; 8] = [
+    "src",
+    "memory",
+    "Cargo.toml",
+    "link/src",
+    "../adis16405-driver/src",
+    "../allan-core/src",
+    "../Cargo.toml",
+    "../Cargo.lock",
+];
+
 fn main() {
-    println!("cargo:rerun-if-changed=memory");
+    println!("cargo:rustc-env=FIRMWARE_BUILD={}", build_hash());
     let bare_metal = env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none");
     let board = BOARDS.iter().find(|(feature, _)| env::var_os(feature).is_some());
     let Some((_, map)) = board.filter(|_| bare_metal) else { return };
@@ -20,5 +35,32 @@ fn main() {
     // Functions that are the same to the byte are linked once.
     for argument in ["--nmagic", "--icf=all", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo:rustc-link-arg-bins={argument}");
+    }
+}
+
+/// Hash of the sources, the compiler's target and profile, and the features.
+fn build_hash() -> u32 {
+    let mut hasher = DefaultHasher::new();
+    for source in SOURCES {
+        println!("cargo:rerun-if-changed={source}");
+        hash_files(Path::new(source), &mut hasher);
+    }
+    let is_setting =
+        |name: &str| name.starts_with("CARGO_FEATURE_") || ["TARGET", "PROFILE", "OPT_LEVEL"].contains(&name);
+    let mut settings: Vec<(String, String)> = env::vars().filter(|(name, _)| is_setting(name)).collect();
+    settings.sort();
+    settings.hash(&mut hasher);
+    hasher.finish() as u32
+}
+
+/// Adds the names and contents of the files of a folder in the order of their names; of what does not exist the name alone.
+fn hash_files(path: &Path, hasher: &mut DefaultHasher) {
+    path.hash(hasher);
+    if let Ok(entries) = fs::read_dir(path) {
+        let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        inside.sort();
+        inside.iter().for_each(|entry| hash_files(entry, hasher));
+    } else {
+        fs::read(path).unwrap_or_default().hash(hasher);
     }
 }

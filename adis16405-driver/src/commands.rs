@@ -71,7 +71,8 @@ const SLEEP_INDEFINITELY: u16 = 1 << 8;
 impl Protocol<'_> {
     pub(crate) async fn identity(&self) -> Result<Product, ProtocolError> {
         let answer = self.read(Register::ProdId).await;
-        Product::from_prod_id(answer).ok_or(Error::Product { answer })
+        let overridden = (self.state.prod_id == Some(answer)).then_some(Product::Adis16405);
+        Product::from_prod_id(answer).or(overridden).ok_or(Error::Product { answer })
     }
 
     pub(crate) async fn diagnosis(&self) -> Result<Diagnosis, ProtocolError> {

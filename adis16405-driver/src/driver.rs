@@ -81,6 +81,13 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         self
     }
 
+    /// Takes a part whose PROD_ID answers `prod_id` for an ADIS16405. A working part that answers 0x0003 is known.
+    #[must_use]
+    pub fn with_prod_id(mut self, prod_id: u16) -> Self {
+        self.state.prod_id = Some(prod_id);
+        self
+    }
+
     /// The configuration that [`init`](Self::init) writes, or the one that was set since.
     pub fn config(&self) -> Config {
         self.state.config

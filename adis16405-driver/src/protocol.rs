@@ -121,6 +121,8 @@ pub(crate) struct DriverState {
     pub(crate) stimulated: bool,
     /// True if the part is known to have `config`.
     pub(crate) configured: bool,
+    /// A further answer of PROD_ID that is taken for an ADIS16405.
+    pub(crate) prod_id: Option<u16>,
 }
 
 impl DriverState {
@@ -136,6 +138,7 @@ impl DriverState {
             x_sign_at_risk: false,
             configured: false,
             stimulated: false,
+            prod_id: None,
         }
     }
 

@@ -34,6 +34,23 @@ pub struct TimedBurst {
     pub burst: Option<Burst>,
 }
 
+/// Edges in [`OSCILLATION_US`] from which on the data-ready line is masked: a sensor gives 1.2 a millisecond at most, with an
+/// external clock of 1.2 kHz. Each edge costs an interrupt, and a line that oscillates would leave the processor no time.
+const OSCILLATION_EDGES: u32 = 16;
+/// Time in which they come, in µs.
+const OSCILLATION_US: u64 = 1_000;
+
+/// What is to be done at a data-ready edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EdgeAction {
+    /// Nothing: sampling is disabled, or a burst is being transferred.
+    Ignore,
+    /// Start the transfer of a burst.
+    StartBurst,
+    /// Ignore further edges until sampling is enabled again: the line oscillates.
+    Mask,
+}
+
 /// Transfers of bursts, counted modulo 2³².
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SamplingActivity {
@@ -41,6 +58,10 @@ pub struct SamplingActivity {
     pub started: u32,
     /// Transfers ended, whether the burst was queued or dropped.
     pub ended: u32,
+    /// Times that the data-ready line was masked, since it oscillated.
+    pub masked: u32,
+    /// Whether it is masked now.
+    pub is_masked: bool,
 }
 
 /// Decides at each data-ready edge whether a burst is read, and queues the bursts. It never blocks.
@@ -51,17 +72,22 @@ pub struct Sampler<'q> {
     reading: Option<u64>,
     dropped: u32,
     activity: SamplingActivity,
+    /// Edges since this time, in µs.
+    edges: (u32, u64),
 }
 
 impl<'q> Sampler<'q> {
     /// A sampler that ignores edges until it is [enabled](Self::set_enabled).
     pub fn new(queue: spsc::Producer<'q, TimedBurst>) -> Self {
-        Self { queue, enabled: false, reading: None, dropped: 0, activity: SamplingActivity { started: 0, ended: 0 } }
+        Self { queue, enabled: false, reading: None, dropped: 0, activity: SamplingActivity::default(), edges: (0, 0) }
     }
 
     /// Enables or disables sampling. A transfer in progress is completed and queued.
     pub fn set_enabled(&mut self, enabled: bool) {
         self.enabled = enabled;
+        if enabled {
+            self.activity.is_masked = false;
+        }
     }
 
     /// Whether a burst is being transferred.
@@ -76,18 +102,29 @@ impl<'q> Sampler<'q> {
         self.activity
     }
 
-    /// To be called at every data-ready edge; returns whether the transfer of a burst must be started now.
+    /// To be called at every data-ready edge; returns what must be done now.
     ///
     /// An edge during a transfer starts none: its sample is lost, which
     /// [`DataReadyMonitor`] concludes from the time to the next edge.
     #[must_use]
-    pub fn data_ready(&mut self, at_us: u64) -> bool {
-        let start = self.enabled && self.reading.is_none();
-        if start {
-            self.reading = Some(at_us);
-            self.activity.started = self.activity.started.wrapping_add(1);
+    pub fn data_ready(&mut self, at_us: u64) -> EdgeAction {
+        let (edges, since_us) = &mut self.edges;
+        if at_us.saturating_sub(*since_us) > OSCILLATION_US {
+            (*edges, *since_us) = (0, at_us);
         }
-        start
+        *edges += 1;
+        if *edges >= OSCILLATION_EDGES {
+            *edges = 0;
+            self.activity.masked = self.activity.masked.wrapping_add(1);
+            self.activity.is_masked = true;
+            return EdgeAction::Mask;
+        }
+        if !self.enabled || self.reading.is_some() {
+            return EdgeAction::Ignore;
+        }
+        self.reading = Some(at_us);
+        self.activity.started = self.activity.started.wrapping_add(1);
+        EdgeAction::StartBurst
     }
 
     /// To be called at the end of a transfer with the bytes received, or `None` if it failed.

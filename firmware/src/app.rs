@@ -1,10 +1,11 @@
 //! The application's main loop: commands, checkpoints, epochs and learning, reports.
 
-use crate::board::{Board, BoardContext, Chip};
+use crate::board::{Board, BoardContext, BrownOutLevel, Chip};
 use crate::command::{CommandError, CommandParser, DeviceCommand};
 use crate::console::{Answer, Console, VERSION_LINE};
+use crate::counters::CounterLog;
 use crate::device::{
-    DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers,
+    DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers, log,
 };
 use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
@@ -47,12 +48,13 @@ pub struct App {
     checkpoint_channel: usize,
     armed_until_us: u64,
     tasks: TaskMonitor,
+    counter_log: CounterLog,
 }
 
 /// Runs the application on a board, without end.
-pub fn run<'r, C: Chip, T, B, S, E, Q>(mut board: BoardContext<'r, C, T, B, S, E, Q>, start: Start) -> !
+pub fn run<'r, C: Chip, T, B, S, D, E, Q>(mut board: BoardContext<'r, C, T, B, S, D, E, Q>, start: Start) -> !
 where
-    BoardContext<'r, C, T, B, S, E, Q>: Board,
+    BoardContext<'r, C, T, B, S, D, E, Q>: Board,
 {
     let mut app = App::new(start, &mut board);
     loop {
@@ -105,7 +107,7 @@ impl App {
                 product_id: 0,
                 sensor: SensorState::Probing { at_us: probe_us, step: None },
                 learner: Learner::new(finished),
-                epoch_start_us: now_us,
+                epoch_start_us: now_us as i64 - settings.epoch_age_us as i64,
                 bad_commands: 0,
                 recovery: SensorRecovery::default(),
                 status_flags: StatusFlags::new(),
@@ -120,6 +122,7 @@ impl App {
             checkpoint_channel: 0,
             armed_until_us: 0,
             tasks: TaskMonitor::new(now_us),
+            counter_log: CounterLog::new(),
         }
     }
 
@@ -219,6 +222,23 @@ impl App {
                 self.print(board, format_args!("stream of raw bursts {}", if on { "on" } else { "off" }));
             }
             DeviceCommand::SelfTest => self.state.request_check(now_us, board),
+            DeviceCommand::ProductId(prod_id) => {
+                self.state.settings.prod_id = prod_id;
+                self.retained.write_settings(self.state.settings, false);
+                match prod_id {
+                    0 => self.print(board, format_args!("parts with the PROD_ID of their type")),
+                    _ => self.print(board, format_args!("a part that answers PROD_ID {prod_id} is an ADIS16405")),
+                }
+                self.state.request_check(now_us, board);
+            }
+            DeviceCommand::BrownOut => match board.program_brown_out() {
+                BrownOutLevel::Fixed => self.print(board, format_args!("this board sets its brown-out level itself")),
+                BrownOutLevel::Set => self.print(board, format_args!("brown-out: 2.7 V, as before")),
+                BrownOutLevel::Programmed => {
+                    log(board, format_args!("option bytes written: brown-out level 2.7 V, after the supply was off"));
+                }
+                BrownOutLevel::Failed => log(board, format_args!("option bytes not written")),
+            },
             DeviceCommand::ArmAutoNull => {
                 self.armed_until_us = now_us + ARMED_US;
                 self.print(board, format_args!("keep the sensor still; autonull within 10 s nulls its bias"));
@@ -230,6 +250,7 @@ impl App {
 
     fn restart(&mut self, board: &mut impl Board) {
         (0..CHANNELS.len()).for_each(|index| self.checkpoint_channel(board, index));
+        self.checkpoint_age(board.now_us());
         board.restart();
     }
 
@@ -286,7 +307,8 @@ impl App {
 
     // Checkpoints and timers
 
-    /// Writes one channel after the other to retained RAM, all of them once in 0.8 s: a restart loses no more than that. What
+    /// Writes one channel after the other, and then the age of the epoch, to retained RAM, all of them once in 0.8 s: a restart
+    /// loses no more than that. What
     /// became due during a long step of a fit is written at once.
     fn checkpoint(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
@@ -297,8 +319,16 @@ impl App {
             self.next_checkpoint_us += CHECKPOINT_US;
             self.checkpoint_channel = (self.checkpoint_channel + 1) % CHANNELS.len();
             self.checkpoint_channel(board, self.checkpoint_channel);
+            if self.checkpoint_channel == 0 {
+                self.checkpoint_age(now_us);
+            }
         }
         self.next_checkpoint_us = self.next_checkpoint_us.max(now_us);
+    }
+
+    fn checkpoint_age(&mut self, now_us: u64) {
+        self.state.settings.epoch_age_us = self.state.epoch_age_us(now_us);
+        self.retained.write_settings(self.state.settings, false);
     }
 
     fn checkpoint_channel(&mut self, board: &mut impl Board, index: usize) {
@@ -307,8 +337,11 @@ impl App {
 
     fn check_timers(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
+        if self.counter_log.is_due(now_us) {
+            self.counter_log.compare(&self.state.health(board), now_us);
+        }
         let epoch_us = u64::from(self.state.settings.epoch_s) * 1_000_000;
-        if epoch_us > 0 && now_us >= self.state.epoch_start_us + epoch_us {
+        if epoch_us > 0 && self.state.epoch_age_us(now_us) >= epoch_us {
             self.finish_epoch(board);
         }
         let interval_us = interval_us(self.state.settings);
@@ -346,7 +379,8 @@ impl App {
     }
 
     fn start_epoch(&mut self, board: &mut impl Board) {
-        self.state.epoch_start_us = board.now_us();
+        self.state.epoch_start_us = board.now_us() as i64;
+        self.state.settings.epoch_age_us = 0;
         self.retained.write_settings(self.state.settings, true);
     }
 

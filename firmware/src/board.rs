@@ -106,6 +106,23 @@ pub trait Board {
     fn feed_watchdog(&mut self);
     /// Restarts the microcontroller; retained RAM keeps its content.
     fn restart(&mut self);
+    /// Programs the level of the supply below which the microcontroller is reset into memory that keeps it.
+    fn program_brown_out(&mut self) -> BrownOutLevel {
+        BrownOutLevel::Fixed
+    }
+}
+
+/// The brown-out level of a microcontroller after the request to program it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BrownOutLevel {
+    /// It needs no programming: it is set at every start, or cannot be set.
+    Fixed,
+    /// It was programmed before.
+    Set,
+    /// It was programmed now.
+    Programmed,
+    /// It could not be programmed.
+    Failed,
 }
 
 /// Load figures of a board since it started.
@@ -164,16 +181,26 @@ pub trait Chip {
     fn restart(&mut self);
     /// Load figures, without the time asleep.
     fn meters(&mut self) -> BoardMeters;
+    /// Programs the brown-out level.
+    fn program_brown_out(&mut self) -> BrownOutLevel;
+}
+
+/// The data-ready line, whose edges raise an interrupt.
+pub trait DataReadyLine {
+    /// Ignores edges, or takes them again; those that came meanwhile are forgotten.
+    fn set_masked(&mut self, masked: bool);
 }
 
 /// What the main loop shares with the interrupts. Each lock disables only the interrupts that share the resource.
-pub struct Locks<T, B, S, E, Q> {
+pub struct Locks<T, B, S, D, E, Q> {
     /// [`Uptime`], shared with sampling.
     pub uptime: T,
     /// The sensor's bus, shared with sampling.
     pub bus: B,
     /// [`Sampler`], shared with sampling.
     pub sampler: S,
+    /// The data-ready line, shared with sampling.
+    pub data_ready: D,
     /// [`Estimators`], shared with the estimators' interrupt.
     pub estimators: E,
     /// [`TransmitQueue`], shared with the estimators' interrupt.
@@ -181,9 +208,9 @@ pub struct Locks<T, B, S, E, Q> {
 }
 
 /// A [`Board`] made of a chip and of what it shares with its interrupts.
-pub struct BoardContext<'r, C, T, B, S, E, Q> {
+pub struct BoardContext<'r, C, T, B, S, D, E, Q> {
     chip: C,
-    locks: Locks<T, B, S, E, Q>,
+    locks: Locks<T, B, S, D, E, Q>,
     received: &'r mut spsc::Consumer<'static, u8>,
     asleep_us: u64,
     watchdog: WatchdogFeeder,
@@ -229,9 +256,9 @@ impl WatchdogExtension {
     }
 }
 
-impl<'r, C: Chip, T, B, S, E, Q> BoardContext<'r, C, T, B, S, E, Q> {
+impl<'r, C: Chip, T, B, S, D, E, Q> BoardContext<'r, C, T, B, S, D, E, Q> {
     /// `received` is the queue of bytes from the serial port.
-    pub fn new(chip: C, locks: Locks<T, B, S, E, Q>, received: &'r mut spsc::Consumer<'static, u8>) -> Self {
+    pub fn new(chip: C, locks: Locks<T, B, S, D, E, Q>, received: &'r mut spsc::Consumer<'static, u8>) -> Self {
         Self { chip, locks, received, asleep_us: 0, watchdog: WatchdogFeeder { fed_at: 0 } }
     }
 
@@ -246,12 +273,13 @@ impl<'r, C: Chip, T, B, S, E, Q> BoardContext<'r, C, T, B, S, E, Q> {
     }
 }
 
-impl<C, T, B, S, E, Q> Board for BoardContext<'_, C, T, B, S, E, Q>
+impl<C, T, B, S, D, E, Q> Board for BoardContext<'_, C, T, B, S, D, E, Q>
 where
     C: Chip,
     T: Mutex<T = Uptime>,
     B: Mutex<T: SensorBus>,
     S: Mutex<T = Sampler<'static>>,
+    D: Mutex<T: DataReadyLine>,
     E: Mutex<T = Estimators<'static>>,
     Q: Mutex<T = TransmitQueue<'static>>,
 {
@@ -284,7 +312,9 @@ where
 
     fn set_sampling(&mut self, enabled: bool) {
         self.locks.sampler.lock(|sampler| sampler.set_enabled(enabled));
-        if !enabled {
+        if enabled {
+            self.locks.data_ready.lock(|line| line.set_masked(false));
+        } else {
             let start = self.chip.microseconds();
             while self.locks.sampler.lock(|sampler| sampler.is_reading()) {
                 if self.chip.microseconds().wrapping_sub(start) > BURST_US {
@@ -323,6 +353,10 @@ where
 
     fn restart(&mut self) {
         self.chip.restart();
+    }
+
+    fn program_brown_out(&mut self) -> BrownOutLevel {
+        self.chip.program_brown_out()
     }
 }
 
@@ -396,6 +430,9 @@ mod tests {
         fn transmit(&mut self) {}
         fn abandon_burst(&mut self) {}
         fn restart(&mut self) {}
+        fn program_brown_out(&mut self) -> BrownOutLevel {
+            BrownOutLevel::Fixed
+        }
         fn meters(&mut self) -> BoardMeters {
             BoardMeters::default()
         }

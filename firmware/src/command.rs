@@ -4,7 +4,7 @@ use adis16405_driver::GyroRange;
 use heapless::Vec;
 
 /// The lines that `?` prints.
-pub const HELP: [&str; 19] = [
+pub const HELP: [&str; 21] = [
     "at the press of a key:",
     "?          this list",
     "r          report in frames, for a program",
@@ -19,11 +19,13 @@ pub const HELP: [&str; 19] = [
     "e SECONDS  length of an epoch, 0 for one without end",
     "i SECONDS  time between reports, 0 for none",
     "w 1, w 0   start and stop the stream of raw bursts",
+    "p ID       take a part with this PROD_ID for an ADIS16405, 0 for none",
     "check      self-test of the sensor",
     "arm        allow autonull for 10 s",
     "autonull   store the gyro output as the bias; keep the sensor still",
     "clear      reset the statistics",
     "boot       restart; the statistics are kept",
+    "brownout   program a reset below 2.7 V into the microcontroller",
 ];
 
 /// A valid command.
@@ -55,8 +57,12 @@ pub enum DeviceCommand {
     Interval(u32),
     /// Start or stop the stream of raw bursts.
     RawStream(bool),
+    /// Take a part that answers this PROD_ID for an ADIS16405, 0 for none.
+    ProductId(u16),
     /// Probe the sensor, self-test included.
     SelfTest,
+    /// Program the brown-out level into the microcontroller's option bytes.
+    BrownOut,
     /// Allow auto-null for 10 s.
     ArmAutoNull,
     /// Store the present gyro output as the bias in the sensor.
@@ -134,7 +140,7 @@ fn key(byte: u8) -> Option<DeviceCommand> {
 }
 
 /// Letters that a line may begin with.
-const LINE_STARTS: &[u8] = b"fgneiwcab";
+const LINE_STARTS: &[u8] = b"fgneiwcabp";
 
 fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
     match line {
@@ -143,6 +149,7 @@ fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
         b"autonull" => return Some(DeviceCommand::AutoNull),
         b"clear" => return Some(DeviceCommand::ResetStatistics),
         b"boot" => return Some(DeviceCommand::Restart),
+        b"brownout" => return Some(DeviceCommand::BrownOut),
         _ => {}
     }
     let (&letter, digits) = line.split_first()?;
@@ -158,6 +165,7 @@ fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
         (b'n', 0..=6) => Some(DeviceCommand::Filter(number as u8)),
         (b'e', _) => Some(DeviceCommand::Epoch(number)),
         (b'i', _) => Some(DeviceCommand::Interval(number)),
+        (b'p', _) => u16::try_from(number).ok().map(DeviceCommand::ProductId),
         (b'w', 0) => Some(DeviceCommand::RawStream(false)),
         (b'w', 1) => Some(DeviceCommand::RawStream(true)),
         _ => None,
@@ -221,13 +229,15 @@ mod tests {
     #[test]
     fn commands_that_change_something_are_whole_lines() {
         assert_eq!(
-            parse("clear\rcheck\narm\rautonull\rboot\r"),
+            parse("clear\rcheck\narm\rautonull\rboot\rbrownout\rp 3\r"),
             [
                 Ok(DeviceCommand::ResetStatistics),
                 Ok(DeviceCommand::SelfTest),
                 Ok(DeviceCommand::ArmAutoNull),
                 Ok(DeviceCommand::AutoNull),
                 Ok(DeviceCommand::Restart),
+                Ok(DeviceCommand::BrownOut),
+                Ok(DeviceCommand::ProductId(3)),
             ]
         );
         // After an unknown key the line is ignored, except the key `t`, which acts at once.
@@ -257,6 +267,7 @@ mod tests {
             "f1.2.3\r",
             "f1.2345x\r",
             "e4294968\r",
+            "p65536\r",
             "cl3ar\r",
             long,
         ] {

@@ -1,7 +1,9 @@
 //! Text for a person at a terminal: single lines, and answers of several lines that are made and sent one line at a time.
 
+use crate::bench_log::bench_log;
 use crate::board::Board;
 use crate::command::HELP;
+use crate::counters::counters;
 use crate::device::DeviceState;
 use crate::number_text::Decimal;
 use crate::report_text::{self, AnswerLine};
@@ -44,6 +46,7 @@ impl Console {
     /// Sends a text line, after those that wait. If too many wait, the oldest is dropped.
     pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = text_line(text);
+        bench_log(&line);
         if self.lines.is_empty() && board.transmit_queue(|queue| queue.send_text(&line)) {
             return;
         }
@@ -151,54 +154,10 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
 
 /// A line for each counter that is not 0.
 fn counter_line(health: &Health, index: usize) -> AnswerLine {
-    let counters = [
-        ("bursts", health.bursts),
-        ("used", health.used),
-        ("no_new_data", health.no_new_data),
-        ("error_alarm", health.error_alarm),
-        ("supply", health.supply),
-        ("stuck_low", health.stuck_low),
-        ("stuck_high", health.stuck_high),
-        ("shifted", health.shifted),
-        ("frozen", health.frozen),
-        ("impossible_rate", health.impossible_rate),
-        ("x_sign", health.x_sign),
-        ("repeated", health.repeated),
-        ("bus_errors", health.bus_errors),
-        ("queue_full", health.queue_full),
-        ("queue_peak", health.queue_peak),
-        ("lost_edges", health.lost_edges),
-        ("spurious_edges", health.spurious_edges),
-        ("suspect", health.suspect),
-        ("recoveries", health.recoveries),
-        ("raw_dropped", health.raw_dropped),
-        ("serial_overruns", health.serial_overruns),
-        ("bad_commands", health.bad_commands),
-        ("awake_permille", health.awake_permille),
-        ("sampling_cycles", health.sampling_cycles),
-        ("estimator_cycles", health.estimator_cycles),
-        ("stack_bytes", health.stack_bytes),
-        ("stack_size", health.stack_size),
-        ("partly_used", health.partly_used),
-        ("marked", health.marked),
-        ("implausible_supply", health.implausible_supply),
-        ("diag_reads", health.diag_reads),
-        ("diag_supply_low", health.diag_supply_low),
-        ("diag_supply_high", health.diag_supply_high),
-        ("diag_flash_update", health.diag_flash_update),
-        ("diag_spi", health.diag_spi),
-        ("diag_over_range", health.diag_over_range),
-        ("diag_self_test", health.diag_self_test),
-        ("diag_flash_checksum", health.diag_flash_checksum),
-        ("diag_alarm", health.diag_alarm),
-        ("rereads", health.rereads),
-        ("bus_resets", health.bus_resets),
-        ("sensor_resets", health.sensor_resets),
-        ("reset_lines", health.reset_lines),
-        ("settling", health.settling),
-    ];
-    match counters.get(index) {
-        Some((name, count)) => (*count > 0).then(|| text_line(format_args!("{name} {count}"))).into(),
+    match counters(health).get(index) {
+        Some(counter) => {
+            (counter.value > 0).then(|| text_line(format_args!("{} {}", counter.name, counter.value))).into()
+        }
         None => AnswerLine::End,
     }
 }

@@ -1,6 +1,7 @@
 //! State of the device, and supervision of the sensor: it is probed before its samples are used, recovered when it is in
 //! trouble, and its status register is read when it reports an error.
 
+use crate::bench_log::bench_log;
 use crate::board::Board;
 use crate::channels::{CHANNELS, ChannelSet};
 use crate::learner::Learner;
@@ -29,6 +30,8 @@ pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
     epoch: 0,
     interval_s: 10,
     starts: 0,
+    epoch_age_us: 0,
+    prod_id: 0,
 };
 
 /// Time between two probes of a sensor that does not answer.
@@ -50,7 +53,8 @@ pub(crate) struct DeviceState {
     pub(crate) product_id: u16,
     pub(crate) sensor: SensorState,
     pub(crate) learner: Learner,
-    pub(crate) epoch_start_us: u64,
+    /// When the running epoch began, in µs since the start; negative if that was before.
+    pub(crate) epoch_start_us: i64,
     pub(crate) bad_commands: u32,
     pub(crate) recovery: SensorRecovery,
     pub(crate) status_flags: StatusFlags,
@@ -100,8 +104,12 @@ impl DeviceState {
         matches!(self.sensor, SensorState::Sampled { .. })
     }
 
+    pub(crate) fn epoch_age_us(&self, now_us: u64) -> u64 {
+        (now_us as i64 - self.epoch_start_us).max(0) as u64
+    }
+
     pub(crate) fn epoch_age_s(&self, now_us: u64) -> u64 {
-        (now_us - self.epoch_start_us) / 1_000_000
+        self.epoch_age_us(now_us) / 1_000_000
     }
 
     /// The counters of sampling, estimating and the application and the load figures of the board.
@@ -115,6 +123,7 @@ impl DeviceState {
             bus_resets: recovery.bus_resets,
             sensor_resets: recovery.sensor_resets,
             reset_lines: recovery.reset_lines,
+            data_ready_masked: board.sampling_activity().masked,
             bad_commands: self.bad_commands,
             serial_overruns: meters.serial_overruns,
             awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
@@ -170,6 +179,7 @@ impl DeviceState {
         let last_edge_us = board.estimators(|estimators| estimators.last_edge_us());
         board.set_sampling(false);
         let (reason, cause, left_alone_us) = match trouble {
+            _ if board.sampling_activity().is_masked => ("the data-ready line oscillates and is masked", "", 0),
             // It may have lost its supply, and must not be clocked while it starts up.
             SensorTrouble::NoEdges => ("no data-ready edges", "", last_edge_us.unwrap_or(0) + START_UP_US),
             SensorTrouble::EdgeRate => ("silent, or edges at another rate", "", 0),
@@ -214,7 +224,8 @@ impl DeviceState {
         }
         // The sensor may be in low-power mode until it is configured.
         board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-        let result = probe(board.sensor_bus(), self.config, scope).map_err(|error| text_line(format_args!("{error}")));
+        let result = probe(board.sensor_bus(), self.config, scope, self.settings.prod_id)
+            .map_err(|error| text_line(format_args!("{error}")));
         self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {
             Ok(identity) => {
@@ -312,6 +323,7 @@ fn count(counter: &mut u32) {
 /// Sends a text as a log message, which host programs receive too.
 pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
+    bench_log(&line);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));
 }
 

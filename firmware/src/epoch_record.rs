@@ -14,16 +14,17 @@ const OCTAVE_WORDS: usize = 10;
 pub(crate) const SUMS_WORDS: usize = 4 + OCTAVES * OCTAVE_WORDS;
 /// Largest sum that is stored.
 pub(crate) const MAX_SUM: u128 = (1 << 96) - 1;
-/// Words of an epoch: its number, the measured sample rate, the sums, whether the covariances are complete, and their means and pairs of 64 bits each.
-const EPOCH_WORDS: usize = 4 + CHANNELS.len() * SUMS_WORDS + 2 * (CHANNELS.len() + PAIRS.len() * CROSS_OCTAVES);
+/// Words of an epoch: the sensor's settings, its number, the measured sample rate, the sums, whether the covariances are complete, and their means and pairs of 64 bits each.
+const EPOCH_WORDS: usize = 5 + CHANNELS.len() * SUMS_WORDS + 2 * (CHANNELS.len() + PAIRS.len() * CROSS_OCTAVES);
 /// Marks a record, in its first word. Changes with the layout.
-const MAGIC: u32 = 0xAD17_E003;
+const MAGIC: u32 = 0xAD17_E004;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// CRC-32 of words, each with its least significant byte first.
-pub(crate) fn checksum(words: &[AtomicU32]) -> u32 {
+/// CRC-32 of the hash of a build and of words, each with its least significant byte first.
+pub(crate) fn checksum(build: u32, words: &[AtomicU32]) -> u32 {
     let mut digest = CRC.digest();
+    digest.update(&build.to_le_bytes());
     for word in words {
         digest.update(&word.load(Relaxed).to_le_bytes());
     }
@@ -93,26 +94,26 @@ impl EpochRecord {
         Self([const { AtomicU32::new(0) }; EPOCH_WORDS + 2])
     }
 
-    /// Writes an epoch in the place of the one before.
-    pub(crate) fn write(&self, epoch: &FinishedEpoch) {
+    /// Writes an epoch, whose samples a sensor with these settings has taken, in the place of the one before.
+    pub(crate) fn write(&self, epoch: &FinishedEpoch, build: u32, of_sensor: u32) {
         let covariances = &epoch.covariances;
         let floats = covariances.means.iter().chain(covariances.pairs.as_flattened()).map(|value| value.to_bits());
-        let head = [MAGIC, epoch.number, u32::from(covariances.complete)];
+        let head = [MAGIC, of_sensor, epoch.number, u32::from(covariances.complete)];
         let rate = halves(epoch.measured_hz.unwrap_or(0.0).to_bits());
         let words =
             head.into_iter().chain(rate).chain(epoch.sums.iter().flat_map(sums_words)).chain(floats.flat_map(halves));
         for (cell, word) in self.0[..=EPOCH_WORDS].iter().zip(words) {
             cell.store(word, Relaxed);
         }
-        self.0[EPOCH_WORDS + 1].store(checksum(&self.0[..=EPOCH_WORDS]), Relaxed);
+        self.0[EPOCH_WORDS + 1].store(checksum(build, &self.0[..=EPOCH_WORDS]), Relaxed);
     }
 
     /// Overwrites `epoch` with the one that was written last. Returns false, and leaves `epoch` alone, if there is none or it
-    /// was damaged.
-    pub(crate) fn restore(&self, epoch: &mut FinishedEpoch) -> bool {
+    /// was damaged, or is of another build or of a sensor with other settings.
+    pub(crate) fn restore(&self, epoch: &mut FinishedEpoch, build: u32, of_sensor: u32) -> bool {
         let mut words = self.0[..=EPOCH_WORDS].iter().map(|cell| cell.load(Relaxed));
-        let intact = self.0[EPOCH_WORDS + 1].load(Relaxed) == checksum(&self.0[..=EPOCH_WORDS]);
-        if words.next() != Some(MAGIC) || !intact {
+        let intact = self.0[EPOCH_WORDS + 1].load(Relaxed) == checksum(build, &self.0[..=EPOCH_WORDS]);
+        if words.next() != Some(MAGIC) || words.next() != Some(of_sensor) || !intact {
             return false;
         }
         epoch.number = words.next().unwrap_or(0);
@@ -166,22 +167,22 @@ mod tests {
     fn an_epoch_is_restored_as_it_was_written() {
         let (record, written) = (EpochRecord::blank(), epoch());
         let mut restored = FinishedEpoch::EMPTY;
-        assert!(!record.restore(&mut restored) && restored == FinishedEpoch::EMPTY, "zeros are no record");
-        record.write(&written);
-        assert!(record.restore(&mut restored));
+        assert!(!record.restore(&mut restored, 1, 2) && restored == FinishedEpoch::EMPTY, "zeros are no record");
+        record.write(&written, 1, 2);
+        assert!(record.restore(&mut restored, 1, 2));
         assert_eq!(restored, written);
         record.clear();
-        assert!(!record.restore(&mut restored));
+        assert!(!record.restore(&mut restored, 1, 2));
     }
 
     #[test]
     fn a_damaged_epoch_is_not_restored() {
         let record = EpochRecord::blank();
-        record.write(&epoch());
+        record.write(&epoch(), 1, 2);
         for cell in &record.0 {
             let mut restored = FinishedEpoch::EMPTY;
             cell.fetch_xor(1 << 19, Relaxed);
-            assert!(!record.restore(&mut restored) && restored == FinishedEpoch::EMPTY);
+            assert!(!record.restore(&mut restored, 1, 2) && restored == FinishedEpoch::EMPTY);
             cell.fetch_xor(1 << 19, Relaxed);
         }
     }

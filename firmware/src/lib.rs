@@ -24,6 +24,7 @@
 //! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
 //! | `report_text`, [`number_text`] | the report as a table that people read; numbers in it |
 //! | [`console`] | answers in text |
+//! | `counters`, `bench_log` | the counters by name; what a debug probe reads |
 //! | `transmit` | the queue to the serial port, raw stream |
 //! | [`command`], `app` | commands, main loop |
 //! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
@@ -36,13 +37,18 @@
 
 pub mod acquisition;
 mod app;
+mod bench_log;
 mod board;
-#[cfg(any(test, all(target_os = "none", feature = "microcontroller")))]
+#[cfg_attr(
+    not(target_os = "none"),
+    allow(dead_code, reason = "the images use all of it, and its tests what they test")
+)]
 mod bus_frame;
 mod channel_validity;
 mod channels;
 pub mod command;
 pub mod console;
+mod counters;
 mod crash_record;
 mod cross_sums;
 mod device;
@@ -66,11 +72,13 @@ mod status_flags;
 mod task_monitor;
 mod transmit;
 
-pub use acquisition::{BurstQueue, Sampler, SamplingActivity, TimedBurst};
+pub use acquisition::{BurstQueue, EdgeAction, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
 pub use board::{
-    Board, BoardContext, BoardMeters, BusTiming, Chip, Locks, SelectTiming, SensorBus, Uptime, WatchdogExtension,
+    Board, BoardContext, BoardMeters, BrownOutLevel, BusTiming, Chip, DataReadyLine, Locks, SelectTiming, SensorBus,
+    Uptime, WatchdogExtension,
 };
+pub use bus_frame::{BusFault, MicrosecondCounter};
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;

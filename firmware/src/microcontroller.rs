@@ -12,9 +12,8 @@ pub mod rp2040;
 #[cfg(feature = "stm32f4")]
 pub mod stm32f4;
 
-pub use crate::bus_frame::{BusFault, MicrosecondCounter};
-
-use crate::board::{SensorBus, WatchdogExtension};
+use crate::board::{BrownOutLevel, DataReadyLine, SensorBus, WatchdogExtension};
+use crate::bus_frame::MicrosecondCounter;
 use adis16405_driver::BURST_BYTES;
 use defmt_rtt as _;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -57,13 +56,17 @@ pub trait Microcontroller: MicrosecondCounter {
     fn feed(&mut self);
     /// Restarts processor and peripherals; the RAM keeps its content.
     fn restart() -> !;
+    /// Programs the level of the supply below which the microcontroller is reset.
+    fn program_brown_out() -> BrownOutLevel {
+        BrownOutLevel::Fixed
+    }
     /// To be called at every interrupt of SysTick, of which there are [`processor::WAKE_HZ`] a second: prolongs the time of a
     /// watchdog that is shorter than a step of the main loop.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
 }
 
 /// The data-ready pin, which raises an interrupt at rising edges.
-pub trait DataReadyPin {
+pub trait DataReadyPin: DataReadyLine {
     /// Clears the pending interrupt.
     fn clear(&mut self);
 }

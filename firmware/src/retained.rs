@@ -1,5 +1,8 @@
 //! Retained RAM: statistics and settings in memory that a warm reset does not clear, each record with a checksum.
 //!
+//! The checksum also covers a hash of the build, so that a program of other sources finds no record, and records of samples carry
+//! the settings of the sensor that took them.
+//!
 //! The memory is an array of atomic words, so that any content after power-on is a valid value. There is one slot more than
 //! there are records. A record is always written into a slot that is not the newest version of any record, so that a reset
 //! during the write loses that version and not the one before.
@@ -9,8 +12,15 @@ use crate::epoch_record::{EpochRecord, SUMS_WORDS, checksum, sums_from_words, su
 use crate::statistics::{CHANNELS, ChannelSums};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Words of a slot: kind, version, generation, payload, checksum.
-const SLOT_WORDS: usize = SUMS_WORDS + 4;
+/// Words of a slot before the payload: kind, version, generation, the sensor's settings.
+const HEAD: usize = 4;
+/// Words of a slot: those, payload, checksum.
+const SLOT_WORDS: usize = HEAD + SUMS_WORDS + 1;
+/// Hash of what this program was built from.
+const BUILD: u32 = match u32::from_str_radix(env!("FIRMWARE_BUILD"), 10) {
+    Ok(hash) => hash,
+    Err(_) => panic!("the build script gives a number"),
+};
 /// Kinds of records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
@@ -45,11 +55,24 @@ pub struct RetainedSettings {
     pub interval_s: u32,
     /// Starts since power-on.
     pub starts: u32,
+    /// Age of the running epoch in µs at the last checkpoint.
+    pub epoch_age_us: u64,
+    /// PROD_ID of a part that is to be taken for an ADIS16405 although it answers this; 0 for none.
+    pub prod_id: u16,
+}
+
+impl RetainedSettings {
+    /// The settings of the sensor: samples of others are of another scale, rate or filter.
+    fn of_sensor(&self) -> u32 {
+        u32::from(self.smpl_prd) << 16 | u32::from(self.sens_avg)
+    }
 }
 
 /// The records in a [`RetainedMemory`].
 pub struct RetainedRam {
     memory: &'static RetainedMemory,
+    /// Hash that all checksums cover.
+    build: u32,
     /// Channel records of another generation are out of date.
     generation: u32,
     version: u32,
@@ -62,9 +85,14 @@ impl RetainedRam {
     /// Finds the newest valid version of every record.
     #[must_use]
     pub fn open(memory: &'static RetainedMemory) -> Self {
-        let mut retained = Self { memory, generation: 0, version: 0, newest: [None; KINDS], settings: None };
+        Self::open_by(BUILD, memory)
+    }
+
+    /// As [`open`](Self::open), as a program with this hash does.
+    fn open_by(build: u32, memory: &'static RetainedMemory) -> Self {
+        let mut retained = Self { memory, build, generation: 0, version: 0, newest: [None; KINDS], settings: None };
         for (index, slot) in memory.slots.iter().enumerate() {
-            let Some((kind, version)) = valid_record(slot) else { continue };
+            let Some((kind, version)) = valid_record(slot, build) else { continue };
             let newer = retained.newest[kind].is_none_or(|other| word(&memory.slots[other], 1) < version);
             if newer {
                 retained.newest[kind] = Some(index);
@@ -73,7 +101,7 @@ impl RetainedRam {
         }
         if let Some(slot) = retained.newest[SETTINGS].map(|index| &memory.slots[index]) {
             retained.generation = word(slot, 2);
-            let at = |index: usize| word(slot, 3 + index);
+            let at = |index: usize| word(slot, HEAD + index);
             retained.settings = Some(RetainedSettings {
                 smpl_prd: at(0) as u8,
                 sens_avg: at(1) as u16,
@@ -81,6 +109,8 @@ impl RetainedRam {
                 epoch: at(3),
                 interval_s: at(4),
                 starts: at(5),
+                epoch_age_us: u64::from(at(6)) | u64::from(at(7)) << 32,
+                prod_id: at(8) as u16,
             });
         }
         retained
@@ -92,7 +122,7 @@ impl RetainedRam {
             slot[0].store(0, Relaxed);
         }
         self.memory.epoch.clear();
-        *self = Self::open(self.memory);
+        *self = Self::open_by(self.build, self.memory);
     }
 
     /// The settings that were written last.
@@ -101,23 +131,24 @@ impl RetainedRam {
         self.settings
     }
 
-    /// The sums of [`CHANNELS`]`[index]`; `None` without a record of the present generation.
+    /// The sums of [`CHANNELS`]`[index]`; `None` without a record of the present generation and the present settings of the
+    /// sensor.
     #[must_use]
     pub fn restore(&self, index: usize) -> Option<ChannelSums> {
         let slot = &self.memory.slots[self.newest.get(1 + index).copied()??];
-        let words = slot[3..].iter().map(|cell| cell.load(Relaxed));
-        (word(slot, 2) == self.generation).then(|| sums_from_words(words))
+        let words = slot[HEAD..].iter().map(|cell| cell.load(Relaxed));
+        (word(slot, 2) == self.generation && word(slot, 3) == self.of_sensor()).then(|| sums_from_words(words))
     }
 
     /// Writes a finished epoch in the place of the one before. A reset during the write loses it.
     pub fn write_epoch(&mut self, epoch: &FinishedEpoch) {
-        self.memory.epoch.write(epoch);
+        self.memory.epoch.write(epoch, self.build, self.of_sensor());
     }
 
     /// Overwrites `epoch` with the finished epoch. Returns false, and leaves `epoch` alone, if there is none.
     #[must_use]
     pub fn restore_epoch(&self, epoch: &mut FinishedEpoch) -> bool {
-        self.memory.epoch.restore(epoch)
+        self.memory.epoch.restore(epoch, self.build, self.of_sensor())
     }
 
     /// Erases the finished epoch: nothing is left to be learned from it.
@@ -129,8 +160,11 @@ impl RetainedRam {
     pub fn write_settings(&mut self, settings: RetainedSettings, new_generation: bool) {
         self.generation = self.generation.wrapping_add(u32::from(new_generation));
         self.settings = Some(settings);
-        let RetainedSettings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts } = settings;
-        let words = [u32::from(smpl_prd), u32::from(sens_avg), epoch_s, epoch, interval_s, starts];
+        let RetainedSettings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts, epoch_age_us, prod_id } =
+            settings;
+        let (age, age_high) = (epoch_age_us as u32, (epoch_age_us >> 32) as u32);
+        let sensor = [u32::from(smpl_prd), u32::from(sens_avg)];
+        let words = sensor.into_iter().chain([epoch_s, epoch, interval_s, starts, age, age_high, u32::from(prod_id)]);
         self.write(SETTINGS, words);
     }
 
@@ -139,6 +173,10 @@ impl RetainedRam {
         if index < CHANNELS.len() {
             self.write(1 + index, sums_words(sums));
         }
+    }
+
+    fn of_sensor(&self) -> u32 {
+        self.settings.as_ref().map_or(0, RetainedSettings::of_sensor)
     }
 
     fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
@@ -151,11 +189,12 @@ impl RetainedRam {
         slot[0].store(MAGIC | kind as u32, Relaxed);
         slot[1].store(self.version, Relaxed);
         slot[2].store(self.generation, Relaxed);
+        slot[3].store(self.of_sensor(), Relaxed);
         let words = words.into_iter().chain(core::iter::repeat(0));
-        for (cell, word) in slot[3..SLOT_WORDS - 1].iter().zip(words) {
+        for (cell, word) in slot[HEAD..SLOT_WORDS - 1].iter().zip(words) {
             cell.store(word, Relaxed);
         }
-        slot[SLOT_WORDS - 1].store(checksum(&slot[..SLOT_WORDS - 1]), Relaxed);
+        slot[SLOT_WORDS - 1].store(checksum(self.build, &slot[..SLOT_WORDS - 1]), Relaxed);
         self.newest[kind] = Some(free);
     }
 }
@@ -167,9 +206,9 @@ fn word(slot: &[AtomicU32], index: usize) -> u32 {
 }
 
 /// The kind and version of the record in a slot, if its checksum is right.
-fn valid_record(slot: &Slot) -> Option<(usize, u32)> {
+fn valid_record(slot: &Slot, build: u32) -> Option<(usize, u32)> {
     let kind = (word(slot, 0) ^ MAGIC) as usize;
-    let intact = kind < KINDS && word(slot, SLOT_WORDS - 1) == checksum(&slot[..SLOT_WORDS - 1]);
+    let intact = kind < KINDS && word(slot, SLOT_WORDS - 1) == checksum(build, &slot[..SLOT_WORDS - 1]);
     intact.then(|| (kind, word(slot, 1)))
 }
 
@@ -183,8 +222,16 @@ mod tests {
     use allan_core::Interpolation;
     use std::boxed::Box;
 
-    const SETTINGS_WRITTEN: RetainedSettings =
-        RetainedSettings { smpl_prd: 7, sens_avg: 0x0400, epoch_s: 3600, epoch: 2, interval_s: 10, starts: 3 };
+    const SETTINGS_WRITTEN: RetainedSettings = RetainedSettings {
+        smpl_prd: 7,
+        sens_avg: 0x0400,
+        epoch_s: 3600,
+        epoch: 2,
+        interval_s: 10,
+        starts: 3,
+        epoch_age_us: 3 << 32 | 7,
+        prod_id: 3,
+    };
 
     fn memory() -> &'static RetainedMemory {
         Box::leak(Box::new(blank_memory()))
@@ -241,6 +288,43 @@ mod tests {
         assert!(RetainedRam::open(memory).restore(1).is_none());
         retained.clear();
         assert_eq!(RetainedRam::open(memory).settings(), None);
+    }
+
+    /// Samples of other settings of the sensor are not continued, even if the records are of one generation.
+    #[test]
+    fn statistics_of_another_range_or_rate_are_not_restored() {
+        for other in [
+            RetainedSettings { sens_avg: 0x0401, ..SETTINGS_WRITTEN },
+            RetainedSettings { smpl_prd: 1, ..SETTINGS_WRITTEN },
+        ] {
+            let memory = memory();
+            let mut retained = RetainedRam::open(memory);
+            retained.write_settings(SETTINGS_WRITTEN, true);
+            retained.checkpoint(1, &sums(50));
+            retained.write_epoch(&FinishedEpoch::EMPTY);
+            retained.write_settings(other, false);
+            let mut epoch = FinishedEpoch::EMPTY;
+            let opened = RetainedRam::open(memory);
+            assert!(opened.restore(1).is_none() && !opened.restore_epoch(&mut epoch), "{other:?}");
+            retained.write_settings(SETTINGS_WRITTEN, false);
+            let opened = RetainedRam::open(memory);
+            assert!(opened.restore(1).is_some() && opened.restore_epoch(&mut epoch));
+        }
+    }
+
+    /// An image of other sources may give the words another meaning.
+    #[test]
+    fn another_build_finds_no_record() {
+        let memory = memory();
+        let mut retained = RetainedRam::open_by(1, memory);
+        retained.write_settings(SETTINGS_WRITTEN, true);
+        retained.checkpoint(1, &sums(50));
+        retained.write_epoch(&FinishedEpoch::EMPTY);
+        let (same, other) = (RetainedRam::open_by(1, memory), RetainedRam::open_by(2, memory));
+        let mut epoch = FinishedEpoch::EMPTY;
+        assert!(same.settings().is_some() && same.restore(1).is_some() && same.restore_epoch(&mut epoch));
+        assert!(other.settings().is_none() && other.restore(1).is_none() && !other.restore_epoch(&mut epoch));
+        assert_ne!(BUILD, 0);
     }
 
     /// A bit flips in any word of the slot written last: the version before is found.

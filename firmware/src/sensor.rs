@@ -94,7 +94,7 @@ impl fmt::Display for TestOutcome {
     }
 }
 
-/// Identifies the sensor, runs its self-test, and configures it: range, filter, sample period, and data ready on DIO1,
+/// Identifies the sensor, by `prod_id` too unless that is 0, runs its self-test, and configures it: range, filter, sample period, and data ready on DIO1,
 /// active high. A negative bias of gyro x is moved from the sensor to the host.
 ///
 /// # Errors
@@ -103,9 +103,13 @@ pub fn probe<SPI: SpiDevice<u8>>(
     (bus, delay): (SPI, impl DelayNs),
     config: Config,
     scope: ProbeScope,
+    prod_id: u16,
 ) -> Result<SensorIdentity, Error<SPI::Error>> {
     // The sensor may be in low-power mode until it is configured.
     let mut sensor = Adis16405::new(bus, delay, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power);
+    if prod_id != 0 {
+        sensor = sensor.with_prod_id(prod_id);
+    }
     if scope.pulse {
         // Whether the sensor answers is for the steps below to find out.
         let _ = sensor.wake();

@@ -54,7 +54,7 @@ impl TaskMonitor {
     /// A monitor that starts at `now_us`.
     pub(crate) const fn new(now_us: u64) -> Self {
         Self {
-            activity: SamplingActivity { started: 0, ended: 0 },
+            activity: SamplingActivity { started: 0, ended: 0, masked: 0, is_masked: false },
             reading_since_us: None,
             processed: 0,
             ended_then: 0,
@@ -127,7 +127,7 @@ mod tests {
     }
 
     fn ended(count: u32) -> SamplingActivity {
-        SamplingActivity { started: count, ended: count }
+        SamplingActivity { started: count, ended: count, ..SamplingActivity::default() }
     }
 
     #[test]
@@ -139,7 +139,7 @@ mod tests {
         let slow = |pass: u32| {
             let bursts = pass / 2000;
             match pass % 2000 {
-                0 => (SamplingActivity { started: bursts + 1, ended: bursts }, bursts),
+                0 => (SamplingActivity { started: bursts + 1, ..ended(bursts) }, bursts),
                 1 => (ended(bursts + 1), bursts),
                 _ => (ended(bursts + 1), bursts + 1),
             }
@@ -149,7 +149,7 @@ mod tests {
 
     impl SamplingActivity {
         fn after(self, more: u32) -> Self {
-            Self { started: self.started.wrapping_add(more), ended: self.ended.wrapping_add(more) }
+            Self { started: self.started.wrapping_add(more), ended: self.ended.wrapping_add(more), ..self }
         }
     }
 
@@ -165,7 +165,7 @@ mod tests {
         };
         let transfer = |pass: u32| {
             let bursts = pass.min(stop);
-            (SamplingActivity { started: bursts + u32::from(pass > stop), ended: bursts }, bursts)
+            (SamplingActivity { started: bursts + u32::from(pass > stop), ..ended(bursts) }, bursts)
         };
         within(first_stop(true, transfer), StoppedTask::Sampling, SAMPLING_US);
         within(first_stop(true, |pass| (ended(pass), pass.min(stop))), StoppedTask::Estimators, SAMPLING_US);

@@ -445,4 +445,9 @@ pub struct Health {
     /// Bursts not used because the sensor's filter still mixed them with what was before a self-test, a reset or a change of
     /// settings.
     pub settling: u32,
+    /// Times that the data-ready line was masked because it oscillated.
+    pub data_ready_masked: u32,
+    /// Bursts of which a channel was refused as a gross error: further from the sample before than its noise makes likely, and
+    /// not followed by another such sample.
+    pub gross_errors: u32,
 }

@@ -80,10 +80,10 @@ macro_rules! observatory {
                 Blinker, ESTIMATOR_CYCLES, Interrupts, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
             };
             use $crate::microcontroller::{
-                BoardParts, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, MicrosecondCounter as _, ReceiveBuffer, UartPort as _, UartQueues,
+                BoardParts, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer, UartPort as _, UartQueues,
             };
             use $crate::{
-                BoardContext, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, Sampler, Start, Statistics,
+                BoardContext, BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, MicrosecondCounter as _, Sampler, Start, Statistics,
                 TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
             };
 
@@ -92,13 +92,13 @@ macro_rules! observatory {
                 uptime: Uptime,
                 bus: $bus,
                 sampler: Sampler<'static>,
+                line: $data_ready,
                 estimators: Estimators<'static>,
                 transmit_queue: TransmitQueue<'static>,
             }
 
             #[local]
             struct Local {
-                data_ready: $data_ready,
                 bursts: Consumer<'static, TimedBurst>,
                 port: $port,
                 processor: Processor<$microcontroller>,
@@ -130,20 +130,22 @@ macro_rules! observatory {
                     uptime: Uptime::new(<$microcontroller>::counter()),
                     bus,
                     sampler: Sampler::new(to_estimators),
+                    line: data_ready,
                     estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
                     transmit_queue: TransmitQueue::new(to_port),
                 };
                 let start = Some(Start { boot, retained, finished: context.local.finished });
-                (shared, Local { data_ready, bursts, port, processor, blinker: Blinker::new(led, clock), received, start })
+                (shared, Local { bursts, port, processor, blinker: Blinker::new(led, clock), received, start })
             }
 
-            #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, estimators, transmit_queue])]
+            #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, line, estimators, transmit_queue])]
             fn idle(context: idle::Context) -> ! {
                 let shared = context.shared;
                 let locks = Locks {
                     uptime: shared.uptime,
                     bus: shared.bus,
                     sampler: shared.sampler,
+                    data_ready: shared.line,
                     estimators: shared.estimators,
                     transmit_queue: shared.transmit_queue,
                 };
@@ -152,14 +154,16 @@ macro_rules! observatory {
             }
 
             /// A new sample: starts the transfer of a burst by DMA.
-            #[task(binds = $edge, priority = 3, local = [data_ready], shared = [uptime, bus, sampler])]
+            #[task(binds = $edge, priority = 3, shared = [uptime, bus, sampler, line])]
             fn data_ready(context: data_ready::Context) {
                 measure(&SAMPLING_CYCLES, || {
-                    let data_ready::SharedResources { uptime, bus, sampler, .. } = context.shared;
-                    context.local.data_ready.clear();
-                    (uptime, bus, sampler).lock(|uptime, bus, sampler| {
-                        if sampler.data_ready(uptime.at(<$microcontroller>::counter())) {
-                            bus.start_burst();
+                    let data_ready::SharedResources { uptime, bus, sampler, line, .. } = context.shared;
+                    (uptime, bus, sampler, line).lock(|uptime, bus, sampler, line| {
+                        line.clear();
+                        match sampler.data_ready(uptime.at(<$microcontroller>::counter())) {
+                            EdgeAction::StartBurst => bus.start_burst(),
+                            EdgeAction::Mask => line.set_masked(true),
+                            EdgeAction::Ignore => {}
                         }
                     });
                 });

@@ -1,7 +1,7 @@
 //! The Cortex-M core: sleep, SysTick as the cycle counter, load figures, and the LED, which SysTick blinks.
 
 use super::Microcontroller;
-use crate::board::{BoardMeters, Chip};
+use crate::board::{BoardMeters, BrownOutLevel, Chip};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -115,6 +115,10 @@ impl<M: Microcontroller> Chip for &mut Processor<M> {
 
     fn restart(&mut self) {
         M::restart()
+    }
+
+    fn program_brown_out(&mut self) -> BrownOutLevel {
+        M::program_brown_out()
     }
 
     fn meters(&mut self) -> BoardMeters {

@@ -5,7 +5,7 @@ use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::{
-    App, Board, BoardMeters, BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler,
+    App, Board, BoardMeters, BurstQueue, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler,
     SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
 use heapless::spsc::Consumer;
@@ -55,6 +55,8 @@ struct SimulatedBoard {
     reset_line: bool,
     /// Time for which the samples of the sensor could have been used, µs.
     usable_us: u64,
+    /// Data-ready edges that have raised an interrupt.
+    edges: u64,
 }
 
 impl Device {
@@ -102,6 +104,11 @@ impl Device {
     /// Time for which the samples of the sensor could have been used, µs: no fault hid them, and the sensor was sampling.
     pub fn usable_us(&self) -> u64 {
         self.board.usable_us
+    }
+
+    /// Data-ready edges that have raised an interrupt.
+    pub fn edges(&self) -> u64 {
+        self.board.edges
     }
 
     /// Retained memory without valid contents.
@@ -178,6 +185,7 @@ impl SimulatedBoard {
             fixed_clock: false,
             reset_line: false,
             usable_us: 0,
+            edges: 0,
         }
     }
 
@@ -185,8 +193,8 @@ impl SimulatedBoard {
     fn boot(&mut self, cause: BootCause, memory: &'static RetainedMemory) -> App {
         let fresh = Self::new(self.bus.clone(), self.now_us);
         let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
-        let Self { restarts, fixed_clock, reset_line, usable_us, .. } = *self;
-        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, ..fresh };
+        let Self { restarts, fixed_clock, reset_line, usable_us, edges, .. } = *self;
+        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, edges, ..fresh };
         let start = Start {
             boot: Boot { cause, ..Boot::default() },
             retained: RetainedRam::open(memory),
@@ -206,7 +214,7 @@ impl SimulatedBoard {
 
     /// The two sampling interrupts and the one of the estimators.
     fn data_ready(&mut self) {
-        if self.sampler.data_ready(self.now_us) {
+        if self.edge() == EdgeAction::StartBurst {
             let mut answer = [0; BURST_BYTES];
             let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
             self.sampler.transfer_ended(Some(&answer));
@@ -215,6 +223,21 @@ impl SimulatedBoard {
         if !self.bus.faults().borrow().no_estimators {
             estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);
         }
+    }
+
+    /// One edge, or many in a row if the line oscillates; none while it is masked.
+    fn edge(&mut self) -> EdgeAction {
+        let edges = if self.bus.faults().borrow().oscillates { 1000 } else { 1 };
+        let mut first = EdgeAction::Ignore;
+        for k in 0..edges {
+            if self.sampler.activity().is_masked {
+                break;
+            }
+            let action = self.sampler.data_ready(self.now_us);
+            self.edges += 1;
+            first = if k == 0 { action } else { first };
+        }
+        first
     }
 
     fn transmit(&mut self) {

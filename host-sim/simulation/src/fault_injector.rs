@@ -70,6 +70,8 @@ pub struct InjectedFaults {
     pub damaged: u64,
     /// The data-ready line is interrupted.
     pub no_data_ready: bool,
+    /// The data-ready line oscillates: a thousand edges for every one.
+    pub oscillates: bool,
     /// The estimators' interrupt does not come.
     pub no_estimators: bool,
     /// The serial port sends nothing.
@@ -80,7 +82,10 @@ impl InjectedFaults {
     /// Whether an observer who knew everything could not use the sensor's present samples.
     pub(crate) fn hide_samples(&self) -> bool {
         let harmless = |fault| fault == FrameFault::LowSupply;
-        self.no_data_ready || self.no_estimators || self.frames.is_some_and(|(fault, _)| !harmless(fault))
+        self.no_data_ready
+            || self.oscillates
+            || self.no_estimators
+            || self.frames.is_some_and(|(fault, _)| !harmless(fault))
     }
 }
 

@@ -194,6 +194,31 @@ fn an_interrupted_data_ready_line_is_one_loss() {
     assert!(f64::from(used) > 8.4 * RATE_HZ, "{used} samples in 10 s");
 }
 
+/// A line that oscillates would leave the processor no time. It is masked after 16 edges, at each step of recovery again, and told;
+/// when it has calmed down, sampling goes on.
+#[test]
+fn an_oscillating_data_ready_line_is_masked_and_told() {
+    let mut device = device();
+    let before = health_after(&mut device, 5.0);
+    let edges_before = device.edges();
+    device.faults().oscillates = true;
+    let heard = report_after(&mut device, "", 10.0);
+    let health = heard.health.expect("a report");
+    let edges = device.edges() - edges_before;
+    // Ten steps of recovery, once a second, each of which takes the edges again.
+    assert!((8..=12).contains(&health.data_ready_masked), "{health:?}");
+    assert!(edges <= 16 * u64::from(health.data_ready_masked) + 16, "{edges} interrupts");
+    assert!(
+        heard.logs.iter().any(|log| log.contains("the data-ready line oscillates and is masked")),
+        "{:?}",
+        heard.logs
+    );
+    assert_eq!((health.recoveries, device.restarts()), (1, 0), "{health:?}");
+    device.faults().oscillates = false;
+    let used = health_after(&mut device, 10.0).used - health.used;
+    assert!(f64::from(used) > 8.3 * RATE_HZ, "{used} samples in 10 s, {} before", before.used);
+}
+
 /// After 30 failed steps the microcontroller is restarted, once, with its statistics.
 #[test]
 fn after_thirty_failed_steps_the_microcontroller_is_restarted_once() {

@@ -1,8 +1,9 @@
 //! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
 
-use crate::board::WatchdogExtension;
+use crate::board::{DataReadyLine, WatchdogExtension};
+use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
-use crate::microcontroller::{DataReadyPin, Microcontroller, MicrosecondCounter};
+use crate::microcontroller::{DataReadyPin, Microcontroller};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use embedded_hal::digital::StatefulOutputPin;
 use link::BootCause;
@@ -84,6 +85,8 @@ impl Rp2040 {
         let mut watchdog = Watchdog::new(watchdog);
         // From the ring oscillator, until the crystal runs: the watchdog's time is then 5.7 s or more.
         watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
+        // While a debugger has halted the processor.
+        watchdog.pause_on_debug(true);
         watchdog.start(WATCHDOG_MS.millis());
         chip.bod().modify(|_, w| {
             // SAFETY: one of the 16 levels.
@@ -145,5 +148,14 @@ impl Microcontroller for Rp2040 {
 impl<I: PinId> DataReadyPin for Pin<I, FunctionSioInput, PullNone> {
     fn clear(&mut self) {
         self.clear_interrupt(Interrupt::EdgeHigh);
+    }
+}
+
+impl<I: PinId> DataReadyLine for Pin<I, FunctionSioInput, PullNone> {
+    fn set_masked(&mut self, masked: bool) {
+        if self.is_interrupt_enabled(Interrupt::EdgeHigh) == masked {
+            self.clear_interrupt(Interrupt::EdgeHigh);
+            self.set_interrupt_enabled(Interrupt::EdgeHigh, !masked);
+        }
     }
 }

@@ -1,11 +1,12 @@
 //! Start of an STM32F4: cause, watchdog, brown-out level, clocks; and the data-ready input.
 
-use crate::bus_frame::wait_for;
-use crate::microcontroller::{DataReadyPin, Microcontroller, MicrosecondCounter};
+use crate::board::{BrownOutLevel, DataReadyLine};
+use crate::bus_frame::{MicrosecondCounter, wait_for};
+use crate::microcontroller::{DataReadyPin, Microcontroller};
 use cortex_m::peripheral::SCB;
 use link::{BootCause, ClockSource};
 use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Pin};
-use stm32f4xx_hal::pac::{EXTI, FLASH, IWDG, RCC, SYSCFG, TIM2};
+use stm32f4xx_hal::pac::{DBGMCU, EXTI, FLASH, IWDG, RCC, SYSCFG, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -68,7 +69,10 @@ impl Stm32f4 {
         let cause = boot_cause(&rcc);
         let mut watchdog = IndependentWatchdog::new(watchdog);
         watchdog.start(WATCHDOG_MS.millis());
-        set_brown_out_level(&flash);
+        stop_watchdog_with_debugger();
+        // The option bytes keep the level; they are not written without being asked to.
+        let programmed = flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3;
+        defmt::info!("brown-out level of 2.7 V {=str}", if programmed { "set" } else { "not set: command brownout" });
         let clock = start_crystal(&rcc);
         let source = match clock {
             ClockSource::Crystal => Config::hse(crystal_hz.Hz()),
@@ -97,25 +101,10 @@ fn start_crystal(rcc: &RCC) -> ClockSource {
     }
 }
 
-/// Has a supply below 2.7 V reset the microcontroller, which at 168 MHz needs that much: brown-out level 3. The option bytes
-/// keep it, so that it is programmed at the first start only (RM0090 sections 3.7.2 and 3.7.3).
-fn set_brown_out_level(flash: &FLASH) {
-    if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 {
-        return;
-    }
-    for key in OPTION_KEYS {
-        // SAFETY: the values that unlock the option bytes.
-        flash.optkeyr().write(|w| unsafe { w.bits(key) });
-    }
-    let ready = || flash.sr().read().bsy().bit_is_clear();
-    if wait_for(ready) {
-        // SAFETY: one of the four levels.
-        flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(BROWN_OUT_LEVEL_3) });
-        flash.optcr().modify(|_, w| w.optstrt().set_bit());
-        // The watchdog ends a wait without end.
-        while !wait_for(ready) {}
-    }
-    flash.optcr().modify(|_, w| w.optlock().set_bit());
+/// A processor that a debugger has halted is not restarted by the watchdog (RM0090 section 38.16.4, DBG_IWDG_STOP).
+fn stop_watchdog_with_debugger() {
+    // SAFETY: a register that nothing else uses.
+    unsafe { (*DBGMCU::ptr()).apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit()) };
 }
 
 impl MicrosecondCounter for Stm32f4 {
@@ -132,6 +121,29 @@ impl Microcontroller for Stm32f4 {
 
     fn restart() -> ! {
         SCB::sys_reset()
+    }
+
+    /// Has a supply below 2.7 V reset the microcontroller, which at 168 MHz needs that much: brown-out level 3 in the option
+    /// bytes (RM0090 sections 3.7.2 and 3.7.3), for which the processor waits some milliseconds.
+    fn program_brown_out() -> BrownOutLevel {
+        // SAFETY: only this function uses the flash memory's registers after the start.
+        let flash = unsafe { &*FLASH::ptr() };
+        if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 {
+            return BrownOutLevel::Set;
+        }
+        for key in OPTION_KEYS {
+            // SAFETY: the values that unlock the option bytes.
+            flash.optkeyr().write(|w| unsafe { w.bits(key) });
+        }
+        let is_ready = || (0..1000).any(|_| wait_for(|| flash.sr().read().bsy().bit_is_clear()));
+        let done = is_ready() && {
+            // SAFETY: one of the four levels.
+            flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(BROWN_OUT_LEVEL_3) });
+            flash.optcr().modify(|_, w| w.optstrt().set_bit());
+            is_ready()
+        };
+        flash.optcr().modify(|_, w| w.optlock().set_bit());
+        if done { BrownOutLevel::Programmed } else { BrownOutLevel::Failed }
     }
 }
 
@@ -155,5 +167,18 @@ where
 impl<const P: char, const N: u8> DataReadyPin for Pin<P, N, Input> {
     fn clear(&mut self) {
         self.clear_interrupt_pending_bit();
+    }
+}
+
+impl<const P: char, const N: u8> DataReadyLine for Pin<P, N, Input> {
+    fn set_masked(&mut self, masked: bool) {
+        // SAFETY: the line of this pin in a register that the interrupt of the pin alone uses too, which waits meanwhile.
+        let mask = unsafe { (*EXTI::ptr()).imr() };
+        let is_masked = mask.read().bits() >> N & 1 == 0;
+        if masked != is_masked {
+            self.clear_interrupt_pending_bit();
+            // SAFETY: a bit of the mask.
+            mask.modify(|r, w| unsafe { w.bits(r.bits() & !(1 << N) | u32::from(!masked) << N) });
+        }
     }
 }
