@@ -44,6 +44,10 @@ impl ChannelSet {
         self.0 & Self::INERTIAL.0 == Self::INERTIAL.0
     }
 
+    pub(crate) const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// Adds a channel if the condition holds.
     pub(crate) fn insert_if(&mut self, index: usize, condition: bool) {
         self.0 |= u8::from(condition) << index;

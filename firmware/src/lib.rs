@@ -15,6 +15,7 @@
 //! | `sample_intake` | the path of every sample into the statistics, health counters |
 //! | `channel_validity` | which channels of a burst are refused, by its faults |
 //! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve and baseline model made of them |
+//! | `gross_error_gate` | single samples that noise does not explain |
 //! | `scale` | the unit of a count and the measured time between two samples |
 //! | [`epoch`] | a finished epoch, regression on covariates, compensated curves |
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
@@ -54,6 +55,7 @@ mod cross_sums;
 mod device;
 pub mod epoch;
 mod epoch_record;
+mod gross_error_gate;
 pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 #[allow(unsafe_code, reason = "registers, and memory that is not initialised at the start")]

@@ -3,6 +3,7 @@
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
 use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
 use crate::channels::ChannelSet;
+use crate::gross_error_gate::GrossErrorGate;
 use crate::scale::Scale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
@@ -57,6 +58,7 @@ pub struct Estimators<'m> {
     /// Losses of the epoch that was finished last.
     finished_losses: SampleLosses,
     validator: BurstValidator,
+    gate: GrossErrorGate,
     monitor: DataReadyMonitor,
     /// Counters of sampling and estimating; those of the validator are added when they are read.
     health: Health,
@@ -86,6 +88,7 @@ impl<'m> Estimators<'m> {
             config,
             statistics,
             validator: BurstValidator::default(),
+            gate: GrossErrorGate::new(),
             monitor: DataReadyMonitor::new(config.sample_period()),
             finished_losses: SampleLosses::NONE,
             health: Health::default(),
@@ -176,6 +179,7 @@ impl<'m> Estimators<'m> {
         self.monitor.mark_probed(now_us);
         self.unusable = 0;
         self.settling = settling_samples(self.config);
+        self.gate.disarm();
         self.used_since_probe = 0;
         self.error_flag = false;
     }
@@ -185,6 +189,7 @@ impl<'m> Estimators<'m> {
     pub fn restart(&mut self, config: Config) {
         self.reset();
         self.config = config;
+        self.gate = GrossErrorGate::new();
         self.monitor = DataReadyMonitor::new(config.sample_period());
         self.next_sample = 0;
         if self.raw_stream.is_on() {
@@ -298,7 +303,9 @@ impl<'m> Estimators<'m> {
         }
         let (faults, refused) = (validity.faults, refused_channels(validity));
         let counts = burst.counts();
-        self.statistics.push(CHANNELS.map(|channel| i32::from(counts.get(channel))), refused);
+        let counts = CHANNELS.map(|channel| i32::from(counts.get(channel)));
+        let gross = self.gate.find(&counts, refused);
+        self.statistics.push(counts, refused.union(gross));
         if refused.has_all_inertial() {
             return self.mark_unusable(faults.cause().unwrap_or_default());
         }
@@ -307,7 +314,8 @@ impl<'m> Estimators<'m> {
         self.error_flag = faults.contains(Faults::ERROR_ALARM);
         let health = &mut self.health;
         add(&mut health.used, 1);
-        add(&mut health.partly_used, u32::from(!refused.is_empty()));
+        add(&mut health.gross_errors, u32::from(!gross.is_empty()));
+        add(&mut health.partly_used, u32::from(!refused.union(gross).is_empty()));
         add(&mut health.marked, u32::from(is_marked(faults)));
     }
 

@@ -2,8 +2,8 @@
 
 use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts, GyroRange, OutputWord, SamplePeriod};
 use firmware::{
-    BurstQueue, CHANNELS, ChannelSums, Estimators, Sampler, Statistics, TimedBurst, TransmitBuffer, TransmitQueue,
-    estimate,
+    BurstQueue, CHANNELS, ChannelSums, EdgeAction, Estimators, Sampler, Statistics, TimedBurst, TransmitBuffer,
+    TransmitQueue, estimate,
 };
 use link::{Decoder, Health, Message, RawMessage, Received};
 
@@ -128,21 +128,22 @@ fn a_full_queue_is_counted_with_the_next_burst_that_fits() {
     let (producer, mut consumer) = queue.split();
     let mut sampler = Sampler::new(producer);
     let capacity = consumer.capacity() as u64;
-    assert!(!sampler.data_ready(0), "sampling is disabled");
+    assert_eq!(sampler.data_ready(0), EdgeAction::Ignore, "sampling is disabled");
     sampler.set_enabled(true);
-    let mut sample = |at_us: u64| {
-        assert!(sampler.data_ready(at_us));
-        assert!(!sampler.data_ready(at_us + 1), "a burst is being transferred");
-        sampler.transfer_ended(Some(&burst(at_us as i16).to_bytes()));
+    let mut sample = |k: u64| {
+        let at_us = 1_000 * k;
+        assert_eq!(sampler.data_ready(at_us), EdgeAction::StartBurst);
+        assert_eq!(sampler.data_ready(at_us + 1), EdgeAction::Ignore, "a burst is being transferred");
+        sampler.transfer_ended(Some(&burst(k as i16).to_bytes()));
     };
     (0..capacity + 7).for_each(&mut sample);
     let mut queued = |count| -> Vec<(u64, u32)> {
         (0..count).map_while(|_| consumer.dequeue()).map(|timed| (timed.at_us, timed.dropped)).collect()
     };
-    assert!(queued(1000).into_iter().eq((0..capacity).map(|at_us| (at_us, 0))));
+    assert!(queued(1000).into_iter().eq((0..capacity).map(|k| (1_000 * k, 0))));
     sample(1000);
     sample(1001);
-    assert_eq!(queued(3), [(1000, 7), (1001, 0)]);
+    assert_eq!(queued(3), [(1_000_000, 7), (1_001_000, 0)]);
 }
 
 /// The raw stream contains every burst, usable or not, with its sample number and time; lost ones leave a gap in the numbers.
@@ -387,4 +388,73 @@ fn averaging_times_are_by_the_measured_rate() {
     };
     let ratio = random_walk(0.97) / random_walk(1.0);
     assert!((ratio / (1.0_f64 / 0.97).sqrt() - 1.0).abs() < 1e-3, "{ratio}");
+}
+
+/// Sixteen edges in a millisecond, 13 times as many as a sensor can give, whether sampling is enabled or not.
+#[test]
+fn an_oscillating_line_is_to_be_masked() {
+    for enabled in [true, false] {
+        let mut queue = BurstQueue::new();
+        let mut sampler = Sampler::new(queue.split().0);
+        sampler.set_enabled(enabled);
+        assert!((0..1000).all(|k| sampler.data_ready(833 * k) != EdgeAction::Mask), "an external clock of 1.2 kHz");
+        assert_eq!((0..100).position(|k| sampler.data_ready(900_000 + k) == EdgeAction::Mask), Some(15));
+        assert!(sampler.activity().is_masked && sampler.activity().masked == 1);
+        sampler.set_enabled(true);
+        assert!(!sampler.activity().is_masked);
+    }
+}
+
+/// One bit in a million of the words is flipped, flags included; the noise is that of a gyro of 0.0368 deg/√s at 204.8 samples a
+/// second, 10.5 counts. Ten flips of a channel in 700,000 samples raise its variance by a fifth, N by 10 %: without the gate N is
+/// outside its bounds.
+#[test]
+fn bit_errors_leave_n_within_its_bounds() {
+    const SIGMA: f64 = 10.5;
+    const SAMPLES: u32 = 2_000_000;
+    const FLIPS_A_BIT: f64 = 1e-6;
+    let config = Config::new(GyroRange::Dps300, 0, SamplePeriod::nearest(204.8).unwrap()).unwrap();
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    };
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, config);
+    let (mut flips, mut to_next) = (0, 0.0);
+    for period in 0..SAMPLES {
+        let mut counts = AT_REST;
+        for pair in counts[1..7].chunks_mut(2) {
+            let (radius, angle) = ((-2.0 * uniform().ln()).sqrt(), std::f64::consts::TAU * uniform());
+            pair[0] = (SIGMA * radius * angle.cos()).round() as i16;
+            pair[1] = (SIGMA * radius * angle.sin()).round() as i16;
+        }
+        let mut burst = Burst::from_counts(&Counts::new(counts));
+        // Flips are independent: the number of bits between two has an exponential distribution.
+        let bits = 12.0 * 16.0;
+        while to_next < bits {
+            let bit = to_next as usize;
+            burst.words[bit / 16].0 ^= 1 << (bit % 16);
+            flips += 1;
+            to_next += 1.0 - uniform().ln() / FLIPS_A_BIT;
+        }
+        to_next -= bits;
+        estimators
+            .process(TimedBurst { at_us: (f64::from(period) * 1e6 / 204.8) as u64, dropped: 0, burst: Some(burst) }, 0);
+    }
+    let health = estimators.health();
+    println!("{flips} flips; {health:?}");
+    // Rounding to counts adds 1/12.
+    let truth = 0.05 * (SIGMA * SIGMA + 1.0 / 12.0).sqrt() / 204.8_f64.sqrt();
+    for (index, lsb) in [(0, 1.0), (1, 1.0), (2, 1.0), (3, 3.33e-3 / 0.05), (4, 3.33e-3 / 0.05), (5, 3.33e-3 / 0.05)] {
+        let sums = ChannelSums::from_estimator(estimators.channel(index).unwrap());
+        let n = sums.fit_baseline(CHANNELS[index], estimators.scale()).terms()[0];
+        let truth = truth * lsb;
+        println!("{:?}: N {:.6} ({:.6} to {:.6}), truth {truth:.6}", CHANNELS[index], n.value, n.low, n.high);
+        // 95 % bounds of six channels: half as wide again for all of them together.
+        let (low, high) = (1.5 * n.low - 0.5 * n.value, 1.5 * n.high - 0.5 * n.value);
+        assert!((low..high).contains(&truth), "{:?}: {n:?}, truth {truth}", CHANNELS[index]);
+    }
+    assert!(health.gross_errors > 0 && health.gross_errors < flips, "{health:?}");
+    assert_eq!(health.recoveries, 0);
 }
