@@ -7,8 +7,8 @@
 //! | GP20 | data ready, rising edge | DIO1 |
 //! | GP0, GP1 | UART0 TX, RX, 460 800 Bd 8N1 | to the host |
 //!
-//! The sensor runs from 5 V, which VBUS gives. The RP2040's pins accept 3.3 V at most: DOUT and DIO1 need a divider or level
-//! shifter. GP16 and GP20 have no pull.
+//! The sensor runs from 5 V, which VBUS gives; its inputs accept 3.3 V, and its outputs are driven from an internal supply of
+//! 3.3 V (ADIS16400/ADIS16405 data sheet Rev. B, page 5), as the RP2040's pins need it. GP16 and GP20 have no pull.
 #![no_std]
 #![no_main]
 

@@ -45,9 +45,11 @@ pub(crate) const SYSCFG_EXTICR: [u64; 2] = [0x4001_3808, 0x4001_380C];
 pub(crate) const EXTI_IMR: u64 = 0x4001_3C00;
 pub(crate) const EXTI_RTSR: u64 = 0x4001_3C08;
 pub(crate) const EXTI_FTSR: u64 = 0x4001_3C0C;
+/// What stops while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
+pub(crate) const DBGMCU_APB1_FZ: u64 = 0xE004_2008;
 /// Registers that a run returns beside the pulls.
-const CONFIGURATION: [u64; 7] =
-    [FLASH_OPTCR, SPI1_CR1, SYSCFG_EXTICR[0], SYSCFG_EXTICR[1], EXTI_IMR, EXTI_RTSR, EXTI_FTSR];
+const CONFIGURATION: [u64; 8] =
+    [FLASH_OPTCR, SPI1_CR1, SYSCFG_EXTICR[0], SYSCFG_EXTICR[1], EXTI_IMR, EXTI_RTSR, EXTI_FTSR, DBGMCU_APB1_FZ];
 /// Longest time that the emulator runs between two looks at the sensor's clock and the events.
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
@@ -161,8 +163,12 @@ pub(crate) enum Event {
     SensorReset,
     /// The sensor is put to sleep, without end.
     SensorSleep,
+    /// Something else writes this frame to the sensor.
+    WriteRegister(u16),
     /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
+    /// The data-ready line changes its level every 4 us for this time, in ns.
+    Oscillate(u64),
     /// So many of the next data-ready edges do not reach the processor.
     LoseEdges(u32),
     /// The sensor is unplugged (no edges, and zeros on the data line), or plugged in again.
@@ -192,6 +198,9 @@ struct Plant {
     samples: u64,
     /// Data-ready edges still to be withheld from the processor.
     edges_to_lose: u64,
+    /// Time in ns until which the data-ready line oscillates, and its level.
+    oscillates_until: u64,
+    oscillating_level: bool,
     /// Bits of the DMA stream's control register to be cleared within the next burst.
     burst_fault: u64,
     led_level: u64,
@@ -226,12 +235,18 @@ impl Plant {
                 sensor.part.transfer(0xBE80); // GLOB_CMD bit 7
                 sensor.part.deselect();
             }
+            Event::WriteRegister(frame) => {
+                sensor.part.select();
+                sensor.part.transfer(frame);
+                sensor.part.deselect();
+            }
             Event::SensorSleep => {
                 sensor.part.select();
                 sensor.part.transfer(0xBB01); // SLP_CNT bit 8
                 sensor.part.deselect();
             }
             Event::Stuck(byte) => sensor.stuck_at = byte,
+            Event::Oscillate(time_ns) => self.oscillates_until = stop.at.0 + time_ns,
             Event::LoseEdges(edges) => self.edges_to_lose = u64::from(edges),
             Event::Unplugged(out) => {
                 sensor.stuck_at = out.then_some(0);
@@ -300,6 +315,11 @@ impl Driver<Bench> for Plant {
                 bench.microcontroller.drive_pin(stop.at, port, pin, true);
             }
         }
+        if now < self.oscillates_until {
+            self.oscillating_level = !self.oscillating_level;
+            bench.microcontroller.drive_pin(stop.at, port, pin, self.oscillating_level);
+            return Some(VirtualNanos(now + 4_000));
+        }
         Some(self.next_stop(bench, now))
     }
 }
@@ -350,6 +370,8 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
         pulse_end: None,
         samples: 0,
         edges_to_lose: 0,
+        oscillates_until: 0,
+        oscillating_level: false,
         burst_fault: 0,
         led_level: 0,
         led_changes: 0,

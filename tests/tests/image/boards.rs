@@ -1,8 +1,8 @@
 //! What the boards differ in, and what their documents demand: crystal, pins, the 5 V of the sensor, brown-out, log.
 
 use crate::bench::{
-    EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_OPTCR, H405, Outcome, PUPDR, SPI1_CR1, SYSCFG_EXTICR, Scenario,
-    feather_image, gpio, image, run,
+    DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_OPTCR, H405, Outcome, PUPDR, SPI1_CR1,
+    SYSCFG_EXTICR, Scenario, feather_image, gpio, image, run,
 };
 use crate::costs::{Costs, Memory, assert_within_budget, counter};
 use crate::decoded::Decoded;
@@ -40,9 +40,26 @@ fn each_board_samples_with_its_crystal_and_pins() {
         assert_eq!(routed, port as u64, "{name}: line {line}");
         let edges = [EXTI_IMR, EXTI_RTSR, EXTI_FTSR].map(|register| registers[&register]);
         assert_eq!(edges, [1 << line, 1 << line, 0], "{name}: lines, rising and falling edges");
-        // BOR_LEV = 00: level 3 (RM0090 section 3.9.10).
-        assert_eq!(registers[&FLASH_OPTCR] >> 2 & 3, 0, "{name}: brown-out level");
+        assert_eq!(registers[&DBGMCU_APB1_FZ] >> 12 & 1, 1, "{name}: the watchdog stops with the debugger");
+        // BOR_LEV = 11: off, as delivered (RM0090 section 3.9.10).
+        assert_eq!(registers[&FLASH_OPTCR] >> 2 & 3, 0b11, "{name}: the option bytes are not written");
     }
+}
+
+/// On the command alone, and once.
+#[test]
+fn the_brown_out_level_is_programmed_on_command() {
+    let keys = vec![(0.1, b"i 0\r".to_vec()), (1.0, b"brownout\r".to_vec()), (1.5, b"brownout\r".to_vec())];
+    let sensor = Some(Sensor::published(27));
+    let Outcome { received, diagnostics, registers, .. } =
+        run(image(), Scenario { sensor, keys, seconds: 2.0, ..Scenario::default() });
+    assert_eq!(diagnostics, [""; 0]);
+    // BOR_LEV = 00: level 3 (RM0090 section 3.9.10).
+    assert_eq!(registers[&FLASH_OPTCR] >> 2 & 3, 0, "brown-out level");
+    let decoded = Decoded::decode(&received);
+    let told = |text: &str| decoded.logs().iter().filter(|log| log.starts_with(text)).count();
+    assert_eq!(told("option bytes written"), 1, "{:?}", decoded.logs());
+    assert!(decoded.lines.iter().any(|line| line == "brown-out: 2.7 V, as before"), "{:?}", decoded.lines);
 }
 
 #[test]

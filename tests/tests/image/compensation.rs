@@ -1,33 +1,23 @@
 //! Learning on the device: the model of one epoch is fitted, its covariates are subtracted, and the next epoch shows
 //! the drift with and without the subtraction.
 
-use crate::bench::{Event, Outcome, Scenario, assert_stack_suffices, image, run};
+use crate::bench::{Event, FEATHER, H405, Outcome, Scenario, Wiring, assert_stack_suffices, feather_image, image, run};
 use crate::decoded::Decoded;
+use crate::epochs::{
+    EPOCH_S, LINE_HZ, RATE_HZ, SENSITIVITY, SENTENCES, assert_told, four_effects, learned_on_device, learned_on_host,
+    warming_part,
+};
 use crate::peripherals::Sensor;
-use adis16405_driver::{BURST_BYTES, Burst, Channel, SamplePeriod};
-use firmware::epoch::estimate_regressors;
-use firmware::learner::{EpochFit, validate};
-use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, Statistics, TimedBurst};
+use adis16405_driver::Channel;
+use firmware::CHANNELS;
 use link::{
     Decoder, LearnedMessage, Message, Received, ReportedDeviations, ReportedParameter, ReportedTerm, ValidationMessage,
 };
-use virtual_sensor::{
-    Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario, TemperatureProfile, VirtualAdis16405,
-};
+use std::path::Path;
+use virtual_sensor::{InjectedEffect, OutputRegister};
 
-const EPOCH_S: f64 = 60.0;
-const RATE_HZ: f64 = 204.8;
-/// Sensitivity of gyro x to temperature, deg/s/°C.
-const SENSITIVITY: f64 = 0.05;
-/// Frequency of the line on gyro z.
-const LINE_HZ: f64 = 20.5;
-
-/// A sensor with `effects` that warms up by 8 °C in a room whose temperature cycles with a period of 50 s.
 fn warming_sensor(effects: Vec<InjectedEffect>) -> Sensor {
-    let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 50.0 };
-    let environment = Environment { temperature, ..Environment::default() };
-    let scenario = SensorScenario { environment, effects };
-    Sensor::new(VirtualAdis16405::with_scenario(&scenario, NoiseModel::paper(), 1))
+    Sensor::new(warming_part(effects))
 }
 
 /// The results of two epochs.
@@ -42,14 +32,25 @@ struct Epochs {
     longest_channel_s: f64,
     /// Time from a key press during the fit to the answer, s.
     response_s: f64,
+    /// The table after the fit of the second.
+    table: Vec<String>,
 }
 
+/// Time of the fit of an epoch, and of the table after it.
+const LONGEST_FIT_S: f64 = 30.0;
+
 fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
+    run_on(image(), H405, effects, vec![])
+}
+
+fn run_on(image: &Path, wiring: Wiring, effects: Vec<InjectedEffect>, events: Vec<(f64, Event)>) -> Epochs {
     const PRESSED_S: f64 = EPOCH_S + 5.0;
-    let keys = vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (PRESSED_S, b"v".to_vec())];
-    let scenario =
-        Scenario { sensor: Some(warming_sensor(effects)), keys, seconds: 2.0 * EPOCH_S + 5.0, ..Scenario::default() };
-    let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
+    let end_s = 2.0 * EPOCH_S + LONGEST_FIT_S;
+    let keys =
+        vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (PRESSED_S, b"v".to_vec()), (end_s, b"t".to_vec())];
+    let sensor = Some(warming_sensor(effects));
+    let scenario = Scenario { wiring, sensor, keys, events, seconds: end_s + 3.0, ..Scenario::default() };
+    let Outcome { sensor, received, diagnostics, .. } = run(image, scenario);
     assert_eq!(diagnostics, [""; 0]);
     let sensor = sensor.expect("the sensor on the bus");
     assert_eq!(sensor.part.violations(), []);
@@ -63,16 +64,9 @@ fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
     let samples: Vec<u64> = decoded.channels().iter().map(|report| report.samples).collect();
     let samples = &samples[..2 * CHANNELS.len()];
 
-    let (mut learned, mut validated) = (Vec::new(), Vec::new());
-    for message in &decoded.messages {
-        match message {
-            Message::Learned(message) if message.epoch == 0 => learned.push(message.clone()),
-            Message::Validation(message) => validated.push(message.clone()),
-            _ => {}
-        }
-    }
+    let (learned, validated) = learned_on_device(&decoded.messages);
     let rates: Vec<Option<f64>> = decoded.hellos().iter().map(|hello| hello.measured_rate_hz).collect();
-    let expected = on_host(&sensor.bursts, samples, &rates);
+    let expected = learned_on_host(&sensor.bursts, samples, &rates);
     assert_eq!((&learned, &validated), (&expected.0, &expected.1), "bit for bit");
     let times = |wanted: fn(&Received) -> bool| -> Vec<f64> {
         let mut decoder = Decoder::new();
@@ -84,60 +78,12 @@ fn run_two_epochs(effects: Vec<InjectedEffect>) -> Epochs {
     let answers = times(|received| matches!(received, Received::Text(line) if line.contains("observatory")));
     let longest_channel_s = models.windows(2).map(|pair| pair[1] - pair[0]).take(5).fold(0.0, f64::max);
     let (fit_s, response_s) = (reports[0] - EPOCH_S, answers[0] - PRESSED_S);
-    Epochs { learned, validated, fit_s, longest_channel_s, response_s }
-}
-
-/// The same messages, computed on the host from the bursts that the sensor sent. `samples` are those of one epoch or two,
-/// channel by channel, and `rates` the sample rates that the microcontroller has measured in each.
-fn on_host(
-    bursts: &[(u64, [u8; BURST_BYTES])],
-    samples: &[u64],
-    rates: &[Option<f64>],
-) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
-    assert_eq!(FIRST_CONFIG.sample_period(), SamplePeriod::nearest(RATE_HZ).expect("a rate"));
-    let mut statistics = Statistics::new();
-    let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
-    let at_us = |sample: u64| (sample as f64 * 1e6 / RATE_HZ) as u64;
-    estimators.mark_probed(at_us(bursts[0].0));
-    let mut bursts = bursts.iter();
-    let mut epochs = Vec::new();
-    for ((number, samples), rate_hz) in (0..).zip(samples.chunks(CHANNELS.len())).zip(rates) {
-        assert!(
-            samples.iter().all(|other| *other == samples[0]),
-            "all channels of an epoch have taken the same samples"
-        );
-        // The first bursts after the start are not used: the filter settles.
-        while estimators.channel(0).is_some_and(|estimator| estimator.len() < samples[0])
-            && let Some((sample, bytes)) = bursts.next()
-        {
-            let arrival = TimedBurst { at_us: at_us(*sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) };
-            estimators.process(arrival, 0);
-        }
-        let mut epoch = FinishedEpoch::EMPTY;
-        epoch.number = number;
-        epoch.fill(&mut estimators);
-        epoch.measured_hz = *rate_hz;
-        epochs.push(epoch);
-    }
-    let (first, second) = (&epochs[0], epochs.get(1));
-    let means = first.covariances().expect("no restart").means;
-    let scale = first.scale(FIRST_CONFIG);
-    let fit = |index: usize| {
-        let mut fit = EpochFit::new(estimate_regressors(first, index, scale, &mut || true)?);
-        fit.run(first, index, scale, &mut || true).then_some(fit)
-    };
-    let fits: Vec<EpochFit> = (0..6).map(|index| fit(index).expect("a fit that is not cancelled")).collect();
-    let validation = |index: usize| {
-        let second = second?;
-        validate(&fits[index].model(), Some(&means), second, index, second.scale(FIRST_CONFIG))
-    };
-    let learned = fits.iter().enumerate().map(|(index, fit)| fit.message(index, first.number)).collect();
-    (learned, (0..6).filter_map(validation).collect())
+    Epochs { learned, validated, fit_s, longest_channel_s, response_s, table: decoded.lines }
 }
 
 #[test]
 fn a_temperature_effect_is_learned_and_subtracted() {
-    let Epochs { learned, validated, fit_s, longest_channel_s, response_s } = run_two_epochs(vec![
+    let Epochs { learned, validated, fit_s, longest_channel_s, response_s, .. } = run_two_epochs(vec![
         InjectedEffect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY },
         InjectedEffect::Sinusoid {
             channel: OutputRegister::GyroZ,
@@ -217,10 +163,44 @@ fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
     assert!(learned(&before).len() < 6, "the reset came too late");
     // The epoch was finished, and its rate measured, before the reset.
     let rates: Vec<Option<f64>> = before.hellos().iter().map(|hello| hello.measured_rate_hz).collect();
-    assert_eq!(learned(&after), on_host(&bursts, &samples, &rates).0, "bit for bit");
+    assert_eq!(learned(&after), learned_on_host(&bursts, &samples, &rates).0, "bit for bit");
 
     let running = after.channels()[after.channels().len() - CHANNELS.len()].samples as f64;
     let sampled_s = running / RATE_HZ;
     println!("{sampled_s:.2} s of samples, 31 s after the start of the epoch");
     assert!((29.3..31.1).contains(&sampled_s), "{sampled_s} s of samples");
+}
+
+/// Five effects, each undeclared to the firmware, on both boards: a temperature effect, a Gauss-Markov process, a line and steps at
+/// once, and the sensor's filter at another setting, which something else has written. Names, parameters and the errors before and
+/// after on the next epoch are those of the host on the same samples, bit for bit, and the table says them in words.
+#[test]
+fn five_hidden_effects_are_found_on_each_board() {
+    // SENS_AVG, lower byte: sixteen taps a stage, 0.1 s after the firmware has set none.
+    let filter = vec![(0.6, Event::WriteRegister(0xB804))];
+    for (name, image, wiring) in [("H405", image(), H405), ("Feather", feather_image(), FEATHER)] {
+        println!("{name}, four effects");
+        let Epochs { learned, validated, table, .. } = run_on(image, wiring, four_effects(), vec![]);
+        print_errors(&learned, &validated);
+        assert_told(&table, &SENTENCES);
+        // The three gyros fail on the next epoch without their effects, and do not with them.
+        for validated in &validated[..3] {
+            let (before, after) = (validated.before.expect("a model"), validated.after.expect("a model"));
+            assert!(before.deviance_per_point > 2.0 * after.deviance_per_point, "{validated:?}");
+        }
+        println!("{name}, another filter");
+        let Epochs { learned, validated, table, .. } = run_on(image, wiring, vec![], filter.clone());
+        print_errors(&learned, &validated);
+        assert_told(&table, &[("all channels", "The part's low-pass filter of 16 taps")]);
+    }
+}
+
+fn print_errors(learned: &[LearnedMessage], validated: &[ValidationMessage]) {
+    for (learned, validated) in learned.iter().zip(validated) {
+        let name = Channel::ALL[usize::from(learned.channel)].name();
+        let terms: Vec<ReportedTerm> = learned.added_terms.iter().map(|term| term.coefficient.term).collect();
+        let error = |error: &Option<link::ReportedModelError>| error.map_or(f64::NAN, |error| error.deviance_per_point);
+        let (before, after) = (error(&validated.before), error(&validated.after));
+        println!("{name}: {} covariates, {terms:?}, deviance {before:.1} -> {after:.2}", learned.regressors.len());
+    }
 }

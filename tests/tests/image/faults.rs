@@ -261,3 +261,20 @@ fn a_sleeping_sensor_is_woken() {
     // Two seconds before, and at least two of the four after: steps come once a second.
     assert!(f64::from(health.used) > 4.0 * RATE_HZ, "{health:?}");
 }
+
+/// A data-ready line that oscillates at 125 kHz for 50 ms is masked, and told; the next step of recovery takes its edges again.
+#[test]
+fn an_oscillating_data_ready_line_is_masked() {
+    let keys = vec![(0.1, b"i 0\r".to_vec()), (5.0, b"r".to_vec())];
+    let events = vec![(2.0, Event::Oscillate(50_000_000))];
+    let sensor = Some(Sensor::published(28));
+    let Outcome { received, diagnostics, .. } =
+        run(image(), Scenario { sensor, keys, events, seconds: 7.0, ..Scenario::default() });
+    assert_eq!(diagnostics, [""; 0], "no restart");
+    let decoded = Decoded::decode(&received);
+    println!("{:#?}", decoded.logs());
+    assert!(decoded.logs().iter().any(|log| log.contains("oscillates and is masked")), "{:?}", decoded.logs());
+    let health = **decoded.healths().last().expect("a report");
+    assert_eq!((health.data_ready_masked, health.recoveries, health.queue_full), (1, 1, 0), "{health:?}");
+    assert!(f64::from(health.used) > 3.3 * RATE_HZ, "{health:?}");
+}

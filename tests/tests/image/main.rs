@@ -5,6 +5,7 @@ mod boards;
 mod compensation;
 mod costs;
 mod decoded;
+mod epochs;
 mod faults;
 mod full_speed;
 mod images;

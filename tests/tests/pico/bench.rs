@@ -70,6 +70,10 @@ pub(crate) struct Outcome {
     pub(crate) led_changes: u64,
     /// Longest time for which the watchdog was not fed, in s.
     pub(crate) longest_unfed_s: f64,
+    /// SSPCR0 of SPI0, PROC0_INTE2 of the pins, and CTRL of the watchdog, at the end.
+    pub(crate) registers: Vec<u32>,
+    /// Shortest time from one falling edge of chip select to the next while SCK was at most 300 kHz, in ns.
+    pub(crate) shortest_slow_read_ns: u64,
     /// Warnings and errors of the emulator, one a line.
     pub(crate) diagnostics: String,
 }
@@ -117,6 +121,7 @@ pub(crate) fn run(
     let (mut answers, mut questions) = (node.stdin.take().expect("a pipe"), node.stdout.take().expect("a pipe"));
     let (mut bursts, mut received, mut frame) = (Vec::new(), Vec::new(), Vec::new());
     let (mut instructions, mut led_changes, mut longest_unfed_s) = (0, 0, 0.0);
+    let (mut registers, mut sck_hz, mut selected_at, mut shortest_slow_read_ns) = (Vec::new(), 0.0, 0, u64::MAX);
     let mut question = [0; 9];
     while questions.read_exact(&mut question).is_ok() {
         let [kind, value @ ..] = question;
@@ -129,9 +134,14 @@ pub(crate) fn run(
             b'e' => instructions = value as u64,
             b'l' => led_changes = value as u64,
             b'w' => longest_unfed_s = value * 1e-9,
+            b'r' => registers.push(value as u32),
+            b'c' => {
+                sck_hz = value;
+                part.set_sck_hz(Some(value as u32));
+            }
             _ => {}
         }
-        if matches!(kind, b'e' | b'l' | b'w') {
+        if matches!(kind, b'c' | b'e' | b'l' | b'r' | b'w') {
             continue;
         }
         part.advance_to(value as u64);
@@ -153,6 +163,10 @@ pub(crate) fn run(
         match kind {
             b's' => {
                 selected = true;
+                let before = std::mem::replace(&mut selected_at, value as u64);
+                if sck_hz <= 300_000.0 && before > 0 {
+                    shortest_slow_read_ns = shortest_slow_read_ns.min(selected_at - before);
+                }
                 part.select();
                 frame.clear();
             }
@@ -184,5 +198,15 @@ pub(crate) fn run(
     let output = node.wait_with_output().expect("the emulator ends");
     let diagnostics = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{diagnostics}");
-    Outcome { part, bursts, received, instructions, led_changes, longest_unfed_s, diagnostics }
+    Outcome {
+        part,
+        bursts,
+        received,
+        instructions,
+        led_changes,
+        longest_unfed_s,
+        registers,
+        shortest_slow_read_ns,
+        diagnostics,
+    }
 }

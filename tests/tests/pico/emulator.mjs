@@ -1,11 +1,13 @@
 // Runs an RP2040 image in rp2040js. The sensor is simulated by the parent process, to which questions go over standard
-// output, and from which answers come over standard input. Arguments: the folder of rp2040js, the image as UF2 and as
+// output, and from which answers come over standard input. The frequency of SCK goes with every frame. Arguments: the folder of rp2040js, the image as UF2 and as
 // ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, the time in s of an error of the DMA channel
 // that receives a burst, and keys as TIME=TEXT.
 //
-// A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `s` and `d` are
+// A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `c` has a frequency of SCK in
+// Hz in the place of the time, `s` and `d` are
 // the falling and the rising edge of chip select, `b` and a further byte a transfer over SPI, `u` and a further byte an
-// output of the serial port. At the end follow, in the place of the time, `l` with the number of changes of the LED, `w` with
+// output of the serial port. At the end follow, in the place of the time, `r` with the registers of which the test asserts bits
+// (SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog), `l` with the number of changes of the LED, `w` with
 // the longest time in ns for which the watchdog was not fed, and `e` with the number of instructions. The answer to `n` is
 // the number of samples and the time of the next one (two f64), that to `b` a byte; the others have none.
 import fs from 'node:fs';
@@ -103,8 +105,11 @@ spi.onTransmit = (value) => {
   clock.createAlarm(() => spi.completeTransmit(answer)).schedule((spi.dataBits * 1e9) / spi.clockFrequency);
 };
 mcu.gpio[PIN_SELECT].addListener((state) => {
-  if (state === GPIOPinState.Low) ask('s', clock.nanos, undefined, 0);
-  else if (state === GPIOPinState.High) ask('d', clock.nanos, undefined, 0);
+  if (state === GPIOPinState.Low) {
+    ask('c', spi.clockFrequency, undefined, 0);
+    ask('s', clock.nanos, undefined, 0);
+  }
+  if (state === GPIOPinState.High) ask('d', clock.nanos, undefined, 0);
 });
 let ledChanges = 0;
 const isDriven = (state) => state === GPIOPinState.Low || state === GPIOPinState.High;
@@ -141,6 +146,7 @@ while (clock.nanos < end) {
   }
 }
 for (const diagnostic of diagnostics.keys()) console.error(diagnostic);
+for (const address of [0x4003c000, 0x40014108, 0x40058000]) ask('r', mcu.readUint32(address), undefined, 0);
 ask('l', ledChanges, undefined, 0);
 ask('w', longestUnfed, undefined, 0);
 ask('e', instructions, undefined, 0);

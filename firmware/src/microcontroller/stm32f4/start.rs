@@ -147,7 +147,7 @@ impl Microcontroller for Stm32f4 {
     }
 }
 
-/// Makes a pin the data-ready input. It floats: the sensor drives it with up to 5 V, which a pin tolerates only without a
+/// Makes a pin the data-ready input. It floats: the sensor drives it, with 3.3 V, and a pin tolerates more only without a
 /// pull-up or pull-down (STM32F405 data sheet, table 7, FT).
 pub fn data_ready_input<const P: char, const N: u8>(
     pin: Pin<P, N>,

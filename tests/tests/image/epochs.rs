@@ -1,0 +1,121 @@
+//! What a device learns from epochs: the effects that are hidden from it, and the models that the host makes of the same samples.
+
+use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
+use firmware::epoch::estimate_regressors;
+use firmware::learner::{EpochFit, validate};
+use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, Statistics, TimedBurst};
+use link::{LearnedMessage, Message, ValidationMessage};
+use virtual_sensor::{
+    Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario, TemperatureProfile, VirtualAdis16405,
+};
+
+pub(crate) const EPOCH_S: f64 = 60.0;
+pub(crate) const RATE_HZ: f64 = 204.8;
+/// Sensitivity of gyro x to temperature, deg/s/°C.
+pub(crate) const SENSITIVITY: f64 = 0.05;
+/// Frequency of the line on gyro z.
+pub(crate) const LINE_HZ: f64 = 20.5;
+
+/// A part with `effects` that warms up by 8 °C in a room whose temperature cycles with a period of 50 s.
+pub(crate) fn warming_part(effects: Vec<InjectedEffect>) -> VirtualAdis16405 {
+    let temperature = TemperatureProfile { rise_c: 8.0, time_constant_s: 60.0, cycle_c: 3.0, period_s: 50.0 };
+    let environment = Environment { temperature, ..Environment::default() };
+    let scenario = SensorScenario { environment, effects };
+    VirtualAdis16405::with_scenario(&scenario, NoiseModel::paper(), 1)
+}
+
+/// A temperature effect on gyro x, a Gauss-Markov process on gyro y, a line on gyro z, and on accelerometer x a step in each of two
+/// epochs.
+pub(crate) fn four_effects() -> Vec<InjectedEffect> {
+    let step = |time_s| InjectedEffect::BiasStep { channel: OutputRegister::AcclX, time_s, size: 0.05 };
+    vec![
+        InjectedEffect::Temperature { channel: OutputRegister::GyroX, sensitivity: SENSITIVITY },
+        InjectedEffect::Markov { channel: OutputRegister::GyroY, time_constant_s: 0.5, deviation: 0.2 },
+        InjectedEffect::Sinusoid {
+            channel: OutputRegister::GyroZ,
+            frequency_hz: LINE_HZ,
+            amplitude: 0.4,
+            phase_rad: 0.0,
+        },
+        step(0.5 * EPOCH_S),
+        step(1.5 * EPOCH_S),
+    ]
+}
+
+/// What the table of a device that has met [`four_effects`] says of them, channel and sentence.
+pub(crate) const SENTENCES: [(&str, &str); 3] = [
+    ("gyro x", "The bias follows the temperature: "),
+    ("gyro y", "A noise with a memory of "),
+    ("gyro z", "A vibration "),
+];
+
+/// Asserts that a line for each of these channels has the sentence.
+pub(crate) fn assert_told(lines: &[String], sentences: &[(&str, &str)]) {
+    let found = lines.iter().skip_while(|line| *line != "What was found");
+    found.clone().take_while(|line| !line.starts_with("Health")).for_each(|line| println!("{line}"));
+    for (channel, sentence) in sentences {
+        let is_told = |line: &String| line.contains(channel) && line.contains(sentence);
+        assert!(found.clone().any(is_told), "{channel}: {sentence}: {lines:#?}");
+    }
+}
+
+/// The models of the first epoch and their validations on the second, as the device has sent them.
+pub(crate) fn learned_on_device(messages: &[Message]) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
+    let (mut learned, mut validated) = (Vec::new(), Vec::new());
+    for message in messages {
+        match message {
+            Message::Learned(message) if message.epoch == 0 => learned.push(message.clone()),
+            Message::Validation(message) if message.epoch == 1 => validated.push(message.clone()),
+            _ => {}
+        }
+    }
+    (learned, validated)
+}
+
+/// The same messages, computed on the host from the bursts that the sensor sent. `samples` are those of one epoch or two,
+/// channel by channel, and `rates` the sample rates that the microcontroller has measured in each.
+pub(crate) fn learned_on_host(
+    bursts: &[(u64, [u8; BURST_BYTES])],
+    samples: &[u64],
+    rates: &[Option<f64>],
+) -> (Vec<LearnedMessage>, Vec<ValidationMessage>) {
+    assert_eq!(FIRST_CONFIG.sample_period(), SamplePeriod::nearest(RATE_HZ).expect("a rate"));
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
+    let at_us = |sample: u64| (sample as f64 * 1e6 / RATE_HZ) as u64;
+    estimators.mark_probed(at_us(bursts[0].0));
+    let mut bursts = bursts.iter();
+    let mut epochs = Vec::new();
+    for ((number, samples), rate_hz) in (0..).zip(samples.chunks(CHANNELS.len())).zip(rates) {
+        assert!(
+            samples.iter().all(|other| *other == samples[0]),
+            "all channels of an epoch have taken the same samples"
+        );
+        // The first bursts after the start are not used: the filter settles.
+        while estimators.channel(0).is_some_and(|estimator| estimator.len() < samples[0])
+            && let Some((sample, bytes)) = bursts.next()
+        {
+            let arrival = TimedBurst { at_us: at_us(*sample), dropped: 0, burst: Some(Burst::from_bytes(bytes)) };
+            estimators.process(arrival, 0);
+        }
+        let mut epoch = FinishedEpoch::EMPTY;
+        epoch.number = number;
+        epoch.fill(&mut estimators);
+        epoch.measured_hz = *rate_hz;
+        epochs.push(epoch);
+    }
+    let (first, second) = (&epochs[0], epochs.get(1));
+    let means = first.covariances().expect("no restart").means;
+    let scale = first.scale(FIRST_CONFIG);
+    let fit = |index: usize| {
+        let mut fit = EpochFit::new(estimate_regressors(first, index, scale, &mut || true)?);
+        fit.run(first, index, scale, &mut || true).then_some(fit)
+    };
+    let fits: Vec<EpochFit> = (0..6).map(|index| fit(index).expect("a fit that is not cancelled")).collect();
+    let validation = |index: usize| {
+        let second = second?;
+        validate(&fits[index].model(), Some(&means), second, index, second.scale(FIRST_CONFIG))
+    };
+    let learned = fits.iter().enumerate().map(|(index, fit)| fit.message(index, first.number)).collect();
+    (learned, (0..6).filter_map(validation).collect())
+}
