@@ -149,7 +149,8 @@ fn report_after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
     assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{health:?}");
     let up_s = hello.uptime_us as f64 * 1e-6;
     let counted_s = f64::from(health.bursts + health.settling) / RATE_HZ;
-    assert!((up_s - 0.07..up_s + REPORT_S).contains(&counted_s), "{counted_s} s of bursts, up for {up_s} s");
+    // The self-test takes 48 ms at this rate: 12 ms at 819.2 SPS (data sheet Rev. B, Table 1).
+    assert!((up_s - 0.11..up_s + REPORT_S).contains(&counted_s), "{counted_s} s of bursts, up for {up_s} s");
     assert!(sensor.is_some_and(|sensor| sensor.bursts.len() as u32 >= health.bursts));
     (hello, health)
 }
