@@ -294,8 +294,9 @@ impl App {
         }
         board.set_sampling(false);
         self.state.request_probe(now_us);
-        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-        let done = auto_null(board.sensor_bus(), self.state.config).map_err(|error| text_line(format_args!("{error}")));
+        let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
+        let done = auto_null(board.sensor_bus(), self.state.config, sck_hz)
+            .map_err(|error| text_line(format_args!("{error}")));
         match done {
             Ok(()) => {
                 self.reset_statistics(board);

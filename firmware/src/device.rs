@@ -223,8 +223,8 @@ impl DeviceState {
             }
         }
         // The sensor may be in low-power mode until it is configured.
-        board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-        let result = probe(board.sensor_bus(), self.config, scope, self.settings.prod_id)
+        let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
+        let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.prod_id)
             .map_err(|error| text_line(format_args!("{error}")));
         self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {

@@ -42,6 +42,12 @@ pub struct ProbeScope {
     pub self_test: bool,
 }
 
+/// The sensor as it is addressed while its power mode may be either: with the stall of low-power mode, at a serial clock of
+/// `sck_hz`.
+fn addressed<SPI: SpiDevice<u8>, D: DelayNs>((bus, delay): (SPI, D), config: Config, sck_hz: u32) -> Adis16405<SPI, D> {
+    Adis16405::new(bus, delay, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power).with_sck_hz(sck_hz)
+}
+
 /// A sensor that has passed a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SensorIdentity {
@@ -100,13 +106,14 @@ impl fmt::Display for TestOutcome {
 /// # Errors
 /// The bus failed, another product answered, or a register did not take its value. A self-test that fails is none.
 pub fn probe<SPI: SpiDevice<u8>>(
-    (bus, delay): (SPI, impl DelayNs),
+    bus: (SPI, impl DelayNs),
     config: Config,
+    sck_hz: u32,
     scope: ProbeScope,
     prod_id: u16,
 ) -> Result<SensorIdentity, Error<SPI::Error>> {
     // The sensor may be in low-power mode until it is configured.
-    let mut sensor = Adis16405::new(bus, delay, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power);
+    let mut sensor = addressed(bus, config, sck_hz);
     if prod_id != 0 {
         sensor = sensor.with_prod_id(prod_id);
     }
@@ -148,12 +155,11 @@ pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
 /// # Errors
 /// The bus failed, or the sensor does not answer afterwards.
 pub fn auto_null<SPI: SpiDevice<u8>>(
-    (bus, delay): (SPI, impl DelayNs),
+    bus: (SPI, impl DelayNs),
     config: Config,
+    sck_hz: u32,
 ) -> Result<(), Error<SPI::Error>> {
-    // The sensor may be in low-power mode.
-    let stall_ns = Timing::DEFAULT.stall_ns.low_power;
-    Adis16405::new(bus, delay, config).with_stall_ns(stall_ns).auto_null().map(|_offsets| ())
+    addressed(bus, config, sck_hz).auto_null().map(|_offsets| ())
 }
 
 #[cfg(test)]
