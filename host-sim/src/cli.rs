@@ -1,14 +1,11 @@
 //! The arguments of the command line.
 
 use adis16405_driver::GyroRange;
-use benchmarks::losses::LossPlan;
-use benchmarks::undeclared::{self, EffectKind, UndeclaredPlan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use recordings::serial;
 use reports::export::{AxisChoice, ExportFormat};
 use simulation::Simulation;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Noise analysis of the ADIS16405 inertial sensor, with a virtual sensor, recordings and replay.
@@ -79,130 +76,6 @@ pub(crate) enum Command {
         /// The file to write.
         out: PathBuf,
     },
-    /// Hide random effects in recordings of the virtual sensor and score how well the analysis names them.
-    Undeclared(UndeclaredArguments),
-    /// Repeat the published characterisation on simulated hours whose noise is known: slope method beside the fit.
-    Paper {
-        /// Hours to simulate; a scatter needs two.
-        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=MOST_RECORDINGS))]
-        seeds: u64,
-        /// Seed of the first.
-        #[arg(long, default_value_t = 1)]
-        first_seed: u64,
-        /// Where the result goes besides the terminal.
-        #[command(flatten)]
-        output: JsonArgument,
-    },
-    /// Take samples out of simulated records and compare variance and coefficients with those of the complete records.
-    Losses(LossArguments),
-}
-
-/// Most recordings of a benchmark: each has a seed of its own, and its result is kept until the end.
-const MOST_RECORDINGS: u64 = 100_000;
-
-/// The benchmark of lost samples.
-#[derive(Debug, Args)]
-pub(crate) struct LossArguments {
-    /// Records of each noise.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=MOST_RECORDINGS))]
-    records: u64,
-    /// Binary logarithm of the number of samples of a record, at 204.8 SPS; 20 is 1.4 hours.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(14..=24))]
-    samples_log2: u32,
-    /// Seed of the first record.
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
-    /// Threads [default: as many as the machine has cores].
-    #[arg(long)]
-    jobs: Option<NonZeroUsize>,
-    /// Where the result goes besides the terminal.
-    #[command(flatten)]
-    pub(crate) output: JsonArgument,
-}
-
-impl LossArguments {
-    /// The benchmark that the arguments describe.
-    pub(crate) fn plan(&self) -> LossPlan {
-        LossPlan {
-            records: self.records,
-            samples: 1 << self.samples_log2,
-            first_seed: self.first_seed,
-            jobs: self.jobs.map_or_else(cores, NonZeroUsize::get),
-        }
-    }
-}
-
-/// Cores of the machine, 1 where it does not say.
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
-}
-
-/// The detection benchmark.
-#[derive(Debug, Args)]
-pub(crate) struct UndeclaredArguments {
-    /// Kind that is hidden alone; may be repeated [default: all].
-    #[arg(long, value_enum)]
-    pub(crate) kind: Vec<EffectKind>,
-    /// Recordings a kind.
-    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
-    pub(crate) per_kind: u64,
-    /// Recordings with nothing hidden.
-    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
-    pub(crate) nothing: u64,
-    /// Recordings with two effects.
-    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
-    pub(crate) pairs: u64,
-    /// Recordings with three effects.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
-    pub(crate) triples: u64,
-    /// Recordings of each kind of effect that no kind of the report describes.
-    #[arg(long, value_name = "PER_KIND", default_value_t = 20, value_parser = clap::value_parser!(u64).range(..=MOST_RECORDINGS))]
-    pub(crate) outside: u64,
-    /// Length of a recording, s.
-    #[arg(long, default_value_t = 1800.0)]
-    pub(crate) seconds: f64,
-    /// Samples that are lost at random in every recording, %.
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = loss_percent)]
-    pub(crate) loss: f64,
-    /// Recordings that are examined at a time [default: one a core].
-    #[arg(long)]
-    pub(crate) jobs: Option<NonZeroUsize>,
-    /// First seed of each group of recordings.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..undeclared::SEEDS_PER_GROUP / 2))]
-    pub(crate) seed: u64,
-    /// Take the seeds that are kept for the end.
-    #[arg(long)]
-    pub(crate) sealed: bool,
-    /// Where the result goes besides the terminal.
-    #[command(flatten)]
-    pub(crate) output: JsonArgument,
-}
-
-impl UndeclaredArguments {
-    /// The benchmark that the arguments describe.
-    pub(crate) fn plan(&self) -> UndeclaredPlan {
-        UndeclaredPlan {
-            kinds: if self.kind.is_empty() { EffectKind::ALL.to_vec() } else { self.kind.clone() },
-            per_kind: self.per_kind,
-            empty: self.nothing,
-            pairs: self.pairs,
-            triples: self.triples,
-            outside: self.outside,
-            seconds: self.seconds,
-            loss_percent: self.loss,
-            seed: self.seed,
-            sealed: self.sealed,
-            jobs: self.jobs.map_or_else(cores, NonZeroUsize::get),
-        }
-    }
-}
-
-/// A share of lost samples from 0 to 50 %.
-fn loss_percent(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
-        _ => Err("not a percentage from 0 to 50".to_owned()),
-    }
 }
 
 /// Recordings to analyse, and where the report goes.

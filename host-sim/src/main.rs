@@ -7,16 +7,13 @@ mod convert;
 mod explain;
 mod export;
 mod live;
-mod losses;
 mod many;
 mod output;
-mod paper;
 mod progress;
 mod record;
 mod recording_file;
 mod simulate;
 mod streaming;
-mod undeclared;
 
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
@@ -111,9 +108,6 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             output::print(|out| out.write_all(&script))
         }
         Some(Command::Explain(arguments)) => explain::run(&arguments),
-        Some(Command::Undeclared(arguments)) => undeclared::run(&arguments.plan(), &arguments.output),
-        Some(Command::Paper { seeds, first_seed, output }) => paper::run(seeds, first_seed, &output),
-        Some(Command::Losses(arguments)) => losses::run(&arguments.plan(), &arguments.output),
         Some(Command::Monitor(arguments)) => monitor_source(&arguments),
         Some(Command::Uf2 { elf, out }) => convert_image(&elf, &out),
     }

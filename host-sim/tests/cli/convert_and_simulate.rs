@@ -156,7 +156,6 @@ fn options_are_those_that_a_subcommand_uses() {
         &["replay", "a", "--columns", "gyro_x=0"],
         &["replay", "a", "--topic", "t"],
         &["convert", "a", "b", "--rate", "100"],
-        &["paper", "--export", "kalibr=c"],
         &["compare", "a", "b", "--page", "d"],
     ] {
         let output = host_sim(arguments);

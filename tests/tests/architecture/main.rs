@@ -19,7 +19,7 @@ use std::process::Command;
 /// `noise-analysis`: so recordings contain no statistics, and the analysis no file, driver, firmware or virtual sensor.
 /// `measurement` needs `allan-core` only for the description of a sensor's filters. The virtual sensor is written from
 /// the data sheet alone, so that it can check the driver. Reports are made of findings: those of `noise-analysis` and
-/// the models of `allan-core` in them. Only the command depends on the benchmarks.
+/// the models of `allan-core` in them. Nothing depends on the benchmarks.
 #[rustfmt::skip]
 const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("adis16405-driver", ""),
@@ -35,7 +35,7 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("simulation", "adis16405-driver firmware link recordings virtual-sensor"),
     ("reports", "allan-core noise-analysis"),
     ("benchmarks", "adis16405-driver allan-core measurement noise-analysis recordings reports simulation virtual-sensor"),
-    ("host-sim", "adis16405-driver benchmarks link measurement noise-analysis recordings reports simulation"),
+    ("host-sim", "adis16405-driver link measurement noise-analysis recordings reports simulation"),
     ("system-tests", ""),
     ("driver-footprint", "adis16405-driver allan-core"),
     ("instruction-counts", "allan-core"),

@@ -1,0 +1,203 @@
+//! The program `benchmarks`: runs a benchmark, prints its tables, writes them as JSON.
+
+use anyhow::{Context, Result};
+use benchmarks::losses::LossPlan;
+use benchmarks::reproduction::Reproduction;
+use benchmarks::undeclared::{EffectKind, SEEDS_PER_GROUP, UndeclaredPlan};
+use clap::{Args, Parser, Subcommand, value_parser};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::fs::OpenOptions;
+use std::io::{self, BufWriter, StdoutLock, Write};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Most recordings of a benchmark: each has a seed of its own, and its result is kept until the end.
+const MOST_RECORDINGS: u64 = 100_000;
+
+/// Benchmarks of the noise analysis, on simulated recordings whose noise and effects are known.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    benchmark: Benchmark,
+    /// Write the result as JSON; - for standard output.
+    #[arg(long, global = true, value_name = "OUT")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Benchmark {
+    /// Hide random effects in recordings and score how well the analysis names them.
+    Undeclared(UndeclaredArguments),
+    /// Repeat the published characterisation on simulated hours: slope method beside the fit.
+    Paper(PaperArguments),
+    /// Take samples out of records and compare variance and coefficients with those of the complete records.
+    Losses(LossArguments),
+}
+
+#[derive(Debug, Args)]
+struct UndeclaredArguments {
+    /// Kind that is hidden alone; may be repeated [default: all].
+    #[arg(long, value_enum)]
+    kind: Vec<EffectKind>,
+    /// Recordings a kind.
+    #[arg(long, default_value_t = 40, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
+    per_kind: u64,
+    /// Recordings with nothing hidden.
+    #[arg(long, default_value_t = 200, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
+    nothing: u64,
+    /// Recordings with two effects.
+    #[arg(long, default_value_t = 200, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
+    pairs: u64,
+    /// Recordings with three effects.
+    #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
+    triples: u64,
+    /// Recordings of each kind of effect that no kind of the report describes.
+    #[arg(long, value_name = "PER_KIND", default_value_t = 20, value_parser = value_parser!(u64).range(..=MOST_RECORDINGS))]
+    outside: u64,
+    /// Length of a recording, s.
+    #[arg(long, default_value_t = 1800.0)]
+    seconds: f64,
+    /// Samples that are lost at random in every recording, %.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = loss_percent)]
+    loss: f64,
+    /// Recordings that are examined at a time [default: one a core].
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+    /// First seed of each group of recordings.
+    #[arg(long, default_value_t = 0, value_parser = value_parser!(u64).range(..SEEDS_PER_GROUP / 2))]
+    seed: u64,
+    /// Take the seeds that are kept for the end.
+    #[arg(long)]
+    sealed: bool,
+}
+
+#[derive(Debug, Args)]
+struct PaperArguments {
+    /// Hours to simulate; a scatter needs two.
+    #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(2..=MOST_RECORDINGS))]
+    seeds: u64,
+    /// Seed of the first.
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+}
+
+#[derive(Debug, Args)]
+struct LossArguments {
+    /// Records of each noise.
+    #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(2..=MOST_RECORDINGS))]
+    records: u64,
+    /// Binary logarithm of the number of samples of a record, at 204.8 SPS; 20 is 1.4 hours.
+    #[arg(long, default_value_t = 20, value_parser = value_parser!(u32).range(14..=24))]
+    samples_log2: u32,
+    /// Seed of the first record.
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// Threads [default: as many as the machine has cores].
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+}
+
+/// A share of lost samples from 0 to 50 %.
+fn loss_percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
+        _ => Err("not a percentage from 0 to 50".to_owned()),
+    }
+}
+
+/// The number of threads, by default that of the cores, and 1 where the machine does not say how many it has.
+fn threads(jobs: Option<NonZeroUsize>) -> usize {
+    jobs.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get)
+}
+
+/// Exit code 0 for success, 1 for an error; the argument parser ends the process with 2 for wrong usage.
+fn main() -> ExitCode {
+    match run(Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of standard output has closed it, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Where standard error is closed too, the exit code alone shows the error.
+            let _ = writeln!(io::stderr(), "error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(Cli { benchmark, json }: Cli) -> Result<()> {
+    let json = json.as_deref();
+    if let Some(file) = json.filter(|file| !is_standard_output(file)) {
+        // Before hours of work; a file that exists keeps its content.
+        OpenOptions::new().append(true).create(true).open(file).with_context(|| file.display().to_string())?;
+    }
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} recordings, {eta} left") {
+        bar.set_style(style);
+    }
+    let progress = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    match benchmark {
+        Benchmark::Undeclared(arguments) => {
+            let plan = UndeclaredPlan {
+                kinds: if arguments.kind.is_empty() { EffectKind::ALL.to_vec() } else { arguments.kind },
+                per_kind: arguments.per_kind,
+                empty: arguments.nothing,
+                pairs: arguments.pairs,
+                triples: arguments.triples,
+                outside: arguments.outside,
+                seconds: arguments.seconds,
+                loss_percent: arguments.loss,
+                seed: arguments.seed,
+                sealed: arguments.sealed,
+                jobs: threads(arguments.jobs),
+            };
+            let table = plan.run(progress)?;
+            bar.finish_and_clear();
+            conclude(&table, json, |out| table.write(out))
+        }
+        Benchmark::Paper(PaperArguments { seeds, first_seed }) => {
+            let result = Reproduction { seeds, first_seed }.run(|done| progress(done as usize, seeds as usize));
+            bar.finish_and_clear();
+            conclude(&result, json, |out| result.write(out))
+        }
+        Benchmark::Losses(LossArguments { records, samples_log2, first_seed, jobs }) => {
+            let plan = LossPlan { records, samples: 1 << samples_log2, first_seed, jobs: threads(jobs) };
+            let table = plan.run(progress);
+            bar.finish_and_clear();
+            conclude(&table, json, |out| table.write(out))
+        }
+    }
+}
+
+/// Writes a result as JSON into `file`, if there is one, and its tables to standard output, if the JSON is not there.
+fn conclude(
+    result: &impl Serialize,
+    file: Option<&Path>,
+    tables: impl FnOnce(&mut BufWriter<StdoutLock>) -> io::Result<()>,
+) -> Result<()> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    if let Some(file) = file {
+        let mut json = serde_json::to_vec_pretty(result)?;
+        json.push(b'\n');
+        if is_standard_output(file) {
+            out.write_all(&json)?;
+            return Ok(out.flush()?);
+        }
+        std::fs::write(file, json).with_context(|| file.display().to_string())?;
+    }
+    tables(&mut out)?;
+    Ok(out.flush()?)
+}
+
+fn is_standard_output(file: &Path) -> bool {
+    file.as_os_str() == "-"
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
