@@ -128,7 +128,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
     /// # Cost
     /// | `CovariateRegression::sensitivities` | Cortex-M4F | Cortex-M0+ |
     /// |---|---|---|
-    /// | instructions | 51.5 million | — |
+    /// | instructions | 50 million | — |
     /// | stack, bytes | 11,600 | — |
     /// | flash, bytes | 33,800 | — |
     ///

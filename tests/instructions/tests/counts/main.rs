@@ -9,6 +9,7 @@ mod image;
 
 use image::{Counts, M0_PLUS, M4F};
 use std::ops::RangeInclusive;
+use std::path::Path;
 
 /// The count may change by a tenth with the compiler.
 fn band(count: f64) -> RangeInclusive<f64> {
@@ -108,13 +109,15 @@ fn assert_row(page: &str, start: &str, separator: &str, name: &str) {
     }
 }
 
+/// The page on which a cost is stated; others quote it.
+const COSTS: &str = include_str!("../../../../docs/costs.md");
+
 #[test]
 fn the_pages_have_the_instructions_of_a_sample() {
     let page = include_str!("../../../../allan-core/guide/parameters.md");
     for overlap in [4, 8, 16] {
         assert_row(page, &format!("| {overlap} |"), ", ", &format!("push_p{overlap}"));
     }
-    let page = include_str!("../../../../docs/costs.md");
     for (row, name) in [
         ("| average |", "push_p8"),
         ("| average, 1 % of the samples missing |", "lossy_push_p8"),
@@ -123,6 +126,60 @@ fn the_pages_have_the_instructions_of_a_sample() {
         ("| after 100 missing samples |", "gap_of_100_p8"),
         ("| after 2²⁰, the longest gap that is bridged |", "longest_gap_p8"),
     ] {
-        assert_row(page, row, " | ", name);
+        assert_row(COSTS, row, " | ", name);
+    }
+}
+
+/// The cells of a row of the page on costs, without "instructions".
+fn stated(row: &str) -> Vec<&'static str> {
+    let line = COSTS.lines().find(|line| line.starts_with(&format!("| {row} |")));
+    let cells = line.unwrap_or_else(|| panic!("no row {row}")).trim_matches('|').split('|').skip(1);
+    cells.map(|cell| cell.trim().trim_end_matches(" instructions")).collect()
+}
+
+#[test]
+fn what_quotes_a_cost_has_the_figure_of_the_page_on_costs() {
+    let [average, lossy, most] =
+        ["average", "average, 1 % of the samples missing", "when every octave is due"].map(stated);
+    let [one, hundred, longest] =
+        ["the same after a gap of 1 sample", "after 100 missing samples", "after 2²⁰, the longest gap that is bridged"]
+            .map(stated);
+    let [fit, goodness, nothing, tone, sensitivities] = [
+        "fit of N, B and K with bounds",
+        "its p-value",
+        "trace that finds nothing",
+        "trace that adds the two terms of a square wave",
+        "sensitivities of one channel to two others",
+    ]
+    .map(|row| stated(row)[0]);
+    let row = |label: &str, cells: &[&str]| format!("| {label} | {} |", cells.join(" | "));
+    let start = |label: &str, cell: &str| format!("| {label} | {cell} |");
+    let sentence =
+        format!("takes {} instructions on average on a Cortex-M4F and {} on a Cortex-M0+", average[0], average[1]);
+    let of_gaps =
+        format!("{} instructions on average with 1 % of the samples missing, {} without", lossy[0], average[0]);
+    let quotations = [
+        ("README.md", sentence),
+        ("docs/gaps.md", of_gaps),
+        ("allan-core/README.md", format!("| {} on average, {} at most |", average[0], most[0])),
+        ("allan-core/README.md", format!("| and `fit` of N, B and K | 51.7 kB | {fit} |")),
+        ("allan-core/guide/parameters.md", format!("| {} |", average.join(", "))),
+        ("allan-core/src/cascade.rs", row("instructions on average", &average)),
+        ("allan-core/src/cascade.rs", row("instructions at most", &most)),
+        ("allan-core/src/cascade/block.rs", row("instructions on average", &average)),
+        ("allan-core/src/cascade/gap.rs", row("instructions of the next sample, 1 missing", &one)),
+        ("allan-core/src/cascade/gap.rs", row("instructions of the next sample, 100 missing", &hundred)),
+        ("allan-core/src/cascade/gap.rs", row("instructions of the next sample, 2²⁰ missing", &longest)),
+        ("allan-core/src/fit.rs", start("instructions", fit)),
+        ("allan-core/src/fit.rs", start("instructions", goodness)),
+        ("allan-core/src/trace.rs", start("instructions", nothing)),
+        ("allan-core/src/trace.rs", start("instructions that add two terms", tone)),
+        ("allan-core/src/regression.rs", start("instructions", sensitivities)),
+    ];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for (file, quotation) in quotations {
+        let text = std::fs::read_to_string(root.join(file)).expect("a file");
+        let words: Vec<&str> = text.split_whitespace().collect();
+        assert!(words.join(" ").contains(&quotation), "{file} does not have \"{quotation}\"");
     }
 }
