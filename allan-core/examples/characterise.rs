@@ -48,7 +48,7 @@ fn main() {
     println!("\nwith {} added: p = {:.2}", traced.added.len(), traced.after_goodness.p_value);
     for term in traced.after.terms() {
         print!("{:>20} {:.5} ({:.5} … {:.5})", term.kind.name(), term.value, term.low, term.high);
-        for (name, value) in term.kind.shape().into_iter().filter(|(name, _)| !name.is_empty()) {
+        for (name, value) in term.kind.shape().named() {
             print!(", {name} {value:.4}");
         }
         println!();

@@ -107,9 +107,9 @@ impl AllanPoint {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Unchecked<OCTAVES>"))]
 pub struct Curve<const OCTAVES: usize> {
-    sample_period: f64,
-    samples: u64,
-    points: Vec<AllanPoint, OCTAVES>,
+    pub(crate) sample_period: f64,
+    pub(crate) samples: u64,
+    pub(crate) points: Vec<AllanPoint, OCTAVES>,
 }
 
 /// A curve of any number of points, borrowed: what is fitted and compared.
@@ -366,23 +366,6 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.retain(keep);
     }
 
-    /// This curve at averaging factors below `from`, and at longer ones that of the means of each `samples` samples in a row,
-    /// which are `means`.
-    ///
-    /// Second differences of such means are those of the samples at `samples` times the averaging factor, so that a long
-    /// record need not be kept to be looked at again: its means are enough. An empty curve leaves the points of the means
-    /// alone. Points for which there is no room are left out, the longest averaging times first.
-    #[must_use]
-    pub fn continued_by_means(mut self, means: &Self, samples: u64, from: u64) -> Self {
-        self.points.retain(|point| point.n < from);
-        let points = means.points.iter().map(|point| AllanPoint { n: point.n.saturating_mul(samples), ..*point });
-        let free = OCTAVES - self.points.len();
-        self.points.extend(points.filter(|point| point.n >= from).take(free));
-        self.sample_period = means.sample_period / samples as f64;
-        self.samples = means.samples.saturating_mul(samples);
-        self
-    }
-
     /// The same curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
@@ -401,16 +384,9 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Copies another curve in place, without a copy on the stack.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        (self.sample_period, self.samples) = (other.sample_period, other.samples);
-        self.points.clear();
-        self.points.extend(other.points.iter().copied());
-    }
-
     /// Replaces the variance of every point with a positive one. The bounds change in proportion, the degrees of freedom
     /// not at all.
-    pub fn replace_avar(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
+    pub(crate) fn set_variances(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
             let ratio = avar(point) / point.avar;
             point.avar *= ratio;
@@ -418,6 +394,13 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
             point.low *= ratio;
             point.high *= ratio;
         }
+    }
+
+    /// Copies another curve in place, without a copy on the stack.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        (self.sample_period, self.samples) = (other.sample_period, other.samples);
+        self.points.clear();
+        self.points.extend(other.points.iter().copied());
     }
 
     /// The same curve with the confidence of the variance fractions that `fractions` returns for each point.

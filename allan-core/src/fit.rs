@@ -89,41 +89,15 @@ pub fn fit_shapes<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm]) -> M
     model
 }
 
-/// Fits the coefficients of `kinds` and their shape parameters as [`fit_shapes`] does, but keeps the shapes of the sinusoids
-/// and filters in `known`, which were estimated elsewhere. The bounds are those of a filter that is known exactly.
-#[must_use]
-pub fn fit_shapes_except<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm], known: &[NoiseTerm]) -> Model {
-    let curve = curve.into();
-    let mut model = Model::new(0.0, []);
-    estimate::<AllTerms>(curve, kinds, FreeShapes::AllExcept(known), &mut || true, &mut model);
-    let filter = known.iter().find(|kind| matches!(kind, NoiseTerm::Filtered(_)));
-    let free = FreeShapes::AllExcept(filter.map(core::slice::from_ref).unwrap_or_default());
-    bounds::set_free::<AllTerms>(curve, &mut model, free);
-    model
-}
-
-/// Compares sets of terms with fixed shapes by their deviance from one curve, all at the degrees of freedom that one fitted
-/// model gives to its points.
-pub struct DevianceComparison<'a>(Baseline<'a>);
-
-impl<'a> DevianceComparison<'a> {
-    /// For `curve`, with the degrees of freedom of `model`.
-    #[must_use]
-    pub fn new(curve: impl Into<CurveView<'a>>, model: &Model) -> Self {
-        let mut baseline = Baseline::empty(curve.into());
-        baseline.fill(model);
-        Self(baseline)
-    }
-
-    /// `Σ edf·(v/m − 1 − ln(v/m))` with the coefficients of `kinds` that make it least; infinite without terms.
-    pub fn deviance(&mut self, kinds: &[NoiseTerm]) -> f64 {
-        f64::from(self.0.deviance - self.0.fall(kinds))
-    }
-}
-
 /// Sets the bounds of all parameters of `model`, which was fitted to `curve`.
 pub(crate) fn set_bounds(curve: CurveView, model: &mut Model) {
     bounds::set::<AllTerms>(curve, model);
+}
+
+/// As [`set_bounds`], with the shapes that are not `free` known exactly.
+#[cfg(feature = "host")]
+pub(crate) fn set_free_bounds(curve: CurveView, model: &mut Model, free: FreeShapes) {
+    bounds::set_free::<AllTerms>(curve, model, free);
 }
 
 /// Tests whether `model`, which was fitted to `curve`, describes it within its uncertainty.
@@ -236,7 +210,7 @@ fn traces(measured: &[Measured], directions: &[[f32; MAX_POINTS]]) -> (f32, f32)
 /// A fitted model with which other sets of terms are compared, at the degrees of freedom that it gives to the points.
 pub(crate) struct Baseline<'a> {
     points: Points<'a>,
-    deviance: f32,
+    pub(crate) deviance: f32,
     modelled: [f32; MAX_POINTS],
     /// Number of orthonormal directions of its own parameters in `explained`.
     directions: usize,

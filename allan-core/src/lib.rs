@@ -56,6 +56,8 @@ mod formatted;
 mod fractional_octaves;
 pub mod guide;
 mod hadamard;
+#[cfg(feature = "host")]
+pub mod host;
 mod interpolation;
 mod list;
 mod math;

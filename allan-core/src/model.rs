@@ -5,7 +5,7 @@ use crate::curve::{AllanPoint, CurveView};
 use crate::interpolation::subtraction_factor;
 use crate::math::{Real, abs, clamp, exp, ln, sqrt};
 use crate::noise_type::VarianceFractions;
-use crate::term::{AllTerms, MAX_SHAPE, NoiseTerm, TermSet};
+use crate::term::{AllTerms, NoiseTerm, Shape, TermSet};
 use core::mem::discriminant;
 use heapless::Vec;
 
@@ -25,16 +25,21 @@ pub struct FittedTerm {
     pub low: f64,
     /// Upper 95 % bound; above 0 if the curve has any point with a positive variance.
     pub high: f64,
-    /// 95 % bounds of the shape parameters, in the order of [`NoiseTerm::shape`].
-    pub shape: [(f64, f64); MAX_SHAPE],
+    /// 95 % bounds of the shape parameters.
+    pub shape: Shape<(f64, f64)>,
 }
 
 impl FittedTerm {
     /// A term with a known coefficient: its bounds are the value itself.
     #[must_use]
     pub fn exact(kind: NoiseTerm, value: f64) -> Self {
-        let shape = kind.shape().map(|(_, value)| (value, value));
+        let shape = kind.shape().map(|value| (value, value));
         Self { kind, value, low: value, high: value, shape }
+    }
+
+    /// Name, value and 95 % bounds of each shape parameter.
+    pub fn shape_parameters(&self) -> impl Iterator<Item = (&'static str, f64, (f64, f64))> + use<> {
+        self.kind.shape().named().zip(self.shape.named()).map(|((name, value), (_, bounds))| (name, value, bounds))
     }
 }
 

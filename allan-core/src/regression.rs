@@ -249,7 +249,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
 
     /// Subtracts the dependence on covariates with these variances from the channel's `curve`.
     fn subtract(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity], variance: impl Fn(usize, u64) -> f64) {
-        curve.replace_avar(|point| {
+        curve.set_variances(|point| {
             let change = |a: &Sensitivity| {
                 let with_channel = self.with_channel(a.covariate, point.n);
                 // Where its own variance is not known, the channel's covariance with it has the share: `cov(y, c) = β·σ²(c)`.
@@ -271,7 +271,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
     ///
     /// Exact where all covariances are known; elsewhere the point stays as it is.
     pub fn subtract_from(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity]) {
-        curve.replace_avar(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
+        curve.set_variances(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
     }
 
     /// The Allan variance of that stream at one point; `None` if a covariance is not known.

@@ -8,17 +8,17 @@ mod exponential;
 mod filter;
 mod process;
 mod set;
+mod shape;
 
 pub use exponential::{Markov, Resonance};
 pub use filter::MovingAverageFilter;
 pub use process::{AngleRandomWalk, BiasInstability, Process, Quantization, RateRamp, RateRandomWalk, Sinusoid};
 pub(crate) use set::{AllTerms, PowerLawTerms, TermSet};
+pub(crate) use shape::MAX_SHAPE;
+pub use shape::Shape;
 
 use crate::math::clamp;
 use crate::noise_type::VarianceFractions;
-
-/// Largest number of shape parameters of a term.
-pub const MAX_SHAPE: usize = 2;
 
 /// A term of a noise model: a [`Process`] with an unknown coefficient.
 ///
@@ -57,9 +57,6 @@ const BROADEST: f64 = 1.5;
 /// between that of a random walk (+1), of flicker noise (0) and of white noise (−1).
 const WALK_UP_TO: f64 = 0.769;
 const WHITE_FROM: f64 = 4.145;
-
-/// An unused shape parameter.
-const UNUSED: (&str, f64) = ("", 0.0);
 
 /// The unit of a coefficient in terms of the unit of the channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,15 +139,17 @@ impl NoiseTerm {
         }
     }
 
-    /// Names and values of its shape parameters, times in s and frequencies in Hz; unused ones have an empty name.
+    /// Its shape parameters, times in s and frequencies in Hz.
     #[must_use]
-    pub const fn shape(&self) -> [(&'static str, f64); MAX_SHAPE] {
+    pub const fn shape(&self) -> Shape {
         match self {
-            Self::Markov(markov) => [("time_constant", markov.time_constant), UNUSED],
-            Self::Resonance(resonance) => [("frequency", resonance.frequency), ("bandwidth", resonance.bandwidth)],
-            Self::Sinusoid(sinusoid) => [("frequency", sinusoid.frequency), UNUSED],
-            Self::Filtered(filter) => [("taps", filter.taps as f64), ("decimation", filter.decimation)],
-            _ => [UNUSED, UNUSED],
+            Self::Markov(markov) => Shape::Markov { time_constant: markov.time_constant },
+            Self::Resonance(resonance) => {
+                Shape::Resonance { frequency: resonance.frequency, bandwidth: resonance.bandwidth }
+            }
+            Self::Sinusoid(sinusoid) => Shape::Sinusoid { frequency: sinusoid.frequency },
+            Self::Filtered(filter) => Shape::Filtered { taps: filter.taps as f64, decimation: filter.decimation },
+            _ => Shape::PowerLaw,
         }
     }
 

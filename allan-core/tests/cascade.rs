@@ -1,6 +1,6 @@
 //! The sums of the estimator: against their definition, published values, gaps, merging and restoring.
 
-use allan_core::{Cascade, Curve};
+use allan_core::Cascade;
 use proptest::prelude::*;
 
 const OCTAVES: usize = 9;
@@ -285,29 +285,4 @@ fn nbs14_deviations_with_partial_overlap() {
         &[(32, 469), (64, 219), (128, 94)],
         5e-11,
     );
-}
-
-/// From eight means on, where the curves of samples and of means have eight differences in an averaging time, the differences are the
-/// same ones.
-#[test]
-fn the_curve_of_means_continues_that_of_the_samples() {
-    const MEAN: usize = 4;
-    let samples: Vec<i32> = (0..100_000_i32).map(|at| at.wrapping_mul(0x9E37_79B9_u32 as i32) >> 20).collect();
-    let (mut whole, mut means) = (Cascade::<14, 8>::new(), Cascade::<14, 8>::new());
-    whole.push_slice(&samples);
-    samples.chunks_exact(MEAN).for_each(|chunk| means.push(chunk.iter().sum()));
-    let whole = whole.curve(0.01);
-    let means = means.curve(0.04).scaled(1.0 / MEAN as f64);
-    let joined = whole.clone().continued_by_means(&means, MEAN as u64, 8 * MEAN as u64);
-    assert_eq!((joined.sample_period(), joined.samples()), (0.01, 100_000));
-    assert_eq!(joined.points().len(), whole.points().len());
-    for (joined, whole) in joined.points().iter().zip(whole.points()) {
-        assert_eq!((joined.n, joined.count, joined.overlap), (whole.n, whole.count, whole.overlap));
-        assert!((joined.avar / whole.avar - 1.0).abs() < 1e-12, "{}", whole.n);
-    }
-    let of_means = Curve::empty().continued_by_means(&means, MEAN as u64, 0);
-    assert_eq!(of_means.points()[0].n, 4);
-    // Without room, the longest averaging times are left out.
-    let full = Curve::<14>::empty().continued_by_means(&means, 1 << 40, 0);
-    assert_eq!(full.points().len(), means.points().len().min(14));
 }

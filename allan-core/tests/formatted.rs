@@ -7,7 +7,7 @@ use allan_core::slope_method::SlopeEstimate;
 use allan_core::telegraph::KurtosisRatio;
 use allan_core::term::{
     AngleRandomWalk, BiasInstability, CoefficientUnit, Markov, MovingAverageFilter, Quantization, RateRamp,
-    RateRandomWalk, Resonance, Sinusoid,
+    RateRandomWalk, Resonance, Shape, Sinusoid,
 };
 use allan_core::trace::{AddedTerm, LineCandidates, Residual, Trace};
 use allan_core::*;
@@ -50,7 +50,7 @@ fn every_public_value_can_be_printed_by_defmt() {
         Covariate<8>, Curve<8>, CurveView, Discrepancy, FittedTerm, FractionalOctaves<8, 8>, Goodness, Hadamard<8, 4>,
         HadamardPoint, Interpolation, KurtosisRatio, LineCandidates, Markov, Model, MovingAverageFilter, NoiseTerm,
         OctaveSums, PhaseCounts, PowerLaw, Quantization, Quantizer, RateRamp, RateRandomWalk, Residual, Resonance,
-        SampleError, Sensitivity, Sinusoid, SlopeEstimate, Snapshot<8, 4>, TableError, TimeStampError, TimeStamps, Trace,
+        SampleError, Sensitivity, Shape, Sinusoid, SlopeEstimate, Snapshot<8, 4>, TableError, TimeStampError, TimeStamps, Trace,
         VarianceFractions,
     ]
     .to_vec();

@@ -5,7 +5,7 @@
 mod simulation;
 
 use allan_core::model::FittedTerm;
-use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
+use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Shape, Sinusoid};
 use allan_core::trace::{LineCandidates, Trace, trace};
 use allan_core::{Model, telegraph};
 use simulation::{Noise, curve, telegraph_signal};
@@ -81,8 +81,8 @@ fn each_missing_term_is_added_with_its_name_and_size() {
         let [term] = added[..] else { panic!("{kind:?}: {added:?}") };
         assert_eq!(term.kind.name(), kind.name());
         assert!((term.value / value - 1.0).abs() < amount, "{kind:?}: {term:?}");
-        for ((name, truth), (_, found)) in kind.shape().into_iter().zip(term.kind.shape()) {
-            assert!(name.is_empty() || (found / truth - 1.0).abs() < share, "{name} of {kind:?}: {found}");
+        for ((name, truth), (_, found)) in kind.shape().named().zip(term.kind.shape().named()) {
+            assert!((found / truth - 1.0).abs() < share, "{name} of {kind:?}: {found}");
         }
         assert!(trace.before_goodness.p_value < 1e-3, "{kind:?}: {:?}", trace.before_goodness);
         assert!(trace.after_goodness.p_value > 1e-3, "{kind:?}: {:?}", trace.after_goodness);
@@ -115,7 +115,7 @@ fn the_decimation_of_a_filter_is_estimated() {
     let trace = trace(&curve(&noise.sum(SAMPLES, &terms)), LineCandidates::Curve, &FILTERS);
     let added = added(&trace);
     let [term] = added[..] else { panic!("{added:?}") };
-    let (low, high) = term.shape[1];
+    let Shape::Filtered { decimation: (low, high), .. } = term.shape else { panic!("{term:?}") };
     assert!(low < decimation && decimation < high && high - low < 1.0, "{term:?}");
 }
 

@@ -225,11 +225,11 @@ fn reported_regressor(regressor: &Regressor) -> ReportedRegressor {
 }
 
 fn reported_added_term(found: &AddedTerm, model: &Model) -> ReportedAddedTerm {
-    let FittedTerm { kind, value, low, high, shape } = model.terms()[found.term];
-    let named = kind.shape().into_iter().zip(shape).filter(|((name, _), _)| !name.is_empty());
+    let term = &model.terms()[found.term];
+    let FittedTerm { kind, value, low, high, .. } = *term;
     ReportedAddedTerm {
         coefficient: ReportedCoefficient { term: reported_term(kind), value, low, high },
-        shape: named.map(|((_, value), (low, high))| ReportedParameter { value, low, high }).collect(),
+        shape: term.shape_parameters().map(|(_, value, (low, high))| ReportedParameter { value, low, high }).collect(),
         score: found.score,
         n: found.residual.n,
         excess: found.residual.excess,

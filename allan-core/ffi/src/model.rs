@@ -6,12 +6,12 @@ use crate::status::{contained, status};
 use crate::storage::{elements, object_ref, store};
 use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
-use allan_core::term::{MAX_SHAPE, Markov, MovingAverageFilter, Resonance, Sinusoid};
+use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Model, NoiseTerm, PowerLaw};
 
 /// Largest number of terms of a model.
 pub const ALLAN_MAX_TERMS: usize = 8;
-const _: () = assert!(ALLAN_MAX_TERMS == MAX_TERMS && MAX_SHAPE == 2);
+const _: () = assert!(ALLAN_MAX_TERMS == MAX_TERMS);
 
 /// The noise that dominates around an averaging time.
 #[repr(C)]
@@ -121,15 +121,19 @@ impl allan_term {
             NoiseTerm::Resonance(_) => (ALLAN_RESONANCE, 0),
             NoiseTerm::Sinusoid(_) => (ALLAN_SINUSOID, 0),
         };
+        let (mut shape, mut shape_low, mut shape_high) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for (index, (_, value, (low, high))) in term.shape_parameters().take(2).enumerate() {
+            (shape[index], shape_low[index], shape_high[index]) = (value, low, high);
+        }
         Self {
             kind: kind as i32,
             stages,
             value: term.value,
             low: term.low,
             high: term.high,
-            shape: term.kind.shape().map(|(_, value)| value),
-            shape_low: term.shape.map(|(low, _)| low),
-            shape_high: term.shape.map(|(_, high)| high),
+            shape,
+            shape_low,
+            shape_high,
         }
     }
 

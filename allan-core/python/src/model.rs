@@ -84,8 +84,7 @@ const fn unit(term: NoiseTerm) -> &'static str {
 }
 
 fn row(term: &FittedTerm) -> Row {
-    let named = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
-    let shape = named.map(|((name, value), (low, high))| (name, (value, low, high))).collect();
+    let shape = term.shape_parameters().map(|(name, value, (low, high))| (name, (value, low, high))).collect();
     (term.kind.name(), term.kind.coefficient(), (term.value, term.low, term.high), unit(term.kind), shape)
 }
 

@@ -70,9 +70,12 @@ pub(crate) fn set_free<T: TermSet>(curve: CurveView, model: &mut Model, free: Fr
             Parameter::Shape(..) if !T::SHAPES => {}
             Parameter::Shape(term, index) => {
                 let term = &mut model.terms_mut()[term];
-                let (_, value) = term.kind.shape()[index];
                 let half_width = NORMAL_975 * f64::from(own.deviation);
-                term.shape[index] = (value * exp(-half_width), value * exp(half_width));
+                if let (Some(bounds), Some((_, value))) =
+                    (term.shape.iter_mut().nth(index), term.kind.shape().named().nth(index))
+                {
+                    *bounds = (value * exp(-half_width), value * exp(half_width));
+                }
             }
         }
     }

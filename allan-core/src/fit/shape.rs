@@ -125,7 +125,7 @@ fn line_search<T: TermSet>(
 
 /// The term with one shape parameter multiplied by `exp(shift)`.
 fn shifted(kind: NoiseTerm, index: usize, shift: f64, sample_period: f64) -> NoiseTerm {
-    let mut shape = kind.shape().map(|(_, value)| value);
+    let mut shape = kind.shape().values();
     shape[index] *= exp(shift);
     if let NoiseTerm::Markov(_) = kind {
         shape[index] = shape[index].max(SHORTEST * sample_period);
@@ -160,7 +160,7 @@ impl<T: TermSet> Problem<T> {
                 let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
                 for (entry, point) in column.iter_mut().zip(points.all()) {
                     let at = |factor: f64| {
-                        let mut shape: [f64; MAX_SHAPE] = kind.shape().map(|(_, value)| value);
+                        let mut shape = kind.shape().values();
                         shape[index] *= factor;
                         T::avar(&kind.with_shape(shape), point.n, points.curve.sample_period())
                     };

@@ -11,7 +11,7 @@ use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual};
 use allan_core::fit::fit;
 use allan_core::model::FittedTerm;
-use allan_core::term::{Markov, MovingAverageFilter};
+use allan_core::term::{Markov, MovingAverageFilter, Shape};
 use allan_core::trace::{LineCandidates, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelId, SensorProfile};
@@ -228,7 +228,7 @@ impl ChannelFit {
         let by_spectrum = |term: &FittedTerm| FittedTerm {
             low: found.deviation.low.min(term.value),
             high: found.deviation.high.max(term.value),
-            shape: [(found.time_constant.low, found.time_constant.high), term.shape[1]],
+            shape: Shape::Markov { time_constant: (found.time_constant.low, found.time_constant.high) },
             ..*term
         };
         if let Some(with) = self.traced.added_to(curve, (markov, Some(added)), by_spectrum) {

@@ -19,7 +19,7 @@ use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
-use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
+use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Shape, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::PI;
@@ -229,7 +229,7 @@ fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
 
 /// Whether a term is a resonance of whose bandwidth a record of this length bounds both sides.
 fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
-    let [_, (narrowest, widest)] = term.shape;
+    let Shape::Resonance { bandwidth: (narrowest, widest), .. } = term.shape else { return false };
     matches!(term.kind, NoiseTerm::Resonance(of) if narrowest > 1.0 / duration_s && widest < WIDEST_BAND * of.frequency)
 }
 
@@ -353,7 +353,10 @@ fn markov_effect(term: &FittedTerm, by_spectrum: &MarkovEstimate, unit: &str) ->
 /// A Markov term in the place of the white noise.
 fn low_pass_effect(term: &FittedTerm, markov: Markov, found: &Addition, period_s: f64) -> Effect {
     let corner = |time_constant: f64| 0.5 / (PI * time_constant);
-    let (shortest, longest) = term.shape[0];
+    let (shortest, longest) = match term.shape {
+        Shape::Markov { time_constant } => time_constant,
+        _ => (markov.time_constant, markov.time_constant),
+    };
     let bandwidth = Parameter::new(corner(markov.time_constant), corner(longest), corner(shortest), "Hz");
     let evidence = format!(
         "{:+.1} % at tau = {} s ({:.0} sigma); all the white noise is correlated over {} s and none is left: \

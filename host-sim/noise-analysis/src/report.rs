@@ -340,8 +340,7 @@ pub fn term_reports(model: &Model, unit: &str) -> Vec<TermReport> {
 #[must_use]
 pub fn term_parameters(term: &allan_core::model::FittedTerm, unit: &str) -> BTreeMap<String, Parameter> {
     let coefficient = Parameter::new(term.value, term.low, term.high, coefficient_unit(&term.kind, unit));
-    let shapes = term.kind.shape().into_iter().zip(term.shape).filter(|((name, _), _)| !name.is_empty());
-    let shape = |((name, value), (low, high)): ((&str, f64), (f64, f64))| {
+    let shape = |(name, value, (low, high)): (&str, f64, (f64, f64))| {
         let unit = match name {
             "frequency" | "bandwidth" => "Hz",
             "time_constant" => "s",
@@ -349,7 +348,7 @@ pub fn term_parameters(term: &allan_core::model::FittedTerm, unit: &str) -> BTre
         };
         (name.to_owned(), Parameter::new(value, low, high, unit))
     };
-    shapes.map(shape).chain([(term.kind.coefficient().to_owned(), coefficient)]).collect()
+    term.shape_parameters().map(shape).chain([(term.kind.coefficient().to_owned(), coefficient)]).collect()
 }
 
 impl ModelErrorReport {

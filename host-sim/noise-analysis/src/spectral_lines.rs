@@ -9,7 +9,7 @@ use crate::uniform_series::UniformSeries;
 use allan_core::Model;
 use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
-use allan_core::term::{NoiseTerm, Resonance, Sinusoid};
+use allan_core::term::{NoiseTerm, Resonance, Shape, Sinusoid};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Peaks closer than this part of their frequency are one line if either has a width.
@@ -240,7 +240,11 @@ impl MergedLine {
         let scale = if self.is_sinusoid() { SQRT_2 } else { 1.0 };
         let (low, high) = bounds(self.deviation);
         let value = scale * self.deviation.value;
-        let shape = [bounds(self.frequency), bounds(self.width)];
+        let frequency = bounds(self.frequency);
+        let shape = match kind {
+            NoiseTerm::Resonance(_) => Shape::Resonance { frequency, bandwidth: bounds(self.width) },
+            _ => Shape::Sinusoid { frequency },
+        };
         FittedTerm { low: scale * low, high: scale * high, shape, ..FittedTerm::exact(kind, value) }
     }
 

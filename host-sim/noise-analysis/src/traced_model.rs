@@ -5,7 +5,8 @@ use crate::OCTAVES;
 use crate::findings::BoundedEstimate;
 use crate::noise_terms::{is_filter, is_white};
 use crate::octave_covariance::with_bounds_behind_a_filter;
-use allan_core::fit::{Goodness, fit, fit_shapes_except, goodness};
+use allan_core::fit::{Goodness, fit, goodness};
+use allan_core::host::fit_shapes_except;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::trace::{Residual, Trace};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
@@ -200,7 +201,7 @@ impl TracedModel {
     pub(crate) fn bounded(mut self, curve: &Curve<OCTAVES>, decimation: Option<BoundedEstimate>) -> Self {
         let resolved = |term: &FittedTerm| {
             let mut term = *term;
-            for ((name, value), bounds) in term.kind.shape().into_iter().zip(&mut term.shape) {
+            for ((name, value), bounds) in term.kind.shape().named().zip(term.shape.iter_mut()) {
                 if let Some(common) = decimation.filter(|_| name == "decimation") {
                     *bounds = (common.low, common.high);
                 } else if let Some((least, most)) = resolvable(name, curve) {
@@ -220,8 +221,8 @@ impl TracedModel {
     pub(crate) fn unresolved(&self, curve: &Curve<OCTAVES>) -> Option<usize> {
         let is_unresolved = |at: &usize| {
             let term = &self.model.terms()[*at];
-            let mut shapes = term.kind.shape().into_iter().zip(term.shape);
-            let is_whole_range = |((name, _), bounds): ((&str, f64), (f64, f64))| {
+            let mut shapes = term.shape.named();
+            let is_whole_range = |(name, bounds): (&str, (f64, f64))| {
                 resolvable(name, curve).is_some_and(|(least, most)| bounds.0 <= least && bounds.1 >= most)
             };
             term.low == 0.0 && !is_white(&term.kind) && shapes.any(is_whole_range)

@@ -4,7 +4,7 @@ use super::epochs::SIGNIFICANCE;
 use crate::minimum::downhill;
 use allan_core::confidence::octave_correlation;
 use allan_core::model::FittedTerm;
-use allan_core::term::{Resonance, Sinusoid};
+use allan_core::term::{Resonance, Shape, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -116,7 +116,10 @@ impl TrackedModel {
     /// Mean frequency of the line that is tracked, Hz.
     #[must_use]
     pub(crate) fn line_frequency(&self) -> Option<f64> {
-        self.line.map(|line| self.model.terms()[line].kind.shape()[0].1)
+        match self.model.terms()[self.line?].kind.shape() {
+            Shape::Resonance { frequency, .. } | Shape::Sinusoid { frequency } => Some(frequency),
+            _ => None,
+        }
     }
 
     /// All parameters that can be tracked.

@@ -5,7 +5,7 @@ use crate::distributions::ROUNDING;
 use crate::minimum::golden_section;
 use crate::noise_terms::is_white;
 use crate::octave_covariance::relative_covariance;
-use allan_core::fit::DevianceComparison;
+use allan_core::host::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::MovingAverageFilter;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};

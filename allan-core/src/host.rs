@@ -1,0 +1,65 @@
+//! What an analysis of whole recordings on a host needs beside the calls above (feature `host`): curves that are put together
+//! or changed, and fits with shapes that were estimated elsewhere.
+
+use crate::curve::{AllanPoint, Curve, CurveView};
+use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
+use crate::model::Model;
+use crate::term::{AllTerms, NoiseTerm};
+
+impl<const OCTAVES: usize> Curve<OCTAVES> {
+    /// This curve at averaging factors below `from`, and at longer ones that of the means of each `samples` samples in a row,
+    /// which are `means`.
+    ///
+    /// Second differences of such means are those of the samples at `samples` times the averaging factor, so that a long
+    /// record need not be kept to be looked at again: its means are enough. An empty curve leaves the points of the means
+    /// alone. Points for which there is no room are left out, the longest averaging times first.
+    #[must_use]
+    pub fn continued_by_means(mut self, means: &Self, samples: u64, from: u64) -> Self {
+        self.points.retain(|point| point.n < from);
+        let points = means.points.iter().map(|point| AllanPoint { n: point.n.saturating_mul(samples), ..*point });
+        let free = OCTAVES - self.points.len();
+        self.points.extend(points.filter(|point| point.n >= from).take(free));
+        self.sample_period = means.sample_period / samples as f64;
+        self.samples = means.samples.saturating_mul(samples);
+        self
+    }
+
+    /// Replaces the variance of every point with a positive one. The bounds change in proportion, the degrees of freedom
+    /// not at all.
+    pub fn replace_avar(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
+        self.set_variances(avar);
+    }
+}
+
+/// Fits the coefficients of `kinds` and their shape parameters as [`fit_shapes`](crate::fit::fit_shapes) does, but keeps the
+/// shapes of the sinusoids and filters in `known`, which were estimated elsewhere. The bounds are those of a filter that is known
+/// exactly.
+#[must_use]
+pub fn fit_shapes_except<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm], known: &[NoiseTerm]) -> Model {
+    let curve = curve.into();
+    let mut model = Model::new(0.0, []);
+    estimate::<AllTerms>(curve, kinds, FreeShapes::AllExcept(known), &mut || true, &mut model);
+    let filter = known.iter().find(|kind| matches!(kind, NoiseTerm::Filtered(_)));
+    let free = FreeShapes::AllExcept(filter.map(core::slice::from_ref).unwrap_or_default());
+    set_free_bounds(curve, &mut model, free);
+    model
+}
+
+/// Compares sets of terms with fixed shapes by their deviance from one curve, all at the degrees of freedom that one fitted
+/// model gives to its points.
+pub struct DevianceComparison<'a>(Baseline<'a>);
+
+impl<'a> DevianceComparison<'a> {
+    /// For `curve`, with the degrees of freedom of `model`.
+    #[must_use]
+    pub fn new(curve: impl Into<CurveView<'a>>, model: &Model) -> Self {
+        let mut baseline = Baseline::empty(curve.into());
+        baseline.fill(model);
+        Self(baseline)
+    }
+
+    /// `Σ edf·(v/m − 1 − ln(v/m))` with the coefficients of `kinds` that make it least; infinite without terms.
+    pub fn deviance(&mut self, kinds: &[NoiseTerm]) -> f64 {
+        f64::from(self.0.deviance - self.0.fall(kinds))
+    }
+}

@@ -1,0 +1,89 @@
+//! The shape parameters of a term, by name.
+
+/// Largest number of shape parameters of a term.
+pub(crate) const MAX_SHAPE: usize = 2;
+
+/// The shape parameters of a term: their values, or what else `T` says of each, such as its bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Shape<T = f64> {
+    /// A power law has none.
+    PowerLaw,
+    /// Of [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
+    Filtered {
+        /// Taps of each of its averages.
+        taps: T,
+        /// Values of the filter for each sample.
+        decimation: T,
+    },
+    /// Of [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
+    Markov {
+        /// s
+        time_constant: T,
+    },
+    /// Of [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
+    Resonance {
+        /// Hz
+        frequency: T,
+        /// Hz
+        bandwidth: T,
+    },
+    /// Of [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
+    Sinusoid {
+        /// Hz
+        frequency: T,
+    },
+}
+
+impl<T: Copy> Shape<T> {
+    /// The parameters with their names in reports, in the order of the fields.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, T)> + use<T> {
+        let (first, second) = match *self {
+            Self::PowerLaw => (None, None),
+            Self::Filtered { taps, decimation } => (Some(("taps", taps)), Some(("decimation", decimation))),
+            Self::Markov { time_constant } => (Some(("time_constant", time_constant)), None),
+            Self::Resonance { frequency, bandwidth } => {
+                (Some(("frequency", frequency)), Some(("bandwidth", bandwidth)))
+            }
+            Self::Sinusoid { frequency } => (Some(("frequency", frequency)), None),
+        };
+        first.into_iter().chain(second)
+    }
+
+    /// The same parameters with what `change` makes of each.
+    pub fn map<U>(&self, mut change: impl FnMut(T) -> U) -> Shape<U> {
+        match *self {
+            Self::PowerLaw => Shape::PowerLaw,
+            Self::Filtered { taps, decimation } => {
+                Shape::Filtered { taps: change(taps), decimation: change(decimation) }
+            }
+            Self::Markov { time_constant } => Shape::Markov { time_constant: change(time_constant) },
+            Self::Resonance { frequency, bandwidth } => {
+                Shape::Resonance { frequency: change(frequency), bandwidth: change(bandwidth) }
+            }
+            Self::Sinusoid { frequency } => Shape::Sinusoid { frequency: change(frequency) },
+        }
+    }
+
+    /// The parameters in the order of the fields.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
+        let (first, second) = match self {
+            Self::PowerLaw => (None, None),
+            Self::Filtered { taps, decimation } => (Some(taps), Some(decimation)),
+            Self::Markov { time_constant } => (Some(time_constant), None),
+            Self::Resonance { frequency, bandwidth } => (Some(frequency), Some(bandwidth)),
+            Self::Sinusoid { frequency } => (Some(frequency), None),
+        };
+        first.into_iter().chain(second)
+    }
+}
+
+impl Shape {
+    /// The values in the order of the fields, and 0 where there is none.
+    pub(crate) fn values(&self) -> [f64; MAX_SHAPE] {
+        let mut values = [0.0; MAX_SHAPE];
+        values.iter_mut().zip(self.named()).for_each(|(slot, (_, value))| *slot = value);
+        values
+    }
+}
