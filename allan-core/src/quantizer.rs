@@ -44,6 +44,13 @@ pub struct Quantizer {
 /// Steps of [`Quantizer::for_samples`] in the standard deviation of white noise.
 const STEPS: f64 = 65_536.0;
 
+/// Values that are rounded together.
+const BLOCK: usize = 16;
+/// 1.5·2⁵²: a double of this size has no fraction, and the sum with an integer of 32 bits has that integer in its low bits.
+const SHIFT: f64 = 6_755_399_441_055_744.0;
+/// Steps up to which every count fits.
+const LARGEST_IN_BLOCK: f64 = i32::MAX as f64;
+
 /// Why a value has no count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -138,6 +145,55 @@ impl Quantizer {
     pub fn count(&self, value: impl Into<f64>) -> Result<i32, SampleError> {
         let count = self.wide_count(value.into())?;
         i32::try_from(count).map_err(|_| SampleError::OutOfRange)
+    }
+
+    /// Puts the counts of `values` into the first places of `counts`, as [`count`](Self::count) gives them, up to the first value
+    /// that has none; returns how many it has put there. Faster than one by one on machines with vector units.
+    ///
+    /// ```
+    /// use allan_core::Quantizer;
+    ///
+    /// let quantizer = Quantizer::new(0.0, 0.5).unwrap();
+    /// let mut counts = [0; 4];
+    /// assert_eq!(quantizer.counts(&[1.0, -2.0, f64::NAN, 3.0], &mut counts), 2);
+    /// assert_eq!(counts[..2], [2, -4]);
+    /// ```
+    pub fn counts<T: Copy + Into<f64>>(&self, values: &[T], counts: &mut [i32]) -> usize {
+        // Dividing by a power of two and multiplying by its reciprocal round the same number.
+        let reciprocal = 1.0 / self.lsb;
+        let is_power_of_two = self.lsb.is_normal() && reciprocal.is_normal() && self.lsb.to_bits() << 12 == 0;
+        if is_power_of_two {
+            self.put_counts(values, counts, |offset| offset * reciprocal)
+        } else {
+            self.put_counts(values, counts, |offset| offset / self.lsb)
+        }
+    }
+
+    #[inline(always)] // for each way to scale
+    fn put_counts<T: Copy + Into<f64>>(&self, values: &[T], counts: &mut [i32], steps: impl Fn(f64) -> f64) -> usize {
+        let length = values.len().min(counts.len());
+        for start in (0..length).step_by(BLOCK) {
+            let end = length.min(start + BLOCK);
+            let mut all_fit = true;
+            for (count, &value) in counts[start..end].iter_mut().zip(&values[start..end]) {
+                let steps = steps(value.into() - self.origin);
+                // False for what is not a number.
+                all_fit &= abs(steps) <= LARGEST_IN_BLOCK;
+                // The low bits of the sum are the nearest integer, ties to even, in two's complement.
+                let shifted = steps + SHIFT;
+                let is_tie_below = steps - (shifted - SHIFT) == 0.5;
+                *count = (shifted.to_bits() as i32).wrapping_add(i32::from(is_tie_below));
+            }
+            if !all_fit {
+                for at in start..end {
+                    match self.count(values[at]) {
+                        Ok(count) => counts[at] = count,
+                        Err(_) => return at,
+                    }
+                }
+            }
+        }
+        length
     }
 
     /// The count, if it is within ±2⁵³, where every integer is a double.

@@ -72,6 +72,37 @@ fn a_value_has_the_nearest_count_or_an_error() {
     }
 }
 
+/// Random values near and beyond the limits, ties, and what is no number: with a power of two as LSB, a decimal one, and one whose
+/// reciprocal is no normal number.
+#[test]
+fn counts_of_many_values_are_those_of_each() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let special = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300, 2_147_483_646.5, 2_147_483_647.5, -2_147_483_648.5];
+    for (origin, lsb) in [(0.0, 1.0), (0.75, 0.25), (-3.1, 0.05), (1e3, 3e-7), (0.0, 2.0_f64.powi(-1074))] {
+        let quantizer = Quantizer::new(origin, lsb).unwrap();
+        let values: Vec<f64> = (0..20_000)
+            .map(|at| match at % 7 {
+                0 => origin + lsb * (f64::from(rng.random_range(-1_000..1_000)) + 0.5),
+                1 if at % 49 == 1 => origin + lsb * special[rng.random_range(0..special.len())],
+                2 => origin + lsb * rng.random_range(-2.2e9..2.2e9),
+                _ => origin + lsb * rng.random_range(-40.0..40.0),
+            })
+            .collect();
+        let (mut start, mut counts) = (0, vec![0; values.len()]);
+        while start < values.len() {
+            let put = quantizer.counts(&values[start..], &mut counts[start..]);
+            for at in start..start + put {
+                assert_eq!(quantizer.count(values[at]), Ok(counts[at]), "{} / {lsb}", values[at]);
+            }
+            start += put;
+            if start < values.len() {
+                assert!(quantizer.count(values[start]).is_err(), "{} / {lsb}", values[start]);
+            }
+            start += 1;
+        }
+    }
+}
+
 #[test]
 fn a_quantizer_for_samples_is_fine_against_their_white_noise() {
     let mut random = ChaCha8Rng::seed_from_u64(5);

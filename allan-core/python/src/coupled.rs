@@ -2,7 +2,7 @@
 
 use crate::OCTAVES;
 use crate::curve::NativeCurve;
-use crate::quantizer::{Chunk, Grid};
+use crate::samples::{Array, Counts, Grid, Rest, Values};
 use allan_core::regression::{Covariate, CovariateRegression, MAX_COVARIATES};
 use allan_core::{Cascade, Coupling};
 use postcard::{from_bytes, to_allocvec};
@@ -15,8 +15,8 @@ const OVERLAP: usize = 8;
 
 /// Index of the covariate, sensitivity with its lower and upper bound, and its significance in standard deviations.
 type Row = (usize, f64, f64, f64, f64);
-/// Samples of one channel: the bytes of an `int32` array, or of a `float64` array if there is a grid of origin and LSB.
-type Samples<'py> = (Bound<'py, PyBytes>, Option<Grid>);
+/// Samples of one channel: an array, with a grid of origin and LSB if they are values in a unit.
+type Samples<'py> = (Array<'py>, Option<Grid>);
 
 /// The channels, the channel of interest first, and the coupling of each with each one before it.
 #[derive(Clone)]
@@ -29,6 +29,18 @@ struct Channels {
 fn pair(a: usize, b: usize) -> usize {
     let (low, high) = (a.min(b), a.max(b));
     high * (high - 1) / 2 + low
+}
+
+/// The counts of a channel's samples; `None` where one is missing.
+fn column(mut counts: Counts, values: Values) -> PyResult<Vec<Option<i32>>> {
+    let mut column = Vec::with_capacity(values.len());
+    counts.each_run(values, |counts, rest| {
+        column.extend(counts.iter().copied().map(Some));
+        if let Rest::Missing = rest {
+            column.push(None);
+        }
+    })?;
+    Ok(column)
 }
 
 impl Channels {
@@ -78,10 +90,11 @@ impl CoupledEstimators {
     /// Adds samples that were taken together. `first` is the index of the first one in the user's arrays, for messages.
     /// Nothing is added if a value is refused.
     fn push(&self, py: Python, channels: Vec<Samples>, first: u64) -> PyResult<()> {
-        let chunks = channels.iter().map(|(bytes, grid)| Chunk { bytes: bytes.as_bytes(), grid: *grid, first });
-        let chunks: Vec<Chunk> = chunks.collect();
+        let samples = channels.iter().map(|(array, grid)| Ok((Counts::new(*grid, first)?, array.values())));
+        let samples = samples.collect::<PyResult<Vec<_>>>()?;
         py.detach(|| {
-            let columns = chunks.into_iter().map(Chunk::counts).collect::<PyResult<Vec<_>>>()?;
+            let columns =
+                samples.into_iter().map(|(counts, values)| column(counts, values)).collect::<PyResult<Vec<_>>>()?;
             let mut channels = self.lock();
             if columns.len() != channels.cascades.len() {
                 let (given, expected) = (columns.len(), channels.cascades.len());

@@ -2,7 +2,7 @@
 
 use crate::OCTAVES;
 use crate::curve::NativeCurve;
-use crate::quantizer::{Chunk, Grid, int32};
+use crate::samples::{Array, Counts, Grid, Rest, Values};
 use allan_core::Cascade;
 use postcard::{from_bytes, to_allocvec};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -45,23 +45,15 @@ impl AnyOverlap {
         }
     }
 
-    fn push(&mut self, chunk: Chunk) -> PyResult<()> {
-        if chunk.grid.is_none() {
-            let counts = int32(chunk.bytes)?;
-            with_cascade!(self, cascade => cascade.push_slice(&counts));
-            return Ok(());
-        }
-        let samples = chunk.counts()?;
-        let mut counts = Vec::with_capacity(samples.len());
-        for run in samples.chunk_by(|a, b| a.is_some() == b.is_some()) {
-            counts.clear();
-            counts.extend(run.iter().flatten());
-            if counts.is_empty() {
-                self.gap(run.len() as u64);
-            }
-            with_cascade!(self, cascade => cascade.push_slice(&counts));
-        }
-        Ok(())
+    fn push(&mut self, mut counts: Counts, values: Values) -> PyResult<()> {
+        counts.each_run(values, |counts, rest| {
+            with_cascade!(self, cascade => {
+                cascade.push_slice(counts);
+                if let Rest::Missing = rest {
+                    cascade.gap(1);
+                }
+            });
+        })
     }
 
     fn gap(&mut self, mut missing: u64) {
@@ -93,11 +85,13 @@ impl Estimator {
         Ok(Self { cascade: Mutex::new(AnyOverlap::new(overlap)?) })
     }
 
-    /// Adds samples: the bytes of an `int32` array, or those of a `float64` array if `grid` is `(origin, lsb)`.
+    /// Adds the samples of an array: counts, or values in a unit if `grid` is `(origin, lsb)`.
     ///
-    /// `first` is the index of the first one in the user's array, for messages. Nothing is added if a value is refused.
-    fn push(&self, py: Python, samples: &[u8], grid: Option<Grid>, first: u64) -> PyResult<()> {
-        py.detach(|| self.lock().push(Chunk { bytes: samples, grid, first }))
+    /// `first` is the index of the first one in the user's array, for messages. If a value is refused, some of those before
+    /// it have been added.
+    fn push(&self, py: Python, samples: Array, grid: Option<Grid>, first: u64) -> PyResult<()> {
+        let (values, counts) = (samples.values(), Counts::new(grid, first)?);
+        py.detach(|| self.lock().push(counts, values))
     }
 
     /// Says that `missing` samples are missing before the next one.

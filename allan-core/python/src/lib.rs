@@ -1,15 +1,16 @@
 //! The compiled half of the Python module `allan_core`. The other half, in `package/allan_core`, turns what users have
-//! (arrays of any dtype, time stamps, names) into bytes and numbers, and wraps the results in arrays.
+//! (lists, series, time stamps, names) into arrays and numbers, and wraps the results in arrays.
 //!
-//! Samples arrive as `bytes`, which are immutable: they are read without the global interpreter lock. No method holds a
-//! mutex while it waits for that lock.
+//! Arrays are read where they are, without the global interpreter lock: another thread must not write to them meanwhile, as
+//! with the functions of NumPy. No method holds a mutex while it waits for that lock.
 #![forbid(unsafe_code)]
 
 mod coupled;
 mod curve;
 mod estimator;
 mod model;
-mod quantizer;
+mod samples;
+mod time_stamps;
 mod trace;
 
 /// Octaves of every estimator: averaging factors up to 2³⁰ samples.
@@ -26,7 +27,9 @@ mod _native {
     #[pymodule_export]
     use super::model::{NativeModel, fit};
     #[pymodule_export]
-    use super::quantizer::{automatic_quantizer, gaps};
+    use super::samples::automatic_quantizer;
+    #[pymodule_export]
+    use super::time_stamps::gaps;
     #[pymodule_export]
     use super::trace::trace;
 }

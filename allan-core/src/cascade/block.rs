@@ -18,6 +18,8 @@ struct Sums<W> {
     past: u64,
     /// Number of sums of the block at this level.
     new: usize,
+    /// Octaves whose differences had 14 bits or more in the last block, as bits: there the fast sums for less are not tried.
+    large: u64,
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
@@ -106,7 +108,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     }
 
     /// Adds the differences with an averaging time of `reach` steps that end in the block.
-    fn accumulate_block<W: Word>(&mut self, octave: usize, reach: usize, sums: &Sums<W>) {
+    fn accumulate_block<W: Word>(&mut self, octave: usize, reach: usize, sums: &mut Sums<W>) {
         // The first difference ends two averaging times after the gap.
         let level = octave.saturating_sub(Self::FINE);
         let complete = self.octaves[octave].resumed + (2 << octave);
@@ -115,26 +117,28 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             return;
         }
         let steps = HISTORY + first as usize..HISTORY + sums.new;
-        let sums = [0, reach, 2 * reach].map(|back| &sums.values[steps.start - back..steps.end - back]);
+        let terms = [0, reach, 2 * reach].map(|back| &sums.values[steps.start - back..steps.end - back]);
         let moments = &mut self.octaves[octave].moments;
-        if let Some((squares, fourths)) = W::powers(sums, unit_bits(octave)) {
+        let mut is_large = (sums.large >> octave) & 1 == 1;
+        if let Some((squares, fourths)) = W::powers(terms, unit_bits(octave), &mut is_large) {
             moments.squares.add(squares);
             moments.fourths.add(fourths);
         } else {
-            differences(sums).for_each(|difference| moments.add(octave, difference));
+            differences(terms).for_each(|difference| moments.add(octave, difference));
         }
+        sums.large = (sums.large & !(1 << octave)) | (u64::from(is_large) << octave);
     }
 }
 
 impl<W: Word> Sums<W> {
     fn new() -> Self {
-        Self { values: [W::default(); HISTORY + BLOCK], base: 0, past: 0, new: 0 }
+        Self { values: [W::default(); HISTORY + BLOCK], base: 0, past: 0, new: 0, large: 0 }
     }
 
     /// The same sums in words that hold any value.
     fn widened(&self) -> Sums<i64> {
         let values = self.values.map(|value| self.base.wrapping_add(value.into()));
-        Sums { values, base: 0, past: self.past, new: self.new }
+        Sums { values, base: 0, past: self.past, new: self.new, large: self.large }
     }
 
     /// The sum of `back` steps before the newest.
@@ -189,8 +193,9 @@ trait Word: Copy + Default + Into<i64> {
     fn truncated(sum: i64) -> Self;
 
     /// Sums of the squares and of the fourth powers of the second differences of newest, middle and oldest sums. For the
-    /// fourth powers, differences are rounded by `bits`. `None` if the totals might not fit.
-    fn powers(sums: [&[Self]; 3], bits: u32) -> Option<(u128, u128)>;
+    /// fourth powers, differences are rounded by `bits`. `None` if the totals might not fit. `is_large` says that differences of 14
+    /// bits or more are expected, and is set to whether there were some.
+    fn powers(sums: [&[Self]; 3], bits: u32, is_large: &mut bool) -> Option<(u128, u128)>;
 }
 
 /// Holds any sum.
@@ -205,7 +210,7 @@ impl Word for i64 {
         sum
     }
 
-    fn powers(sums: [&[Self]; 3], bits: u32) -> Option<(u128, u128)> {
+    fn powers(sums: [&[Self]; 3], bits: u32, _: &mut bool) -> Option<(u128, u128)> {
         wide_powers(sums, bits)
     }
 }
@@ -222,11 +227,23 @@ impl Word for i32 {
         sum as i32
     }
 
-    fn powers(sums: [&[Self]; 3], bits: u32) -> Option<(u128, u128)> {
-        let exact = (bits == 0).then(|| narrow_powers(sums)).flatten();
-        exact.or_else(|| wide_powers(sums, bits))
+    fn powers(sums: [&[Self]; 3], bits: u32, is_large: &mut bool) -> Option<(u128, u128)> {
+        if bits > 0 {
+            return wide_powers(sums, bits);
+        }
+        if !*is_large && let Some(powers) = narrow_powers(sums) {
+            return Some(powers);
+        }
+        let powers = middle_powers(sums);
+        *is_large = powers.is_none_or(|(_, digits)| digits >= SMALL);
+        powers.map(|(powers, _)| powers).or_else(|| wide_powers(sums, bits))
     }
 }
+
+/// Differences below this have 13 bits at most.
+const SMALL: u32 = 1 << 13;
+/// Bits of a difference, and of a half of its square, in [`middle_powers`].
+const HALF: u32 = 26;
 
 /// `None` if a difference has 14 bits or more: the fourth powers of a block of 13-bit differences fill 62 bits.
 fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
@@ -240,7 +257,27 @@ fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
         squares += square;
         fourths = fourths.wrapping_add(square * square);
     }
-    (digits < 1 << 13).then_some((squares.into(), fourths.into()))
+    (digits < SMALL).then_some((squares.into(), fourths.into()))
+}
+
+/// The sums, and the bits that the differences have. `None` if one has 27 bits or more: the squares of a block of 26-bit
+/// differences fill 62 bits, and so do the products of the two halves of these squares, of which the fourth powers consist.
+fn middle_powers(sums: [&[i32]; 3]) -> Option<((u128, u128), u32)> {
+    // Factors of 32 bits, which the vector multiplication of every x86-64 supports.
+    let product = |one: u64, other: u64| (one & 0xffff_ffff) * (other & 0xffff_ffff);
+    let (mut digits, mut squares, mut high, mut middle, mut low) = (0, 0_u64, 0_u64, 0_u64, 0_u64);
+    for (newest, middle_sum, oldest) in zipped(sums) {
+        let magnitude = newest.wrapping_sub(middle_sum).wrapping_sub(middle_sum.wrapping_sub(oldest)).unsigned_abs();
+        digits |= magnitude;
+        let square = product(magnitude.into(), magnitude.into());
+        squares = squares.wrapping_add(square);
+        let (upper, lower) = (square >> HALF, square & ((1 << HALF) - 1));
+        high = high.wrapping_add(product(upper, upper));
+        middle = middle.wrapping_add(product(upper, lower));
+        low = low.wrapping_add(product(lower, lower));
+    }
+    let fourths = (u128::from(high) << (2 * HALF)) + (u128::from(middle) << (HALF + 1)) + u128::from(low);
+    (digits < 1 << HALF).then_some(((squares.into(), fourths), digits))
 }
 
 /// `None` if a difference has 29 bits or more: the fourth powers of a block of 28-bit differences fill 122 bits.

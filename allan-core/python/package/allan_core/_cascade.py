@@ -181,7 +181,7 @@ def curve(
 
 
 def _push(estimator: _native.Estimator, array: npt.NDArray[Any], grid: Grid | None, start: int) -> None:
-    for data, first in chunks(array, grid):
+    for data, first in chunks(array):
         estimator.push(data, grid, start + first)
 
 

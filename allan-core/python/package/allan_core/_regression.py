@@ -79,7 +79,7 @@ class CovariateRegression:
                 grids[index] = automatic_grid(array)
             kinds[index] = is_float
         estimators = self._estimators.copy()
-        columns = [chunks(array, grid) for array, grid in zip(arrays, grids, strict=True)]
+        columns = [chunks(array) for array in arrays]
         for parts in zip(*columns, strict=True):
             data = [(part[0], grid) for part, grid in zip(parts, grids, strict=True)]
             estimators.push(data, parts[0][1])

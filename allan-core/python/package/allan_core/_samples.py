@@ -1,4 +1,4 @@
-"""Arrays of any dtype as the chunks of bytes that the compiled estimators read, and time stamps as gaps."""
+"""Arrays of any dtype as those that the compiled estimators read, and time stamps as gaps."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from . import _native
 
 # Samples of one call of the compiled estimators. Between the calls Ctrl-C is noticed.
 CHUNK = 1 << 20
+
+# What the compiled estimators read where it is: integers of 1 to 8 bytes, floats of 4 and 8.
+READ = frozenset("bhilqBHILQfd")
 
 Grid = tuple[float, float]
 
@@ -35,8 +38,7 @@ def as_samples(samples: npt.ArrayLike) -> npt.NDArray[Any]:
 
 def automatic_grid(array: npt.NDArray[Any]) -> Grid:
     """Origin and LSB for the floats of the first array that is pushed."""
-    values = np.ascontiguousarray(array[:CHUNK], dtype=np.float64)
-    grid = _native.automatic_quantizer(values.tobytes())
+    grid = _native.automatic_quantizer(readable(array[:CHUNK]))
     if grid is None:
         raise ValueError(
             "the first floats do not show how fine their grid must be, because no two neighbours differ: pass lsb=…"
@@ -44,23 +46,18 @@ def automatic_grid(array: npt.NDArray[Any]) -> Grid:
     return grid
 
 
-def chunks(array: npt.NDArray[Any], grid: Grid | None) -> Iterator[tuple[bytes, int]]:
-    """The bytes of each chunk, and the index of its first sample."""
-    limits = np.iinfo(np.int32)
+def readable(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The array, or a copy where the compiled estimators cannot read it: half and long floats, other byte orders, odd places."""
+    known = array.dtype.char in READ
+    if known and array.dtype.isnative and array.flags.aligned and array.strides[0] % array.itemsize == 0:
+        return array
+    return array.astype(array.dtype.newbyteorder("=") if known else np.float64)
+
+
+def chunks(array: npt.NDArray[Any]) -> Iterator[tuple[npt.NDArray[Any], int]]:
+    """The array in chunks, and the index of each one's first sample."""
     for first in range(0, len(array), CHUNK):
-        chunk = array[first : first + CHUNK]
-        if grid is not None:
-            yield np.ascontiguousarray(chunk, dtype=np.float64).tobytes(), first
-            continue
-        if not np.can_cast(chunk.dtype, np.int32):
-            outside = (chunk < limits.min) | (chunk > limits.max)
-            if outside.any():
-                index = int(outside.argmax())
-                raise OverflowError(
-                    f"sample {first + index} is {chunk[index]}, outside the 32 bits of a count: "
-                    "pass lsb=1 and the origin from which counts are to be taken"
-                )
-        yield np.ascontiguousarray(chunk, dtype=np.int32).tobytes(), first
+        yield readable(array[first : first + CHUNK]), first
 
 
 def seconds(times: npt.ArrayLike) -> npt.NDArray[np.float64]:
@@ -86,7 +83,7 @@ def gaps(
     """
     if not np.isfinite(times).all():
         raise ValueError(f"time stamp {int((~np.isfinite(times)).argmax())} is not finite")
-    return _native.gaps(np.ascontiguousarray(times).tobytes(), rate, previous)
+    return _native.gaps(np.ascontiguousarray(times), rate, previous)
 
 
 def check_rate(rate: float) -> float:

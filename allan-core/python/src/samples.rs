@@ -1,0 +1,254 @@
+//! What Python passes on: arrays of samples, read where they are, and their counts.
+
+use allan_core::{Quantizer, SampleError};
+use numpy::ndarray::{ArrayView1, Axis, Slice};
+use numpy::{PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use std::fmt::Display;
+
+/// Origin and LSB of a quantizer.
+pub(crate) type Grid = (f64, f64);
+
+/// Samples that are turned into counts together: their counts stay in the nearest cache.
+pub(crate) const BLOCK: usize = 4096;
+
+/// Declares the dtypes that are read without a copy, each with the bits of a sample beyond those
+/// of a count, all of them 0 where it is one.
+macro_rules! dtypes {
+    ($($name:ident $type:ty, $is_float:literal, |$value:ident| $beyond:expr;)*) => {
+        /// An array of samples that Python holds.
+        pub(crate) enum Array<'py> {
+            $($name(PyReadonlyArray1<'py, $type>),)*
+        }
+
+        /// The samples of an array.
+        #[derive(Clone, Copy)]
+        pub(crate) enum Values<'a> {
+            $($name(ArrayView1<'a, $type>),)*
+        }
+
+        impl<'a, 'py> FromPyObject<'a, 'py> for Array<'py> {
+            type Error = PyErr;
+
+            fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+                $(if let Ok(array) = object.extract::<PyReadonlyArray1<$type>>() {
+                    return Ok(Self::$name(array));
+                })*
+                let array = object.cast::<PyUntypedArray>()?;
+                Err(PyTypeError::new_err(format!("an array of {} with {} dimensions", array.dtype(), array.ndim())))
+            }
+        }
+
+        impl Array<'_> {
+            pub(crate) fn values(&self) -> Values<'_> {
+                match self {
+                    $(Self::$name(array) => Values::$name(array.as_array()),)*
+                }
+            }
+        }
+
+        impl Values<'_> {
+            pub(crate) fn len(&self) -> usize {
+                match self {
+                    $(Self::$name(values) => values.len(),)*
+                }
+            }
+
+            /// The grid of [`Quantizer::for_samples`], if these are floats.
+            fn automatic_grid(self) -> Option<Grid> {
+                let quantizer = match self {
+                    $(Self::$name(values) if $is_float => match values.as_slice() {
+                        Some(values) => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
+                        None => Quantizer::for_samples(values.iter().map(|&value| value as f64)),
+                    },)*
+                    _ => None,
+                };
+                quantizer.map(|quantizer| (quantizer.origin(), quantizer.lsb()))
+            }
+        }
+
+        impl Counts {
+            /// Calls `take` with the counts of all samples in runs, each as long as a block or up to a sample that is missing.
+            pub(crate) fn each_run(&mut self, values: Values, take: impl FnMut(&[i32], Rest)) -> PyResult<()> {
+                match values {
+                    $(Values::$name(values) => self.each_block(values, |$value| $beyond, take),)*
+                }
+            }
+        }
+    };
+}
+dtypes! {
+    Int8 i8, false, |_value| 0;
+    Int16 i16, false, |_value| 0;
+    Int32 i32, false, |_value| 0;
+    Int64 i64, false, |value| (value.wrapping_add(1 << 31) as u64) >> 32;
+    UInt8 u8, false, |_value| 0;
+    UInt16 u16, false, |_value| 0;
+    UInt32 u32, false, |value| u64::from(value >> 31);
+    UInt64 u64, false, |value| value >> 31;
+    Float32 f32, true, |_value| 1;
+    Float64 f64, true, |_value| 1;
+}
+
+/// The counts of the first samples of a part of an array.
+pub(crate) struct Counts {
+    counts: [i32; BLOCK],
+    quantizer: Option<Quantizer>,
+    /// Index of the array's first sample in the user's array, for messages.
+    first: u64,
+}
+
+/// What the samples after some counts are.
+pub(crate) enum Rest {
+    /// There are none.
+    End,
+    /// The next one is missing.
+    Missing,
+}
+
+impl Counts {
+    pub(crate) fn new(grid: Option<Grid>, first: u64) -> PyResult<Self> {
+        let quantizer = |(origin, lsb)| {
+            Quantizer::new(origin, lsb)
+                .ok_or_else(|| PyValueError::new_err(format!("no grid has lsb={lsb} and origin={origin}")))
+        };
+        Ok(Self { counts: [0; BLOCK], quantizer: grid.map(quantizer).transpose()?, first })
+    }
+
+    /// [`each_run`](Self::each_run) for samples of one type. Without a grid those with no bits `beyond` a count's are counts.
+    fn each_block<T: Sample>(
+        &mut self,
+        values: ArrayView1<T>,
+        beyond: impl Fn(T) -> u64,
+        mut take: impl FnMut(&[i32], Rest),
+    ) -> PyResult<()> {
+        if self.quantizer.is_none()
+            && let Some(counts) = values.as_slice().and_then(T::counts)
+        {
+            take(counts, Rest::End);
+            return Ok(());
+        }
+        let Self { counts, quantizer, .. } = self;
+        let mut gathered = [T::default(); BLOCK];
+        let mut start = 0;
+        while start < values.len() {
+            let end = values.len().min(start + BLOCK);
+            let part = values.slice_axis(Axis(0), Slice::from(start..end));
+            let block = part.as_slice().unwrap_or_else(|| {
+                gathered.iter_mut().zip(&part).for_each(|(slot, &value)| *slot = value);
+                &gathered[..part.len()]
+            });
+            let put = match quantizer {
+                Some(quantizer) => T::put_rounded(quantizer, block, counts),
+                None => put_integers(block, counts, &beyond),
+            };
+            start += put;
+            if put == block.len() {
+                take(&counts[..put], Rest::End);
+            } else {
+                check_missing(block[put], *quantizer, self.first + start as u64)?;
+                take(&counts[..put], Rest::Missing);
+                start += 1;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A type of samples.
+trait Sample: Copy + Default + Display {
+    /// The samples as counts without a copy, if that is what they are.
+    fn counts(_values: &[Self]) -> Option<&[i32]> {
+        None
+    }
+
+    /// The lower 32 bits of an integer.
+    fn low_bits(self) -> i32;
+
+    fn to_f64(self) -> f64;
+
+    /// Puts the counts of the first samples on a grid; returns how many have one.
+    fn put_rounded(quantizer: &Quantizer, values: &[Self], counts: &mut [i32]) -> usize;
+}
+
+macro_rules! samples {
+    ($($type:ty: $put:expr $(, $counts:item)?;)*) => {
+        $(impl Sample for $type {
+            $($counts)?
+
+            fn low_bits(self) -> i32 {
+                self as i32
+            }
+
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+
+            fn put_rounded(quantizer: &Quantizer, values: &[Self], counts: &mut [i32]) -> usize {
+                $put(quantizer, values, counts)
+            }
+        })*
+    };
+}
+samples! {
+    i8: Quantizer::counts;
+    i16: Quantizer::counts;
+    i32: Quantizer::counts, fn counts(values: &[Self]) -> Option<&[i32]> { Some(values) };
+    u8: Quantizer::counts;
+    u16: Quantizer::counts;
+    u32: Quantizer::counts;
+    f32: Quantizer::counts;
+    f64: Quantizer::counts;
+    // Integers of 64 bits are rounded to doubles first.
+    i64: |quantizer: &Quantizer, values: &[i64], counts| put_each(quantizer, values, counts);
+    u64: |quantizer: &Quantizer, values: &[u64], counts| put_each(quantizer, values, counts);
+}
+
+/// Puts integers into `counts` up to the first one with bits `beyond` those of a count; returns how many.
+fn put_integers<T: Sample>(values: &[T], counts: &mut [i32], beyond: impl Fn(T) -> u64) -> usize {
+    let mut found = 0;
+    for (count, &value) in counts.iter_mut().zip(values) {
+        *count = value.low_bits();
+        found |= beyond(value);
+    }
+    if found == 0 { values.len() } else { values.iter().take_while(|&&value| beyond(value) == 0).count() }
+}
+
+/// Puts the counts of samples on a grid into `counts`, one by one; returns how many have one.
+fn put_each<T: Sample>(quantizer: &Quantizer, values: &[T], counts: &mut [i32]) -> usize {
+    let mut put = 0;
+    for (count, value) in counts.iter_mut().zip(values) {
+        let Ok(found) = quantizer.count(value.to_f64()) else { break };
+        (*count, put) = (found, put + 1);
+    }
+    put
+}
+
+/// Whether a sample that has no count is missing, that is NaN; anything else is an error.
+fn check_missing(value: impl Sample, quantizer: Option<Quantizer>, index: u64) -> PyResult<()> {
+    let Some(quantizer) = quantizer else {
+        return Err(PyOverflowError::new_err(format!(
+            "sample {index} is {value}, outside the 32 bits of a count: pass lsb=1 and the origin from which counts are to be \
+             taken"
+        )));
+    };
+    match quantizer.count(value.to_f64()) {
+        Err(SampleError::NotANumber) => Ok(()),
+        Err(SampleError::Infinite) => {
+            Err(PyValueError::new_err(format!("sample {index} is {value}: a missing sample is NaN")))
+        }
+        _ => Err(PyOverflowError::new_err(format!(
+            "sample {index} is {value}, more than 2**31 steps of lsb={} from origin={}: choose a coarser lsb or another origin",
+            quantizer.lsb(),
+            quantizer.origin()
+        ))),
+    }
+}
+
+/// Origin and LSB for the floats of an array.
+#[pyfunction]
+pub(crate) fn automatic_quantizer(py: Python, samples: Array) -> Option<Grid> {
+    let values = samples.values();
+    py.detach(|| values.automatic_grid())
+}
