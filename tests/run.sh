@@ -99,18 +99,15 @@ lint_images() { # where the tests build them, so that their build scripts are co
     lint "${image[@]}" --bin observatory-feather --features board-feather --target "$MCU"
     lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
 }
-lint_examples() { # workspaces of their own
-    (
-        cd adis16405-driver/examples-stm32f405
-        run cargo fmt --all --check
-        lint --target "$MCU" --target-dir "$TARGET/examples"
-    )
-    cd allan-core/examples-cortex-m
-    run cargo fmt --all --check
-    for example in plain rtic embassy; do # one by one: their interrupt vectors differ
-        lint --target "$MCU" --target-dir "$TARGET/examples-allan" --package "examples-cortex-m-$example"
+lint_examples() { # two workspaces with the same frameworks, which are compiled once
+    local workspace
+    for workspace in adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m; do
+        (
+            cd "$workspace"
+            run cargo fmt --all --check
+            lint --target "$MCU" --target-dir "$TARGET/examples"
+        )
     done
-    cd ../..
 }
 lint_libraries() {
     for target in "$MCU" "$SMALL"; do
@@ -123,21 +120,30 @@ documentation() {
     document --package adis16405-driver --package allan-core
     document --package adis16405-driver --all-features
 }
-python() { # with the packages of tests/requirements.txt
+python() { # with the packages of tests/requirements.txt; compiled as the tests are, so that dependencies are compiled once
     local python=$TARGET/python/bin
-    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET/python-build run "$python/pip" install --quiet --disable-pip-version-check \
-        --no-build-isolation --no-deps --force-reinstall ./allan-core/python
+    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET run "$python/pip" install --quiet --disable-pip-version-check \
+        --config-settings build-args="--profile dev" --no-build-isolation --no-deps --force-reinstall ./allan-core/python
     (cd allan-core/python && run "$python/pytest" --quiet -p no:cacheprovider) 2>&1 | tee -a "$log"
+}
+# Each test program ends after an hour, one with long tests after twelve, also if it hangs.
+bound_tests() {
+    local machine bound=1h
+    case " ${chosen[*]-} " in *" --include-ignored "*) bound=12h ;; esac
+    machine=$(rustc -vV | sed -n 's/^host: //p' | tr 'a-z-' 'A-Z_')
+    export "CARGO_TARGET_${machine}_RUNNER=timeout --foreground --kill-after=10s $bound"
 }
 build() {
     host test --no-run
     export HOST_SIM=$TARGET/debug/host-sim # the program as just built
 }
 tests() {
+    bound_tests
     host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
     sed -n 's/: .* ADIS_RECORDINGS names$//p' "$SKIPPED_TESTS" | sort -u >"$WITHOUT_RECORDINGS"
 }
 recordings() {
+    bound_tests
     host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
     # What was skipped again is printed at the end. Each name has to be that of a test.
     [ ! -s "$SKIPPED_TESTS" ] && [ "$(awk '/^test result: / { sum += $4 } END { print sum + 0 }' "$log")" -ge ${#chosen[@]} ]

@@ -11,10 +11,10 @@ use std::fmt::Display;
 pub(crate) type Grid = (f64, f64);
 
 /// Samples that are turned into counts together: their counts stay in the nearest cache.
-pub(crate) const BLOCK: usize = 4096;
+const BLOCK: usize = 4096;
 
-/// Declares the dtypes that are read without a copy, each with the bits of a sample beyond those
-/// of a count, all of them 0 where it is one.
+/// Declares the dtypes that are read without a copy, each with the bits of a sample beyond those of a count, all of them 0 where
+/// it is one.
 macro_rules! dtypes {
     ($($name:ident $type:ty, $is_float:literal, |$value:ident| $beyond:expr;)*) => {
         /// An array of samples that Python holds.
@@ -131,25 +131,25 @@ impl Counts {
         }
         let Self { counts, quantizer, .. } = self;
         let mut gathered = [T::default(); BLOCK];
-        let mut start = 0;
-        while start < values.len() {
+        for start in (0..values.len()).step_by(BLOCK) {
             let end = values.len().min(start + BLOCK);
             let part = values.slice_axis(Axis(0), Slice::from(start..end));
-            let block = part.as_slice().unwrap_or_else(|| {
+            let mut rest = part.as_slice().unwrap_or_else(|| {
                 gathered.iter_mut().zip(&part).for_each(|(slot, &value)| *slot = value);
                 &gathered[..part.len()]
             });
-            let put = match quantizer {
-                Some(quantizer) => T::put_rounded(quantizer, block, counts),
-                None => put_integers(block, counts, &beyond),
-            };
-            start += put;
-            if put == block.len() {
-                take(&counts[..put], Rest::End);
-            } else {
-                check_missing(block[put], *quantizer, self.first + start as u64)?;
+            while !rest.is_empty() {
+                let put = match quantizer {
+                    Some(quantizer) => T::put_rounded(quantizer, rest, counts),
+                    None => put_integers(rest, counts, &beyond),
+                };
+                if put == rest.len() {
+                    take(&counts[..put], Rest::End);
+                    break;
+                }
+                check_missing(rest[put], *quantizer, self.first + (end - rest.len() + put) as u64)?;
                 take(&counts[..put], Rest::Missing);
-                start += 1;
+                rest = &rest[put + 1..];
             }
         }
         Ok(())

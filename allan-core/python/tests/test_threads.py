@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import allan_core
 import numpy as np
@@ -37,7 +37,7 @@ def seen_during(work: Callable[[], object]) -> int:
 
 def test_other_threads_run_during_a_push() -> None:
     estimator = _native.Estimator(8)
-    samples = np.zeros(1 << 25, dtype=np.int32).tobytes()
+    samples = np.zeros(1 << 25, dtype=np.int32)
     # With the lock held the other thread could not run at all inside of the call. A busy machine may let it starve once.
     assert any(seen_during(lambda: estimator.push(samples, None, 0)) for _ in range(20))
 
@@ -51,7 +51,7 @@ def test_other_threads_run_during_a_fit() -> None:
 
 def test_estimators_can_be_used_by_several_threads_at_once() -> None:
     estimator = _native.Estimator(8)
-    samples = np.zeros(1 << 16, dtype=np.int32).tobytes()
+    samples = np.zeros(1 << 16, dtype=np.int32)
     threads = [threading.Thread(target=lambda: estimator.push(samples, None, 0)) for _ in range(8)]
     for thread in threads:
         thread.start()
@@ -60,23 +60,31 @@ def test_estimators_can_be_used_by_several_threads_at_once() -> None:
     assert estimator.samples()[0] == 8 << 16
 
 
-def test_ctrl_c_ends_a_push_and_nothing_is_added() -> None:
+@pytest.fixture
+def ctrl_c() -> Iterator[Callable[[], None]]:
+    """Sends this process an interrupt, which Python takes even if the process was started with interrupts ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield lambda: os.kill(os.getpid(), signal.SIGINT)
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_a_push_and_nothing_is_added(ctrl_c: Callable[[], None]) -> None:
     cascade = allan_core.Cascade()
     cascade.push([1, 2, 3])
-    endless = np.broadcast_to(np.int32(5), (1 << 40,))  # no memory, half an hour of samples
-    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    long = np.broadcast_to(np.int32(5), (1 << 32,))  # no memory, some ten seconds
+    timer = threading.Timer(0.3, ctrl_c)
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        cascade.push(endless)
+        cascade.push(long)
     timer.join()
     assert len(cascade) == 3
 
 
-def test_ctrl_c_ends_a_trace() -> None:
+def test_ctrl_c_ends_a_trace(ctrl_c: Callable[[], None]) -> None:
     curve = allan_core.curve(np.random.default_rng(1).integers(0, 100, 10_000), 1.0)
 
     def interrupt() -> bool:
-        os.kill(os.getpid(), signal.SIGINT)
+        ctrl_c()
         return True
 
     with pytest.raises(KeyboardInterrupt):
