@@ -106,19 +106,24 @@ fn rate_scale(log: &[u8]) -> f64 {
     if header(log, "blackbox_high_resolution") == Some("1") { scale / 10.0 } else { scale }
 }
 
-/// The usual time between two frames, us: the median. `None` of fewer than two.
+/// Part of the median by which the steps between neighbours differ at most.
+const JITTER: f64 = 0.1;
+
+/// The usual time between two frames, us: the mean of the steps near the median. `None` of fewer than two frames.
 fn usual_step(headers: &Headers) -> Option<f64> {
     let mut frames = headers.data_parser();
     let (mut steps, mut last) = (Vec::new(), None);
     while let Some(event) = frames.next() {
         if let ParserEvent::Main(frame) = event {
             let time = frame.time_raw();
-            steps.extend(last.filter(|last| *last < time).map(|last| time - last));
+            steps.extend(last.filter(|last| *last < time).map(|last| (time - last) as f64));
             last = Some(time);
         }
     }
     let middle = steps.len() / 2;
-    (!steps.is_empty()).then(|| *steps.select_nth_unstable(middle).1 as f64)
+    let median = (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)?;
+    steps.retain(|step| (step / median - 1.0).abs() <= JITTER);
+    Some(steps.iter().sum::<f64>() / steps.len() as f64)
 }
 
 /// g in a count of the accelerometer.
@@ -149,19 +154,16 @@ impl Source for BlackboxSource<'_> {
             _ => None,
         };
         let scales: Vec<Option<f64>> = columns.iter().map(scale).collect();
-        // The loop that takes the samples is regular: between its frames lie as many others as there were steps.
+        // The clock of the samples is regular: a frame is at the nearest of its ticks, and later than the one before.
         let step = usual_step(&headers).unwrap_or(1.0);
-        let (mut number, mut last) = (0i64, None::<u64>);
+        let (mut number, mut first) = (-1i64, None);
         let mut frames = headers.data_parser();
         let mut row = Vec::with_capacity(columns.len());
         while let Some(event) = frames.next() {
             let ParserEvent::Main(frame) = event else { continue };
             let time = frame.time_raw();
-            if let Some(last) = last {
-                let steps = (time.saturating_sub(last) as f64 / step).round().max(1.0);
-                number = i64::saturating_add(number, steps as i64);
-            }
-            last = Some(time);
+            let ticks = (time.saturating_sub(*first.get_or_insert(time)) as f64 / step).round() as i64;
+            number = ticks.max(number.saturating_add(1));
             row.clear();
             for (&column, scale) in columns.iter().zip(&scales) {
                 let field = match (fields.get(column), frame.get_raw(column)) {
