@@ -13,7 +13,7 @@ fn options(columns: &[&str]) -> ReadOptions {
 }
 
 /// A loop of 125 us (`looptime`), of which the controller runs every second time (`pid_process_denom`) and every second of those is logged
-/// (`P interval`): 2 kHz. A sixth of the frames was dropped.
+/// (`P interval`): 2 kHz, by the clock of a gyroscope, which is within 1 %. A sixth of the frames was dropped.
 #[test]
 fn frames_that_a_blackbox_dropped_are_gaps() {
     let Some(file) = recording("frames_that_a_blackbox_dropped_are_gaps", "others/betaflight_btfl_001.bbl") else {
@@ -22,7 +22,7 @@ fn frames_that_a_blackbox_dropped_are_gaps() {
     let recording = InputFile::open(&file).expect("a file").read(&options(&[])).expect("a log");
     let (base, _) = recording.time_base(None).expect("a time base");
     let measured = base.measurement;
-    assert!((measured.sample_rate_hz / 2000.0 - 1.0).abs() < 5e-3, "{}", measured.sample_rate_hz);
+    assert!((measured.sample_rate_hz / 2000.0 - 1.0).abs() < 1e-2, "{}", measured.sample_rate_hz);
     // As many frames as orangebox decodes.
     assert_eq!(measured.len(), 24_060);
     let gaps = measured.dropped["gap"] as f64;
