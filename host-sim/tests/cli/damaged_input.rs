@@ -282,15 +282,18 @@ fn padding_after_gzip_data_is_skipped_and_other_bytes_are_named() {
 }
 
 #[test]
-fn a_small_file_of_too_many_rows_is_refused() {
+fn too_many_rows_are_refused_and_fewer_where_a_small_file_expands_to_them() {
     let dir = tempdir().expect("a folder");
     let mut rows = b"gyro_x_counts\n".to_vec();
     rows.resize(rows.len() + 2 * ((1 << 25) + 1), b'\n');
     rows[14..].chunks_exact_mut(2).for_each(|row| row[0] = b'1');
-    let file = write(&dir, "ones.csv.gz", &gzip(&rows));
     // `analyze` condenses it; `explain` would hold it in memory.
+    let file = write(&dir, "ones.csv", &rows);
     let line = refusal(&["explain", name(&file), "--rate", "100"]);
     assert!(line.contains("more than 33554432 samples"), "{line}");
+    let file = write(&dir, "ones.csv.gz", &gzip(&rows));
+    let line = refusal(&["explain", name(&file), "--rate", "100"]);
+    assert!(line.contains("far more than a recording of this size"), "{line}");
 }
 
 #[test]
