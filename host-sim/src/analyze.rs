@@ -2,6 +2,7 @@
 
 use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
 use crate::output::{self, note};
+use crate::output_files::{OutputFiles, is_standard_stream};
 use crate::progress::{self, Progress};
 use crate::{many, streaming};
 use anyhow::{Context, Result, bail};
@@ -42,16 +43,17 @@ const GENERIC: &str = "generic";
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let AnalyzeArguments { recording, more, against, quick, reports, output } = arguments;
     let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
-    let inputs: Vec<&Path> = files.iter().copied().chain(against.as_deref()).collect();
+    let sensor = recording.input.sensor.as_deref().map(Path::new);
+    let outputs = OutputFiles::beside(files.iter().copied().chain(against.as_deref()).chain(sensor));
     if let Some(folder) = reports {
         let analyze = |file: &Path| report(&of_file(recording, file), *quick, &ReadMonitor::default(), &mut |_| {});
-        return many::write_reports(&files, folder, output.quiet, analyze);
+        return many::write_reports(&files, folder, output.quiet, &outputs, analyze);
     }
-    output::check(output, &inputs)?;
+    output::check(output, &outputs)?;
     if more.is_empty() && against.is_none() {
         let source = output::source_name(&recording.input.file);
         let report = watched_report(recording, *quick)?;
-        return output::write_report(&report, Some(&source), output);
+        return output::write_report(&report, Some(&source), output, &outputs);
     }
     if *quick {
         bail!("several recordings have a summary and no report: leave out --quick, or give --reports DIR");
@@ -74,9 +76,10 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         None => None,
     };
     if let Some(file) = &output.json {
-        output::write_json(&SeveralRecordings { agreement: agreement.as_ref(), inflation: inflation.as_ref() }, file)?;
+        let several = SeveralRecordings { agreement: agreement.as_ref(), inflation: inflation.as_ref() };
+        output::write_json(&several, file, &outputs)?;
     }
-    if output.quiet || output.json.as_deref().is_some_and(output::is_standard_output) {
+    if output.quiet || output.json.as_deref().is_some_and(is_standard_stream) {
         return Ok(());
     }
     output::print(|out| {
@@ -93,7 +96,7 @@ fn of_file(recording: &RecordingArguments, file: &Path) -> RecordingArguments {
 
 /// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
 fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Report> {
-    let mut progress = Progress::reading(&recording.input.file)?;
+    let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
     let mut end_reading = |stream: &SampleStream| {
         if progress.end_reading() {
@@ -214,6 +217,11 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     let sensor = sensor.as_deref().map(sensor_profile).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
     let input = InputFile::open_monitored(file, monitor)?;
+    if let Some(topic) = topic.as_ref().filter(|_| input.format().is_text() && input.format() != FileFormat::TextTable)
+    {
+        let name = file.display().to_string();
+        bail!("{}: --topic {}: a file of text has no topics; leave it out", Printable(&name), Printable(topic));
+    }
     let is_adis16405 = sensor.as_ref().is_none_or(|sensor| sensor.name == adis16405::NAME);
     match input.format() {
         FileFormat::FrameLog | FileFormat::SpiExport => replayed(&input, *range).map(Opened::Replayed),

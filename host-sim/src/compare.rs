@@ -2,6 +2,7 @@
 
 use crate::cli::CompareArguments;
 use crate::output::{check_result, print, write_result};
+use crate::output_files::OutputFiles;
 use anyhow::{Context, Result};
 use recordings::Printable;
 use reports::comparison;
@@ -11,8 +12,8 @@ use std::path::{Path, PathBuf};
 /// Compares the last report of the arguments with the first, or with the data sheet, and prints the table.
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     let CompareArguments { first, second, data_sheet: _, output } = arguments;
-    let inputs: Vec<&Path> = [first].into_iter().chain(second).map(PathBuf::as_path).collect();
-    check_result(output, &inputs)?;
+    let files = OutputFiles::beside([first].into_iter().chain(second).map(PathBuf::as_path));
+    check_result(output, &files)?;
     let (comparison, before, after) = match second {
         Some(second) => {
             let comparison = comparison::of_reports(&read(first)?, &read(second)?)?;
@@ -23,7 +24,7 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
             (comparison, "data sheet".to_owned(), name(first))
         }
     };
-    write_result(&comparison, output)?;
+    write_result(&comparison, output, &files)?;
     print(|out| comparison.write(&before, &after, out))
 }
 

@@ -2,31 +2,34 @@
 
 use crate::analyze::{Recorded, read};
 use crate::cli::{ConvertArguments, RecordingFormat};
-use crate::output::{check_file, note};
+use crate::output::note;
+use crate::output_files::OutputFiles;
 use crate::recording_file;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use recordings::any_sensor::SensorRecording;
 use std::path::Path;
 
 /// Reads a recording of any format and writes it anew.
 pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
     let ConvertArguments { input, out, to } = arguments;
-    check_file(out, &[&input.file]).with_context(|| out.display().to_string())?;
+    let sensor = input.sensor.as_deref().map(Path::new);
+    let files = OutputFiles::beside([input.file.as_path()].into_iter().chain(sensor));
+    files.check(out)?;
     let format = recording_file::format_of(out, *to);
     match read(input)? {
-        Recorded::Counts(recording) => recording_file::write(&recording, out, format),
+        Recorded::Counts(recording) => recording_file::write(&recording, out, format, &files),
         Recorded::AnySensor(recording) => {
             recording.notes().iter().for_each(|sentence| note(format_args!("{sentence}")));
-            write(&recording, out, format).with_context(|| out.display().to_string())
+            write(&recording, out, format, &files)
         }
     }
 }
 
-fn write(recording: &SensorRecording, out: &Path, format: RecordingFormat) -> Result<()> {
+fn write(recording: &SensorRecording, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<()> {
     match format {
-        RecordingFormat::Table => Ok(recording.write_table(out)?),
+        RecordingFormat::Table => files.write_with(out, |out| Ok(recording.write_table(out)?)),
         RecordingFormat::Npy => {
-            recording_file::note_columns(out, &recording.write_array(out)?);
+            recording_file::note_columns(out, &files.write_with(out, |out| Ok(recording.write_array(out)?))?);
             Ok(())
         }
         RecordingFormat::Frames => {

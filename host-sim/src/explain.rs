@@ -2,6 +2,7 @@
 
 use crate::cli::ExplainArguments;
 use crate::output::{note, print};
+use crate::output_files::OutputFiles;
 use anyhow::{Context, Result};
 use noise_analysis::analysis::analyze;
 use noise_analysis::report::Report;
@@ -11,26 +12,27 @@ use recordings::time_base::{StampQuality, time_base};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Explains every recording that is named, or is in a folder that is named.
 pub(crate) fn run(arguments: &ExplainArguments) -> Result<()> {
     let mut stems = BTreeSet::new();
-    for path in &arguments.recordings {
-        for file in count_table::tables_in(path)? {
-            let recording = count_table::read(&file, arguments.range.into())?;
-            let base = time_base(&recording, arguments.rate).with_context(|| file.display().to_string())?;
-            for sentence in base.stamps.iter().flat_map(StampQuality::notes) {
-                note(format_args!("{}: {sentence}", file.display()));
-            }
-            let report = analyze(&base.measurement);
-            print(|out| {
-                writeln!(out, "\n══ {}", Printable(&file.display().to_string()))?;
-                reports::explanation::write(&report, out)
-            })?;
-            if let Some(folder) = &arguments.pictures {
-                write_figures(&report, &distinct_stem(&file, &mut stems), folder)?;
-            }
+    let tables: Vec<Vec<PathBuf>> =
+        arguments.recordings.iter().map(|path| count_table::tables_in(path)).collect::<Result<_, _>>()?;
+    let files = OutputFiles::beside(tables.iter().flatten().map(PathBuf::as_path));
+    for file in tables.iter().flatten() {
+        let recording = count_table::read(file, arguments.range.into())?;
+        let base = time_base(&recording, arguments.rate).with_context(|| file.display().to_string())?;
+        for sentence in base.stamps.iter().flat_map(StampQuality::notes) {
+            note(format_args!("{}: {sentence}", file.display()));
+        }
+        let report = analyze(&base.measurement);
+        print(|out| {
+            writeln!(out, "\n══ {}", Printable(&file.display().to_string()))?;
+            reports::explanation::write(&report, out)
+        })?;
+        if let Some(folder) = &arguments.pictures {
+            write_figures(&report, &distinct_stem(file, &mut stems), folder, &files)?;
         }
     }
     Ok(())
@@ -48,11 +50,11 @@ fn distinct_stem(recording: &Path, stems: &mut BTreeSet<String>) -> String {
 }
 
 /// Writes every figure of a report as SVG into `folder`, named after the recording and the figure.
-fn write_figures(report: &Report, stem: &str, folder: &Path) -> Result<()> {
+fn write_figures(report: &Report, stem: &str, folder: &Path, files: &OutputFiles) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for picture in reports::figure::pictures(report) {
         let file = folder.join(format!("{stem}-{}.svg", picture.name));
-        fs::write(&file, picture.svg).with_context(|| file.display().to_string())?;
+        files.write(&file, picture.svg.as_bytes())?;
     }
     Ok(())
 }

@@ -1,15 +1,17 @@
 //! `export`: the noise of a report in the file format of another program.
 
 use crate::cli::{ExportArguments, ExportTarget};
-use crate::output::{check_file, write_export};
+use crate::output::write_export;
+use crate::output_files::OutputFiles;
 use anyhow::{Context, Result};
 use reports::saved_report::SavedReport;
 
 /// Reads the report and writes the file.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<()> {
     let ExportArguments { report: from, out, format, axis } = arguments;
-    check_file(out, &[from]).with_context(|| out.display().to_string())?;
+    let files = OutputFiles::beside([from.as_path()]);
+    files.check(out)?;
     let report = SavedReport::read(from).with_context(|| from.display().to_string())?;
-    write_export(&report, &ExportTarget { format: *format, file: out.clone() }, *axis)
+    write_export(&report, &ExportTarget { format: *format, file: out.clone() }, *axis, &files)
         .with_context(|| from.display().to_string())
 }

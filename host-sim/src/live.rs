@@ -6,6 +6,7 @@ mod growing_recording;
 pub(crate) use device_view::DeviceSource;
 pub(crate) use growing_recording::GrowingRecording;
 
+use crate::interrupt;
 use anyhow::{Context, Result};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
@@ -49,7 +50,10 @@ pub(crate) fn show(source: &mut impl LiveSource, until: Option<Instant>) -> Resu
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     // In the terminal's raw mode Ctrl-C is a key; this is for a signal from elsewhere.
-    ctrlc::set_handler(move || flag.store(true, Relaxed)).context("signal handler")?;
+    interrupt::on_signal(move || {
+        flag.store(true, Relaxed);
+        true
+    });
     let shown = ratatui::try_init()
         .context("terminal")
         .and_then(|mut terminal| draw_until_end(source, &mut terminal, until, &interrupted));

@@ -6,9 +6,11 @@ mod compare;
 mod convert;
 mod explain;
 mod export;
+mod interrupt;
 mod live;
 mod many;
 mod output;
+mod output_files;
 mod progress;
 mod record;
 mod recording_file;
@@ -21,6 +23,7 @@ use cli::{Cli, Command, MonitorArguments, ReplayArguments};
 use host_sim::{monitor, uf2};
 use live::{DeviceSource, GrowingRecording};
 use mimalloc::MiMalloc;
+use output_files::OutputFiles;
 use recordings::Printable;
 use recordings::serial::{self, SerialLink};
 use std::ffi::c_long;
@@ -61,13 +64,13 @@ fn main() -> ExitCode {
     let delay_ms = if cli.command.is_none() { PURGE_DELAY_OF_SIMULATION_MS } else { PURGE_DELAY_OF_ANALYSIS_MS };
     // SAFETY: no other thread runs yet, and an option that mimalloc does not know has no effect.
     unsafe { libmimalloc_sys::mi_option_set(PURGE_DELAY, delay_ms) };
-    match run(cli) {
+    match interrupt::watch().and_then(|()| run(cli)) {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of standard output has closed it, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             // Where standard error is closed too, the exit code alone shows the error.
-            let _ = writeln!(io::stderr(), "error: {}", Printable(&format!("{error:#}")));
+            let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
             ExitCode::FAILURE
         }
     }
@@ -77,25 +80,28 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
     match command {
         None => {
             output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
-            output::check(&output, &[])?;
-            output::write_report(&record::simulate(&simulate.simulation(3600.0))?, None, &output)
+            let files = OutputFiles::default();
+            output::check(&output, &files)?;
+            output::write_report(&record::simulate(&simulate.simulation(3600.0))?, None, &output, &files)
         }
         Some(Command::Analyze(arguments)) => analyze::run(&arguments),
         Some(Command::Replay(arguments)) => {
             let ReplayArguments { file, output, .. } = &arguments;
-            output::check(output, &[file])?;
-            output::write_report(&analyze::analyze_replay(&arguments)?, Some(&output::source_name(file)), output)
+            let files = OutputFiles::beside([file.as_path()]);
+            output::check(output, &files)?;
+            let report = analyze::analyze_replay(&arguments)?;
+            output::write_report(&report, Some(&output::source_name(file)), output, &files)
         }
         Some(Command::Record { out, port, baud, simulate, output }) => {
-            output::check(&output, &[&out])?;
+            OutputFiles::default().check(&out)?;
+            // The log is read again: nothing else is written to it.
+            let files = OutputFiles::beside([out.as_path()]);
+            output::check(&output, &files)?;
             let report = match port {
-                Some(port) => {
-                    output::check_file(&out, &[]).with_context(|| out.display().to_string())?;
-                    record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?
-                }
+                Some(port) => record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?,
                 None => record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?,
             };
-            output::write_report(&report, Some(&output::source_name(&out)), &output)
+            output::write_report(&report, Some(&output::source_name(&out)), &output, &files)
         }
         Some(Command::Export(arguments)) => export::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
@@ -153,10 +159,11 @@ fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Re
 }
 
 fn convert_image(elf: &Path, out: &Path) -> Result<()> {
-    output::check_file(out, &[elf]).with_context(|| out.display().to_string())?;
+    let files = OutputFiles::beside([elf]);
+    files.check(out)?;
     let image = fs::read(elf).with_context(|| elf.display().to_string())?;
     let uf2 = uf2::from_elf(&image).with_context(|| elf.display().to_string())?;
-    fs::write(out, uf2).with_context(|| out.display().to_string())
+    files.write(out, &uf2)
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -1,6 +1,7 @@
 //! `analyze --reports`: one report a recording, as many recordings at a time as there are cores.
 
 use crate::output::{self, note, progress_bar};
+use crate::output_files::OutputFiles;
 use anyhow::{Context, Result, bail};
 use noise_analysis::parallel::{in_parallel, on_one_thread};
 use noise_analysis::report::Report;
@@ -21,18 +22,18 @@ pub(crate) fn write_reports(
     files: &[&Path],
     folder: &Path,
     is_quiet: bool,
+    outputs: &OutputFiles,
     analyze: impl Fn(&Path) -> Result<Report> + Sync,
 ) -> Result<()> {
     let reports = names(files, folder)?;
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let inputs: Vec<&Path> = files.to_vec();
     for report in &reports {
-        output::check_file(report, &inputs).with_context(|| report.display().to_string())?;
+        outputs.check(report)?;
     }
     let bar = progress_bar(files.len() as u64, "{wide_bar} {pos}/{len} {eta}");
     let work: Vec<(&Path, &PathBuf)> = files.iter().copied().zip(&reports).collect();
     let written = in_parallel(&work, |(file, report)| {
-        let written = on_one_thread(|| output::write_json(&analyze(file)?, report));
+        let written = on_one_thread(|| output::write_json(&analyze(file)?, report, outputs));
         bar.inc(1);
         written.map_err(|error| named(file, &error))
     });

@@ -1,13 +1,12 @@
 //! How far an analysis is, on standard error where that is a terminal; and its interruption.
 
+use crate::interrupt;
 use crate::output::progress_bar;
-use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use noise_analysis::analysis::Stage;
 use recordings::{ReadMonitor, ReadPass};
 use std::fs;
 use std::path::Path;
-use std::process;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread::{self, JoinHandle};
@@ -19,8 +18,6 @@ const READING: &str = "{msg} {wide_bar} {bytes}/{total_bytes} {eta}";
 const READING_PIPE: &str = "{msg} {spinner} {bytes} {elapsed}";
 const FITTING: &str = "fitting {wide_bar} {pos}/{len} channels {elapsed}";
 const ANALYSING: &str = "analysing {wide_bar} {pos}/{len} {msg} {elapsed}";
-/// Exit status of a program that an interrupt has ended, as shells have it.
-const INTERRUPTED: i32 = 130;
 
 /// The bar of one recording: first bytes that were read, then parts of the analysis that are done.
 pub(crate) struct Progress {
@@ -32,19 +29,18 @@ pub(crate) struct Progress {
 impl Progress {
     /// Begins to show how far the reading of `file` is. An interrupt then ends the reading, and a second one, or one at any other
     /// time, the program.
-    pub(crate) fn reading(file: &Path) -> Result<Self> {
+    pub(crate) fn reading(file: &Path) -> Self {
         let monitor = ReadMonitor::default();
         let of_handler = monitor.clone();
         let mut is_first = true;
-        ctrlc::set_handler(move || {
-            if is_first && of_handler.is_reading() {
+        interrupt::on_signal(move || {
+            let is_taken_up = is_first && of_handler.is_reading();
+            if is_taken_up {
                 is_first = false;
                 of_handler.stop();
-            } else {
-                process::exit(INTERRUPTED);
             }
-        })
-        .context("the interrupt of the terminal")?;
+            is_taken_up
+        });
         let length = fs::metadata(file).ok().filter(fs::Metadata::is_file).map(|file| file.len());
         let bar = match length {
             Some(length) => progress_bar(length, READING),
@@ -67,7 +63,7 @@ impl Progress {
             }
             bar.finish_and_clear();
         });
-        Ok(Self { monitor, is_over, watcher: Some(watcher) })
+        Self { monitor, is_over, watcher: Some(watcher) }
     }
 
     /// What the readers tell how far they are.

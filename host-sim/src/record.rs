@@ -1,6 +1,7 @@
 //! `record`, and the command without a subcommand: recordings of the virtual sensor or of a device, and their reports.
 
 use crate::analyze::analyze_recording;
+use crate::interrupt;
 use crate::output::{note, progress_bar};
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result};
@@ -41,15 +42,10 @@ fn run(simulation: &Simulation, log: Option<&Path>) -> Result<Recording> {
 /// Writes `seconds` of the raw bursts of the device on `port` to the frame log `log` and reports on them.
 pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> Result<Report> {
     let mut link = SerialLink::new(serial::open(port, baud).with_context(|| port.to_owned())?);
-    // At an interrupt the recording ends and what came until then is analysed; a second interrupt ends the program.
+    // At a signal the recording ends, the device is told, and what came until then is analysed; a second one ends the program.
     let is_interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&is_interrupted);
-    let handler = move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(handler).context("the interrupt of the terminal")?;
+    interrupt::on_signal(move || !flag.swap(true, Ordering::Relaxed));
     let recorded = serial::record(&mut link, log, seconds, || is_interrupted.load(Ordering::Relaxed))
         .with_context(|| format!("{port}, {}", log.display()))?;
     if recorded.interrupted {

@@ -2,6 +2,7 @@
 
 use crate::cli::RecordingFormat;
 use crate::output::note;
+use crate::output_files::OutputFiles;
 use adis16405_driver::{BURST_REQUEST, Burst, GyroRange, Register};
 use anyhow::{Context, Result, bail};
 use recordings::frame_log::{Frame, FrameLogWriter};
@@ -16,15 +17,14 @@ pub(crate) fn format_of(out: &Path, named: Option<RecordingFormat>) -> Recording
 }
 
 /// Writes `recording` to `out`.
-pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat) -> Result<()> {
-    let written = match format {
-        RecordingFormat::Table => count_table_writer::write(recording, out).map_err(anyhow::Error::from),
-        RecordingFormat::Frames => write_frames(recording, out),
+pub(crate) fn write(recording: &Recording, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<()> {
+    match format {
+        RecordingFormat::Table => files.write_with(out, |out| Ok(count_table_writer::write(recording, out)?))?,
+        RecordingFormat::Frames => files.write_with(out, |out| write_frames(recording, out))?,
         RecordingFormat::Npy => {
-            numpy_matrix::write(recording, out).map(|names| note_columns(out, &names)).map_err(anyhow::Error::from)
+            note_columns(out, &files.write_with(out, |out| Ok(numpy_matrix::write(recording, out)?))?);
         }
-    };
-    written.with_context(|| out.display().to_string())?;
+    }
     if format == RecordingFormat::Table && recording.range != GyroRange::Dps300 {
         note(format_args!("the table does not say the range: read it with --range {}", full_scale(recording.range)));
     }

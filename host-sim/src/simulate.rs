@@ -1,7 +1,8 @@
 //! `simulate`: a recording of a virtual sensor whose noise, effects and faults the arguments describe.
 
 use crate::cli::{RecordingFormat, SimulateArguments};
-use crate::output::{check_file, note, progress_bar};
+use crate::output::{note, progress_bar};
+use crate::output_files::OutputFiles;
 use crate::recording_file;
 use anyhow::{Context, Result};
 use simulation::Simulation;
@@ -12,7 +13,8 @@ const DEFAULT_S: f64 = 3600.0;
 /// Runs the simulation and writes the recording.
 pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
     let out = &arguments.out;
-    check_file(out, &[]).with_context(|| out.display().to_string())?;
+    let files = OutputFiles::default();
+    files.check(out)?;
     let simulation = simulation(arguments)?;
     let sampled_hz = simulation.sampled_hz()?;
     if (sampled_hz / simulation.rate_hz - 1.0).abs() > 1e-9 {
@@ -23,13 +25,15 @@ pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
     let format = recording_file::format_of(out, arguments.format);
     // A frame log is written as the bus is read: it has the configuration and every fault.
     let recording = match format {
-        RecordingFormat::Frames => simulation.run_logged(out, |taken| bar.set_position(taken))?,
+        RecordingFormat::Frames => {
+            files.write_with(out, |out| Ok(simulation.run_logged(out, |taken| bar.set_position(taken))?))?
+        }
         RecordingFormat::Table | RecordingFormat::Npy => simulation.run(|taken| bar.set_position(taken))?,
     };
     bar.finish_and_clear();
     match format {
         RecordingFormat::Frames => Ok(()),
-        RecordingFormat::Table | RecordingFormat::Npy => recording_file::write(&recording, out, format),
+        RecordingFormat::Table | RecordingFormat::Npy => recording_file::write(&recording, out, format, &files),
     }
 }
 

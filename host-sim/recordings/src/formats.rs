@@ -3,6 +3,7 @@
 mod ardupilot_log;
 mod array_topics;
 mod betaflight;
+mod calendar;
 pub mod file_format;
 mod foreign_format;
 mod hdf5;
@@ -10,6 +11,7 @@ mod matlab;
 mod mcap_bag;
 mod mcap_file;
 mod message_layout;
+mod nmea;
 pub(crate) mod numpy;
 mod ros_bag;
 mod ros_definition;

@@ -46,6 +46,7 @@ pub enum ExportFormat {
 /// # Errors
 /// See [`ExportError`].
 pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> Result<Export, ExportError> {
+    check(report)?;
     match format {
         ExportFormat::Kalibr => visual_inertial::kalibr(report, axes),
         ExportFormat::OpenVins => visual_inertial::openvins(report, axes),
@@ -58,6 +59,36 @@ pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> R
         ExportFormat::Basalt => filters::basalt(report),
         ExportFormat::Csv => Ok(Export { text: table(report), missing: Vec::new() }),
     }
+}
+
+/// Largest coefficient: far above any noise, and far below what overflows in a change of units.
+const MAX_COEFFICIENT: f64 = 1e30;
+/// Terms whose coefficients are deviations.
+const NOISES: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
+
+/// Refuses what a file of another program cannot hold as what it is.
+fn check(report: &SavedReport) -> Result<(), ExportError> {
+    let name = |text: &String| {
+        let is_name = !text.chars().any(|c| c.is_control() || ",\"'\\".contains(c));
+        if is_name { Ok(()) } else { Err(ExportError::NoName(text.clone())) }
+    };
+    for channel in &report.channels {
+        name(&channel.name)?;
+        for term in &channel.refitted.terms {
+            name(&term.kind)?;
+            let least = if NOISES.contains(&term.kind.as_str()) { 0.0 } else { -MAX_COEFFICIENT };
+            for (parameter, of) in &term.parameters {
+                name(parameter)?;
+                name(&of.unit)?;
+                if !(least..=MAX_COEFFICIENT).contains(&of.value) {
+                    let (channel, term) = (channel.name.clone(), term.kind.clone());
+                    let (parameter, value) = (parameter.clone(), format!("{:e}", of.value));
+                    return Err(ExportError::NoCoefficient { channel, term, parameter, value });
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Every parameter of every channel's final model.

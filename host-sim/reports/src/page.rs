@@ -25,6 +25,12 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 /// Name of the page in its folder.
 pub const FILE: &str = "index.html";
 
+/// The report as a page.
+#[must_use]
+pub fn html(report: &Report) -> String {
+    render(report).into_string()
+}
+
 /// The page could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write the page {}: {reason}", path.display())]
@@ -40,7 +46,7 @@ pub struct PageError {
 /// # Errors
 /// The folder or the file cannot be written.
 pub fn write(report: &Report, dir: &Path) -> Result<PathBuf, PageError> {
-    let page = render(report).into_string();
+    let page = html(report);
     let path = dir.join(FILE);
     std::fs::create_dir_all(dir)
         .and_then(|()| std::fs::write(&path, page))

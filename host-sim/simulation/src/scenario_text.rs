@@ -7,7 +7,7 @@ use crate::burst_order::output_register;
 use crate::fault_injector::FrameFault;
 use crate::simulation::{Simulation, TimedFault};
 use adis16405_driver::Channel;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use virtual_sensor::{InjectedEffect, OutputRegister};
 
 /// Kinds of effects.
@@ -53,6 +53,14 @@ pub enum ScenarioTextError {
         kind: String,
         /// The key.
         key: &'static str,
+    },
+    /// A key or a channel is named twice.
+    #[error("{kind} names {name} twice")]
+    Twice {
+        /// The kind.
+        kind: String,
+        /// The key or the channel.
+        name: String,
     },
     /// The kind has no such key.
     #[error("{kind} has no {key}")]
@@ -134,7 +142,7 @@ impl Simulation {
             "stale" => FrameFault::Stale,
             _ => FrameFault::LowSupply,
         };
-        let from_s = fields.number("from")?;
+        let from_s = fields.within("from", 0.0, f64::MAX, "a time of at least 0 s")?;
         let bursts = fields.within("bursts", 1.0, f64::from(u32::MAX), "a number of bursts from 1")? as u32;
         fields.finish()?;
         self.faults.push(TimedFault { from_s, fault, bursts });
@@ -258,8 +266,14 @@ impl<'a> Fields<'a> {
             None => (Some(rest), ""),
         };
         let pair = |text: &'a str| text.split_once('=').ok_or_else(|| ScenarioTextError::Pair(text.to_owned()));
-        let values: Result<_> = pairs.split(',').filter(|text| !text.is_empty()).map(pair).collect();
-        Ok(Self { kind, channel, values: values? })
+        let mut values = BTreeMap::new();
+        for text in pairs.split(',').filter(|text| !text.is_empty()) {
+            let (key, value) = pair(text)?;
+            if values.insert(key, value).is_some() {
+                return Err(ScenarioTextError::Twice { kind: kind.to_owned(), name: key.to_owned() });
+            }
+        }
+        Ok(Self { kind, channel, values })
     }
 
     fn channels(&mut self) -> Result<Vec<OutputRegister>> {
@@ -268,6 +282,10 @@ impl<'a> Fields<'a> {
             let found = Channel::ALL.into_iter().find(|channel| channel.name() == name);
             found.map(output_register).ok_or_else(|| ScenarioTextError::Channel(name.to_owned()))
         };
+        let mut seen = BTreeSet::new();
+        if let Some(name) = names.split('+').find(|name| !seen.insert(*name)) {
+            return Err(ScenarioTextError::Twice { kind: self.kind.to_owned(), name: name.to_owned() });
+        }
         names.split('+').map(channel).collect()
     }
 
@@ -381,6 +399,8 @@ mod tests {
             ("spikes:gyro_x:rate", "`rate` is not of the form KEY=VALUE"),
             ("dropped_samples:gyro_x:fraction=0.1", "dropped_samples has no gyro_x"),
             ("dropped_samples:fraction=2", "fraction: `2` is not a fraction"),
+            ("sinusoid:gyro_x:frequency=1,frequency=2,amplitude=1", "sinusoid names frequency twice"),
+            ("common_mode:gyro_x+gyro_x:time_constant=30,deviation=0.01", "common_mode names gyro_x twice"),
             ("", "`` is none of"),
         ] {
             let error = plain().add_effect(text).expect_err(text).to_string();
@@ -390,6 +410,7 @@ mod tests {
             assert!(plain().set_coefficients("gyro_", text).is_err(), "{text}");
         }
         assert!(plain().add_fault("stale:from=1,bursts=0").is_err());
+        assert!(plain().add_fault("stale:from=-1,bursts=1").is_err());
         assert!(plain().set_environment("motion:time_constant=0").is_err());
     }
 }

@@ -13,8 +13,8 @@ use virtual_sensor::{NoiseModel, VirtualAdis16405};
 /// What happens to the device after so much of its own time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
-    /// It is interrupted on the host.
-    Interrupt,
+    /// The program on the host gets this signal.
+    Signal(&'static str),
     Silence,
 }
 
@@ -46,9 +46,12 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
         if fault != Fault::Silence {
             let _ = near.write_all(&sent);
         }
-        if fault == Fault::Interrupt && now_us >= FAULT_AFTER_US && !interrupted {
+        if let Fault::Signal(signal) = fault
+            && now_us >= FAULT_AFTER_US
+            && !interrupted
+        {
             let id = program.id().to_string();
-            assert!(Command::new("kill").args(["-INT", &id]).status().expect("a shell").success());
+            assert!(Command::new("kill").args([signal, &id]).status().expect("a shell").success());
             interrupted = true;
         }
     }
@@ -67,14 +70,16 @@ fn samples(log: &Path) -> u64 {
 
 #[test]
 fn an_interrupted_recording_is_finished_and_the_device_is_told() {
-    let dir = tempdir().expect("a folder");
-    let log = dir.path().join("device.csv.gz");
-    let (output, commands) = record(&log, Fault::Interrupt);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.contains("interrupted"), "{errors}");
-    assert!(commands.ends_with("w 0\r"), "{commands:?}");
-    // 5 s at 204.8 samples per second, and what came before the interrupt was seen.
-    assert!((900..3000).contains(&samples(&log)), "{}", samples(&log));
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let dir = tempdir().expect("a folder");
+        let log = dir.path().join("device.csv.gz");
+        let (output, commands) = record(&log, Fault::Signal(signal));
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && errors.contains("interrupted"), "{errors}");
+        assert!(commands.ends_with("w 0\r"), "{commands:?}");
+        // 5 s at 204.8 samples per second, and what came before the interrupt was seen.
+        assert!((900..3000).contains(&samples(&log)), "{}", samples(&log));
+    }
 }
 
 #[test]

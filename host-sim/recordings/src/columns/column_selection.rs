@@ -266,6 +266,11 @@ impl AvailableColumn {
             .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
     }
 
+    /// Whether its name is that of a time.
+    pub(crate) fn is_time(&self) -> bool {
+        matches!(role_of(&self.name), Some(NamedRole::Time))
+    }
+
     /// A column of a format that says what it is.
     pub(crate) fn known(name: &str, unit: &str) -> Self {
         Self { name: name.to_owned(), unit: Unit::parse(unit) }

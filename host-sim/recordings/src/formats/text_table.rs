@@ -1,11 +1,14 @@
-//! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading.
+//! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading, and sentences as of NMEA 0183.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role};
+use crate::formats::calendar::{self, CalendarClock, CalendarColumns};
+use crate::formats::nmea::{self, Sentence};
 use crate::input::delimited_text::{self, Lines};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
 use crate::tables::any_sensor::ReadOptions;
 use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 /// Separators of columns, the first that occurs; blanks where none does.
@@ -17,12 +20,25 @@ const MISSING: [&str; 6] = ["", "nan", "na", "n/a", "null", "none"];
 /// Lines before the first row of numbers that may be comments or a heading.
 const MAX_PREAMBLE: usize = 64;
 
+/// Lines at the start of a file of sentences that tell which of them is read.
+const SENTENCES: usize = 64;
+
 /// Reads a table; `monitor` counts the bytes and may stop the reading.
 pub(crate) fn read(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<SensorTable, InputError> {
     let mut table = TextTable::open(file, options, monitor)?;
     let mut builder = TableBuilder::new(table.chosen().to_vec());
     while table.add_row(&mut builder)? {}
-    builder.finish().map_err(|reason| InputError::file(file, reason))
+    let mut read = builder.finish().map_err(|reason| InputError::file(file, reason))?;
+    read.notes.extend(table.notes());
+    Ok(read)
+}
+
+/// How the fields of a row are told from each other.
+enum Layout {
+    /// By a separator; blanks where there is none.
+    Columns { separator: Option<char>, calendar: Option<CalendarClock> },
+    /// Those of one kind of sentence.
+    Sentences { name: String, damaged: u64, others: u64 },
 }
 
 /// An open table, read row by row.
@@ -30,11 +46,11 @@ pub(crate) struct TextTable {
     file: PathBuf,
     lines: Lines,
     chosen: Vec<ChosenColumn>,
-    separator: Option<char>,
+    layout: Layout,
     /// Fields of a row.
     width: usize,
-    /// The first row, which was read to tell the columns.
-    first: Option<(u64, String)>,
+    /// The first rows, which were read to tell the columns.
+    first: VecDeque<(u64, String)>,
     row: Vec<Number>,
 }
 
@@ -48,6 +64,10 @@ impl TextTable {
                 let reason = if preamble.is_empty() { Reason::Empty } else { Reason::NoData };
                 return Err(InputError::file(file, reason));
             };
+            if Sentence::parse(text).is_some() {
+                let first = (line, text.to_owned());
+                return Self::open_sentences(file, options, lines, first);
+            }
             if is_row(text) {
                 break (line, text.to_owned());
             }
@@ -56,25 +76,90 @@ impl TextTable {
                 return Err(InputError::line(file, line, Reason::NoNumbers));
             }
         };
+        if let Some(topic) = &options.topic {
+            let names = Box::new((topic.clone(), "no topics: it is a table".to_owned()));
+            return Err(InputError::file(file, Reason::UnknownTopic(names)));
+        }
         let separator = SEPARATORS.into_iter().find(|separator| first.1.contains(*separator));
+        let row: Vec<&str> = split(&first.1, separator).collect();
+        let (width, calendar) = (row.len(), CalendarColumns::find(&row));
+        // The heading may have one name for a date and a time of day.
+        let is_heading = |fields: usize| fields == width || is_short(fields, width, calendar);
         let fields = |text: &str| split(text, separator).count();
-        let width = fields(&first.1);
-        let heading = preamble.iter().rev().find(|(_, text)| fields(text) == width);
+        let heading = preamble.iter().rev().find(|(_, text)| is_heading(fields(text)));
         if heading.is_none()
             && let Some((line, text)) = preamble.iter().rev().find(|(_, text)| !text.starts_with(['#', '%', '/']))
         {
             return Err(InputError::line(file, *line, Reason::FieldCount { found: width, expected: fields(text) }));
         }
-        let available: Vec<AvailableColumn> = match heading {
+        let mut available: Vec<AvailableColumn> = match heading {
             Some((_, text)) => split(text, separator).map(AvailableColumn::from_heading).collect(),
             None => (0..width).map(|number| AvailableColumn { name: number.to_string(), unit: None }).collect(),
         };
+        if let Some(calendar) = calendar {
+            let at = calendar.position();
+            if is_short(available.len(), width, Some(calendar)) {
+                available.insert(at + 1, AvailableColumn { name: "time of day".to_owned(), unit: None });
+            }
+            let name = if available[at].is_time() { available[at].name.clone() } else { "time".to_owned() };
+            available[at] = AvailableColumn::known(&name, "ns");
+        }
         let chosen = options.choose(&available).map_err(|error| match heading {
             Some((line, _)) => InputError::line(file, *line, Reason::Selection(Box::new(error))),
             None => InputError::file(file, Reason::Selection(Box::new(error))),
         })?;
         let row = Vec::with_capacity(chosen.len());
-        Ok(Self { file: file.to_owned(), lines, chosen, separator, width, first: Some(first), row })
+        let layout = Layout::Columns { separator, calendar: calendar.map(CalendarClock::new) };
+        Ok(Self { file: file.to_owned(), lines, chosen, layout, width, first: VecDeque::from([first]), row })
+    }
+
+    /// Opens a file of sentences: of one kind, that which the options name, else the most frequent one with numbers among the first.
+    fn open_sentences(
+        file: &Path,
+        options: &ReadOptions,
+        mut lines: Lines,
+        first: (u64, String),
+    ) -> Result<Self, InputError> {
+        let mut first = VecDeque::from([first]);
+        while first.len() < SENTENCES {
+            let Some((line, text)) = lines.next()? else { break };
+            first.push_back((line, text.to_owned()));
+        }
+        // Name and number of fields of each kind, and how many there are.
+        let mut kinds: Vec<(String, usize, usize)> = Vec::new();
+        for sentence in first.iter().filter_map(|(_, text)| Sentence::parse(text)).filter(|of| of.is_intact) {
+            match kinds.iter_mut().find(|(name, ..)| name == sentence.name) {
+                Some((.., count)) => *count += 1,
+                None => kinds.push((sentence.name.to_owned(), sentence.fields.len(), 1)),
+            }
+        }
+        let names = || kinds.iter().map(|(name, ..)| name.as_str()).collect::<Vec<_>>().join(", ");
+        let unknown = |topic: &String| Reason::UnknownTopic(Box::new((topic.clone(), names())));
+        let is_numeric = |name: &str| {
+            let of_kind = first.iter().filter_map(|(_, text)| Sentence::parse(text)).find(|of| of.name == name);
+            of_kind.is_some_and(|of| {
+                let numbers =
+                    of.fields.iter().filter(|field| number(field).is_some_and(|it| !it.value().is_nan())).count();
+                2 * numbers >= of.fields.len()
+            })
+        };
+        let kind = match &options.topic {
+            Some(topic) => {
+                let named = kinds.iter().find(|(name, ..)| name == topic);
+                named.ok_or_else(|| InputError::file(file, unknown(topic)))?
+            }
+            None => {
+                let most = kinds.iter().filter(|(name, ..)| is_numeric(name)).max_by_key(|(.., count)| *count);
+                most.ok_or_else(|| InputError::file(file, Reason::NoNumbers))?
+            }
+        };
+        let (name, width) = (kind.0.clone(), kind.1);
+        let available = nmea::columns(&name, width);
+        let chosen = options.choose(&available);
+        let chosen = chosen.map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
+        let row = Vec::with_capacity(chosen.len());
+        let layout = Layout::Sentences { name, damaged: 0, others: 0 };
+        Ok(Self { file: file.to_owned(), lines, chosen, layout, width, first, row })
     }
 
     /// The columns that are read.
@@ -82,25 +167,61 @@ impl TextTable {
         &self.chosen
     }
 
+    /// What the user should know of the rows that were read, one sentence each.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        let Layout::Sentences { name, damaged, others } = &self.layout else { return Vec::new() };
+        let sentences = [
+            (*damaged, format!("{damaged} sentences whose checksum is wrong; their values are missing")),
+            (*others, format!("{others} lines that are no sentence {name} are left out; --topic reads another")),
+        ];
+        sentences.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text).collect()
+    }
+
     /// Adds the next row to `builder`; false at the end.
     pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
-        let Self { file, lines, chosen, separator, width, first, row } = self;
-        let first = first.take();
-        let (line, text) = match &first {
-            Some((line, text)) => (*line, text.as_str()),
-            None => match lines.next()? {
-                Some(next) => next,
-                None => return Ok(false),
-            },
-        };
-        let added = numbers(text, chosen, *separator, *width, row).and_then(|()| {
-            let of_column = |(at, reason)| (Some(at), reason);
-            builder.push(row).map_err(of_column)
-        });
-        added.map(|()| true).map_err(|(at, reason)| match at {
-            Some(at) => InputError::field(file, line, &chosen[at].label, reason),
-            None => InputError::line(file, line, reason),
-        })
+        let Self { file, lines, chosen, layout, width, first, row } = self;
+        loop {
+            let first = first.pop_front();
+            let (line, text) = match &first {
+                Some((line, text)) => (*line, text.as_str()),
+                None => match lines.next()? {
+                    Some(next) => next,
+                    None => return Ok(false),
+                },
+            };
+            let of_layout = match layout {
+                Layout::Columns { separator, calendar } => {
+                    numbers(split(text, *separator), chosen, *width, calendar.as_mut(), row).map(|()| true)
+                }
+                Layout::Sentences { name, damaged, others } => match Sentence::parse(text) {
+                    Some(sentence) if !sentence.is_intact => {
+                        *damaged += 1;
+                        row.clear();
+                        row.resize(chosen.len(), Number::Real(f64::NAN));
+                        // A sample came, and its values are not known; nor is its time, if it has one.
+                        Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
+                    }
+                    Some(Sentence { name: own, fields, .. }) if own == *name => {
+                        numbers(fields.into_iter(), chosen, *width, None, row).map(|()| true)
+                    }
+                    _ => {
+                        *others += 1;
+                        Ok(false)
+                    }
+                },
+            };
+            let added = of_layout.and_then(|is_row| {
+                let of_column = |(at, reason)| (Some(at), reason);
+                if is_row { builder.push(row).map(|()| true).map_err(of_column) } else { Ok(false) }
+            });
+            let is_added = added.map_err(|(at, reason)| match at {
+                Some(at) => InputError::field(file, line, &chosen[at].label, reason),
+                None => InputError::line(file, line, reason),
+            })?;
+            if is_added {
+                return Ok(true);
+            }
+        }
     }
 
     /// Whether the reading was stopped before the end of the table.
@@ -109,25 +230,43 @@ impl TextTable {
     }
 }
 
+/// Whether a heading has one name for the date and the time of day of rows of `width` fields.
+fn is_short(fields: usize, width: usize, calendar: Option<CalendarColumns>) -> bool {
+    fields + 1 == width && matches!(calendar, Some(CalendarColumns::Two(_)))
+}
+
 /// The numbers of the `chosen` columns of a row of `width` fields.
-fn numbers(
-    text: &str,
+fn numbers<'a>(
+    mut fields: impl Iterator<Item = &'a str>,
     chosen: &[ChosenColumn],
-    separator: Option<char>,
     width: usize,
+    mut calendar: Option<&mut CalendarClock>,
     row: &mut Vec<Number>,
 ) -> Result<(), (Option<usize>, Reason)> {
     row.clear();
     row.resize(chosen.len(), Number::Real(f64::NAN));
     let mut found = 0;
     let mut fault: Option<(usize, Reason)> = None;
-    for (position, field) in split(text, separator).enumerate() {
+    let mut after_date = None;
+    while let Some(field) = after_date.take().or_else(|| fields.next()) {
+        let position = found;
         found += 1;
+        let mut time_ns = None;
+        if let Some(clock) = calendar.as_mut().filter(|clock| clock.columns.position() == position) {
+            if matches!(clock.columns, CalendarColumns::Two(_)) {
+                after_date = fields.next();
+            }
+            time_ns = Some(clock.time_ns(field, after_date.unwrap_or_default()));
+        }
         for (at, _) in chosen.iter().enumerate().filter(|(_, column)| column.position == position) {
-            match number(field) {
+            let (known, reason): (_, fn(String) -> Reason) = match time_ns {
+                Some(time_ns) => (time_ns.map(Number::Integer), Reason::NotTime),
+                None => (number(field), Reason::NotNumber),
+            };
+            match known {
                 Some(known) => row[at] = known,
                 None if fault.as_ref().is_some_and(|(first, _)| *first < at) => {}
-                None => fault = Some((at, Reason::NotNumber(delimited_text::quote(field)))),
+                None => fault = Some((at, reason(delimited_text::quote(field)))),
             }
         }
     }
@@ -155,14 +294,24 @@ fn number(field: &str) -> Option<Number> {
     real.or_else(missing).map(Number::Real)
 }
 
-/// Whether a line is a row and no heading or comment: at least half of its fields are numbers. The others may be texts, such as
-/// the name of a frame.
+/// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The
+/// others may be texts, such as the name of a frame.
 fn is_row(text: &str) -> bool {
     let separator = SEPARATORS.into_iter().find(|separator| text.contains(*separator));
-    let (mut numbers, mut fields) = (0, 0);
+    let (mut numbers, mut missing, mut fields, mut named) = (0, 0, 0, 0);
     for field in split(text, separator) {
         fields += 1;
-        numbers += usize::from(number(field).is_some_and(|known| !known.value().is_nan()));
+        match number(field) {
+            Some(known) if known.value().is_nan() => {
+                missing += 1;
+                named += usize::from(!field.is_empty());
+            }
+            Some(_) => numbers += 1,
+            None => {
+                let is_time = calendar::time_of_day(field).is_some() || calendar::date_time(field).is_some();
+                numbers += usize::from(is_time || calendar::date(field).is_some());
+            }
+        }
     }
-    numbers > 0 && 2 * numbers >= fields
+    numbers > 0 && 2 * numbers >= fields || named > 0 && missing == fields
 }

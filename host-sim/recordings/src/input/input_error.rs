@@ -135,6 +135,9 @@ pub enum Reason {
     /// Infinity or NaN.
     #[error("{0:?} is not a finite time")]
     NotFinite(String),
+    /// Text where a date or a time of day belongs.
+    #[error("{0:?} is no date or time as in the rows above")]
+    NotTime(String),
     /// A count that the register's field cannot hold.
     #[error("{value} is outside {low}..={high}")]
     OutOfField {
@@ -319,14 +322,21 @@ impl fmt::Display for InputError {
 
 impl std::error::Error for InputError {}
 
-/// Text from outside, with its control characters escaped so that a terminal does not obey them.
+/// Text from outside, with the characters escaped that a terminal obeys or that reorder or hide others.
 #[derive(Debug, Clone, Copy)]
 pub struct Printable<'a>(pub &'a str);
+
+/// Whether a character is invisible and changes the direction or the joining of others (Unicode, general category Cf), or ends a line.
+fn is_format(c: char) -> bool {
+    matches!(c,
+        '\u{ad}' | '\u{600}'..='\u{605}' | '\u{61c}' | '\u{6dd}' | '\u{70f}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
+        | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+}
 
 impl fmt::Display for Printable<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for c in self.0.chars() {
-            if c.is_control() {
+            if c.is_control() || is_format(c) {
                 write!(f, "{}", c.escape_default())?;
             } else {
                 write!(f, "{c}")?;

@@ -15,7 +15,7 @@ use crate::streams::recorded_blocks::RecordedBlocks;
 use crate::streams::value_stream::{self, ColumnSample, ValueColumn, ValueHead, ValueStream};
 use crate::tables::any_sensor::{ReadOptions, SensorRecording};
 use crate::tables::quantizer::Quantizer;
-use crate::tables::sensor_measurement::quantizer_note;
+use crate::tables::sensor_measurement::rounding_note;
 use crate::tables::sensor_table::SensorTable;
 use crate::time_base::sample_slots::SampleSlots;
 use crate::time_base::stamp_quality::StampQuality;
@@ -435,11 +435,12 @@ impl SampleStream {
                 Some(quantizer) => {
                     let lsb = quantizer.lsb * factor;
                     self.description.channels.push(ChannelProfile { lsb, ..*profile });
-                    self.notes.push(quantizer_note(profile, quantizer, lsb));
                 }
                 None => self.notes.push(format!("{} ({label}) has no usable value and is left out", profile.name)),
             }
         }
+        let rounded = columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
+        self.notes.extend(rounding_note(rounded));
     }
 }
 

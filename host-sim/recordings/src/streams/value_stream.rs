@@ -38,6 +38,13 @@ impl RowReader {
         }
     }
 
+    fn notes(&self) -> Vec<String> {
+        match self {
+            Self::Text(rows) => rows.notes(),
+            Self::Npy(_) => Vec::new(),
+        }
+    }
+
     fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
         match self {
             Self::Text(rows) => rows.add_row(builder),
@@ -78,7 +85,9 @@ pub(crate) fn head(
         is_all = !rows.add_row(&mut builder)?;
     }
     let (time_unit_s, _) = builder.time_unit().map_err(fail)?;
-    Ok(ValueHead { table: builder.finish().map_err(fail)?, time_unit_s, is_all })
+    let mut table = builder.finish().map_err(fail)?;
+    table.notes.extend(rows.notes());
+    Ok(ValueHead { table, time_unit_s, is_all })
 }
 
 /// A channel and how its numbers are read.

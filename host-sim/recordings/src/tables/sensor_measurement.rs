@@ -13,8 +13,16 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Fewest channels whose equal rows are one sample that was read twice; fewer are equal by chance.
 pub(crate) const MIN_CHANNELS_OF_REPEAT: usize = 3;
 
+/// Largest part of the variance of the noise that rounding adds without a note: ten times what it adds where there is room for it, and
+/// a twentieth of a percent of N.
+const NOTED_COST: f64 = 1e-3;
+
 /// How often a range of the data sheet a value may be before it is no measurement.
 const MAX_RANGES: f64 = 2.0;
+
+/// The same in the unit of a channel whose range is not known: far above what any sensor measures in deg/s, g or gauss, and the largest
+/// count of 32 bits.
+const LARGEST_VALUE: f64 = 4.3e9;
 
 /// The rows of `table`, which `sensor` measured, on their time base; and what the user should know, one sentence each.
 pub(crate) fn time_base(
@@ -33,14 +41,23 @@ pub(crate) fn time_base(
     dropped.insert("gap", base.never_arrived.saturating_sub(left_out));
     let mut health = BTreeMap::from([("saturated", BTreeSet::new()), ("stuck", BTreeSet::new())]);
     let mut channels = Vec::with_capacity(columns.len());
+    let (mut rounded, mut unusable_values) = (Vec::new(), BTreeMap::new());
     for column in columns {
         let unusable = format!("{} ({}) has no usable value and is left out", column.profile.name, column.label);
-        match channel(column, &mut health, &mut notes) {
-            Some(channel) => channels.push(channel),
-            None => notes.push(unusable),
+        match channel(column, &mut health, &mut notes, &mut rounded) {
+            Ok(channel) => channels.push(channel),
+            Err(refused) => {
+                notes.push(unusable);
+                for (cause, positions) in refused {
+                    let count = unusable_values.entry(cause).or_insert(0);
+                    *count = positions.len().max(*count as usize) as u64;
+                }
+            }
         }
     }
+    notes.extend(rounding_note(rounded.iter().map(|(profile, quantizer)| (profile, quantizer))));
     if channels.is_empty() {
+        dropped.extend(unusable_values);
         return Err(TimeBaseError::TooShort { used: 0, dropped });
     }
     let mut flagged: BTreeMap<&'static str, u64> =
@@ -101,26 +118,28 @@ pub(crate) fn refusal(value: f64, factor: f64, limit: f64) -> Option<&'static st
 
 /// The largest value of a channel that is a measurement, in its unit.
 pub(crate) fn largest_value(profile: &ChannelProfile) -> f64 {
-    profile.range.map_or(f64::INFINITY, |range| MAX_RANGES * range)
+    profile.range.map_or(LARGEST_VALUE, |range| MAX_RANGES * range)
 }
 
-/// What the user should know of the counts of a channel, which are `lsb` large.
-pub(crate) fn quantizer_note(profile: &ChannelProfile, quantizer: &Quantizer, lsb: f64) -> String {
-    let ChannelProfile { name, unit, .. } = profile;
-    match quantizer.cost {
-        None => format!("{name}: counts of {lsb:.6e} {unit}, as in the file"),
-        Some(cost) => {
-            format!("{name}: rounded to counts of {lsb:.6e} {unit}, which adds {cost:.1e} to the variance of its noise")
-        }
-    }
+/// What the user should know of the counts that stand for the numbers of some channels; `None` where rounding to them costs nothing that
+/// counts.
+pub(crate) fn rounding_note<'a>(channels: impl Iterator<Item = (&'a ChannelProfile, &'a Quantizer)>) -> Option<String> {
+    let cost = |(profile, quantizer): (&ChannelProfile, &Quantizer)| {
+        let cost = quantizer.cost.filter(|cost| *cost > NOTED_COST)?;
+        Some(format!("{} {cost:.1e}", profile.name))
+    };
+    let costs: Vec<String> = channels.filter_map(cost).collect();
+    let of = "rounding to counts adds to the variance of the noise, as a part of it:";
+    (!costs.is_empty()).then(|| format!("{of} {}", costs.join(", ")))
 }
 
-/// One channel as counts; `None` where no value is usable.
+/// One channel as counts; the positions of the values that are refused, by cause, where all are.
 fn channel(
     column: TableColumn,
     health: &mut BTreeMap<&'static str, BTreeSet<usize>>,
     notes: &mut Vec<String>,
-) -> Option<MeasuredChannel> {
+    rounded: &mut Vec<(ChannelProfile, Quantizer)>,
+) -> Result<MeasuredChannel, BTreeMap<&'static str, Vec<usize>>> {
     let TableColumn { profile, factor, mut values, .. } = column;
     let limit = largest_value(&profile);
     let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
@@ -133,7 +152,7 @@ fn channel(
     let lsb = quantizer.lsb * factor;
     let counts: Vec<Option<i32>> = values.iter().map(|&value| quantizer.count(value)).collect();
     if counts.iter().all(Option::is_none) {
-        return None;
+        return Err(refused);
     }
     let beyond = |position: &usize| counts[*position].is_none() && values[*position].is_finite();
     let beyond: Vec<usize> = (0..values.len()).filter(beyond).collect();
@@ -141,7 +160,7 @@ fn channel(
         refused.entry("out_of_range").or_default().extend(beyond);
         refused.values_mut().for_each(|positions| positions.sort_unstable());
     }
-    notes.push(quantizer_note(&profile, &quantizer, lsb));
+    rounded.push((profile, quantizer));
     let mut seen = ChannelHealth::examine(&counts, profile.range.map(|range| range / lsb));
     if !profile.quantity.is_inertial() {
         // A temperature or a supply may well stay where it is.
@@ -157,5 +176,5 @@ fn channel(
         health.entry(cause).or_default().extend(positions);
     }
     let counts = counts.into_iter().map(Option::unwrap_or_default).collect();
-    Some(MeasuredChannel { profile: ChannelProfile { lsb, ..profile }, counts, refused })
+    Ok(MeasuredChannel { profile: ChannelProfile { lsb, ..profile }, counts, refused })
 }

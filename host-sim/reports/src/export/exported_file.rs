@@ -29,6 +29,21 @@ pub enum ExportError {
          of the format is made: the record is too short"
     )]
     NoSlowNoise(&'static str),
+    /// A coefficient that is none: negative, or beyond 10³⁰.
+    #[error("{channel}: {term}, {parameter}: {value} is no coefficient of noise: the report is damaged")]
+    NoCoefficient {
+        /// Such as `gyro_y`.
+        channel: String,
+        /// Such as `angle_random_walk`.
+        term: String,
+        /// Such as `value`.
+        parameter: String,
+        /// As the report has it.
+        value: String,
+    },
+    /// A name that would be read as something else: it has control characters, a comma or a quotation mark.
+    #[error("{0:?} is no name of a channel, a term or a unit: the report is damaged")]
+    NoName(String),
 }
 
 /// The text of a file, and what it lacks.

@@ -1,0 +1,83 @@
+//! Sentences as of NMEA 0183: `$NAME,field,field,…*68`, where the last two digits are the exclusive or of all characters between `$` and
+//! `*`. Inertial sensors send their samples so.
+
+use crate::columns::column_selection::AvailableColumn;
+
+/// A line that is a sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sentence<'a> {
+    /// Such as `VNYMR`.
+    pub(crate) name: &'a str,
+    /// What comes after the name, and before the checksum.
+    pub(crate) fields: Vec<&'a str>,
+    /// Whether its checksum is right; a sentence without one is taken as it is.
+    pub(crate) is_intact: bool,
+}
+
+impl<'a> Sentence<'a> {
+    /// `None` for a line that is none.
+    pub(crate) fn parse(line: &'a str) -> Option<Self> {
+        let content = line.strip_prefix(['$', '!'])?;
+        let (content, is_intact) = match content.rsplit_once('*') {
+            Some((content, digits)) => {
+                let stated = u8::from_str_radix(digits.trim_end(), 16).ok().filter(|_| digits.trim_end().len() == 2);
+                (content, stated == Some(content.bytes().fold(0, |sum, byte| sum ^ byte)))
+            }
+            None => (content, true),
+        };
+        let (name, fields) = content.split_once(',')?;
+        let is_name = !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric());
+        is_name.then(|| Self { name, fields: fields.split(',').map(str::trim).collect(), is_intact })
+    }
+}
+
+/// The columns of a sentence of `width` fields: by the names that its sender's manual gives them, else by their numbers, from 1.
+pub(crate) fn columns(name: &str, width: usize) -> Vec<AvailableColumn> {
+    const ATTITUDE: &[(&str, &str)] = &[("yaw", ""), ("pitch", ""), ("roll", "")];
+    const QUATERNION: &[(&str, &str)] = &[("q0", ""), ("q1", ""), ("q2", ""), ("q3", "")];
+    const MAGNETIC: &[(&str, &str)] = &[("magn_x", "gauss"), ("magn_y", "gauss"), ("magn_z", "gauss")];
+    const ACCELERATION: &[(&str, &str)] = &[("accl_x", "m/s^2"), ("accl_y", "m/s^2"), ("accl_z", "m/s^2")];
+    const RATE: &[(&str, &str)] = &[("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
+    // VectorNav, VN-100 User Manual (UM001), "System Module" and "Attitude Subsystem": ASCII measurement messages.
+    let parts: &[&[(&str, &str)]] = match name {
+        "VNYMR" => &[ATTITUDE, MAGNETIC, ACCELERATION, RATE],
+        "VNQMR" => &[QUATERNION, MAGNETIC, ACCELERATION, RATE],
+        "VNIMU" => &[MAGNETIC, ACCELERATION, RATE, &[("temp", "degC"), ("pressure", "")]],
+        "VNMAR" => &[MAGNETIC, ACCELERATION, RATE],
+        "VNACC" => &[ACCELERATION],
+        "VNGYR" => &[RATE],
+        "VNMAG" => &[MAGNETIC],
+        _ => &[],
+    };
+    let known: Vec<AvailableColumn> =
+        parts.concat().iter().map(|(name, unit)| AvailableColumn::known(name, unit)).collect();
+    if known.len() == width {
+        return known;
+    }
+    (1..=width).map(|number| AvailableColumn { name: number.to_string(), unit: None }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Sentence, columns};
+
+    /// `$GPGLL` with the checksum 1D is a well-known example of NMEA 0183.
+    #[test]
+    fn a_sentence_has_a_name_fields_and_a_checksum() {
+        let content = "VNYMR,+006.380,+000.023,-001.953,+1.0640,-0.2531,+3.0614,+00.005,+00.344,-09.758,-0.001222,-0.000450,-0.001218";
+        let checksum = content.bytes().fold(0u8, |sum, byte| sum ^ byte);
+        let line = format!("${content}*{checksum:02X}");
+        let sentence = Sentence::parse(&line).expect("a sentence");
+        assert_eq!((sentence.name, sentence.fields.len(), sentence.is_intact), ("VNYMR", 12, true));
+        assert_eq!(sentence.fields[11], "-0.001218");
+        let damaged = line.replace("+006", "+007");
+        assert!(!Sentence::parse(&damaged).expect("a sentence").is_intact);
+        assert!(Sentence::parse("$GPGLL,4916.45,N,12311.12,W,225444,A,*1D").expect("a sentence").is_intact);
+        for line in ["", "$", "$VNYMR", "VNYMR,1*00", "$a b,1", "12,13"] {
+            assert_eq!(Sentence::parse(line), None, "{line}");
+        }
+        let known = columns("VNYMR", 12);
+        assert_eq!((known[9].name.as_str(), known[9].unit.map(|unit| unit.name)), ("gyro_x", Some("rad/s")));
+        assert_eq!(columns("PIMU", 2)[1].name, "2");
+    }
+}

@@ -1,0 +1,76 @@
+//! Signals that end the program: an interrupt of the terminal, a hang-up, a request to end.
+//!
+//! The first one may be taken up by what runs, which then ends in good order; any other removes the files that are not complete and ends
+//! the program.
+
+use anyhow::{Context, Result};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process;
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+/// Exit status of a program that a signal has ended, as shells have it, less the number of the signal.
+const ENDED_BY_SIGNAL: i32 = 128;
+
+/// Takes a signal up, or does not.
+type Action = Box<dyn FnMut() -> bool + Send>;
+
+static ACTION: LazyLock<Mutex<Option<Action>>> = LazyLock::new(Mutex::default);
+static INCOMPLETE: LazyLock<Mutex<Vec<PathBuf>>> = LazyLock::new(Mutex::default);
+
+fn lock<T>(shared: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Begins to wait for signals. A hang-up that the caller ignores, as `nohup` makes it, is ignored here too.
+///
+/// # Errors
+/// The system refuses.
+pub(crate) fn watch() -> Result<()> {
+    let signals = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP));
+    let mut signals = Signals::new(signals.collect::<Vec<_>>()).context("signals")?;
+    thread::spawn(move || {
+        for signal in signals.forever() {
+            let is_taken_up = lock(&ACTION).as_mut().is_some_and(|action| action());
+            if !is_taken_up {
+                lock(&INCOMPLETE).iter().for_each(|file| {
+                    // The program ends: a file that cannot be removed stays.
+                    let _ = fs::remove_file(file);
+                });
+                process::exit(ENDED_BY_SIGNAL + signal);
+            }
+        }
+    });
+    Ok(())
+}
+
+/// Whether the program was started with `signal` ignored, where the system says it.
+fn is_ignored(signal: i32) -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+/// Has `action` decide about the signals that come from now on: it returns whether it takes one up.
+pub(crate) fn on_signal(action: impl FnMut() -> bool + Send + 'static) {
+    *lock(&ACTION) = Some(Box::new(action));
+}
+
+/// A file that is removed if a signal ends the program before this is dropped.
+pub(crate) struct IncompleteFile(PathBuf);
+
+impl IncompleteFile {
+    pub(crate) fn new(file: &Path) -> Self {
+        lock(&INCOMPLETE).push(file.to_owned());
+        Self(file.to_owned())
+    }
+}
+
+impl Drop for IncompleteFile {
+    fn drop(&mut self) {
+        lock(&INCOMPLETE).retain(|file| *file != self.0);
+    }
+}

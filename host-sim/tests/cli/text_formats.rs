@@ -1,0 +1,173 @@
+//! Texts as people's loggers write them: calendar times, sentences, rows without a number, and characters that a terminal obeys.
+
+use crate::program::{host_sim, json_of, write};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+use system_tests::recording;
+use tempfile::{TempDir, tempdir};
+
+const ROWS: u32 = 6000;
+
+/// The report of a text, and what is said of its reading.
+fn analysed(dir: &TempDir, text: &str, arguments: &[&str]) -> Value {
+    let file = write(dir, "recording.txt", text.as_bytes());
+    let arguments = [&["analyze", file.to_str().expect("UTF-8")], arguments].concat();
+    serde_json::from_slice(&json_of(dir, &arguments)).expect("JSON")
+}
+
+fn refusal(text: &[u8], arguments: &[&str]) -> String {
+    let dir = tempdir().expect("a folder");
+    let file = write(&dir, "recording.csv", text);
+    let output = host_sim(&[&["analyze", file.to_str().expect("UTF-8"), "--quiet"], arguments].concat());
+    assert!(!output.status.success());
+    String::from_utf8(output.stderr).expect("UTF-8")
+}
+
+/// White noise of 0.02 rad/s at `row`.
+fn noise(rng: &mut ChaCha8Rng) -> f64 {
+    ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0) * 0.02
+}
+
+/// Date and time of day of a row at so many Hz after 10:00:13, which may go past midnight.
+fn stamp(row: u32, hz: f64, start_s: f64, decimals: usize) -> (u32, String) {
+    let time = start_s + f64::from(row) / hz;
+    let time = (time * 10f64.powi(decimals as i32)).floor() / 10f64.powi(decimals as i32);
+    let (day, second) = ((time / 86_400.0).floor(), time.rem_euclid(86_400.0));
+    let (hour, minute) = ((second / 3600.0) as u32, (second / 60.0) as u32 % 60);
+    let width = if decimals == 0 { 2 } else { decimals + 3 };
+    (25 + day as u32, format!("{hour:02}:{minute:02}:{:0width$.decimals$}", second.rem_euclid(60.0)))
+}
+
+#[test]
+fn calendar_times_in_one_or_two_columns_show_the_rate() {
+    let dir = tempdir().expect("a folder");
+    let columns = ["--columns", "gyro_x=2", "--units", "rad/s"];
+    // Across midnight; whole seconds at 5 Hz; each with its separator and heading.
+    for (name, hz, decimals, heading, arguments) in [
+        ("two columns of blanks", 5.0, 0, "", &columns[..]),
+        ("two columns of commas", 50.0, 3, "date,time,gyro_x [rad/s]\n", &[]),
+        ("one name for two columns", 50.0, 3, "stamp gyro_x_rad_s\n", &[]),
+        ("one column", 50.0, 6, "timestamp,gyro_x [rad/s]\n", &[]),
+        ("month and day", 50.0, 3, "timestamp;gyro_x [rad/s]\n", &[]),
+        ("time of day", 50.0, 3, "time,gyro_x [rad/s]\n", &[]),
+    ] {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let rows: String = (0..ROWS)
+            .map(|row| {
+                let (day, time) = stamp(row, hz, 86_400.0 - 60.0, decimals);
+                let value = noise(&mut rng);
+                match name {
+                    "two columns of blanks" | "one name for two columns" => {
+                        format!("2018-04-{day}   {time} {value:.5}\n")
+                    }
+                    "two columns of commas" => format!("{day}.04.2018,{time},{value:.5}\n"),
+                    "one column" => format!("2018-04-{day}T{time}Z,{value:.5}\n"),
+                    "month and day" => format!("04/{day}/2018 {time};{value:.5}\n"),
+                    _ => format!("{time},{value:.5}\n"),
+                }
+            })
+            .collect();
+        let report = analysed(&dir, &format!("{heading}{rows}"), arguments);
+        assert_eq!(report["samples"], ROWS, "{name}");
+        assert_eq!(report["dropped"]["gap"], 0, "{name}");
+        let rate = report["sample_rate_hz"].as_f64().expect("a rate") / hz;
+        // A stamp is known to its last digit, over the length of the record.
+        let tolerance = 1e-6 + 10f64.powi(-(decimals as i32)) * hz / f64::from(ROWS);
+        assert!((rate - 1.0).abs() < tolerance, "{name}: {rate}");
+    }
+}
+
+#[test]
+fn a_phone_with_whole_seconds_at_5_hz_is_read() {
+    let test = "a_phone_with_whole_seconds_at_5_hz_is_read";
+    let Some(file) = recording(test, "others/phone_gyro4.txt") else { return };
+    let dir = tempdir().expect("a folder");
+    let columns = ["--columns", "gyro_x=2,gyro_y=3,gyro_z=4", "--units", "rad/s"];
+    let arguments = [&["analyze", file.to_str().expect("UTF-8")], &columns[..]].concat();
+    let report: Value = serde_json::from_slice(&json_of(&dir, &arguments)).expect("JSON");
+    let rate = report["sample_rate_hz"].as_f64().expect("a rate");
+    assert!((rate / 5.0 - 1.0).abs() < 0.01, "{rate}");
+}
+
+fn sentence(content: &str) -> String {
+    format!("${content}*{:02X}\r\n", content.bytes().fold(0u8, |sum, byte| sum ^ byte))
+}
+
+#[test]
+fn sentences_are_checked_and_those_of_vectornav_known_by_name() {
+    let dir = tempdir().expect("a folder");
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut text = String::new();
+    let (mut known, mut other) = (Vec::new(), Vec::new());
+    for _ in 0..ROWS {
+        let [x, y, z] = std::array::from_fn(|_| noise(&mut rng));
+        let fields = format!(
+            "+006.380,+000.023,-001.953,+1.0640,-0.2531,+3.0614,+00.005,+00.344,-09.758,{x:+.6},{y:+.6},{z:+.6}"
+        );
+        known.push(sentence(&format!("VNYMR,{fields}")));
+        other.push(sentence(&format!("PIMU,12,{x:+.6},{y:+.6},{z:+.6}")));
+    }
+    text.extend(known.iter().map(String::as_str));
+    let complete = analysed(&dir, &text, &["--rate", "40"]);
+    assert_eq!(complete["samples"], ROWS);
+    let channel = |report: &Value, name: &str| -> Value {
+        let channels = report["channels"].as_array().expect("a list");
+        channels.iter().find(|of| of["name"] == name).expect(name).clone()
+    };
+    // 0.02 rad/s at 40 Hz in deg/s: the deviation of neighbours is that of a sample.
+    let deviation = channel(&complete, "gyro_x")["curve"][0]["adev"].as_f64().expect("a number");
+    assert!((deviation / 0.02f64.to_degrees() - 1.0).abs() < 5.0 / f64::from(ROWS).sqrt(), "{deviation}");
+    // Damaged sentences, and others between them.
+    let mut damaged = known.clone();
+    for at in [100, 2000, 2001, 5999] {
+        damaged[at] = damaged[at].replace("-09.758", "-09.753");
+    }
+    damaged.insert(500, sentence("GPGLL,4916.45,N,12311.12,W,225444,A,"));
+    let file = write(&dir, "damaged.txt", damaged.concat().as_bytes());
+    let output = host_sim(&["analyze", file.to_str().expect("UTF-8"), "--rate", "40", "--json", "-"]);
+    let notes = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(notes.contains("4 sentences whose checksum is wrong") && notes.contains("1 lines that are no"), "{notes}");
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(channel(&report, "gyro_y")["refused"]["missing"], 4, "{notes}");
+    // Of another sender by the numbers of the fields.
+    let columns = ["--columns", "gyro_x=2,gyro_y=3,gyro_z=4", "--units", "rad/s", "--rate", "40"];
+    let report = analysed(&dir, &other.concat(), &columns);
+    assert_eq!(channel(&report, "gyro_x")["curve"], channel(&complete, "gyro_x")["curve"]);
+}
+
+#[test]
+fn rows_without_a_number_are_missing_samples() {
+    let dir = tempdir().expect("a folder");
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for missing in [3, 100] {
+        let rows: String = (0..ROWS).map(|_| format!("{:.5}\n", noise(&mut rng))).collect();
+        let report = analysed(
+            &dir,
+            &format!("{}{rows}", "nan\n".repeat(missing)),
+            &["--columns", "gyro_x=0", "--units", "rad/s", "--rate", "100"],
+        );
+        assert_eq!(report["channels"][0]["refused"]["missing"], missing);
+    }
+}
+
+#[test]
+fn errors_are_short_and_hide_nothing() {
+    // A right-to-left override in the name of a column.
+    let error = refusal("a\u{202e}b,c\n1,2\n".as_bytes(), &[]);
+    assert!(!error.contains('\u{202e}') && error.contains("202e"), "{error}");
+    let error = refusal(b"time_s,gyro_x_deg_s\n0,1\n1,2\n", &["--topic", "imu"]);
+    assert!(error.contains("--topic imu") && error.contains("no topics"), "{error}");
+    let error = refusal(b"time_s,gyro_x_counts\n0,1\n1,2\n", &["--topic", "imu"]);
+    assert!(error.contains("--topic imu") && error.contains("no topics"), "{error}");
+    // Values that no sensor measures.
+    let rows: String = (0..3000).map(|row| format!("{}.5e160\n", row * 7919 % 41 - 20)).collect();
+    let error = refusal(format!("gyro_x_deg_s\n{rows}").as_bytes(), &["--rate", "100"]);
+    assert!(error.contains("out_of_range"), "{error}");
+    // A text of 100 kB where the report has a number.
+    let dir = tempdir().expect("a folder");
+    let text = format!("{{\"schema\": \"{}\"}}", "x".repeat(100_000));
+    let file = write(&dir, "report.json", text.as_bytes());
+    let output = host_sim(&["compare", file.to_str().expect("UTF-8"), "--data-sheet"]);
+    assert!(!output.status.success() && output.stderr.len() < 4000, "{} bytes", output.stderr.len());
+}
