@@ -74,7 +74,7 @@ impl Statistics {
 
     /// Whether a channel has taken a sample.
     pub(crate) fn has_samples(&self) -> bool {
-        self.estimators.iter().any(|estimator| estimator.len() > 0)
+        self.estimators.iter().any(|estimator| !estimator.is_empty())
     }
 
     /// A number of samples of all channels never arrived.
