@@ -198,7 +198,7 @@ pub(crate) enum Recorded {
     /// Register counts of an ADIS16405.
     Counts(Recording),
     /// Numbers of any sensor.
-    AnySensor(SensorRecording),
+    AnySensor(Box<SensorRecording>),
 }
 
 /// An open file, by the way in which it is read.
@@ -244,7 +244,7 @@ fn read_content(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Rec
             let recording = count_table::read_monitored(input.path(), arguments.range.into(), monitor);
             Ok(Recorded::Counts(recording.map_err(|error| input.rename(error))?))
         }
-        Opened::AnySensor(input, options) => Ok(Recorded::AnySensor(input.read(&options)?)),
+        Opened::AnySensor(input, options) => Ok(Recorded::AnySensor(Box::new(input.read(&options)?))),
         Opened::Replayed(recording) => Ok(Recorded::Counts(recording)),
     }
 }

@@ -97,7 +97,8 @@ impl OutputFiles {
                 Ok(_) => drop(OpenOptions::new().write(true).open(file)?),
                 Err(_) => {}
             }
-            Ok(drop(file_beside(&target(file))?))
+            file_beside(&target(file)).map(drop)?;
+            Ok(())
         };
         check().with_context(|| file.display().to_string())
     }
