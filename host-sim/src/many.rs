@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use noise_analysis::parallel::{in_parallel, on_one_thread};
 use noise_analysis::report::Report;
 use recordings::Printable;
+use reports::json::ReportJson;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
@@ -33,7 +34,7 @@ pub(crate) fn write_reports(
     let bar = progress_bar(files.len() as u64, "{wide_bar} {pos}/{len} {eta}");
     let work: Vec<(&Path, &PathBuf)> = files.iter().copied().zip(&reports).collect();
     let written = in_parallel(&work, |(file, report)| {
-        let written = on_one_thread(|| output::write_json(&analyze(file)?, report, outputs));
+        let written = on_one_thread(|| output::write_json(&ReportJson::from(&analyze(file)?), report, outputs));
         bar.inc(1);
         written.map_err(|error| named(file, &error))
     });

@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
 use recordings::Printable;
 use reports::export::{self, AxisChoice};
+use reports::json::ReportJson;
 use reports::raster::Rasterizer;
 use reports::saved_report::SavedReport;
 use reports::terminal::Screen;
@@ -50,7 +51,7 @@ pub(crate) fn write_report(
     output: &OutputArguments,
     files: &OutputFiles,
 ) -> Result<()> {
-    let json = output.json.as_ref().map_or(Ok(()), |file| write_json(report, file, files));
+    let json = output.json.as_ref().map_or(Ok(()), |file| write_json(&ReportJson::from(report), file, files));
     let exports = write_exports(report, output, files);
     let write_page = |folder: &PathBuf| -> Result<PathBuf> {
         let file = folder.join(page::FILE);

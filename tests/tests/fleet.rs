@@ -2,6 +2,7 @@
 
 use noise_analysis::analysis::analyze;
 use noise_analysis::report::Report;
+use reports::json::ReportJson;
 use serde_json::Value;
 use simulation::Simulation;
 use std::path::{Path, PathBuf};
@@ -70,7 +71,8 @@ fn the_statements_of_the_page_answer_as_the_reports_do() {
     for (seed, (part, factor)) in PARTS.into_iter().enumerate() {
         let report = simulated(part, factor, seed as u64);
         rows += report.channels.iter().map(|channel| channel.assessment.coefficients.len()).sum::<usize>();
-        std::fs::write(reports.join(format!("{part}.json")), serde_json::to_vec(&report).expect("JSON")).expect("room");
+        let json = serde_json::to_vec(&ReportJson::from(&report)).expect("JSON");
+        std::fs::write(reports.join(format!("{part}.json")), json).expect("room");
     }
     let answers = answers(&python, folder.path());
     let [loaded, coefficients, drift, lines, noisy, kinds] = answers.as_slice() else {

@@ -117,7 +117,7 @@ impl FilteredChannel {
             Some(FilteredCoefficient { truth: truth[at], value, low, high })
         };
         let is_filter = |kind: &str| taps > 1 && kind == "filter_bandwidth";
-        let kinds = report.effects.iter().map(|effect| effect.kind.clone());
+        let kinds = report.effects.iter().map(|shown| shown.effect.name().to_owned());
         Self {
             seed,
             channel,

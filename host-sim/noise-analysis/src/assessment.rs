@@ -9,7 +9,7 @@ mod spectral_white_noise;
 
 pub use innovations::Innovations;
 
-use crate::findings::{BoundedEstimate, Parameter};
+use crate::bounds::{BoundedEstimate, Parameter};
 use crate::noise_terms::is_white;
 use crate::series::Series;
 use crate::spectra::{Welch, correlation_time};

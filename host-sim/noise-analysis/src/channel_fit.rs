@@ -1,9 +1,9 @@
 //! The noise model of one channel in one part of a recording, with the low-pass filter that all channels of the sensor have.
 
 use crate::OCTAVES;
+use crate::bounds::BoundedEstimate;
 use crate::covariates::CovariateFit;
 use crate::estimators::RecordEstimators;
-use crate::findings::BoundedEstimate;
 use crate::noise_terms::{filter_length_s, is_filter, is_line, is_white, line_frequency};
 use crate::part_filter::PartFilter;
 use crate::spectra::MarkovEstimate;

@@ -1,7 +1,7 @@
 //! Whether two estimates differ by more than their intervals allow, and which of many do.
 
+use crate::bounds::BoundedEstimate;
 use crate::distributions::upper_tail;
-use crate::findings::BoundedEstimate;
 use allan_core::confidence::NORMAL_975;
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! A recording as it is analysed: the means of as many samples in a row as leave few enough of them, and what is known of the samples
 //! beside. A short recording has one sample a mean.
 
-use crate::findings::Effect;
+use crate::effects::Effect;
 use crate::parallel::per_channel;
 use crate::sample_curves::SampleCurves;
 use crate::sample_effects::SampleEffects;

@@ -1,7 +1,7 @@
 //! What the figures of a report show beside the Allan deviation: the data sheet's values, the measured spectrum and the
 //! bias over time, condensed to at most [`MOST_POINTS`] points each.
 
-use crate::findings::Parameter;
+use crate::effects::BiasBlocks;
 use crate::parallel::in_parallel;
 use crate::report::{BiasOverTime, ChannelReport, DataSheetReport, FigureData, Report, SpectrumReport, TermReport};
 use crate::series::Series;
@@ -270,47 +270,23 @@ impl<'a> BlockMeans<'a> {
     /// What the effects of a channel explain of its bias over time; empty where they explain nothing.
     fn followed(&self, channel: &ChannelReport, data: &FigureData) -> Vec<f64> {
         let Some(bias) = &data.bias_over_time else { return Vec::new() };
-        let mut sum = vec![0.0; bias.time_s.len()];
-        let mut explained = false;
-        for effect in &channel.effects {
-            let of = |name: &str| effect.parameters.get(name).map(|parameter: &Parameter| parameter.value);
-            let mut add = |scale: Option<f64>, covariate: Option<Vec<f64>>| {
-                let Some((scale, covariate)) = scale.zip(covariate) else { return };
-                explained = true;
-                for (sum, value) in sum.iter_mut().zip(covariate) {
-                    *sum += scale * value;
-                }
+        let of = |quantity: Quantity, axis: &str| {
+            let other = match quantity {
+                Quantity::Temperature => self.temperature,
+                Quantity::SupplyVoltage => self.supply,
+                _ => self.specific_force.get(axis).copied(),
             };
-            let along = |other: Option<&BiasOverTime>| other.map(|other| at_times(other, &bias.time_s));
-            match effect.kind.as_str() {
-                "temperature" => add(of("sensitivity"), along(self.temperature)),
-                "supply" => add(of("sensitivity"), along(self.supply)),
-                "acceleration" => {
-                    for (axis, force) in &self.specific_force {
-                        add(of(&format!("sensitivity_{axis}")), along(Some(force)));
-                    }
-                }
-                "thermal_lag" => {
-                    let lagged = along(self.temperature).zip(of("time_constant"));
-                    add(of("sensitivity"), lagged.map(|(temperature, lag)| low_pass(&bias.time_s, &temperature, lag)));
-                }
-                // Both are about the mean temperature.
-                "temperature_squared" => {
-                    let temperature = along(self.temperature);
-                    let squares = temperature.as_ref().map(|of| of.iter().map(|value| value * value).collect());
-                    add(of("sensitivity"), temperature);
-                    add(of("curvature"), squares);
-                }
-                "bias_step" => {
-                    let step = of("time").map(|at| bias.time_s.iter().map(|time| f64::from(*time >= at)).collect());
-                    add(of("size"), step);
-                }
-                "rate_ramp" => add(of("slope"), Some(bias.time_s.clone())),
-                _ => {}
-            }
-        }
-        if !explained {
+            other.map(|other| at_times(other, &bias.time_s))
+        };
+        let blocks = BiasBlocks { time_s: &bias.time_s, of: &of };
+        let parts: Vec<(f64, Vec<f64>)> =
+            channel.effects.iter().flat_map(|shown| shown.effect.course(&blocks)).collect();
+        if parts.is_empty() {
             return Vec::new();
+        }
+        let mut sum = vec![0.0; bias.time_s.len()];
+        for (factor, values) in parts {
+            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
         }
         let level = sum.iter().sum::<f64>() / sum.len() as f64;
         sum.into_iter().map(|value| rounded(value - level)).collect()
@@ -326,18 +302,6 @@ fn at_times(bias: &BiasOverTime, times: &[f64]) -> Vec<f64> {
         bias.mean[if is_before { before } else { after }]
     };
     times.iter().map(nearest).collect()
-}
-
-/// `values` behind a low-pass filter of the first order with the time constant `lag`, s, that begins in balance.
-fn low_pass(times: &[f64], values: &[f64], lag: f64) -> Vec<f64> {
-    let mut state = values.first().copied().unwrap_or(0.0);
-    let mut last = times.first().copied().unwrap_or(0.0);
-    let follow = |(time, value): (&f64, &f64)| {
-        state += (1.0 - (-(time - last) / lag).exp()) * (value - state);
-        last = *time;
-        state
-    };
-    times.iter().zip(values).map(follow).collect()
 }
 
 #[cfg(test)]
@@ -404,14 +368,5 @@ mod tests {
             assert!((mean - time - level).abs() < 0.6 * bias.block_s, "{time}: {mean}");
         }
         assert!(bias.mean.iter().sum::<f64>().abs() < 0.1);
-    }
-
-    #[test]
-    fn a_low_pass_follows_a_step_exponentially() {
-        let times: Vec<f64> = (0..1000).map(f64::from).collect();
-        let step: Vec<f64> = times.iter().map(|time| f64::from(*time >= 1.0)).collect();
-        for (time, value) in times.iter().zip(low_pass(&times, &step, 100.0)).skip(1) {
-            assert!((value - (1.0 - (-time / 100.0).exp())).abs() < 1e-9, "{time}");
-        }
     }
 }

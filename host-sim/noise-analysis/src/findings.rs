@@ -1,84 +1,30 @@
-//! Plain data that every later stage passes on: estimates with their bounds, an effect that was found, and the correction
-//! that removes an effect from the samples.
+//! What was found: an effect with the correction that removes it from the samples, and the causes that a report lists.
 
+use crate::effects::Effect;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Highest probability that chance alone produces a [`Detection`] anywhere in the record of one channel.
 pub const SIGNIFICANCE: f64 = 2e-4;
 
-/// An estimate with its standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeasuredValue {
-    /// Likeliest value.
-    pub value: f64,
-    /// Standard deviation, in the unit of the value.
-    pub error: f64,
-}
-
-/// An estimate with its 95 % bounds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoundedEstimate {
-    /// Likeliest value.
-    pub value: f64,
-    /// Lower 95 % bound.
-    pub low: f64,
-    /// Upper 95 % bound.
-    pub high: f64,
-}
-
-/// An estimated number with its 95 % bounds. A term that the data does not show has the value and the lower bound 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Parameter {
-    /// Estimate.
-    pub value: f64,
-    /// Lower 95 % bound.
-    pub low: f64,
-    /// Upper 95 % bound.
-    pub high: f64,
-    /// Unit of all three.
-    pub unit: String,
-}
-
-impl Parameter {
-    /// `value` between `low` and `high`, all three in `unit`.
-    pub fn new(value: f64, low: f64, high: f64, unit: impl Into<String>) -> Self {
-        Self { value, low, high, unit: unit.into() }
-    }
-}
-
-/// An effect beyond the baseline noise model, as it is reported.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Effect {
-    /// Such as `sinusoid`.
-    pub kind: String,
-    /// By name, with intervals.
-    pub parameters: BTreeMap<String, Parameter>,
-    /// One sentence for the reader: what was measured, against which threshold, and the usual causes.
-    pub evidence: String,
-    /// Position in the report's list of findings of the cause that this effect belongs to.
+/// An effect by which a channel shows a cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelEffect {
+    /// What the channel shows.
+    pub effect: Effect,
+    /// Position of the cause in the report's list of findings.
     pub finding: usize,
 }
 
-impl Effect {
-    /// An effect of this kind with its parameters by name.
-    pub fn new<'a>(kind: &str, parameters: impl IntoIterator<Item = (&'a str, Parameter)>, evidence: String) -> Self {
-        let parameters = parameters.into_iter().map(|(name, parameter)| (name.to_owned(), parameter)).collect();
-        Self { kind: kind.to_owned(), parameters, evidence, finding: 0 }
-    }
-}
-
 /// One cause of what the baseline noise model lacks, with every channel that shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// Such as `sinusoid`, as in [`Effect::kind`].
-    pub kind: String,
+    /// As the channel shows it that shows it most clearly.
+    pub effect: Effect,
     /// Names of the channels that show it, in the order of the report.
     pub channels: Vec<String>,
-    /// By name, with intervals: those of the channel that shows the cause most clearly.
-    pub parameters: BTreeMap<String, Parameter>,
-    /// One sentence for the reader: what was measured, against which threshold.
-    pub evidence: String,
+    /// Position in `channels` of the one that shows it most clearly.
+    pub clearest: usize,
     /// Whether the model with this cause holds on data that it was not fitted to.
     pub validated: Validation,
     /// By channel: the part of the channel's Allan variance that is due to this cause, in percent, at the averaging time where

@@ -25,6 +25,7 @@
 
 pub mod analysis;
 pub mod assessment;
+pub mod bounds;
 mod causes;
 mod channel_fit;
 mod channel_lines;
@@ -34,6 +35,7 @@ pub mod contradiction;
 mod covariates;
 pub mod detectors;
 pub mod distributions;
+pub mod effects;
 mod estimators;
 mod exclusion;
 pub mod figure_data;

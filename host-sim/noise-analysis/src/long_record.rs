@@ -17,7 +17,7 @@
 use crate::condensed_record::{CondensedChannel, CondensedRecord};
 use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
-use crate::findings::Effect;
+use crate::effects::Effect;
 use crate::nonstationarity::epochs;
 use crate::parallel::{self, in_parallel};
 use crate::sample_curves::SampleCurves;
@@ -60,8 +60,6 @@ const LEAST_FILL: f64 = 0.5;
 const MEANS_PER_PERIOD: f64 = 2.5;
 /// A block mean at this place has no sample.
 const MISSING: i32 = i32::MIN;
-/// Effects that only the samples themselves show, and that are looked for in the first of them.
-const FAST_KINDS: [&str; 4] = ["noise_below_count", "quantization", "repeated_samples", "sample_clock"];
 
 /// Reads a long recording block by block.
 pub struct LongRecordReader {
@@ -89,10 +87,18 @@ impl FastFindings {
     fn new(profile: &ChannelProfile, first: Option<ChannelId>, shown: &SampleEffects) -> Self {
         let effects = first.into_iter().flat_map(|of| shown.of(of));
         Self {
-            effects: effects.filter(|effect| FAST_KINDS.contains(&effect.kind.as_str())).cloned().collect(),
+            effects: effects.filter(|effect| is_fast(effect)).cloned().collect(),
             resolution: profile.lsb * f64::from(first.map_or(1, |of| shown.counts_per_step(of))),
         }
     }
+}
+
+/// Whether only the samples themselves show an effect, and the first of them as well as all.
+fn is_fast(effect: &Effect) -> bool {
+    matches!(
+        effect,
+        Effect::NoiseBelowCount(_) | Effect::EffectiveLsb(_) | Effect::RepeatedSamples(_) | Effect::ClockDeviation(_)
+    )
 }
 
 /// What is kept of one channel.

@@ -9,8 +9,10 @@
 //! with the changes of the rest of the record. A jump to and fro in one channel alone is that of random telegraph noise where that is
 //! found.
 
+use crate::bounds::BoundedEstimate;
 use crate::distributions::quantile;
-use crate::findings::{Effect, Parameter, SIGNIFICANCE};
+use crate::effects::MotionInterval;
+use crate::findings::SIGNIFICANCE;
 use crate::report::Stretch;
 use crate::series::Series;
 use measurement::{ChannelId, ChannelProfile, PerChannel, Quantity};
@@ -36,7 +38,7 @@ pub(crate) struct PlatformMotion {
     /// Whether the channel changes faster than a Gaussian process would.
     is_sudden: bool,
     /// As reported.
-    pub effect: Effect,
+    pub effect: MotionInterval,
 }
 
 /// The motion that a channel shows, if any.
@@ -71,20 +73,15 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
     }
     let (from, to) = (seconds.first()?.start as f64 * BLOCK_S, seconds.last()?.end as f64 * BLOCK_S);
     let moved: usize = seconds.iter().map(Range::len).sum();
-    let evidence = format!(
-        "the mean of a second leaves the median by up to {largest:.3} {unit}, more than three times the {:.3} {unit} by which \
-         the biases of parts differ, in {} stretches of together {moved} s: the platform was moved",
-        limit / BIAS_ERRORS,
-        seconds.len(),
-        unit = channel.unit,
-    );
-    let exact = |value: f64, error: f64, unit: &str| Parameter::new(value, value - error, value + error, unit);
-    let parameters = [
-        ("from", exact(from, BLOCK_S, "s")),
-        ("to", exact(to, BLOCK_S, "s")),
-        ("size", exact(largest, channel.initial_bias_error?, channel.unit)),
-    ];
-    let effect = Effect::new("motion", parameters, evidence);
+    let exact = |value: f64, error: f64| BoundedEstimate::new(value, value - error, value + error);
+    let effect = MotionInterval {
+        from_s: exact(from, BLOCK_S),
+        to_s: exact(to, BLOCK_S),
+        size: exact(largest, channel.initial_bias_error?).in_unit(channel.unit),
+        bias_error: limit / BIAS_ERRORS,
+        stretches: seconds.len(),
+        moved_s: moved,
+    };
     Some(PlatformMotion { quantity: channel.quantity, seconds, is_sudden: is_sudden(&means), effect })
 }
 
@@ -108,7 +105,7 @@ pub(crate) fn of_platform(
         let others = motions.with_ids().filter(|(other, _)| *other != channel).filter_map(|(_, other)| other.as_ref());
         let is_shared = others.filter(|other| other.quantity == motion.quantity).any(|other| motion.overlaps(other));
         let is_telegraph = || {
-            let size = &motion.effect.parameters["size"];
+            let size = motion.effect.size;
             distance_of_levels(channel).is_some_and(|distance| size.low.abs().min(size.high.abs()) < distance)
         };
         is_shared || (motion.is_sudden && !is_telegraph())
@@ -206,9 +203,8 @@ mod tests {
         // The data sheet: ±50 mg of initial bias error, 1 σ.
         assert_eq!(find(&series(0.14), &channel), None);
         let motion = find(&series(-0.7), &channel).unwrap();
-        let value = |name: &str| motion.effect.parameters[name].value;
-        assert!((value("size") + 0.7).abs() < 1e-12);
-        assert_eq!((value("from"), value("to")), (38.0, 52.0), "two seconds around");
+        assert!((motion.effect.size.value + 0.7).abs() < 1e-12);
+        assert_eq!((motion.effect.from_s.value, motion.effect.to_s.value), (38.0, 52.0), "two seconds around");
         let rest = [Stretch { from_s: 0.0, to_s: 38.0 }, Stretch { from_s: 52.0, to_s: 100.0 }];
         assert_eq!(at_rest([&motion].into_iter(), 100.0), rest);
         assert_eq!(at_rest([].into_iter(), 100.0), [Stretch { from_s: 0.0, to_s: 100.0 }]);

@@ -16,7 +16,8 @@ mod screen;
 pub(crate) use channel_deviance::FilteredChannel;
 
 use crate::OCTAVES;
-use crate::findings::{BoundedEstimate, SIGNIFICANCE};
+use crate::bounds::BoundedEstimate;
+use crate::findings::SIGNIFICANCE;
 use crate::parallel;
 use allan_core::Curve;
 use allan_core::term::MovingAverageFilter;

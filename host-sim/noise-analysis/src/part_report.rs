@@ -1,7 +1,7 @@
 //! What a report says of the sensor's clock and of its low-pass filter.
 
+use crate::bounds::{BoundedEstimate, MeasuredValue, Parameter};
 use crate::distributions::NORMAL_975;
-use crate::findings::{BoundedEstimate, MeasuredValue, Parameter};
 use crate::part_filter::{PartFilter, Unidentified};
 use crate::report::PartReport;
 use crate::sampling_faults::rate_by_time_stamps;

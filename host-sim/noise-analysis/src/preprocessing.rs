@@ -12,13 +12,13 @@ use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
+use crate::effects::Effect;
 use crate::exclusion::Exclusion;
-use crate::findings::{Correction, Detection, Effect};
+use crate::findings::{Correction, Detection};
 use crate::parallel::{in_parallel, per_channel};
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;
-use allan_core::NoiseTerm;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::sync::Arc;
 
@@ -126,7 +126,7 @@ impl Preprocessing {
     /// Whether a channel responds to temperature behind a lag or with a curvature.
     pub(crate) fn responds_to_temperature(&self, channel: ChannelId) -> bool {
         let responses = self.channels[channel].responses(Exclusion::ByWhole);
-        responses.iter().any(|of| of.effect.kind != "vibration_rectification")
+        responses.iter().any(|of| !matches!(of.effect, Effect::VibrationRectification(_)))
     }
 
     /// A channel's series as measured, with its resolution.
@@ -151,7 +151,7 @@ impl Preprocessing {
 
     /// Whether a ramp was found in a channel.
     pub(crate) fn has_ramp(&self, channel: ChannelId) -> bool {
-        self.effects(channel).iter().any(|effect| effect.kind == NoiseTerm::RateRamp.name())
+        self.effects(channel).iter().any(|effect| matches!(effect, Effect::LinearDrift(_)))
     }
 
     /// The temperature and supply that a channel depends on, and how much.
@@ -268,7 +268,7 @@ impl KnocksInChannels {
     fn detections(&self, measurement: &Measurement, series: &Series, channel: ChannelId) -> Vec<Detection> {
         let detection = |knock: &Knock| {
             let shows = |others: &Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
-            let shown: Vec<&str> = self
+            let shown: Vec<&'static str> = self
                 .by_whole
                 .with_ids()
                 .filter(|(_, others)| shows(others))

@@ -8,9 +8,9 @@
 use crate::analysis::missing;
 use crate::assessment::Assessment;
 use crate::causes;
+use crate::effects::Effect;
 use crate::estimators::{RecordEstimators, RecordPart};
 use crate::figure_data;
-use crate::findings::Effect;
 use crate::first_half::FirstHalf;
 use crate::gapped_cascade::GappedCascade;
 use crate::parallel::{self, per_channel};
@@ -64,7 +64,7 @@ impl CurveEstimators {
                     return Vec::new();
                 }
                 let (mut named, unexplained) = part.named_effects(profile, &estimators.both, channel, None);
-                named.extend(unexplained);
+                named.extend(unexplained.map(Effect::from));
                 named
             };
             part.channels.ids().map(of).collect()

@@ -1,11 +1,13 @@
-//! The report of an analysis as plain data: the JSON schema, and the source of the terminal table and of the page.
+//! The report of an analysis as plain data: the source of the JSON schema, of the terminal table and of the page.
 //!
 //! A report does not name the source of its samples: a recording that is read from a file and the same recording replayed
 //! over the bus give the same bytes.
 
 use crate::assessment::Assessment;
+pub use crate::bounds::Parameter;
 pub use crate::contradiction::Contradiction;
-pub use crate::findings::{Effect, Finding, Parameter, Validation};
+pub use crate::effects::Effect;
+pub use crate::findings::{ChannelEffect, Finding, Validation};
 pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
 use crate::units::coefficient_unit;
 use allan_core::model::cube_root_deviation;
@@ -17,13 +19,12 @@ use std::collections::BTreeMap;
 pub const SCHEMA: u32 = 1;
 
 /// A whole analysis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// [`SCHEMA`].
     pub schema: u32,
     /// Whether the report is of the curves alone, without what needs the samples themselves: spectra, spikes, steps, covariates,
     /// causes that channels have in common, and changes of the noise. Absent where it is not.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub quick: bool,
     /// As the user states it or as the time stamps show it, Hz.
     pub sample_rate_hz: f64,
@@ -38,7 +39,6 @@ pub struct Report {
     /// What the baseline models lack, one entry a cause.
     pub findings: Vec<Finding>,
     /// Regression of the gyros and accelerometers on each other; absent where there are fewer than two, or too few samples.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub common_mode: Option<CommonModeRegression>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
@@ -78,7 +78,7 @@ pub struct Stretch {
 }
 
 /// One output of the sensor.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ChannelReport {
     /// The channel's name, such as `gyro_z`.
     pub name: String,
@@ -87,7 +87,6 @@ pub struct ChannelReport {
     /// Samples that arrived and were used as a whole, in every channel.
     pub samples: u64,
     /// Samples that the channel's model lacks.
-    #[serde(flatten)]
     pub missing: MissingSamples,
     /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
@@ -96,7 +95,7 @@ pub struct ChannelReport {
     /// The baseline model: angle random walk, bias instability, rate random walk.
     pub before: ModelReport,
     /// Effects that the baseline model lacks.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<ChannelEffect>,
     /// The baseline model with the terms that were added.
     pub after: ModelReport,
     /// Against the second half, of the curve of the first half taken for a model. A model that describes the first half exactly
@@ -104,19 +103,15 @@ pub struct ChannelReport {
     pub first_half_curve: ModelErrorReport,
     /// The model of `after`, fitted once more to the whole record. Its errors are those of `after`: the whole record leaves no
     /// data that it has not seen.
-    #[serde(rename = "final")]
     pub refitted: ModelReport,
     /// How the noise changes in the course of the record; absent of a record that is too short to be cut into epochs, and of
     /// channels other than gyros and accelerometers.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub nonstationarity: Option<Nonstationarity>,
     /// Stretches in which the sensor was at rest: those without a motion of any channel.
     pub at_rest: Vec<Stretch>,
     /// Assessment of the model for use in navigation.
-    #[serde(rename = "practice")]
     pub assessment: Assessment,
     /// What the figures show beside the Allan deviation.
-    #[serde(flatten)]
     pub figure_data: FigureData,
 }
 

@@ -3,7 +3,8 @@
 
 use crate::detectors::effective_lsb;
 use crate::detectors::output_range::{ValueCounts, find_noise_below_count};
-use crate::findings::{Detection, Effect};
+use crate::effects::Effect;
+use crate::findings::Detection;
 use crate::parallel::per_channel;
 use crate::sampling_faults;
 use crate::series::Series;
@@ -50,7 +51,7 @@ impl SampleEffects {
 
     /// Whether values of a channel are cut off: they are no noise around which a sample could be a spike.
     pub(crate) fn is_saturated(&self, channel: ChannelId) -> bool {
-        self.of(channel).any(|effect| effect.kind == "saturated")
+        self.of(channel).any(|effect| matches!(effect, Effect::Saturation(_)))
     }
 }
 

@@ -1,7 +1,9 @@
 //! Detectors of faults of the sampling: lost samples, repeated samples, and a sample rate other than the nominal one.
 
+use crate::bounds::{BoundedEstimate, MeasuredValue};
 use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
-use crate::findings::{Correction, Detection, Effect, MeasuredValue, Parameter, SIGNIFICANCE};
+use crate::effects::{ClockDeviation, DroppedSamples, RepeatedSamples};
+use crate::findings::{Correction, Detection, SIGNIFICANCE};
 use measurement::{Measurement, SensorProfile};
 use std::collections::BTreeMap;
 
@@ -43,17 +45,13 @@ pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gap
     let per_gap = missing / (gaps.max(1) as f64);
     let (low, high) = poisson_bounds(gaps.max(1) as f64);
     let fraction = |count: f64| (count / all).min(1.0);
-    let evidence = format!(
-        "{missing} of {all} samples never arrived, in {gaps} gaps; a reader that comes too late, or a full queue"
-    );
-    Some(Detection {
-        effect: Effect::new(
-            "dropped_samples",
-            [("fraction", Parameter::new(fraction(missing), fraction(low * per_gap), fraction(high * per_gap), ""))],
-            evidence,
-        ),
-        correction: None,
-    })
+    let lost = DroppedSamples {
+        fraction: BoundedEstimate::new(fraction(missing), fraction(low * per_gap), fraction(high * per_gap)),
+        missing,
+        samples: all,
+        gaps,
+    };
+    Some(Detection { effect: lost.into(), correction: None })
 }
 
 /// Samples that equal the sample before in all channels, if there are more of them than by chance.
@@ -84,20 +82,14 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     let count = pairs * repeated_fraction(seen / pairs.max(1.0), &shares) + refused as f64;
     let (low, high) = poisson_bounds(count);
     let all = pairs + 1.0 + refused as f64;
-    let evidence = format!(
-        "{} of {all} samples equal the one before in all {} channels, {expected:.1} at most by chance; \
-         a register that is read before it is renewed",
-        positions.len() as u64 + refused,
-        channels.len(),
-    );
-    Some(Detection {
-        effect: Effect::new(
-            "repeated_samples",
-            [("fraction", Parameter::new(count / all, low / all, high / all, ""))],
-            evidence,
-        ),
-        correction: Some(Correction::Exclude(positions)),
-    })
+    let repeated = RepeatedSamples {
+        fraction: BoundedEstimate::new(count / all, low / all, high / all),
+        equal: positions.len() as u64 + refused,
+        samples: all,
+        by_chance: expected,
+        channels: channels.len(),
+    };
+    Some(Detection { effect: repeated.into(), correction: Some(Correction::Exclude(positions)) })
 }
 
 /// The fraction f of the samples that are repeated, where the fraction `all` of them equals the one before in all channels
@@ -126,19 +118,12 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
         return None;
     }
     let half = NORMAL_975 * error;
-    let evidence = format!(
-        "{measured:.4} Hz by the time stamps, {:+.1} ppm from the nominal {nominal:.4} Hz, {z:.1} σ of an ordinary host's \
-         clock; the tolerance of the part's oscillator",
-        1e6 * off,
-    );
-    Some(Detection {
-        effect: Effect::new(
-            "sample_clock",
-            [("rate_hz", Parameter::new(measured, measured - half, measured + half, "Hz"))],
-            evidence,
-        ),
-        correction: None,
-    })
+    let clock = ClockDeviation {
+        rate_hz: BoundedEstimate::new(measured, measured - half, measured + half),
+        nominal_hz: nominal,
+        sigmas: z,
+    };
+    Some(Detection { effect: clock.into(), correction: None })
 }
 
 /// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and

@@ -2,7 +2,7 @@
 //!
 //! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
 
-use crate::findings::MeasuredValue;
+use crate::bounds::MeasuredValue;
 use crate::series::Series;
 use crate::spectra;
 use crate::uniform_series::UniformSeries;

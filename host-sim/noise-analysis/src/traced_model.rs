@@ -2,7 +2,7 @@
 //! keeps the bounds, the goodness and the additions with them.
 
 use crate::OCTAVES;
-use crate::findings::BoundedEstimate;
+use crate::bounds::BoundedEstimate;
 use crate::noise_terms::{is_filter, is_white};
 use crate::octave_covariance::with_bounds_behind_a_filter;
 use allan_core::fit::{Goodness, fit, goodness};

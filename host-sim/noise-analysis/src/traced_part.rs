@@ -8,8 +8,8 @@ use crate::contradiction::Contradiction;
 use crate::covariates::CovariateFit;
 use crate::detectors::bias::BiasSensitivity;
 use crate::detectors::random_telegraph;
+use crate::effects::{Effect, TelegraphNoise, Unexplained};
 use crate::estimators::RecordPart;
-use crate::findings::{Detection, Effect};
 use crate::naming::{ChannelFindings, name_effects};
 use crate::parallel::per_channel;
 use crate::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
@@ -65,7 +65,7 @@ pub(crate) struct ChannelTrace {
     /// The samples less the share of the covariates; `None` where they were not used.
     pub rest: Option<UniformSeries>,
     /// Random telegraph noise.
-    pub telegraph: Option<Detection>,
+    pub telegraph: Option<TelegraphNoise>,
     /// Signals that have no name.
     pub signals: UnexplainedSignals,
     slowest: Option<CosineSpectrum>,
@@ -120,7 +120,7 @@ impl TracedPart {
         curves: &RecordPart,
         channel: ChannelId,
         common: Option<&ChannelsInCommon>,
-    ) -> (Vec<Effect>, Option<Effect>) {
+    ) -> (Vec<Effect>, Option<Unexplained>) {
         let ChannelTrace { fit, lines, rest, telegraph, .. } = &self.channels[channel];
         let sensitivities = || fit.covariates.sensitivities();
         let findings = ChannelFindings {
@@ -174,9 +174,8 @@ impl ChannelTrace {
         let (mut telegraph, mut signals) = (None, UnexplainedSignals::default());
         if samples.seeks_signals {
             let correlation_times: Vec<f64> = fit.correlation_times().collect();
-            let is_reversible = |found: &Detection| {
-                random_telegraph::is_reversible(&rest, found.effect.parameters["time_constant"].value)
-            };
+            let is_reversible =
+                |found: &TelegraphNoise| random_telegraph::is_reversible(&rest, found.time_constant_s.value);
             telegraph = random_telegraph::find(&rest, own.unit, &correlation_times).filter(is_reversible);
             signals = UnexplainedSignals::find(&rest, &mut lines, &fit.bands());
         }

@@ -3,9 +3,9 @@
 use crate::condensed_record::CondensedRecord;
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::random_telegraph;
+use crate::effects::Effect;
 use crate::estimators::RecordEstimators;
 use crate::exclusion::Exclusion;
-use crate::findings::Effect;
 use crate::motion::{self, PlatformMotion};
 use crate::noise_terms::filter_length_s;
 use crate::parallel::{in_parallel, per_channel};
@@ -17,7 +17,6 @@ use crate::spectral_lines::MergedLine;
 use crate::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::unexplained;
 use crate::uniform_series::UniformSeries;
-use allan_core::NoiseTerm;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 
 /// A recording with what was found in all of it.
@@ -55,10 +54,7 @@ impl<'a> TracedRecord<'a> {
         let samples = PartSamples { record, series: &series, biases, seeks_signals: true };
         let data = PartData { profile: &measurement.profile, curves: &estimators.both, samples: Some(samples) };
         let part = TracedPart::fit(&data);
-        let distance_of_levels = |channel: ChannelId| {
-            let telegraph = part.channels[channel].telegraph.as_ref()?;
-            telegraph.effect.parameters.get("amplitude").map(|amplitude| amplitude.value)
-        };
+        let distance_of_levels = |channel: ChannelId| Some(part.channels[channel].telegraph.as_ref()?.amplitude.value);
         let motions = motion::of_platform(moved, distance_of_levels);
         Self { record, noise_grids, preprocessing, estimators, series, part, motions }
     }
@@ -103,39 +99,43 @@ impl<'a> TracedRecord<'a> {
         let Self { preprocessing, estimators, .. } = self;
         let measurement = self.measurement();
         let (trace, own) = (&self.part.channels[channel], &self.series[channel]);
-        let moved = self.motions[channel].iter().map(|motion| &motion.effect);
+        let moved = self.motions[channel].iter().map(|motion| Effect::from(motion.effect));
         let of_samples = self.record.channels[channel].effects.iter().chain(preprocessing.effects(channel));
-        let mut effects: Vec<Effect> = moved.chain(of_samples).cloned().collect();
+        let mut effects: Vec<Effect> = moved.chain(of_samples.cloned()).collect();
         // The longest octaves of the curve see a sinusoid of a few periods as a ramp.
         let has_ramp = preprocessing.has_ramp(channel) || trace.lines.iter().any(MergedLine::is_slow);
         let (mut named, by_curve) = self.part.named_effects(&measurement.profile, &estimators.both, channel, common);
         // The response that is not proportional has the sensitivity too.
         let responds = preprocessing.responds_to_temperature(channel);
-        named.retain(|effect| !responds || effect.kind != "temperature");
-        let is_ramp = |effect: &Effect| {
-            let slope = effect.parameters.get("slope").map_or(0.0, |slope| slope.value);
-            !has_ramp && goes_as_far_as_ramp(own, slope)
+        named.retain(|effect| !responds || !matches!(effect, Effect::TemperatureSensitivity(_)));
+        let is_named = |effect: &Effect| match effect {
+            Effect::LinearDrift(of) => !has_ramp && goes_as_far_as_ramp(own, of.slope.value),
+            _ => true,
         };
-        let is_named = |effect: &Effect| effect.kind != NoiseTerm::RateRamp.name() || is_ramp(effect);
         effects.extend(named.into_iter().filter(is_named));
         if let Some(unexplained) = &by_curve {
             effects.retain(|effect| !unexplained::is_contradicted(effect, unexplained));
         }
-        effects.extend(by_curve);
+        effects.extend(by_curve.map(Effect::from));
         effects.retain(|effect| !trace.signals.has(effect, &trace.lines));
         effects.extend(trace.signals.effects());
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
         let level = temperature.and_then(|of| unexplained::level_by_temperature(own, &self.series[of]));
         if level.is_some() {
             // The limit above which a sample is a spike is that of a constant level.
-            effects.retain(|effect| effect.kind != "spikes");
+            effects.retain(|effect| !matches!(effect, Effect::Spikes(_)));
         }
-        effects.extend(level);
+        effects.extend(level.map(Effect::from));
         // Jumps to and fro from one sample to the next.
-        let telegraph = effects.iter().find(|effect| effect.kind == "telegraph").cloned();
-        let is_visit = |effect: &Effect| {
-            let explains = |telegraph| random_telegraph::explains_spikes(telegraph, effect, measurement.period_s());
-            effect.kind == "spikes" && telegraph.as_ref().is_some_and(explains)
+        let telegraph = effects.iter().find_map(|effect| match effect {
+            Effect::TelegraphNoise(telegraph) => Some(*telegraph),
+            _ => None,
+        });
+        let is_visit = |effect: &Effect| match (effect, &telegraph) {
+            (Effect::Spikes(spikes), Some(telegraph)) => {
+                random_telegraph::explains_spikes(telegraph, spikes, measurement.period_s())
+            }
+            _ => false,
         };
         effects.retain(|effect| !is_visit(effect));
         effects

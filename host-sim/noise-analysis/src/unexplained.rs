@@ -1,9 +1,11 @@
 //! What a model leaves beyond chance: the point of the curve that contradicts it most, and a level of the noise that changes with
 //! the temperature.
 
+use crate::bounds::BoundedEstimate;
 use crate::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::distributions::{NORMAL_975, ROUNDING, quantile, upper_tail};
-use crate::findings::{Effect, Parameter, SIGNIFICANCE};
+use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
+use crate::findings::SIGNIFICANCE;
 use crate::series::Series;
 use allan_core::{AllanPoint, Model};
 use measurement::SensorProfile;
@@ -45,7 +47,7 @@ pub(crate) fn by_curve(
     profile: &SensorProfile,
     resolution: f64,
     of_covariates: f64,
-) -> Option<Effect> {
+) -> Option<Unexplained> {
     let (curve, model) = (&fit.covariates.curve, fit.after());
     // Without dither the rounding error is no white noise.
     let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
@@ -67,33 +69,29 @@ pub(crate) fn by_curve(
     let first = residuals[..at].iter().rev().take_while(is_part).last().unwrap_or(worst);
     let last = residuals[at..].iter().take_while(is_part).last().unwrap_or(worst);
     let percent = |avar: f64| 100.0 * ((avar / model.avar(worst.point.n)).sqrt() - 1.0);
-    let excess = Parameter::new(percent(worst.point.avar), percent(worst.point.low), percent(worst.point.high), "%");
-    let tau = Parameter::new(worst.point.tau, first.point.tau, last.point.tau, "s");
-    let evidence = format!(
-        "{:+.0} % of the model's Allan deviation at tau = {:.3} s, by chance anywhere in the curve {:.0e}; no effect that \
-         is known here explains it",
-        excess.value,
-        worst.point.tau,
-        (worst.p_value * residuals.len() as f64).min(1.0),
-    );
-    Some(Effect::new("unexplained", [("tau", tau), ("excess_percent", excess)], evidence))
+    Some(Unexplained {
+        place: UnexplainedPlace::AveragingTime(BoundedEstimate::new(worst.point.tau, first.point.tau, last.point.tau)),
+        excess_percent: Some(BoundedEstimate::new(
+            percent(worst.point.avar),
+            percent(worst.point.low),
+            percent(worst.point.high),
+        )),
+        observation: Observation::PointOfCurve { p_value: (worst.p_value * residuals.len() as f64).min(1.0) },
+    })
 }
 
 /// Whether an effect that was read off the curve is contradicted by what the model with it leaves `unexplained` there: a Markov
 /// process whose largest Allan deviation, at 1.89 time constants, is within two octaves of it.
-pub(crate) fn is_contradicted(effect: &Effect, unexplained: &Effect) -> bool {
-    let value = |of: &Effect, name: &str| of.parameters.get(name).map(|parameter| parameter.value);
-    let (Some(time_constant), Some(tau)) = (value(effect, "time_constant"), value(unexplained, "tau")) else {
-        return false;
-    };
-    effect.kind == "markov" && (tau / (MARKOV_PEAK * time_constant)).log2().abs() <= 2.0
+pub(crate) fn is_contradicted(effect: &Effect, unexplained: &Unexplained) -> bool {
+    let (Effect::MarkovProcess(markov), Some(tau_s)) = (effect, unexplained.tau_s()) else { return false };
+    (tau_s.value / (MARKOV_PEAK * markov.time_constant_s.value)).log2().abs() <= 2.0
 }
 
 /// A level of the noise that changes with the temperature: no effect that has a name.
 ///
 /// The level of a block is half the mean square of the differences of neighbouring samples. Its logarithm is regressed on the mean
 /// temperature of the block.
-pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Option<Effect> {
+pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Option<Unexplained> {
     let (first, last) = (*series.slots.first()?, *series.slots.last()?);
     let block_of = |slot: u64| ((slot - first) * LEVEL_BLOCKS as u64 / (last - first + 1)) as usize;
     let mut levels = vec![(0.0, 0_u32); LEVEL_BLOCKS];
@@ -136,21 +134,11 @@ pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Opt
         return None;
     }
     let (a, b) = (percent(slope - NORMAL_975 * error), percent(slope + NORMAL_975 * error));
-    let period_s = series.period_s;
-    let evidence = format!(
-        "the level of the noise changes by {:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes follow the \
-         measured temperature, and no effect that is known here changes it",
-        percent(slope),
-        100.0 * explained,
-    );
-    Some(Effect::new(
-        "unexplained",
-        [
-            ("tau", Parameter::new(period_s, period_s, period_s, "s")),
-            ("excess_percent", Parameter::new(percent(slope), a.min(b), a.max(b), "%")),
-        ],
-        evidence,
-    ))
+    Some(Unexplained {
+        place: UnexplainedPlace::AveragingTime(BoundedEstimate::exact(series.period_s)),
+        excess_percent: Some(BoundedEstimate::new(percent(slope), a.min(b), a.max(b))),
+        observation: Observation::LevelByTemperature { range_degc: [coldest, warmest], explained },
+    })
 }
 
 /// The deviation of a point, less what a rounding error of this variance can add or take away.
@@ -214,7 +202,7 @@ mod tests {
         // the relative variance 3/1000, the slope over the range is known to 0.5·√(3/1000/64)/0.35, which is 1 % of 1.49.
         let found =
             level_by_temperature(&noise(1, |at| (0.04 * temperature_c(at)).exp()), &temperature).expect("follows");
-        let excess = found.parameters["excess_percent"].value;
+        let excess = found.excess_percent.expect("a size").value;
         assert!((excess - 100.0 * 0.4_f64.exp_m1()).abs() < 5.0, "{excess}");
         // A constant level, and one that goes up and down twice in the meantime.
         for seed in 2..12 {

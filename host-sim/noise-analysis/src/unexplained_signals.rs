@@ -1,8 +1,9 @@
 //! Signals in the samples of a channel that no effect of a name has: a slow periodic one that is no sinusoid, a line whose
 //! frequency runs, and disturbances that begin at once and decay. What was named in their place is taken back.
 
+use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
-use crate::findings::{Effect, Parameter};
+use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
@@ -60,41 +61,44 @@ impl UnexplainedSignals {
     /// Whether what an effect of the channel tells is a part of one of the signals. `lines` are the other lines of the spectrum; those
     /// of the curve are known to an octave.
     pub(crate) fn has(&self, effect: &Effect, lines: &[MergedLine]) -> bool {
-        match effect.kind.as_str() {
-            "markov" | "telegraph" => effect.parameters.get("time_constant").is_some_and(|time| {
-                let is_decay = |decays: &DecayingDisturbances| {
-                    (time.value / decays.time_constant.value).log2().abs() <= SAME_TIME_OCTAVES
-                };
-                let is_periodic = |periodic: &PeriodicSignal| time.value > LEAST_OF_PERIOD * periodic.period_s();
-                let is_track = |track: &FrequencyTrack| {
-                    let [least, most] = OF_TRACK_PERIOD;
-                    let [first, last] = track.frequencies;
-                    (least / first.max(last)..=most / first.min(last)).contains(&time.value)
-                };
-                self.periodic.as_ref().is_some_and(is_periodic)
-                    || self.track.as_ref().is_some_and(is_track)
-                    || self.decays.as_ref().is_some_and(is_decay)
-            }),
+        let is_process = |time_constant_s: f64| {
+            let is_decay = |decays: &DecayingDisturbances| {
+                (time_constant_s / decays.time_constant.value).log2().abs() <= SAME_TIME_OCTAVES
+            };
+            let is_periodic = |periodic: &PeriodicSignal| time_constant_s > LEAST_OF_PERIOD * periodic.period_s();
+            let is_track = |track: &FrequencyTrack| {
+                let [least, most] = OF_TRACK_PERIOD;
+                let [first, last] = track.frequencies;
+                (least / first.max(last)..=most / first.min(last)).contains(&time_constant_s)
+            };
+            self.periodic.as_ref().is_some_and(is_periodic)
+                || self.track.as_ref().is_some_and(is_track)
+                || self.decays.as_ref().is_some_and(is_decay)
+        };
+        let is_line = |frequency_hz: f64| {
+            let is_in_spectrum = lines.iter().any(|line| line.frequency.value == frequency_hz);
+            let is_periodic = |periodic: &PeriodicSignal| periodic.reaches(frequency_hz);
+            let is_track = |track: &FrequencyTrack| track.passes(frequency_hz);
+            let is_part = self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track);
+            is_part && !is_in_spectrum
+        };
+        match effect {
+            Effect::MarkovProcess(of) => is_process(of.time_constant_s.value),
+            Effect::TelegraphNoise(of) => is_process(of.time_constant_s.value),
             // An octave of the curve.
-            "unexplained" => effect.parameters.get("tau").is_some_and(|tau| {
+            Effect::Unexplained(of) => of.tau_s().is_some_and(|tau_s| {
                 self.decays.as_ref().is_some_and(|decays| {
-                    (tau.value / (MARKOV_PEAK * decays.time_constant.value)).log2().abs() <= SAME_TIME_OCTAVES
+                    (tau_s.value / (MARKOV_PEAK * decays.time_constant.value)).log2().abs() <= SAME_TIME_OCTAVES
                 })
             }),
-            "sinusoid" | "resonance" => effect.parameters.get("frequency").is_some_and(|frequency| {
-                let is_in_spectrum = lines.iter().any(|line| line.frequency.value == frequency.value);
-                let is_periodic = |periodic: &PeriodicSignal| periodic.reaches(frequency.value);
-                let is_track = |track: &FrequencyTrack| track.passes(frequency.value);
-                let is_part =
-                    self.periodic.as_ref().is_some_and(is_periodic) || self.track.as_ref().is_some_and(is_track);
-                is_part && !is_in_spectrum
-            }),
-            "rate_ramp" => self.periodic.is_some(),
+            Effect::SinusoidalLine(of) => is_line(of.frequency_hz.value),
+            Effect::ResonantLine(of) => is_line(of.frequency_hz.value),
+            Effect::LinearDrift(_) => self.periodic.is_some(),
             // A sawtooth falls by π times the amplitude of its fundamental; less than a period from the ends of a record a fall is a step.
-            "bias_step" => effect.parameters.get("size").is_some_and(|size| {
-                let least = size.low.abs().min(size.high.abs());
+            Effect::LevelStep(of) => {
+                let least = of.size.low.abs().min(of.size.high.abs());
                 self.periodic.as_ref().is_some_and(|periodic| least < PI * periodic.amplitude)
-            }),
+            }
             _ => false,
         }
     }
@@ -103,65 +107,64 @@ impl UnexplainedSignals {
     pub(crate) fn effects(&self) -> impl Iterator<Item = Effect> {
         let periodic = self.periodic.as_ref().map(periodic_effect);
         let track = self.track.as_ref().map(track_effect);
-        periodic.into_iter().chain(track).chain(self.decays.as_ref().map(decays_effect))
+        periodic.into_iter().chain(track).chain(self.decays.as_ref().map(decays_effect)).map(Effect::from)
     }
 }
 
-fn periodic_effect(periodic: &PeriodicSignal) -> Effect {
-    let evidence = format!(
-        "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, {:.0} times the noise, by \
-         chance at any period {:.0e}",
-        periodic.period_s(),
-        periodic.harmonics_percent.value,
-        periodic.sum,
-        periodic.p_value,
-    );
-    let count = periodic.harmonics();
-    let parameters = [
-        ("frequency", periodic.frequency.clone()),
-        ("excess_percent", periodic.harmonics_percent.clone()),
-        ("harmonics", Parameter::new(count, count, count, "")),
-    ];
-    Effect::new("unexplained", parameters, evidence)
+fn periodic_effect(periodic: &PeriodicSignal) -> Unexplained {
+    Unexplained {
+        place: UnexplainedPlace::Frequency(periodic.frequency),
+        excess_percent: Some(periodic.harmonics_percent),
+        observation: Observation::PeriodicSignal {
+            harmonics: periodic.harmonics(),
+            sum: periodic.sum,
+            p_value: periodic.p_value,
+        },
+    }
 }
 
-fn track_effect(track: &FrequencyTrack) -> Effect {
+fn track_effect(track: &FrequencyTrack) -> Unexplained {
     let [first, last] = track.frequencies;
     let middle = 0.5 * (first + last);
-    let frequency = Parameter::new(middle, first.min(last) - track.error, first.max(last) + track.error, "Hz");
+    let frequency_hz = BoundedEstimate::new(middle, first.min(last) - track.error, first.max(last) + track.error);
     // Of the Allan deviation of what a filter around the line would pass.
     let percent = |excess: f64| 100.0 * ((1.0 + excess.max(0.0)).sqrt() - 1.0);
     let half = NORMAL_975 * track.excess_error;
-    let excess = Parameter::new(percent(track.excess), percent(track.excess - half), percent(track.excess + half), "%");
-    let evidence = format!(
-        "a line whose frequency runs from {first:.2} to {last:.2} Hz over the record, {:+.0} % of the noise of short spectra, by chance \
-         anywhere {:.0e}: a speed that changes",
-        100.0 * track.excess,
-        track.p_value,
-    );
-    Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence)
+    Unexplained {
+        place: UnexplainedPlace::Frequency(frequency_hz),
+        excess_percent: Some(BoundedEstimate::new(
+            percent(track.excess),
+            percent(track.excess - half),
+            percent(track.excess + half),
+        )),
+        observation: Observation::RunningLine {
+            frequencies_hz: track.frequencies,
+            excess: track.excess,
+            p_value: track.p_value,
+        },
+    }
 }
 
-fn decays_effect(decays: &DecayingDisturbances) -> Effect {
-    let time = &decays.time_constant;
-    let of_peak = |time_s: f64| MARKOV_PEAK * time_s;
-    let tau = Parameter::new(of_peak(time.value), of_peak(time.low), of_peak(time.high), "s");
-    let evidence = format!(
-        "disturbances {} that begin at once and decay within {:.2} s: the third moment behind a filter for such is {:.1} standard deviations \
-         from that of a Gaussian process, by chance {:.0e}, and {:.1} behind the same filter in reversed time",
-        if decays.sum > 0.0 { "upwards" } else { "downwards" },
-        time.value,
-        decays.sum.abs(),
-        decays.p_value,
-        decays.reversed.abs(),
-    );
-    Effect::new("unexplained", [("tau", tau)], evidence)
+fn decays_effect(decays: &DecayingDisturbances) -> Unexplained {
+    Unexplained {
+        place: UnexplainedPlace::AveragingTime(decays.time_constant.scaled(MARKOV_PEAK)),
+        excess_percent: None,
+        observation: Observation::DecayingDisturbances {
+            time_constant_s: decays.time_constant.value,
+            sum: decays.sum,
+            reversed: decays.reversed,
+            p_value: decays.p_value,
+        },
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::UnexplainedSignals;
-    use crate::findings::{Effect, Parameter};
+    use crate::bounds::BoundedEstimate;
+    use crate::effects::{
+        Effect, LineEvidence, LineSource, MarkovEvidence, MarkovProcess, ResonantLine, SpectrumEvidence,
+    };
     use crate::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -179,8 +182,26 @@ mod tests {
         UnexplainedSignals::find(&series, &mut Vec::new(), &[])
     }
 
-    fn effect(kind: &str, name: &'static str, value: f64) -> Effect {
-        Effect::new(kind, [(name, Parameter::new(value, value, value, ""))], String::new())
+    fn markov(time_constant_s: f64) -> Effect {
+        MarkovProcess {
+            deviation: BoundedEstimate::exact(1.0).in_unit("g"),
+            time_constant_s: BoundedEstimate::exact(time_constant_s),
+            evidence: MarkovEvidence::Spectrum { corner_hz: 1.0, gain: 10.0 },
+        }
+        .into()
+    }
+
+    fn resonance(frequency_hz: f64) -> Effect {
+        let source =
+            LineSource::Spectrum(SpectrumEvidence { frequency_hz, width_hz: None, sigmas: 9.0, p_value: 1e-9 });
+        ResonantLine {
+            frequency_hz: BoundedEstimate::exact(frequency_hz),
+            bandwidth_hz: BoundedEstimate::exact(0.1 * frequency_hz),
+            deviation: BoundedEstimate::exact(1.0).in_unit("g"),
+            multiples: None,
+            evidence: LineEvidence { has_width: true, source },
+        }
+        .into()
     }
 
     #[test]
@@ -189,13 +210,13 @@ mod tests {
         let of_40_s = signals(|time_s| 0.3 * (time_s / 40.0).fract());
         let found: Vec<Effect> = of_40_s.effects().collect();
         let [effect_of_40_s] = &found[..] else { panic!("{found:?}") };
-        assert_eq!(effect_of_40_s.kind, "unexplained");
+        assert!(matches!(effect_of_40_s, Effect::Unexplained(_)), "{found:?}");
         // The resolution is 2.5 mHz, of which the frequency is known to a tenth.
-        assert!((effect_of_40_s.parameters["frequency"].value - 0.025).abs() < 0.000_25, "{found:?}");
-        assert!(of_40_s.has(&effect("markov", "time_constant", 9.0), &[]));
-        assert!(of_40_s.has(&effect("resonance", "frequency", 0.05), &[]));
-        assert!(!of_40_s.has(&effect("markov", "time_constant", 0.05), &[]));
-        assert!(!of_40_s.has(&effect("resonance", "frequency", 2.0), &[]));
+        assert!((effect_of_40_s.frequency_hz().expect("one").value - 0.025).abs() < 0.000_25, "{found:?}");
+        assert!(of_40_s.has(&markov(9.0), &[]));
+        assert!(of_40_s.has(&resonance(0.05), &[]));
+        assert!(!of_40_s.has(&markov(0.05), &[]));
+        assert!(!of_40_s.has(&resonance(2.0), &[]));
     }
 
     #[test]
@@ -205,12 +226,12 @@ mod tests {
         let found: Vec<Effect> = running.effects().collect();
         let [track] = &found[..] else { panic!("{found:?}") };
         // From 4 to 8 Hz, within the ordinates of 64 segments of 6.25 s.
-        let frequency = &track.parameters["frequency"];
+        let frequency = track.frequency_hz().expect("a range");
         assert!((frequency.low - 4.0).abs() < 0.2 && (frequency.high - 8.0).abs() < 0.2, "{track:?}");
-        assert!(running.has(&effect("resonance", "frequency", 6.0), &[]));
-        assert!(running.has(&effect("markov", "time_constant", 0.05), &[]));
-        assert!(!running.has(&effect("markov", "time_constant", 5.0), &[]));
-        assert!(!running.has(&effect("resonance", "frequency", 12.0), &[]));
+        assert!(running.has(&resonance(6.0), &[]));
+        assert!(running.has(&markov(0.05), &[]));
+        assert!(!running.has(&markov(5.0), &[]));
+        assert!(!running.has(&resonance(12.0), &[]));
         assert_eq!(signals(|_| 0.0).effects().count(), 0);
     }
 }

@@ -4,12 +4,11 @@
 use adis16405_driver::GyroRange;
 use measurement::Measurement;
 use noise_analysis::analysis::analyze;
-use noise_analysis::findings::Effect;
+use noise_analysis::effects::Effect;
 use noise_analysis::report::{ChannelReport, CurvePoint, ModelReport, Parameter, Report, TermReport};
 use recordings::count_table;
 use recordings::time_base::measurement;
 use simulation::Simulation;
-use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
 
 /// A 95 % interval is 1.96 standard deviations to either side.
@@ -98,7 +97,7 @@ fn white_noise(channel: &ChannelReport, add: &mut impl FnMut(String)) {
 /// formulas at a few samples.
 fn curve_of_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let has_covariates =
-        channel.effects.iter().any(|of| ["temperature", "supply", "acceleration"].contains(&of.kind.as_str()));
+        channel.effects.iter().any(|of| ["temperature", "supply", "acceleration"].contains(&of.effect.name()));
     for (name, model) in [("before", &channel.before), ("final", &channel.refitted)] {
         if (name == "final" && has_covariates) || model.terms.iter().any(|term| !POWERS.contains(&term.kind.as_str())) {
             continue;
@@ -121,7 +120,7 @@ fn curve_by_spectrum(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     if ["temp", "supply"].contains(&channel.name.as_str()) || quarters.is_some_and(|of| of.is_nonstationary()) {
         return;
     }
-    let drifts = channel.effects.iter().any(|effect| DRIFTS.contains(&effect.kind.as_str()));
+    let drifts = channel.effects.iter().any(|shown| DRIFTS.contains(&shown.effect.name()));
     for &CurvePoint { tau_s, adev, edf, adev_by_spectrum, replaced_percent, .. } in &channel.curve {
         let is_compared = adev > 0.0 && replaced_percent == 0.0 && (tau_s < 1.0 || !drifts);
         let Some(by_spectrum) = adev_by_spectrum.filter(|_| is_compared) else { continue };
@@ -133,36 +132,40 @@ fn curve_by_spectrum(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     }
 }
 
-/// Whether two sets of parameters are of one line, or have no frequency. Octaves tell a frequency to some tenths.
-fn is_one_line(a: &BTreeMap<String, Parameter>, b: &BTreeMap<String, Parameter>) -> bool {
-    let frequencies = a.get("frequency").zip(b.get("frequency"));
-    frequencies.is_none_or(|(a, b)| (a.value / b.value).ln().abs() < 0.25)
+/// Whether two frequencies are of one line, or one of them is absent. Octaves tell a frequency to some tenths.
+fn is_one_line(a: Option<f64>, b: Option<f64>) -> bool {
+    a.zip(b).is_none_or(|(a, b)| (a / b).ln().abs() < 0.25)
+}
+
+fn frequency_of(term: &TermReport) -> Option<f64> {
+    term.parameters.get("frequency").map(|frequency| frequency.value)
+}
+
+fn frequency(effect: &Effect) -> Option<f64> {
+    effect.frequency_hz().map(|frequency_hz| frequency_hz.value)
 }
 
 /// A parameter of an effect and that of the model's term of the same kind.
 fn effects_and_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
-    for effect in &channel.effects {
+    let effects = || channel.effects.iter().map(|shown| &shown.effect);
+    for effect in effects() {
         // A term is the line whose frequency is nearest, which may be one that has no name.
-        let is_nearest = |parameters: &BTreeMap<String, Parameter>| {
-            let distance = |of: &BTreeMap<String, Parameter>| {
-                let frequencies = of.get("frequency").zip(parameters.get("frequency"));
-                frequencies.map_or(f64::INFINITY, |(a, b)| (a.value / b.value).ln().abs())
-            };
-            channel.effects.iter().all(|other| distance(&effect.parameters) <= distance(&other.parameters))
+        let is_nearest = |of: Option<f64>| {
+            let distance = |other: &Effect| frequency(other).zip(of).map_or(f64::INFINITY, |(a, b)| (a / b).ln().abs());
+            effects().all(|other| distance(effect) <= distance(other))
         };
-        let is_same = |kind: &str, parameters| {
-            kind == effect.kind && is_one_line(parameters, &effect.parameters) && is_nearest(parameters)
-        };
-        let terms = channel.refitted.terms.iter().filter(|term| is_same(&term.kind, &term.parameters));
+        let is_same =
+            |name: &str, of: Option<f64>| name == effect.name() && is_one_line(of, frequency(effect)) && is_nearest(of);
+        let terms = channel.refitted.terms.iter().filter(|term| is_same(&term.kind, frequency_of(term)));
         let [term] = terms.collect::<Vec<_>>()[..] else { continue };
-        if channel.effects.iter().filter(|other| is_same(&other.kind, &other.parameters)).count() > 1 {
+        if effects().filter(|other| is_same(other.name(), frequency(other))).count() > 1 {
             continue;
         }
-        for (name, parameter) in &effect.parameters {
+        for (name, parameter) in effect.parameters() {
             if let Some(of) = term.parameters.get(name)
-                && contradict(parameter, of)
+                && contradict(&parameter, of)
             {
-                add(format!("effect {} {name} {parameter:?}, its term {of:?}", effect.kind));
+                add(format!("effect {} {name} {parameter:?}, its term {of:?}", effect.name()));
             }
         }
     }
@@ -170,14 +173,16 @@ fn effects_and_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
 
 /// Each effect and the finding that it refers to.
 fn effects_and_findings(report: &Report, channel: &ChannelReport, add: &mut impl FnMut(String)) {
-    for effect in &channel.effects {
-        match report.findings.get(effect.finding) {
-            None => add(format!("{} refers to finding {}, which is absent", effect.kind, effect.finding)),
+    for shown in &channel.effects {
+        let name = shown.effect.name();
+        match report.findings.get(shown.finding) {
+            None => add(format!("{name} refers to finding {}, which is absent", shown.finding)),
             Some(finding) => {
                 // A channel in which a line is weak may not resolve the width that others show.
-                let is_same = finding.kind == effect.kind || (finding.kind == "resonance" && effect.kind == "sinusoid");
+                let of_finding = finding.effect.name();
+                let is_same = of_finding == name || (of_finding == "resonance" && name == "sinusoid");
                 if !is_same || !finding.channels.contains(&channel.name) {
-                    add(format!("{} refers to the finding {} of {:?}", effect.kind, finding.kind, finding.channels));
+                    add(format!("{name} refers to the finding {of_finding} of {:?}", finding.channels));
                 }
             }
         }
@@ -190,7 +195,8 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let baseline = ["angle_random_walk", "bias_instability", "rate_random_walk"];
     // Where rounding hides the noise, terms stand for the rounding.
     let is_rounding = |kind: &str| kind == "noise_below_count" || kind == "quantization";
-    if channel.effects.iter().any(|effect| is_rounding(&effect.kind)) {
+    let effects = || channel.effects.iter().map(|shown| &shown.effect);
+    if effects().any(|effect| is_rounding(effect.name())) {
         return;
     }
     // What the whole record no longer shows: its size may be 0.
@@ -199,21 +205,21 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     };
     let added = |term: &&TermReport| !baseline.contains(&term.kind.as_str()) && !may_be_nothing(term);
     for term in channel.refitted.terms.iter().filter(added) {
-        let frequency = term.parameters.get("frequency").map(|frequency| frequency.value);
-        let is_of = |kind: &str| channel.effects.iter().any(|effect| effect.kind == kind);
+        let of_term = frequency_of(term);
+        let is_of = |kind: &str| effects().any(|effect| effect.name() == kind);
         // Disturbances of which the curve shows a line have the averaging time at which that is largest, 0.371/f, within an octave on
         // either side and the tenths to which octaves tell a frequency.
         let is_octave = |effect: &Effect| {
-            let tau = effect.parameters.get("tau").filter(|_| effect.kind == "unexplained");
-            tau.zip(frequency).is_some_and(|(tau, frequency)| (tau.value * frequency / 0.371).ln().abs() < 3f64.ln())
+            let Effect::Unexplained(unexplained) = effect else { return false };
+            let tau_s = unexplained.tau_s().zip(of_term);
+            tau_s.is_some_and(|(tau_s, frequency)| (tau_s.value * frequency / 0.371).ln().abs() < 3f64.ln())
         };
         let is_told = match term.kind.as_str() {
-            "sinusoid" | "resonance" => channel.effects.iter().any(|effect| {
-                let of = effect.parameters.get("frequency").map(|frequency| frequency.value);
+            "sinusoid" | "resonance" => effects().any(|effect| {
                 // Octaves tell a frequency to some tenths. A wave that is no sinusoid has lines at multiples of its frequency.
-                of.zip(frequency).is_some_and(|(of, frequency)| {
+                frequency(effect).zip(of_term).is_some_and(|(of, frequency)| {
                     let multiple = (frequency / of).round().max(1.0);
-                    let is_wave = effect.kind == "square_wave" || effect.parameters.contains_key("harmonics");
+                    let is_wave = effect.name() == "square_wave" || effect.parameters().contains_key("harmonics");
                     (frequency / of / if is_wave { multiple } else { 1.0 }).ln().abs() < 0.25
                 }) || is_octave(effect)
             }),
@@ -227,7 +233,7 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
             kind => is_of(kind),
         };
         if !is_told {
-            let effects: Vec<&str> = channel.effects.iter().map(|effect| effect.kind.as_str()).collect();
+            let effects: Vec<&str> = effects().map(Effect::name).collect();
             add(format!("the model has {} {:?}, and no effect of {effects:?} is it", term.kind, term.parameters));
         }
     }
@@ -237,17 +243,18 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
 /// largest where sin⁴x/x² is, at τ = 0.371/f, 0.525·A² (IEEE Std 952); a deviation of a resonance is that of the sinusoid over √2.
 fn lines_in_model(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let model = &channel.refitted;
-    for effect in &channel.effects {
-        let of = |name: &str| effect.parameters.get(name).map(|parameter| parameter.value);
+    for effect in channel.effects.iter().map(|shown| &shown.effect) {
+        let parameters = effect.parameters();
+        let of = |name: &str| parameters.get(name).map(|parameter| parameter.value);
         let (Some(frequency), Some(amplitude)) =
             (of("frequency"), of("amplitude").or_else(|| Some(2f64.sqrt() * of("deviation")?)))
         else {
             continue;
         };
-        if !["sinusoid", "resonance"].contains(&effect.kind.as_str()) || model.terms.len() == MAX_TERMS {
+        if !["sinusoid", "resonance"].contains(&effect.name()) || model.terms.len() == MAX_TERMS {
             continue;
         }
-        let is_it = |term: &TermReport| is_one_line(&term.parameters, &effect.parameters) && term.kind != "markov";
+        let is_it = |term: &TermReport| is_one_line(frequency_of(term), Some(frequency)) && term.kind != "markov";
         let has_it = model.terms.iter().filter(|term| term.parameters.contains_key("frequency")).any(is_it);
         let share = |point: &CurvePoint| {
             let x = PI * frequency * point.tau_s;
@@ -256,7 +263,7 @@ fn lines_in_model(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         let is_visible =
             |point: &CurvePoint| share(point) * (0.5 * point.edf).sqrt() > CONTRADICTION * point.adev.powi(2);
         if !has_it && channel.curve.iter().any(is_visible) {
-            add(format!("{} {:?} is not in the model", effect.kind, effect.parameters));
+            add(format!("{} {parameters:?} is not in the model", effect.name()));
         }
     }
 }

@@ -52,7 +52,7 @@ fn kinds(report: &Report) -> Vec<(&str, Vec<&str>)> {
     report
         .findings
         .iter()
-        .map(|finding| (finding.kind.as_str(), finding.channels.iter().map(String::as_str).collect()))
+        .map(|finding| (finding.effect.name(), finding.channels.iter().map(String::as_str).collect()))
         .collect()
 }
 
@@ -70,18 +70,18 @@ fn a_square_wave_on_three_accelerometers_is_one_finding() {
     assert_eq!(kinds(&report), [("square_wave", vec!["accl_x", "accl_y", "accl_z"])]);
     let finding = &report.findings[0];
     assert_eq!(finding.validated, Validation::Yes, "{finding:?}");
-    let found = &finding.parameters["frequency"];
+    let found = &finding.effect.parameters()["frequency"];
     assert!(found.low < frequency && frequency < found.high && found.high - found.low < 1e-3, "{found:?}");
     for channel in &report.channels {
         let amplitude = size(&channel.name);
-        let effects: Vec<_> = channel.effects.iter().map(|effect| (effect.kind.as_str(), effect.finding)).collect();
+        let effects: Vec<_> = channel.effects.iter().map(|effect| (effect.effect.name(), effect.finding)).collect();
         if amplitude == 0.0 {
             assert!(effects.is_empty(), "{}: {effects:?}", channel.name);
             continue;
         }
         assert_eq!(effects, [("square_wave", 0)]);
         // The fundamental's error is √(2/60,000) of 5 mg, 0.3 % of the smallest wave; the samples are 0.5 % of a half period.
-        let found = channel.effects[0].parameters["amplitude"].value;
+        let found = channel.effects[0].effect.parameters()["amplitude"].value;
         assert!((found / amplitude - 1.0).abs() < 0.02, "{}: {found} of {amplitude}", channel.name);
         // At half a period nearly all of the variance is the wave's: 8 mg beside 5 mg/√94.
         let share = finding.share_percent[&channel.name];
@@ -126,7 +126,7 @@ fn a_bias_behind_a_lag_and_one_with_a_curvature_are_told_from_a_proportional_one
         [("thermal_lag", vec!["gyro_x"]), ("temperature_squared", vec!["gyro_y"]), ("temperature", vec!["gyro_z"])];
     assert_eq!(kinds(&report), expected);
     let agrees = |finding: usize, name: &str, truth: f64, tolerance: f64| {
-        let of = &report.findings[finding].parameters[name];
+        let of = &report.findings[finding].effect.parameters()[name];
         // Four standard deviations.
         let half = 4.0 * (of.high - of.low) / (2.0 * 1.96);
         assert!(
@@ -139,7 +139,7 @@ fn a_bias_behind_a_lag_and_one_with_a_curvature_are_told_from_a_proportional_one
     agrees(0, "sensitivity", lagged_by, 0.05);
     // The temperature moves by 10 °C once: the standard deviation of the curvature is a tenth of it.
     agrees(1, "curvature", curvature, 0.4);
-    let reference = report.findings[1].parameters["reference"].value;
+    let reference = report.findings[1].effect.parameters()["reference"].value;
     agrees(1, "sensitivity", 2.0 * curvature * (reference - vertex), 0.6);
     // What is left is white noise: no random walk is needed.
     let channel = report.channels.iter().find(|of| of.name == "gyro_x").expect("recorded");
@@ -162,7 +162,7 @@ fn a_proportional_response_is_not_behind_a_lag_because_the_thermometer_rounds() 
         };
         let report = analyze(&recorded(450.0, seed, &waveform));
         assert_eq!(kinds(&report), [("temperature", vec!["accl_x"])], "seed {seed}");
-        let found = &report.findings[0].parameters["sensitivity"];
+        let found = &report.findings[0].effect.parameters()["sensitivity"];
         // Four standard deviations, and the rounding.
         let half = 4.0 * (found.high - found.low) / (2.0 * 1.96);
         assert!((found.value - SENSITIVITY).abs() < half, "seed {seed}: {found:?}");
@@ -202,7 +202,7 @@ fn a_narrow_resonance_is_no_sinusoid() {
         let report = analyze(&recorded(SECONDS, seed, &waveform));
         let of = |name: &str| {
             let channel = report.channels.iter().find(|of| of.name == name).expect("recorded");
-            channel.effects.iter().map(|effect| effect.kind.as_str()).collect::<Vec<_>>()
+            channel.effects.iter().map(|shown| shown.effect.name()).collect::<Vec<_>>()
         };
         assert_eq!((of("gyro_x"), of("gyro_z")), (vec!["resonance"], vec!["sinusoid"]), "seed {seed}");
     }
@@ -228,10 +228,10 @@ fn a_bias_that_follows_the_strength_of_a_vibration_is_its_rectification() {
         _ => 0.0,
     };
     let report = analyze(&recorded(SECONDS, 4, &waveform));
-    let finding = report.findings.iter().find(|of| of.kind == "vibration_rectification");
+    let finding = report.findings.iter().find(|of| of.effect.name() == "vibration_rectification");
     let finding = finding.unwrap_or_else(|| panic!("{:?}", kinds(&report)));
     assert_eq!(finding.channels, ["gyro_y"]);
-    let found = &finding.parameters["sensitivity"];
+    let found = &finding.effect.parameters()["sensitivity"];
     assert_eq!(found.unit, "deg/s/g^2");
     // Four standard deviations. White noise of 0.4 deg/s leaves 0.4/√240,000 of a mean and, of a course that moves by 0.01 g²,
     // some 0.08 of this sensitivity.
@@ -254,7 +254,7 @@ fn a_vibration_that_nothing_follows_and_a_knock_are_no_rectification() {
         _ => 0.0,
     };
     let report = analyze(&recorded(1200.0, 5, &waveform));
-    assert!(report.findings.iter().all(|of| of.kind != "vibration_rectification"), "{:?}", report.findings);
+    assert!(report.findings.iter().all(|of| of.effect.name() != "vibration_rectification"), "{:?}", report.findings);
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn a_sensitivity_far_beyond_the_data_sheet_is_a_shared_drift() {
         };
         let report = analyze(&recorded(1200.0, 3, &waveform));
         let gyro = report.channels.into_iter().find(|of| of.name == "gyro_y").expect("recorded");
-        gyro.effects.into_iter().map(|effect| effect.kind).collect::<Vec<_>>()
+        gyro.effects.into_iter().map(|shown| shown.effect.name()).collect::<Vec<_>>()
     };
     assert_eq!(of(-4.3), ["shared_drift"]);
     // Ten times the data sheet's is a sensitivity.
@@ -284,8 +284,8 @@ fn a_chirp_is_not_a_resonance() {
     let waveform = |name: &str, time: f64| if name == "accl_y" { chirp(time) } else { 0.0 };
     let report = analyze(&recorded(600.0, 4, &waveform));
     assert!(report.findings.iter().all(|finding| finding.channels == ["accl_y"]), "{:?}", kinds(&report));
-    assert!(report.findings.iter().any(|finding| finding.kind == "unexplained"), "{:?}", kinds(&report));
-    assert!(report.findings.iter().all(|finding| finding.kind != "resonance"), "{:?}", kinds(&report));
+    assert!(report.findings.iter().any(|finding| finding.effect.name() == "unexplained"), "{:?}", kinds(&report));
+    assert!(report.findings.iter().all(|finding| finding.effect.name() != "resonance"), "{:?}", kinds(&report));
 }
 
 #[test]
@@ -304,5 +304,5 @@ fn decaying_disturbances_are_no_telegraph() {
     let waveform = |name: &str, time: f64| if name == "accl_z" { disturbance(time) } else { 0.0 };
     let report = analyze(&recorded(600.0, 6, &waveform));
     assert!(!report.findings.is_empty());
-    assert!(report.findings.iter().all(|finding| finding.kind != "telegraph"), "{:?}", kinds(&report));
+    assert!(report.findings.iter().all(|finding| finding.effect.name() != "telegraph"), "{:?}", kinds(&report));
 }

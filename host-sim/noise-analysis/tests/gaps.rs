@@ -2,7 +2,8 @@
 
 use measurement::Measurement;
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::{ChannelReport, ModelReport, Parameter, Report};
+use noise_analysis::effects::{Effect, NoisyInterval};
+use noise_analysis::report::{ChannelEffect, ChannelReport, ModelReport, Parameter, Report};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -50,16 +51,20 @@ fn a_knock_is_named_and_does_not_change_the_coefficients() {
     knock(&mut knocked, "gyro_z", 100.0..120.0, 5.0 * noise("gyro_z"));
     let (before, after) = (analyze(&quiet), analyze(&knocked));
     for of in &after.channels {
-        let knocks: Vec<_> = of.effects.iter().filter(|effect| effect.kind == "knock").collect();
+        let knock = |shown: &ChannelEffect| match &shown.effect {
+            Effect::NoisyInterval(of) => Some(of.clone()),
+            _ => None,
+        };
+        let knocks: Vec<NoisyInterval> = of.effects.iter().filter_map(knock).collect();
         if !["accl_x", "gyro_z"].contains(&of.name.as_str()) {
             assert!(knocks.is_empty(), "{}: {knocks:?}", of.name);
             assert!(!of.missing.refused.contains_key("knock"));
             continue;
         }
-        let [effect] = knocks[..] else { panic!("{}: {knocks:?}", of.name) };
-        assert!((effect.parameters["from"].value - 100.0).abs() < 0.5, "{effect:?}");
-        assert!((effect.parameters["to"].value - 120.0).abs() < 0.5, "{effect:?}");
-        assert!(effect.evidence.contains("gyro_z, accl_x"), "{}", effect.evidence);
+        let [knock] = &knocks[..] else { panic!("{}: {knocks:?}", of.name) };
+        assert!((knock.from_s.value - 100.0).abs() < 0.5, "{knock:?}");
+        assert!((knock.to_s.value - 120.0).abs() < 0.5, "{knock:?}");
+        assert_eq!(knock.channels, ["gyro_z", "accl_x"]);
         let refused = of.missing.refused["knock"];
         assert!((4_000..4_400).contains(&refused), "{refused} of 4,096");
         assert_eq!(of.missing.replaced, refused + of.missing.refused.get("spikes").copied().unwrap_or(0));

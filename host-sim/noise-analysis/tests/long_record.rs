@@ -84,10 +84,11 @@ fn channel<'a>(report: &'a Report, name: &str) -> &'a ChannelReport {
     report.channels.iter().find(|channel| channel.name == name).expect("a recorded channel")
 }
 
-fn parameter<'a>(report: &'a Report, name: &str, kind: &str, parameter: &str) -> &'a Parameter {
+fn parameter(report: &Report, name: &str, kind: &str, parameter: &str) -> Parameter {
     let effects = &channel(report, name).effects;
-    let effect = effects.iter().find(|effect| effect.kind == kind).unwrap_or_else(|| panic!("{name}: no {kind}"));
-    &effect.parameters[parameter]
+    let effect =
+        effects.iter().find(|shown| shown.effect.name() == kind).unwrap_or_else(|| panic!("{name}: no {kind}"));
+    effect.effect.parameters()[parameter].clone()
 }
 
 #[test]
@@ -121,13 +122,13 @@ fn a_condensed_recording_has_the_curves_and_the_findings_of_its_samples() {
         let size = parameter(report, "gyro_x", "spikes", "size");
         assert!((size.low..=size.high).contains(&10.0), "{size:?}");
         assert_eq!(channel(report, "gyro_x").missing.refused["spikes"], spikes(&measurement));
-        let kinds: Vec<&str> = report.findings.iter().map(|finding| finding.kind.as_str()).collect();
+        let kinds: Vec<&str> = report.findings.iter().map(|finding| finding.effect.name()).collect();
         let mut sorted = kinds.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, ["dropped_samples", "sinusoid", "sinusoid", "spikes", "temperature"], "{kinds:?}");
     }
     // The spikes are as frequent and as large in either half.
-    let spikes = long.findings.iter().find(|finding| finding.kind == "spikes").expect("spikes");
+    let spikes = long.findings.iter().find(|finding| finding.effect.name() == "spikes").expect("spikes");
     assert_eq!(spikes.validated, Validation::Yes);
 }
 
@@ -146,7 +147,7 @@ fn a_fast_line_that_begins_later_is_found() {
     }
     let report = condensed(&measurement, 1 << 14);
     let effects = &channel(&report, "gyro_x").effects;
-    let lines: Vec<f64> = effects.iter().filter_map(|of| of.parameters.get("frequency")).map(|of| of.value).collect();
+    let lines: Vec<f64> = effects.iter().filter_map(|of| of.effect.frequency_hz()).map(|of| of.value).collect();
     // The slow line, and this one to 10⁻⁴, as the clock is known, and a part of the resolution of a stretch of 2¹⁶ samples, 3 mHz.
     assert!(
         lines.len() == 2 && lines.iter().any(|of| (of - FAST_LINE_HZ).abs() < 3e-3 + 1e-4 * FAST_LINE_HZ),
@@ -203,6 +204,6 @@ fn lost_samples_are_no_noise() {
     let missing = measurement.periods() - measurement.len() as u64;
     measurement.dropped = BTreeMap::from([("gap", missing)]);
     let report = analyze(&measurement);
-    let kinds: Vec<&str> = report.findings.iter().map(|finding| finding.kind.as_str()).collect();
+    let kinds: Vec<&str> = report.findings.iter().map(|finding| finding.effect.name()).collect();
     assert_eq!(kinds, ["dropped_samples"]);
 }

@@ -5,7 +5,8 @@
 use measurement::adis16405::profile;
 use measurement::{MeasuredChannel, Measurement};
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::{ChannelReport, ModelReport, Parameter, Report};
+use noise_analysis::effects::Effect;
+use noise_analysis::report::{ChannelEffect, ChannelReport, ModelReport, Parameter, Report};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -56,7 +57,7 @@ fn only(report: &Report) -> &ChannelReport {
 }
 
 fn kinds(report: &Report) -> Vec<&str> {
-    only(report).effects.iter().map(|effect| effect.kind.as_str()).collect()
+    only(report).effects.iter().map(|shown| shown.effect.name()).collect()
 }
 
 fn coefficient<'a>(model: &'a ModelReport, kind: &str) -> &'a Parameter {
@@ -68,11 +69,12 @@ fn assert_bounds_hold(report: &Report, what: &str) {
     let channel = only(report);
     let models = [&channel.before, &channel.after, &channel.refitted];
     let terms = models.into_iter().flat_map(|model| &model.terms);
-    let of_terms = terms.flat_map(|term| term.parameters.iter().map(move |(name, of)| (&term.kind, name, of)));
-    let of_effects = channel
-        .effects
-        .iter()
-        .flat_map(|effect| effect.parameters.iter().map(move |(name, of)| (&effect.kind, name, of)));
+    let of_terms = terms
+        .flat_map(|term| term.parameters.iter().map(move |(name, of)| (term.kind.as_str(), name.as_str(), of.clone())));
+    let of_effects = channel.effects.iter().flat_map(|shown| {
+        let parameters = shown.effect.parameters().into_iter();
+        parameters.map(|(name, of)| (shown.effect.name(), name, of))
+    });
     for (kind, name, Parameter { value, low, high, .. }) in of_terms.chain(of_effects) {
         assert!(low <= value && value <= high, "{what}: {kind} {name}: {value} is not in [{low}, {high}]");
     }
@@ -159,10 +161,11 @@ fn a_channel_at_the_end_of_its_range_is_saturated() {
         let at_end = counts.iter().filter(|&&count| count == 8191).count() as f64 / 30_000.0;
         let slots = || (0..30_000).collect();
         let report = analyze(&recording("accl_x", RATE_HZ, slots(), counts));
-        let [effect] = &only(&report).effects[..] else { panic!("seed {seed}: {:?}", kinds(&report)) };
-        assert_eq!(effect.kind, "saturated");
-        assert!((effect.parameters["share"].value - at_end).abs() < 1e-3, "{effect:?}");
-        assert!((effect.parameters["level"].value - 8191.0 * 3.33e-3).abs() < 0.5, "{effect:?}");
+        let [ChannelEffect { effect: Effect::Saturation(saturation), .. }] = &only(&report).effects[..] else {
+            panic!("seed {seed}: {:?}", kinds(&report))
+        };
+        assert!((saturation.fraction.value - at_end).abs() < 1e-3, "{saturation:?}");
+        assert!((saturation.level.value - 8191.0 * 3.33e-3).abs() < 0.5, "{saturation:?}");
         // A gyro that something before the output clips at ±6000 counts.
         let mut normal = normal(seed);
         let wave = |i: i32| 6500.0 * (TAU * f64::from(i) / 5000.0).sin();
@@ -200,14 +203,18 @@ fn a_slow_sinusoid_is_right_or_unnamed() {
             let mut normal = normal(seed);
             let wave = |i: i32| 100.0 * (TAU * frequency * f64::from(i) / RATE_HZ).sin();
             let report = analyze(&gyro((0..60_000).map(|i| (wave(i) + 20.0 * normal()).round() as i32).collect()));
-            for effect in &only(&report).effects {
+            for ChannelEffect { effect, .. } in &only(&report).effects {
                 let what = format!("{frequency} Hz, seed {seed}: {effect:?}");
-                assert!(["sinusoid", "unexplained"].contains(&effect.kind.as_str()), "{what}");
+                let line = match effect {
+                    Effect::SinusoidalLine(line) => line,
+                    Effect::Unexplained(_) => continue,
+                    _ => panic!("{what}"),
+                };
                 // Beside three periods a line of less than a tenth of the wave may stand in its skirts.
-                let is_skirt = frequency < 0.01 && effect.parameters.get("amplitude").is_some_and(|of| of.value < 0.5);
-                if effect.kind == "sinusoid" && !is_skirt {
-                    assert!((effect.parameters["frequency"].value / frequency - 1.0).abs() < 0.02, "{what}");
-                    assert!((effect.parameters["amplitude"].value / 5.0 - 1.0).abs() < 0.02, "{what}");
+                let is_skirt = frequency < 0.01 && line.amplitude.value < 0.5;
+                if !is_skirt {
+                    assert!((line.frequency_hz.value / frequency - 1.0).abs() < 0.02, "{what}");
+                    assert!((line.amplitude.value / 5.0 - 1.0).abs() < 0.02, "{what}");
                 }
             }
         }
@@ -233,12 +240,18 @@ fn a_sinusoid_without_noise_is_one_line() {
     let report = analyze(&gyro(
         (0..60_000).map(|i| (100.0 * (TAU * 5.0 * f64::from(i) / RATE_HZ).sin()).round() as i32).collect(),
     ));
-    let lines: Vec<_> = only(&report).effects.iter().filter(|effect| effect.kind == "sinusoid").collect();
-    let near = |effect: &&&noise_analysis::report::Effect| (effect.parameters["frequency"].value - 5.0).abs() < 0.01;
-    let five = lines.iter().find(near).unwrap_or_else(|| panic!("{:?}", only(&report).effects));
-    assert!((five.parameters["amplitude"].value / 5.0 - 1.0).abs() < 0.01, "{five:?}");
-    for effect in &only(&report).effects {
-        let size = ["amplitude", "deviation"].iter().find_map(|name| effect.parameters.get(*name));
+    let effects = &only(&report).effects;
+    let is_five = |shown: &ChannelEffect| match &shown.effect {
+        Effect::SinusoidalLine(line) if (line.frequency_hz.value - 5.0).abs() < 0.01 => {
+            assert!((line.amplitude.value / 5.0 - 1.0).abs() < 0.01, "{line:?}");
+            true
+        }
+        _ => false,
+    };
+    assert!(effects.iter().any(is_five), "{effects:?}");
+    for ChannelEffect { effect, .. } in effects {
+        let parameters = effect.parameters();
+        let size = ["amplitude", "deviation"].iter().find_map(|name| parameters.get(name));
         assert!(size.is_none_or(|size| size.value > 1e-3 * 0.05), "{effect:?}");
     }
 }

@@ -5,6 +5,7 @@ mod simulated_part;
 
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use noise_analysis::analysis::analyze;
+use noise_analysis::effects::Effect;
 use noise_analysis::report::{ChannelReport, Parameter, Report, TermReport};
 use simulated_part::{RecordedChannel, read};
 use std::collections::BTreeMap;
@@ -38,10 +39,14 @@ fn recorded(taps: usize, rate_hz: f64, is_stamped: bool, seed: u64) -> Measureme
     }
 }
 
-fn filter_terms(channel: &ChannelReport) -> impl Iterator<Item = &BTreeMap<String, Parameter>> {
+/// Decimation and taps of the filter, by the model and by the effect.
+fn filter_terms(channel: &ChannelReport) -> impl Iterator<Item = [Parameter; 2]> {
     let of_terms = channel.refitted.terms.iter().filter(|term| term.kind == "filter_bandwidth");
-    let of_effects = channel.effects.iter().filter(|effect| effect.kind == "filter_bandwidth");
-    of_terms.map(|term| &term.parameters).chain(of_effects.map(|effect| &effect.parameters))
+    let of_effects = channel.effects.iter().filter_map(|shown| match &shown.effect {
+        Effect::OutputFilter(of) => Some([of.decimation.parameter(""), of.taps.parameter("")]),
+        _ => None,
+    });
+    of_terms.map(|term| ["decimation", "taps"].map(|name| term.parameters[name].clone())).chain(of_effects)
 }
 
 fn noisy(report: &Report) -> impl Iterator<Item = &ChannelReport> {
@@ -61,9 +66,9 @@ fn all_channels_have_the_filter_and_the_clock_of_the_part() {
         assert!((clock.value - CLOCK_HZ).abs() < reach && reach < 0.02 * CLOCK_HZ, "{clock:?}");
         for channel in noisy(&report) {
             assert_eq!(filter_terms(channel).count(), 2, "{}: {:?}", channel.name, channel.effects);
-            for parameters in filter_terms(channel) {
-                assert_eq!(parameters["decimation"], *decimation, "{}", channel.name);
-                assert_eq!(parameters["taps"].value, part.taps.as_ref().expect("taps").value, "{}", channel.name);
+            for [of_channel, taps] in filter_terms(channel) {
+                assert_eq!(of_channel, *decimation, "{}", channel.name);
+                assert_eq!(taps.value, part.taps.as_ref().expect("taps").value, "{}", channel.name);
             }
         }
     }

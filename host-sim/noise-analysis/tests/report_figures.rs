@@ -42,7 +42,7 @@ fn the_share_of_a_covariate_reaches_to_the_last_octave() {
     }
     let report = analyze(&measurement);
     let (gyro, temperature) = (channel(&report, "gyro_x"), channel(&report, "temp"));
-    assert!(gyro.effects.iter().any(|effect| effect.kind == "temperature"), "{:?}", gyro.effects);
+    assert!(gyro.effects.iter().any(|shown| shown.effect.name() == "temperature"), "{:?}", gyro.effects);
     // Nearly all of the variance beyond a minute is the temperature's: β²·σ² at each octave. The sensitivity is measured to
     // a few percent, and the other terms add less than a tenth.
     let tail = gyro.curve.len() - 2..gyro.curve.len();

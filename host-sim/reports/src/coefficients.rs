@@ -2,7 +2,7 @@
 //! the page: by the slope method, beside the fit.
 
 use noise_analysis::assessment::sum_of_white_noise;
-use noise_analysis::findings::BoundedEstimate;
+use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue};
 
 /// The coefficient `kind` of a model with these terms: of each its kind, its `value` with bounds, and the unit. N is that of all white

@@ -3,8 +3,8 @@
 use crate::formatting::number;
 use crate::rounding::probability;
 use crate::saved_report::{SavedChannel, SavedPoint, SavedReport};
+use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::comparison::{Verdict, verdicts};
-use noise_analysis::findings::BoundedEstimate;
 use serde::Serialize;
 use std::io::{self, Write};
 

@@ -72,7 +72,7 @@ fn sentence(text: &str) -> String {
     format!("{first}{}{stop}", letters.as_str())
 }
 
-fn found(FindingText { channels, physics, advice, weight, brief: _ }: &FindingText) -> String {
+fn found(FindingText { channels, physics, advice, weight, .. }: &FindingText) -> String {
     format!("{channels}: {physics} {} {advice}", sentence(weight))
 }
 

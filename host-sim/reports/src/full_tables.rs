@@ -2,8 +2,9 @@
 
 use crate::coefficients::{self, CoefficientRow};
 use crate::curve_numbers::curve_numbers;
+use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
-use crate::finding_text::{FindingText, printed_evidence};
+use crate::finding_text::FindingText;
 use crate::formatting::{
     TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
     parameter_name, percent, recording_advice, words, worst_deviations, wrap,
@@ -12,7 +13,7 @@ use crate::rounding::{NONE, Scale, bounded_quantity, parameter_magnitude, probab
 use crate::summary;
 use noise_analysis::assessment::navigation::CALIBRATION_S;
 use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
-use noise_analysis::report::{ChannelReport, Report, TermReport};
+use noise_analysis::report::{ChannelEffect, ChannelReport, Report, TermReport};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
@@ -120,12 +121,9 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     for text in worst_deviations(channel) {
         writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
     }
-    for effect in &channel.effects {
-        writeln!(
-            out,
-            "{}",
-            wrap(&format!("• {}: {}", words(&effect.kind), printed_evidence(&effect.evidence)), WIDTH.into())
-        )?;
+    for ChannelEffect { effect, .. } in &channel.effects {
+        let evidence = EvidenceText::of_effect(effect, NumberStyle::Prefixed).sentence();
+        writeln!(out, "{}", wrap(&format!("• {}: {evidence}", words(effect.name())), WIDTH.into()))?;
     }
     for text in explanation::course(channel) {
         writeln!(out, "{}", wrap(&format!("• {text}"), WIDTH.into()))?;

@@ -4,12 +4,14 @@
 pub mod coefficients;
 pub mod comparison;
 mod curve_numbers;
+mod evidence;
 pub mod explanation;
 pub mod export;
 pub mod figure;
 pub mod finding_text;
 pub mod formatting;
 pub mod full_tables;
+pub mod json;
 pub mod live;
 pub mod page;
 pub mod raster;

@@ -3,9 +3,10 @@
 
 mod tables;
 
+use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
 use crate::figure::{self, Plot};
-use crate::finding_text::{FindingText, describe, printed_evidence};
+use crate::finding_text::{FindingText, describe};
 use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
@@ -187,11 +188,11 @@ fn findings(report: &Report) -> Markup {
 fn finding_section(report: &Report, index: usize, finding: &Finding, text: &FindingText) -> Markup {
     html! {
         section.finding id={ "evidence-" (index + 1) } {
-            h3 { (index + 1) ". " (words(&finding.kind)) " " small { (text.channels) } }
+            h3 { (index + 1) ". " (words(finding.effect.name())) " " small { (text.channels) } }
             p { (text.physics) " " (text.advice) }
             p.faint {
-                @if !finding.evidence.starts_with(&text.weight) { "In the record: " (text.weight) ". " }
-                (capital(printed_evidence(&finding.evidence).trim_end_matches('.'))) "."
+                @if text.is_weighed { "In the record: " (text.weight) ". " }
+                (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "."
             }
             (parameters(finding))
             @if let Some(plot) = figure::evidence(report, index) { (drawing(&plot)) }
@@ -202,7 +203,7 @@ fn finding_section(report: &Report, index: usize, finding: &Finding, text: &Find
 fn parameters(finding: &Finding) -> Markup {
     html! {
         p.parameters {
-            @for (name, parameter) in &finding.parameters {
+            @for (name, parameter) in &finding.effect.parameters() {
                 span { (parameter_name(name)) " " b { (bounded_quantity(parameter)) } }
             }
         }
@@ -234,7 +235,7 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
                         p.faint { "No finding concerns this channel." }
                     } @else {
                         p { "Findings: " @for index in own {
-                            a href={ "#evidence-" (index + 1) } { (index + 1) " " (words(&report.findings[index].kind)) } " " } }
+                            a href={ "#evidence-" (index + 1) } { (index + 1) " " (words(report.findings[index].effect.name())) } " " } }
                     }
                 }
             }

@@ -2,7 +2,7 @@
 //! JSON of schema 1 or taken from a report in memory.
 
 use crate::coefficients;
-use noise_analysis::findings::BoundedEstimate;
+use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Parameter, Report, SCHEMA, TermReport};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;

@@ -2,10 +2,11 @@
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{FindingText, channel_list, describe, place_and_excess, signed_percent};
+use crate::finding_text::{FindingText, channel_list, describe, signed_percent, unexplained_place};
 use crate::formatting::{capital, count, words};
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span, unit};
-use noise_analysis::findings::BoundedEstimate;
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::Effect;
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
@@ -276,12 +277,15 @@ pub fn unexplained(report: &Report) -> Option<String> {
     // Each channel has its own excess at the place of the finding.
     let in_channels = |number: usize| {
         let effects = report.channels.iter().flat_map(|channel| &channel.effects);
-        let shown = effects.filter(move |effect| effect.finding == number);
-        shown.filter_map(|effect| Some(effect.parameters.get("excess_percent")?.value))
+        let shown = effects.filter(move |shown| shown.finding == number);
+        shown.filter_map(|shown| match &shown.effect {
+            Effect::Unexplained(of) => Some(of.excess_percent?.value),
+            _ => None,
+        })
     };
-    let all = report.findings.iter().enumerate();
-    for (number, finding) in all.filter(|(_, finding)| finding.kind == "unexplained") {
-        let (place, excess) = place_and_excess(finding);
+    for (number, finding) in report.findings.iter().enumerate() {
+        let Effect::Unexplained(of) = &finding.effect else { continue };
+        let (place, excess) = (unexplained_place(of), of.excess_percent.map(|of| of.value));
         let excesses = in_channels(number).chain(excess);
         let is_same_side = |of: &Departure| match (of.excesses.first(), excess) {
             (Some(first), Some(excess)) => first.signum() == excess.signum(),
@@ -465,7 +469,7 @@ fn magnetometers(report: &Report) -> Vec<String> {
 #[must_use]
 pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
     let (unexplained, named): (Vec<_>, Vec<_>) =
-        report.findings.iter().partition(|finding| finding.kind == "unexplained");
+        report.findings.iter().partition(|finding| matches!(finding.effect, Effect::Unexplained(_)));
     let of_inertial = |finding: &&&noise_analysis::report::Finding| {
         finding.channels.iter().any(|name| name.starts_with("gyro_") || name.starts_with("accl_"))
     };
@@ -491,7 +495,7 @@ const SAME_LINE: f64 = 0.1;
 
 /// The line of another channel that moves with the line of a finding; `None` where none does.
 fn related_line(report: &Report, finding: &noise_analysis::report::Finding) -> Option<String> {
-    let frequency = finding.parameters.get("frequency")?.value;
+    let frequency = finding.effect.frequency_hz()?.value;
     let of = finding.channels.iter().find_map(|name| {
         let channel = report.channels.iter().find(|channel| channel.name == *name)?;
         let related = channel.nonstationarity.as_ref()?.related_line.as_ref()?;
@@ -565,17 +569,13 @@ pub fn next_steps(report: &Report) -> Vec<String> {
     let mut weighed: Vec<(f64, FindingText)> = report
         .findings
         .iter()
-        .filter(|finding| finding.kind != "unexplained")
+        .filter(|finding| !matches!(finding.effect, Effect::Unexplained(_)))
         .map(|finding| (finding.share_percent.values().copied().fold(0.0, f64::max), describe(finding)))
         .collect();
     weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut steps: Vec<String> = Vec::new();
-    for (_, text) in weighed {
-        let first = text.advice.split_inclusive(['.', ';']).next().unwrap_or_default().trim_end_matches([';', '.']);
-        let step = format!("{first}.");
-        // What the analysis has done already is no step.
-        let is_done = ["Nothing to repair", "These samples are left out"].iter().any(|done| first.starts_with(done));
-        if !is_done && !steps.contains(&step) {
+    for step in weighed.into_iter().filter_map(|(_, text)| text.step) {
+        if !steps.contains(&step) {
             steps.push(step);
         }
     }

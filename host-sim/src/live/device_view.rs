@@ -5,8 +5,16 @@ use adis16405_driver::{Channel, GyroRange};
 use anyhow::Result;
 use host_sim::monitor;
 use link::{
-    ChannelMessage, Health, Hello, LearnedMessage, Message, Received, ReportedAddedTerm, ReportedRegressor,
-    ReportedTerm, ValidationMessage,
+    ChannelMessage, Health, Hello, LearnedMessage, Message, Received, ReportedAddedTerm, ReportedParameter,
+    ReportedRegressor, ReportedTerm, ValidationMessage,
+};
+use measurement::{SensorProfile, adis16405};
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::distributions::NORMAL_975;
+use noise_analysis::effects::{
+    AccelerationSensitivity, AngleQuantization, CurveEvidence, Effect, LineEvidence, LineSource, LinearDrift,
+    LinearDriftEvidence, MarkovEvidence, MarkovProcess, OutputFilter, ResonantLine, SinusoidalLine, SupplySensitivity,
+    TemperatureSensitivity,
 };
 use noise_analysis::report::{Finding, Parameter, Validation};
 use recordings::Printable;
@@ -113,14 +121,11 @@ impl LatestMessages {
         };
         let measured =
             hello.measured_rate_hz.map_or_else(String::new, |hz| format!(" Measured rate {} Hz.", plain(hz, 6)));
-        let findings = self.findings();
+        let findings = self.findings(1.0 / hello.sample_rate_hz);
         let mut advice: Vec<String> = Vec::new();
-        for finding in &findings {
-            let told = finding_text::describe(finding).advice;
-            let first =
-                told.split_inclusive(['.', ';']).next().unwrap_or_default().trim_end_matches([';', '.']).to_owned();
-            if !first.starts_with("Nothing to repair") && !advice.contains(&first) {
-                advice.push(first);
+        for step in findings.iter().filter_map(|finding| finding_text::describe(finding).step) {
+            if !advice.contains(&step) {
+                advice.push(step);
             }
         }
         LiveView {
@@ -170,17 +175,25 @@ impl LatestMessages {
         self.channels.values().filter_map(inertial).collect()
     }
 
-    /// What the models have beyond N, B and K; what several channels share is one finding.
-    fn findings(&self) -> Vec<Finding> {
+    /// What the models have beyond N, B and K of channels that are sampled every `period_s` s; what several channels share is one
+    /// finding.
+    fn findings(&self, period_s: f64) -> Vec<Finding> {
         let mut findings: Vec<Finding> = Vec::new();
         for report in self.learned.values() {
             let Some(channel) = channel_at(report.channel) else { continue };
             let causes = report.regressors.iter().filter_map(|regressor| of_regressor(channel, regressor));
-            let terms = report.added_terms.iter().filter_map(|term| of_term(channel, term));
-            for found in causes.chain(terms) {
-                match findings.iter_mut().find(|earlier| is_shared(earlier, &found)) {
-                    Some(earlier) => earlier.channels.extend(found.channels),
-                    None => findings.push(found),
+            let terms = report.added_terms.iter().filter_map(|term| of_term(channel, term, period_s));
+            for effect in causes.chain(terms) {
+                let name = channel.name().to_owned();
+                match findings.iter_mut().find(|earlier| is_shared(&earlier.effect, &effect)) {
+                    Some(earlier) => earlier.channels.push(name),
+                    None => findings.push(Finding {
+                        effect,
+                        channels: vec![name],
+                        clearest: 0,
+                        validated: Validation::Untestable,
+                        share_percent: BTreeMap::new(),
+                    }),
                 }
             }
         }
@@ -214,71 +227,79 @@ fn curve(report: &ChannelMessage, hello: &Hello) -> Option<LiveCurve> {
     Some(LiveCurve { channel: channel.name().to_owned(), unit: channel.unit().to_owned(), points })
 }
 
-fn finding<'a>(channel: Channel, kind: &str, parameters: impl IntoIterator<Item = (&'a str, Parameter)>) -> Finding {
-    Finding {
-        kind: kind.to_owned(),
-        channels: vec![channel.name().to_owned()],
-        parameters: parameters.into_iter().map(|(name, parameter)| (name.to_owned(), parameter)).collect(),
-        evidence: String::new(),
-        validated: Validation::Untestable,
-        share_percent: BTreeMap::new(),
+fn of_regressor(channel: Channel, regressor: &ReportedRegressor) -> Option<Effect> {
+    let &ReportedRegressor { value, low, high, .. } = regressor;
+    let sensitivity = BoundedEstimate::new(value, low, high).in_unit(channel.unit());
+    let sigmas = 2.0 * NORMAL_975 * value.abs() / (high - low);
+    let along = |axis: usize| {
+        let sensitivity = std::array::from_fn(|of| (of == axis).then_some(sensitivity));
+        Effect::from(AccelerationSensitivity { sensitivity, sigmas })
+    };
+    match channel_at(regressor.covariate)? {
+        Channel::Temp => Some(TemperatureSensitivity { sensitivity, sigmas }.into()),
+        Channel::Supply => Some(SupplySensitivity { sensitivity, sigmas }.into()),
+        Channel::AcclX => Some(along(0)),
+        Channel::AcclY => Some(along(1)),
+        Channel::AcclZ => Some(along(2)),
+        _ => None,
     }
 }
 
-fn of_regressor(channel: Channel, regressor: &ReportedRegressor) -> Option<Finding> {
-    let covariate = channel_at(regressor.covariate)?;
-    let (kind, name) = match covariate {
-        Channel::Temp => ("temperature", "sensitivity"),
-        Channel::Supply => ("supply", "sensitivity"),
-        Channel::AcclX => ("acceleration", "sensitivity_x"),
-        Channel::AcclY => ("acceleration", "sensitivity_y"),
-        Channel::AcclZ => ("acceleration", "sensitivity_z"),
-        _ => return None,
-    };
-    let unit = format!("{}/{}", channel.unit(), covariate.unit());
-    Some(finding(channel, kind, [(name, Parameter::new(regressor.value, regressor.low, regressor.high, unit))]))
-}
-
-fn of_term(channel: Channel, added: &ReportedAddedTerm) -> Option<Finding> {
-    let unit = channel.unit();
+/// The effect of a term that was added to the model of a channel which is sampled every `period_s` s.
+fn of_term(channel: Channel, added: &ReportedAddedTerm, period_s: f64) -> Option<Effect> {
     let of = &added.coefficient;
-    let size = |unit: String| Parameter::new(of.value, of.low, of.high, unit);
-    let shape = |index: usize, unit: &str| {
-        added.shape.get(index).map(|shape| Parameter::new(shape.value, shape.low, shape.high, unit))
+    let size = BoundedEstimate::new(of.value, of.low, of.high).in_unit(channel.unit());
+    let shape = |index: usize| {
+        let ReportedParameter { value, low, high } = *added.shape.get(index)?;
+        Some(BoundedEstimate::new(value, low, high))
     };
-    let (kind, parameters) = match of.term {
-        ReportedTerm::Quantization => ("quantization", vec![("value", Some(size(format!("{unit}*s"))))]),
-        ReportedTerm::RateRamp => ("rate_ramp", vec![("slope", Some(size(format!("{unit}/s"))))]),
-        ReportedTerm::Filtered => ("filter_bandwidth", vec![("taps", shape(0, "")), ("decimation", shape(1, ""))]),
-        ReportedTerm::Markov => {
-            ("markov", vec![("deviation", Some(size(unit.to_owned()))), ("time_constant", shape(0, "s"))])
+    let curve = CurveEvidence {
+        excess: added.excess,
+        tau_s: added.n as f64 * period_s,
+        sigmas: added.sigmas,
+        gain_sigmas: added.score.sqrt(),
+    };
+    let line = |has_width: bool| LineEvidence { has_width, source: LineSource::Curve(curve) };
+    let SensorProfile { internal_rate_hz, ref filters, .. } = adis16405::profile(Channel::GyroX.lsb(GyroRange::Dps300));
+    Some(match of.term {
+        ReportedTerm::Quantization => AngleQuantization { coefficient: size, evidence: curve }.into(),
+        ReportedTerm::RateRamp => LinearDrift { slope: size, evidence: LinearDriftEvidence::Curve(curve) }.into(),
+        ReportedTerm::Filtered => OutputFilter {
+            taps: shape(0)?,
+            decimation: shape(1)?,
+            white_noise: size,
+            stages: filters.first().map_or(0, |filter| filter.stages),
+            internal_rate_hz,
+            evidence: curve,
         }
-        ReportedTerm::Resonance => (
-            "resonance",
-            vec![
-                ("deviation", Some(size(unit.to_owned()))),
-                ("frequency", shape(0, "Hz")),
-                ("bandwidth", shape(1, "Hz")),
-            ],
-        ),
+        .into(),
+        ReportedTerm::Markov => {
+            let evidence = MarkovEvidence::Curve(curve);
+            MarkovProcess { deviation: size, time_constant_s: shape(0)?, evidence }.into()
+        }
+        ReportedTerm::Resonance => ResonantLine {
+            frequency_hz: shape(0)?,
+            bandwidth_hz: shape(1)?,
+            deviation: size,
+            multiples: None,
+            evidence: line(true),
+        }
+        .into(),
         ReportedTerm::Sinusoid => {
-            ("sinusoid", vec![("amplitude", Some(size(unit.to_owned()))), ("frequency", shape(0, "Hz"))])
+            SinusoidalLine { frequency_hz: shape(0)?, amplitude: size, multiples: None, evidence: line(false) }.into()
         }
         ReportedTerm::AngleRandomWalk | ReportedTerm::BiasInstability | ReportedTerm::RateRandomWalk => return None,
-    };
-    let known = parameters.into_iter().filter_map(|(name, parameter)| Some((name, parameter?)));
-    Some(finding(channel, kind, known))
+    })
 }
 
 /// Whether one cause explains both: the part's filter, or lines at one frequency.
-fn is_shared(one: &Finding, other: &Finding) -> bool {
-    let value = |of: &Finding, name: &str| of.parameters.get(name).map(|parameter| parameter.value);
-    one.kind == other.kind
-        && match one.kind.as_str() {
-            "filter_bandwidth" => value(one, "taps") == value(other, "taps"),
-            "sinusoid" | "resonance" => value(one, "frequency")
-                .zip(value(other, "frequency"))
-                .is_some_and(|(one, other)| (one - other).abs() <= SAME_FREQUENCY * one),
-            _ => false,
-        }
+fn is_shared(one: &Effect, other: &Effect) -> bool {
+    let is_near =
+        |one: BoundedEstimate, other: BoundedEstimate| (one.value - other.value).abs() <= SAME_FREQUENCY * one.value;
+    match (one, other) {
+        (Effect::OutputFilter(one), Effect::OutputFilter(other)) => one.taps.value == other.taps.value,
+        (Effect::SinusoidalLine(one), Effect::SinusoidalLine(other)) => is_near(one.frequency_hz, other.frequency_hz),
+        (Effect::ResonantLine(one), Effect::ResonantLine(other)) => is_near(one.frequency_hz, other.frequency_hz),
+        _ => false,
+    }
 }

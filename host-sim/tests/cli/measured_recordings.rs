@@ -7,8 +7,9 @@
 use crate::program::{self, host_sim};
 use adis16405_driver::GyroRange;
 use noise_analysis::analysis::analyze;
+use noise_analysis::effects::{Effect, OutputFilter};
 use noise_analysis::nonstationarity::{FittedPart, TrackedSet};
-use noise_analysis::report::{ChannelReport, ModelErrorReport, Nonstationarity, Report};
+use noise_analysis::report::{ChannelEffect, ChannelReport, ModelErrorReport, Nonstationarity, Report};
 use recordings::count_table;
 use recordings::time_base::measurement;
 
@@ -86,7 +87,7 @@ struct Run {
 fn check(test: &str, run: &Run) {
     let Some(report) = analyzed(test, run.file, Some(100.0)) else { return };
     let time_base = ["dropped_samples", "repeated_samples", "sample_clock"];
-    assert!(report.findings.iter().all(|finding| !time_base.contains(&finding.kind.as_str())), "{:?}", report.findings);
+    assert!(report.findings.iter().all(|finding| !time_base.contains(&finding.effect.name())), "{:?}", report.findings);
     let inertial = INERTIAL.map(|channel| of(&report, channel));
     for (channel, baseline) in inertial.iter().zip(run.baseline) {
         // Of the same samples: the two differ by the overlap of the windows beyond n = 8, by the weights of the fit, and by the
@@ -243,13 +244,22 @@ fn the_parts_filter_is_found_at_the_full_rate() {
         assert!((taps / decimation - 4.0).abs() < 0.2, "{channel}: {taps} taps read every {decimation}");
     }
     // One interval of 16 periods after which no samples follow faster; equal neighbours are as frequent as by chance.
-    let evidence =
-        |kind: &str| report.findings.iter().find(|finding| finding.kind == kind).map(|of| of.evidence.as_str());
-    let gap = evidence("dropped_samples").expect("a gap");
-    assert!(gap.contains("15 of 49440 samples never arrived, in 1 gaps"), "{gap}");
-    let clock = evidence("sample_clock").expect("a clock");
-    assert!(clock.contains("816.4") && clock.contains("819.2"), "{clock}");
-    assert_eq!(evidence("repeated_samples"), None);
+    let mut found = 0;
+    for finding in &report.findings {
+        match &finding.effect {
+            Effect::DroppedSamples(gap) => {
+                assert_eq!((gap.missing, gap.samples, gap.gaps), (15.0, 49_440.0, 1));
+                found += 1;
+            }
+            Effect::ClockDeviation(clock) => {
+                assert!((clock.rate_hz.value - 816.44).abs() < 0.05 && clock.nominal_hz == 819.2, "{clock:?}");
+                found += 1;
+            }
+            Effect::RepeatedSamples(repeated) => panic!("{repeated:?}"),
+            _ => {}
+        }
+    }
+    assert_eq!(found, 2, "a gap and a clock");
 }
 
 /// Checks that `analyze` names one filter in every channel, with the same number of taps: the part has one.
@@ -259,11 +269,15 @@ fn one_filter(test: &str, file: &str, rate: Option<f64>, taps: f64) {
     let report = analyze(&measurement(&recording, rate).expect("a time base"));
     for channel in INERTIAL {
         let of = report.channels.iter().find(|of| of.name == channel).expect("the channel");
-        let filters: Vec<_> = of.effects.iter().filter(|effect| effect.kind == "filter_bandwidth").collect();
-        let [filter] = &filters[..] else { panic!("{}: {filters:?}", channel) };
-        assert_eq!(filter.parameters["taps"].value, taps, "{}", channel);
+        let filter = |shown: &ChannelEffect| match &shown.effect {
+            Effect::OutputFilter(filter) => Some(*filter),
+            _ => None,
+        };
+        let filters: Vec<OutputFilter> = of.effects.iter().filter_map(filter).collect();
+        let [filter] = filters[..] else { panic!("{channel}: {filters:?}") };
+        assert_eq!(filter.taps.value, taps, "{}", channel);
         // Where they are recorded, supply and temperature stay within a count: no channel can be shown to depend on them.
-        let followed = of.effects.iter().find(|effect| ["supply", "temperature"].contains(&effect.kind.as_str()));
+        let followed = of.effects.iter().find(|shown| ["supply", "temperature"].contains(&shown.effect.name()));
         assert_eq!(followed, None, "{}", channel);
     }
 }

@@ -9,6 +9,7 @@ use noise_analysis::analysis::analyze;
 use recordings::frame_log::{Frame, FrameLogWriter};
 use recordings::serial::RawStreamRecorder;
 use recordings::time_base::measurement;
+use reports::json::ReportJson;
 use simulation::replay_log;
 use std::path::Path;
 
@@ -111,7 +112,7 @@ fn assert_recorded_stream_gives_the_identical_report(decoded: &Decoded, bursts: 
     let report = |file: &Path| {
         let recording = replay_log(file, GyroRange::Dps300).expect("a log").recording;
         let measurement = measurement(&recording, Some(RATE_HZ)).expect("a time base");
-        serde_json::to_string(&analyze(&measurement)).expect("a report")
+        serde_json::to_string(&ReportJson::from(&analyze(&measurement))).expect("a report")
     };
     let recorded_file = folder.path().join("recorded.csv");
     let mut tape = RawStreamRecorder::create(&recorded_file).expect("a log");

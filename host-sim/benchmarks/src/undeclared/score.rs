@@ -202,9 +202,9 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
     };
     let false_alarms = scored
         .iter()
-        .flat_map(|(channel, report)| report.effects.iter().map(move |effect| (*channel, effect)))
-        .filter(|(channel, effect)| !is_true(*channel, &effect.kind))
-        .map(|(channel, effect)| format!("{}: {}", channel.name(), effect.kind))
+        .flat_map(|(channel, report)| report.effects.iter().map(move |shown| (*channel, shown.effect.name())))
+        .filter(|(channel, name)| !is_true(*channel, name))
+        .map(|(channel, name)| format!("{}: {name}", channel.name()))
         .collect();
     let estimates = drawn
         .kinds
@@ -219,7 +219,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
 
 fn score_outside(effect: &OutsideEffect, strength: f64, scored: &[(Channel, &ChannelReport)]) -> OutsideScore {
     let own = scored.iter().filter(|(channel, _)| effect.shows_in(simulation::output_register(*channel)));
-    let names: Vec<&str> = own.flat_map(|(_, report)| &report.effects).map(|found| found.kind.as_str()).collect();
+    let names: Vec<&str> = own.flat_map(|(_, report)| &report.effects).map(|found| found.effect.name()).collect();
     let named = names.iter().any(|name| effect.kind().right_names().contains(name));
     OutsideScore { kind: effect.kind(), strength, unexplained: names.contains(&UNEXPLAINED), named }
 }
@@ -232,16 +232,17 @@ fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
 /// An effect counts as named if the report lists it in at least half of the channels that it affects; dropped and repeated samples
 /// and the sample clock count as named if they are listed in one channel.
 pub(super) fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) -> EffectScore {
-    let listing = affected.iter().filter(|report| report.effects.iter().any(|found| found.kind == kind.name())).count();
+    let listing =
+        affected.iter().filter(|report| report.effects.iter().any(|found| found.effect.name() == kind.name())).count();
     let once = matches!(kind, EffectKind::DroppedSamples | EffectKind::RepeatedSamples | EffectKind::SampleClock);
     let named = listing >= if once { 1 } else { affected.len().div_ceil(2).max(1) };
-    let other = affected.iter().flat_map(|report| &report.effects).find(|found| found.kind != kind.name());
+    let other = affected.iter().flat_map(|report| &report.effects).find(|found| found.effect.name() != kind.name());
     EffectScore {
         kind,
         strength,
         named,
         shape_known: None,
-        instead: other.filter(|_| !named).map(|found| found.kind.clone()),
+        instead: other.filter(|_| !named).map(|found| found.effect.name().to_owned()),
     }
 }
 
@@ -255,12 +256,12 @@ pub(super) fn score_parameters(
     let found = scored
         .iter()
         .filter(|(channel, _)| shows_in(effect, *channel))
-        .find_map(|(_, report)| report.effects.iter().find(|found| found.kind == kind.name()));
+        .find_map(|(_, report)| report.effects.iter().find(|found| found.effect.name() == kind.name()));
     let Some(found) = found else { return Vec::new() };
-    let parameters = parameters(effect);
+    let (parameters, estimates) = (parameters(effect), found.effect.parameters());
     let length = parameters.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
     let score = |&(name, truth): &(&'static str, f64)| {
-        let estimate = found.parameters.get(name)?;
+        let estimate = estimates.get(name)?;
         let truth = match kind {
             // What is dropped cannot be lost once more.
             EffectKind::DroppedSamples => truth + (1.0 - truth) * loss,

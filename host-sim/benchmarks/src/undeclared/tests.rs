@@ -16,9 +16,13 @@ use super::{DrawnRecording, EffectKind, OutsideKind, RecordingGroup, TrueRecordi
 use adis16405_driver::Channel;
 use allan_core::NoiseTerm as Term;
 use allan_core::term::{Markov, MovingAverageFilter, Resonance};
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::{
+    ClockDeviation, CurveEvidence, DroppedSamples, Effect, LineEvidence, LineSource, MarkovEvidence, MarkovProcess,
+    NoisyInterval, Observation, OutputFilter, ResonantLine, SinusoidalLine, Unexplained, UnexplainedPlace,
+};
 use noise_analysis::report::{
-    ChannelReport, Effect as Reported, ModelErrorReport, ModelReport, Parameter, PartReport, Report, SCHEMA,
-    SlopeMethodReport,
+    ChannelEffect, ChannelReport, ModelErrorReport, ModelReport, PartReport, Report, SCHEMA, SlopeMethodReport,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -260,10 +264,33 @@ fn a_recording_depends_on_its_seed_only_and_no_seed_is_used_twice() {
     assert!((0..100).all(|seed| differ(DrawnRecording::several(seed))));
 }
 
-/// Channel, kind and parameters of a reported effect.
-type Found<'a> = (Channel, &'a str, &'a [(&'a str, f64)]);
+/// A reported effect and its channel.
+type Found = (Channel, Effect);
 
-fn report(found: &[Found<'_>]) -> Report {
+const CURVE: CurveEvidence = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.0, gain_sigmas: 9.0 };
+
+fn within_a_tenth(value: f64) -> BoundedEstimate {
+    BoundedEstimate::new(value, 0.9 * value, 1.1 * value)
+}
+
+fn markov() -> Effect {
+    let deviation = within_a_tenth(0.1).in_unit("deg/s");
+    MarkovProcess { deviation, time_constant_s: within_a_tenth(1.0), evidence: MarkovEvidence::Curve(CURVE) }.into()
+}
+
+fn output_filter() -> Effect {
+    OutputFilter {
+        taps: within_a_tenth(4.0),
+        decimation: BoundedEstimate::exact(1.0),
+        white_noise: within_a_tenth(0.05).in_unit("deg/s"),
+        stages: 2,
+        internal_rate_hz: 819.2,
+        evidence: CURVE,
+    }
+    .into()
+}
+
+fn report(found: &[Found]) -> Report {
     let model = || ModelReport {
         terms: Vec::new(),
         adev: Vec::new(),
@@ -271,18 +298,7 @@ fn report(found: &[Found<'_>]) -> Report {
         unseen: ModelErrorReport::default(),
         unseen_excluding: None,
     };
-    let effect = |&(_, kind, parameters): &Found<'_>| Reported {
-        kind: kind.to_owned(),
-        parameters: parameters
-            .iter()
-            .map(|&(name, value)| {
-                let unit = String::new();
-                (name.to_owned(), Parameter { value, low: 0.9 * value, high: 1.1 * value, unit })
-            })
-            .collect::<BTreeMap<_, _>>(),
-        evidence: String::new(),
-        finding: 0,
-    };
+    let effect = |(_, effect): &Found| ChannelEffect { effect: effect.clone(), finding: 0 };
     let channel = |channel: Channel| ChannelReport {
         name: channel.name().to_owned(),
         unit: channel.unit().to_owned(),
@@ -292,7 +308,7 @@ fn report(found: &[Found<'_>]) -> Report {
         read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(),
         assessment: Default::default(),
-        effects: found.iter().filter(|(of, ..)| *of == channel).map(effect).collect(),
+        effects: found.iter().filter(|(of, _)| *of == channel).map(effect).collect(),
         after: model(),
         first_half_curve: ModelErrorReport::default(),
         refitted: model(),
@@ -322,24 +338,31 @@ fn an_effect_is_named_in_its_channel_and_a_false_alarm_in_another() {
     case.simulation.scenario.effects =
         vec![InjectedEffect::Sinusoid { channel, frequency_hz, amplitude, phase_rad: 0.0 }];
 
-    let parameters: &[_] = &[("frequency", 20.1), ("amplitude", 0.4)];
-    let right = compare(&case, &report(&[(Channel::GyroY, "sinusoid", parameters)]), 0.0);
+    let line = || {
+        Effect::from(SinusoidalLine {
+            frequency_hz: within_a_tenth(20.1),
+            amplitude: within_a_tenth(0.4).in_unit("deg/s"),
+            multiples: None,
+            evidence: LineEvidence { has_width: false, source: LineSource::Curve(CURVE) },
+        })
+    };
+    let right = compare(&case, &report(&[(Channel::GyroY, line())]), 0.0);
     assert!(right.answers[0].named);
     assert_eq!(right.false_alarms, [""; 0]);
     let errors: Vec<f64> = right.estimates.iter().map(|estimate| estimate.relative_error).collect();
     assert!((errors[0] - 0.005).abs() < 1e-9 && (errors[1] - 0.2).abs() < 1e-9, "{errors:?}");
 
-    let elsewhere = compare(&case, &report(&[(Channel::GyroX, "sinusoid", parameters)]), 0.0);
+    let elsewhere = compare(&case, &report(&[(Channel::GyroX, line())]), 0.0);
     assert!(!elsewhere.answers[0].named);
     assert_eq!(elsewhere.false_alarms, ["gyro_x: sinusoid"]);
 
-    let otherwise = compare(&case, &report(&[(Channel::GyroY, "markov", &[]), (Channel::Temp, "markov", &[])]), 0.0);
+    let otherwise = compare(&case, &report(&[(Channel::GyroY, markov()), (Channel::Temp, markov())]), 0.0);
     assert_eq!(otherwise.answers[0].instead.as_deref(), Some("markov"));
     assert_eq!(otherwise.false_alarms, ["gyro_y: markov"]);
 
     // Accelerometers are not scored during a motion.
     case.simulation.scenario.environment.motion.deviation_g = 0.1;
-    assert_eq!(compare(&case, &report(&[(Channel::AcclX, "markov", &[])]), 0.0).false_alarms, [""; 0]);
+    assert_eq!(compare(&case, &report(&[(Channel::AcclX, markov())]), 0.0).false_alarms, [""; 0]);
 }
 
 /// Outside the vocabulary, `unexplained` and a name that describes the effect are right, in the channels that it is in.
@@ -350,22 +373,43 @@ fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() 
         case.simulation.scenario.environment.motion.deviation_g = 0.0;
         case
     };
-    let told = |case: &DrawnRecording, channel: Channel, name: &'static str| {
-        let score = compare(case, &report(&[(channel, name, &[])]), 0.0);
+    let told = |case: &DrawnRecording, channel: Channel, effect: Effect| {
+        let score = compare(case, &report(&[(channel, effect)]), 0.0);
         let outside = score.outside.expect("an effect is hidden");
         (outside.unexplained, outside.named, score.false_alarms.is_empty())
     };
-    let held = quiet(OutsideKind::HeldValue);
-    let own = simulation::channel(held.simulation.outside[0].channels().next().expect("a channel"));
+    let unexplained = || {
+        let place = UnexplainedPlace::AveragingTime(within_a_tenth(1.0));
+        let observation = Observation::PointOfCurve { p_value: 1e-9 };
+        Effect::from(Unexplained { place, excess_percent: None, observation })
+    };
+    let resonance = || {
+        let evidence = LineEvidence { has_width: true, source: LineSource::Curve(CURVE) };
+        let (frequency_hz, deviation) = (within_a_tenth(20.0), within_a_tenth(0.1).in_unit("deg/s"));
+        let bandwidth_hz = within_a_tenth(1.0);
+        Effect::from(ResonantLine { frequency_hz, bandwidth_hz, deviation, multiples: None, evidence })
+    };
+    let band = quiet(OutsideKind::WanderingBand);
+    let own = simulation::channel(band.simulation.outside[0].channels().next().expect("a channel"));
     let other = if own == Channel::GyroX { Channel::GyroY } else { Channel::GyroX };
-    assert_eq!(told(&held, own, "unexplained"), (true, false, true));
-    assert_eq!(told(&held, own, "stuck"), (false, true, true));
-    assert_eq!(told(&held, own, "spikes"), (false, false, false));
-    assert_eq!(told(&held, other, "stuck"), (false, false, false));
+    assert_eq!(told(&band, own, unexplained()), (true, false, true));
+    assert_eq!(told(&band, own, resonance()), (false, true, true));
+    assert_eq!(told(&band, own, markov()), (false, false, false));
+    assert_eq!(told(&band, other, resonance()), (false, false, false));
     // The clock is that of all channels; a knock is in all of them.
-    assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, "sample_clock"), (false, true, true));
-    assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, "dropped_samples"), (false, false, false));
-    assert_eq!(told(&quiet(OutsideKind::Knock), Channel::AcclZ, "knock"), (false, true, true));
+    let clock = ClockDeviation { rate_hz: within_a_tenth(200.0), nominal_hz: 204.8, sigmas: 9.0 };
+    assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, clock.into()), (false, true, true));
+    let dropped = DroppedSamples { fraction: within_a_tenth(1e-3), missing: 10.0, samples: 1e4, gaps: 10 };
+    assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, dropped.into()), (false, false, false));
+    let knock = NoisyInterval {
+        from_s: within_a_tenth(10.0),
+        to_s: within_a_tenth(12.0),
+        level: within_a_tenth(3.0),
+        tau_s: 0.1,
+        p_value: 1e-9,
+        channels: vec!["accl_z"],
+    };
+    assert_eq!(told(&quiet(OutsideKind::Knock), Channel::AcclZ, knock.into()), (false, true, true));
 }
 
 /// 2 is the smallest strength that is drawn. Each kind is in the counts, the stamps or both.
@@ -387,8 +431,7 @@ fn an_effect_of_all_channels_is_named_if_half_of_those_that_show_it_list_it() {
     case.simulation.scenario.environment.motion.deviation_g = 0.0;
     let mut listed = |taps_log2: u8, count: usize| {
         case.simulation.scenario.effects = vec![InjectedEffect::FilterBandwidth { taps_log2 }];
-        let found: Vec<_> =
-            Channel::INERTIAL[..count].iter().map(|&channel| (channel, "filter_bandwidth", &[][..])).collect();
+        let found: Vec<_> = Channel::INERTIAL[..count].iter().map(|&channel| (channel, output_filter())).collect();
         compare(&case, &report(&found), 0.0).answers[0].named
     };
     assert_eq!([2, 3, 6].map(|count| listed(1, count)), [false, true, true]);

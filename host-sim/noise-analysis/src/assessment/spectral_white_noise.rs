@@ -1,7 +1,7 @@
 //! N by the spectrum beside N by the fit: whether the record identifies it, and whether the two agree.
 
+use crate::bounds::{BoundedEstimate, Parameter};
 use crate::distributions::ROUNDING;
-use crate::findings::{BoundedEstimate, Parameter};
 use crate::noise_terms::is_white;
 use crate::spectra::{KnownShapes, Welch, WhiteNoiseFit, fit_white_noise};
 use crate::units::coefficient_unit;

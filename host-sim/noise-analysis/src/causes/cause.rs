@@ -1,6 +1,7 @@
 //! A cause, and what each channel shows of it.
 
-use crate::findings::{Effect, Parameter};
+use crate::bounds::BoundedEstimate;
+use crate::effects::Effect;
 
 /// What one channel shows of a cause.
 pub(super) struct Shown {
@@ -18,26 +19,18 @@ pub(super) struct Cause {
 }
 
 impl Cause {
-    /// The channel that shows the cause most clearly: whose principal parameter has the narrowest interval for its value. Of
+    /// Position of the channel that shows the cause most clearly: one of whose sizes has the narrowest interval for its value. Of
     /// a line that has a width in some channels it is one of these: a channel in which it is weaker may not resolve it.
-    pub(super) fn clearest(&self) -> &Shown {
-        let has_width = |shown: &&Shown| shown.effect.kind == "resonance";
-        let of_width = self.shown.iter().filter(has_width).reduce(narrower);
-        of_width.unwrap_or_else(|| self.shown[1..].iter().fold(&self.shown[0], narrower))
+    pub(super) fn clearest(&self) -> usize {
+        let positions = 0..self.shown.len();
+        let of_width = positions.clone().filter(|at| matches!(self.shown[*at].effect, Effect::ResonantLine(_)));
+        let narrower = |best: usize, next: usize| if self.width(next) < self.width(best) { next } else { best };
+        of_width.reduce(narrower).or_else(|| positions.reduce(narrower)).unwrap_or(0)
     }
-}
 
-fn narrower<'s>(best: &'s Shown, next: &'s Shown) -> &'s Shown {
-    let width = |shown: &Shown| shown.effect.parameters.values().map(relative_width).fold(f64::INFINITY, size_width);
-    if width(next) < width(best) { next } else { best }
-}
-
-/// Width of the interval of a parameter over its value, of one that says how large an effect is.
-fn relative_width(parameter: &Parameter) -> Option<f64> {
-    let is_size = !matches!(parameter.unit.as_str(), "s" | "Hz" | "") && parameter.value != 0.0;
-    is_size.then(|| (parameter.high - parameter.low) / parameter.value.abs())
-}
-
-fn size_width(least: f64, width: Option<f64>) -> f64 {
-    width.map_or(least, |width| least.min(width))
+    /// The least width of the interval of a size over its value.
+    fn width(&self, at: usize) -> f64 {
+        let relative = |of: BoundedEstimate| (of.value != 0.0).then(|| (of.high - of.low) / of.value.abs());
+        self.shown[at].effect.sizes().into_iter().filter_map(relative).fold(f64::INFINITY, f64::min)
+    }
 }

@@ -1,39 +1,51 @@
 //! Lines of the spectrum that channels show, by their frequency.
 
+use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
-use crate::findings::{Effect, Parameter};
+use crate::effects::{Effect, LineEvidence};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Quantile of the normal distribution for a two-sided level of 1 %: equal frequencies are farther apart once in a hundred.
 pub(super) const NORMAL_995: f64 = 2.576;
-
-/// Whether an effect is a line of the spectrum.
-pub(super) fn is_line(effect: &Effect) -> bool {
-    matches!(effect.kind.as_str(), "sinusoid" | "resonance")
-}
 
 /// A line of one channel.
 #[derive(Clone)]
 pub(super) struct Line {
     pub(super) channel: usize,
     pub(super) effect: Effect,
+    /// What shows it.
+    pub(super) evidence: LineEvidence,
+    /// Hz, with its bounds.
+    pub(super) frequency_hz: BoundedEstimate,
     /// Hz.
     pub(super) frequency: f64,
     /// Standard deviation of the frequency, Hz.
     pub(super) error: f64,
+    /// Amplitude of a sinusoid of the line's power.
+    pub(super) amplitude: ChannelEstimate,
     /// Full width at half maximum, Hz.
     width: f64,
 }
 
 impl Line {
+    /// `None` of what is no line.
     fn new(channel: usize, effect: &Effect) -> Option<Self> {
-        let frequency = effect.parameters.get("frequency")?;
+        let (frequency_hz, amplitude, width, evidence) = match effect {
+            Effect::SinusoidalLine(of) => (of.frequency_hz, of.amplitude, 0.0, of.evidence),
+            Effect::ResonantLine(of) => {
+                (of.frequency_hz, of.deviation.scaled(SQRT_2), of.bandwidth_hz.value, of.evidence)
+            }
+            _ => return None,
+        };
         Some(Self {
             channel,
             effect: effect.clone(),
-            frequency: frequency.value,
-            error: (frequency.high - frequency.low) / (2.0 * NORMAL_975),
-            width: effect.parameters.get("bandwidth").map_or(0.0, |bandwidth| bandwidth.value),
+            evidence,
+            frequency_hz,
+            frequency: frequency_hz.value,
+            error: (frequency_hz.high - frequency_hz.low) / (2.0 * NORMAL_975),
+            amplitude,
+            width,
         })
     }
 
@@ -41,21 +53,10 @@ impl Line {
     /// record share: `√3/(πT)` times the relative error of the amplitude (D. Rife and R. Boorstyn, "Single-tone parameter
     /// estimation from discrete-time observations", IEEE Trans. Inf. Theory 20, 1974).
     pub(super) fn error_by_amplitude(&self, duration_s: f64) -> f64 {
-        let relative = |of: Parameter| (of.high - of.low) / (2.0 * NORMAL_975 * of.value.max(f64::MIN_POSITIVE));
-        let by_amplitude = self.amplitude().map_or(f64::INFINITY, |of| 3f64.sqrt() / (PI * duration_s) * relative(of));
-        by_amplitude.min(self.error)
+        let of = self.amplitude;
+        let relative = (of.high - of.low) / (2.0 * NORMAL_975 * of.value.max(f64::MIN_POSITIVE));
+        (3f64.sqrt() / (PI * duration_s) * relative).min(self.error)
     }
-
-    /// Amplitude of a sinusoid of the line's power, as a parameter.
-    pub(super) fn amplitude(&self) -> Option<Parameter> {
-        let parameters = &self.effect.parameters;
-        let of_deviation = |of: &Parameter| scaled(of, SQRT_2);
-        parameters.get("amplitude").cloned().or_else(|| parameters.get("deviation").map(of_deviation))
-    }
-}
-
-pub(super) fn scaled(of: &Parameter, factor: f64) -> Parameter {
-    Parameter::new(factor * of.value, factor * of.low, factor * of.high, of.unit.clone())
 }
 
 /// Lines of several channels at one frequency.
@@ -66,9 +67,10 @@ pub(super) struct Frequency {
 impl Frequency {
     /// The lines of the effects of all channels in a record of `duration_s`, by their frequency.
     pub(super) fn all(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Self> {
-        let lines = channels.iter().enumerate().flat_map(|(channel, (_, effects))| {
-            effects.iter().filter(|effect| is_line(effect)).filter_map(move |effect| Line::new(channel, effect))
-        });
+        let lines = channels
+            .iter()
+            .enumerate()
+            .flat_map(|(channel, (_, effects))| effects.iter().filter_map(move |effect| Line::new(channel, effect)));
         let mut frequencies: Vec<Self> = Vec::new();
         for line in lines {
             let is_same = |known: &&mut Self| {

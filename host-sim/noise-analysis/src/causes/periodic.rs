@@ -12,8 +12,9 @@ use super::waveform::{
     Multiple, SQUARE_BY_CHANCE, SQUARE_SIGMAS, SQUARE_TOLERANCE, by_channel, is_sawtooth, is_square, periodic,
     sawtooth, square_wave,
 };
+use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
-use crate::findings::{Effect, Parameter};
+use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use std::collections::BTreeMap;
 
 /// By which part of the record's resolution lines that are a few resolutions apart move each other's frequency.
@@ -81,35 +82,31 @@ fn is_in_one_channel([first, others @ ..]: [&Frequency; 3]) -> bool {
 /// errors, and smaller than that of the line between them.
 fn has_equal_sidebands([below, line, above]: [&Frequency; 3]) -> bool {
     line.lines.iter().any(|line| {
-        let of = |of: &Frequency| of.lines.iter().find(|other| other.channel == line.channel)?.amplitude();
-        let (Some(below), Some(amplitude), Some(above)) = (of(below), line.amplitude(), of(above)) else {
-            return false;
-        };
-        let error = |of: &Parameter| (of.high - of.low) / (2.0 * NORMAL_975);
+        let of = |of: &Frequency| Some(of.lines.iter().find(|other| other.channel == line.channel)?.amplitude);
+        let (Some(below), Some(above)) = (of(below), of(above)) else { return false };
+        let error = |of: &ChannelEstimate| (of.high - of.low) / (2.0 * NORMAL_975);
         let mean = 0.5 * (below.value + above.value);
         let joint = error(&below).hypot(error(&above));
-        (below.value - above.value).abs() < SQUARE_TOLERANCE * mean + SQUARE_SIGMAS * joint && mean < amplitude.value
+        (below.value - above.value).abs() < SQUARE_TOLERANCE * mean + SQUARE_SIGMAS * joint
+            && mean < line.amplitude.value
     })
 }
 
 /// A line whose amplitude changes, by the three lines of [`modulated_line`]: no effect that has a name.
 fn modulated_cause(lines: Vec<Frequency>) -> Cause {
     let [below, line, above] = [0, 1, 2].map(|place| lines[place].best());
-    let size = |of: &Line| of.amplitude().map_or(0.0, |amplitude| amplitude.value);
-    let lacking = |amplitudes: [f64; 2]| 100.0 * amplitudes[0].hypot(amplitudes[1]) / size(line).max(f64::MIN_POSITIVE);
-    let bound =
-        |of: fn(&Parameter) -> f64| lacking([below, above].map(|line| line.amplitude().map_or(0.0, |a| of(&a))));
-    let excess = Parameter::new(lacking([size(below), size(above)]), bound(|of| of.low), bound(|of| of.high), "%");
-    let frequency = line.effect.parameters["frequency"].clone();
-    let evidence = format!(
-        "a line at {:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every {:.0} s, which no sinusoid \
-         of one amplitude does; {}",
-        line.frequency,
-        0.5 * (above.frequency - below.frequency),
-        2.0 / (above.frequency - below.frequency),
-        line.effect.evidence,
-    );
-    let effect = Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence);
+    let lacking = |of: fn(&ChannelEstimate) -> f64| {
+        let [below, above] = [below, above].map(|line| of(&line.amplitude));
+        100.0 * below.hypot(above) / line.amplitude.value.max(f64::MIN_POSITIVE)
+    };
+    let effect = Effect::from(Unexplained {
+        place: UnexplainedPlace::Frequency(line.frequency_hz),
+        excess_percent: Some(BoundedEstimate::new(lacking(|of| of.value), lacking(|of| of.low), lacking(|of| of.high))),
+        observation: Observation::EqualSidebands {
+            distance_hz: above.frequency - below.frequency,
+            line: line.evidence,
+        },
+    });
     let mut by_channel: BTreeMap<usize, Vec<Effect>> = BTreeMap::new();
     for line in lines.iter().flat_map(|frequency| &frequency.lines) {
         by_channel.entry(line.channel).or_default().push(line.effect.clone());

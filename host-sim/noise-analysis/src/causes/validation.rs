@@ -7,34 +7,28 @@
 //! half the variance of the first. So the test needs no threshold of detection in the second half: an effect that is
 //! missing there moves the estimate of the whole record.
 
+use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, upper_tail};
-use crate::findings::{Effect, Parameter, Validation};
+use crate::effects::Effect;
+use crate::findings::Validation;
 
 /// Probability that an effect which holds throughout is said to fail, over all its channels and parameters.
 const LEVEL: f64 = 0.01;
-/// Parameters without an interval that could be compared, or that a half does not share with the whole.
-const NOT_COMPARED: [&str; 6] = ["time", "from", "to", "taps", "harmonics", "excess_percent"];
-/// Kinds that happen once, or that are no statement about the samples' distribution.
-const ONCE: [&str; 5] = ["bias_step", "knock", "motion", "saturated", "unexplained"];
-/// The filter of the part. Its `value` is the white noise behind it, which may change over the record while the filter does not.
-const FILTER: &str = "filter_bandwidth";
 /// Farthest that the lines of two halves may be apart, as a part of their frequency, to be taken for the same line.
 const FARTHEST_LINE: f64 = 0.1;
 
 /// Whether an effect of the first half may be the same as one of the whole record.
 pub(super) fn is_same(whole: &Effect, half: &Effect) -> bool {
-    let is_line = |effect: &Effect| matches!(effect.kind.as_str(), "sinusoid" | "resonance" | "square_wave");
-    match (is_line(whole), is_line(half)) {
+    match (whole.is_line(), half.is_line()) {
         (true, true) => distance(whole, half) < FARTHEST_LINE,
-        _ => whole.kind == half.kind,
+        _ => whole.is_of_kind(half),
     }
 }
 
 /// How far the frequencies of two effects are apart, as a part of the first; 0 of effects without a frequency.
 pub(super) fn distance(whole: &Effect, half: &Effect) -> f64 {
-    let of = |effect: &Effect| effect.parameters.get("frequency").map(|parameter| parameter.value);
-    match (of(whole), of(half)) {
-        (Some(whole), Some(half)) if whole > 0.0 => (half / whole - 1.0).abs(),
+    match (whole.frequency_hz(), half.frequency_hz()) {
+        (Some(whole), Some(half)) if whole.value > 0.0 => (half.value / whole.value - 1.0).abs(),
         _ => 0.0,
     }
 }
@@ -43,12 +37,8 @@ pub(super) fn distance(whole: &Effect, half: &Effect) -> f64 {
 pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
     let deviations: Vec<f64> = pairs
         .iter()
-        .filter(|(whole, _)| !ONCE.contains(&whole.kind.as_str()))
-        .flat_map(|(whole, half)| {
-            let is_left_out = |name: &str| NOT_COMPARED.contains(&name) || (whole.kind == FILTER && name == "value");
-            let compared = whole.parameters.iter().filter(move |(name, _)| !is_left_out(name));
-            compared.filter_map(|(name, of_whole)| deviation(of_whole, half.parameters.get(name)?))
-        })
+        .flat_map(|(whole, half)| whole.lasting().into_iter().zip(half.lasting()))
+        .filter_map(|(whole, half)| deviation(&whole?, &half?))
         .collect();
     let Some(largest) = deviations.iter().copied().reduce(f64::max) else { return Validation::Untestable };
     // Of this many deviations the largest, had they been independent (Šidák).
@@ -56,10 +46,10 @@ pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
     if p_value < LEVEL { Validation::No } else { Validation::Yes }
 }
 
-/// Distance of a parameter of the whole record from that of the first half, in standard deviations; `None` without intervals.
-fn deviation(whole: &Parameter, half: &Parameter) -> Option<f64> {
+/// Distance of an estimate by the whole record from that by the first half, in standard deviations; `None` without intervals.
+fn deviation(whole: &BoundedEstimate, half: &BoundedEstimate) -> Option<f64> {
     // An interval that ends at 0 because the parameter cannot be negative says nothing on that side.
-    let error = |of: &Parameter| {
+    let error = |of: &BoundedEstimate| {
         let side = if of.low > 0.0 || of.value < 0.0 { of.high - of.low } else { 2.0 * (of.high - of.value) };
         side / (2.0 * NORMAL_975)
     };

@@ -1,8 +1,11 @@
 //! What the amplitudes of the harmonics of a periodic signal say of its form: a square wave, a sawtooth, or another one.
 
-use super::line::{Frequency, Line, scaled};
+use super::line::{Frequency, Line};
+use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
-use crate::findings::{Effect, Parameter};
+use crate::effects::{
+    Effect, Multiples, Observation, ResonantLine, SinusoidalLine, SquareWave, Unexplained, UnexplainedPlace,
+};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 
@@ -37,8 +40,8 @@ pub(super) fn by_channel<'f>(
     channels
 }
 
-fn amplitude_of(lines: &[(Multiple, Line)], harmonic: u32) -> Option<Parameter> {
-    lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(harmonic))?.1.amplitude()
+fn amplitude_of(lines: &[(Multiple, Line)], harmonic: u32) -> Option<ChannelEstimate> {
+    Some(lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(harmonic))?.1.amplitude)
 }
 
 /// Whether the lines of a channel have the amplitudes of a square wave: 1/k at the odd multiples k, the first and the third
@@ -57,10 +60,10 @@ pub(super) fn is_sawtooth(lines: &[(Multiple, Line)]) -> bool {
 /// the others.
 fn fall_with_their_number(lines: &[(Multiple, Line)], has: impl Fn(u32) -> bool) -> bool {
     let Some(first) = amplitude_of(lines, 1) else { return false };
-    let error = |of: &Parameter| (of.high - of.low) / (2.0 * NORMAL_975);
+    let error = |of: &ChannelEstimate| (of.high - of.low) / (2.0 * NORMAL_975);
     let has_size = |(multiple, line): &(Multiple, Line)| {
         let Multiple::Harmonic(multiple) = *multiple else { return true };
-        let Some(amplitude) = line.amplitude() else { return false };
+        let amplitude = line.amplitude;
         let expected = first.value / f64::from(multiple);
         if !has(multiple) {
             return amplitude.value < SQUARE_TOLERANCE * expected;
@@ -74,22 +77,16 @@ fn fall_with_their_number(lines: &[(Multiple, Line)], has: impl Fn(u32) -> bool)
 /// A signal that rises evenly and jumps back: no effect that has a name.
 pub(super) fn sawtooth(lines: &[(Multiple, Line)]) -> Option<Effect> {
     let (_, line) = lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(1))?;
-    let first = line.amplitude()?;
-    let higher = lines.iter().filter(|(multiple, _)| *multiple != Multiple::Harmonic(1));
-    let amplitudes: Vec<Parameter> = higher.filter_map(|(_, line)| line.amplitude()).collect();
-    let lacking = |of: fn(&Parameter) -> f64| {
-        100.0 * amplitudes.iter().map(|amplitude| of(amplitude).powi(2)).sum::<f64>().sqrt() / first.value
+    let higher = || lines.iter().filter(|(multiple, _)| *multiple != Multiple::Harmonic(1)).map(|(_, line)| line);
+    let lacking = |of: fn(&ChannelEstimate) -> f64| {
+        100.0 * higher().map(|line| of(&line.amplitude).powi(2)).sum::<f64>().sqrt() / line.amplitude.value
     };
-    let excess = Parameter::new(lacking(|of| of.value), lacking(|of| of.low), lacking(|of| of.high), "%");
-    let evidence = format!(
-        "{} of one signal, even and odd ones with amplitudes that fall with their number: it rises evenly and jumps back every \
-         {:.1} s, which no sinusoid and no square wave does; {}",
-        harmonics(lines),
-        1.0 / line.frequency,
-        line.effect.evidence,
-    );
-    let frequency = line.effect.parameters.get("frequency")?.clone();
-    Some(Effect::new("unexplained", [("frequency", frequency), ("excess_percent", excess)], evidence))
+    let unexplained = Unexplained {
+        place: UnexplainedPlace::Frequency(line.frequency_hz),
+        excess_percent: Some(BoundedEstimate::new(lacking(|of| of.value), lacking(|of| of.low), lacking(|of| of.high))),
+        observation: Observation::Sawtooth { multiples: multiples(lines), line: line.evidence },
+    };
+    Some(unexplained.into())
 }
 
 /// The square wave whose lowest odd harmonic in a channel is among `lines`. A square wave of amplitude A, half the distance of
@@ -99,47 +96,31 @@ pub(super) fn square_wave(lines: &[(Multiple, Line)]) -> Option<Effect> {
         Multiple::Harmonic(harmonic) if !harmonic.is_multiple_of(2) => Some((harmonic, line)),
         _ => None,
     })?;
-    let amplitude = scaled(&line.amplitude()?, FRAC_PI_4 * f64::from(harmonic));
-    let frequency = scaled(line.effect.parameters.get("frequency")?, 1.0 / f64::from(harmonic));
-    let evidence = format!(
-        "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic; {}",
-        harmonics(lines),
-        frequency.value,
-        line.effect.evidence,
-    );
-    Some(Effect::new("square_wave", [("frequency", frequency), ("amplitude", amplitude)], evidence))
-}
-
-/// The lowest of the lines of a channel, with the number of all.
-pub(super) fn periodic(lines: &[(Multiple, Line)]) -> Effect {
-    let effect = &lines[0].1.effect;
-    if lines.len() == 1 {
-        return effect.clone();
-    }
-    let count = lines.len() as f64;
-    let mut effect = effect.clone();
-    effect.parameters.insert("harmonics".to_owned(), Parameter::new(count, count, count, ""));
-    effect.evidence = format!("{} of one periodic signal; {}", harmonics(lines), effect.evidence);
-    effect
-}
-
-/// Such as `harmonics 1, 3 and 5 and 2 sidebands`.
-fn harmonics(lines: &[(Multiple, Line)]) -> String {
-    let numbers: Vec<String> = lines
-        .iter()
-        .filter_map(|(multiple, _)| match multiple {
-            Multiple::Harmonic(number) => Some(number.to_string()),
-            Multiple::Sideband => None,
-        })
-        .collect();
-    let harmonics = match numbers.as_slice() {
-        [] => String::new(),
-        [one] => format!("harmonic {one}"),
-        [others @ .., last] => format!("harmonics {} and {last}", others.join(", ")),
+    let square = SquareWave {
+        frequency_hz: line.frequency_hz.scaled(1.0 / f64::from(harmonic)),
+        amplitude: line.amplitude.scaled(FRAC_PI_4 * f64::from(harmonic)),
+        multiples: multiples(lines),
+        line: line.evidence,
     };
-    match lines.len() - numbers.len() {
-        0 => harmonics,
-        count if numbers.is_empty() => format!("{count} sidebands"),
-        count => format!("{harmonics} with {count} sidebands"),
+    Some(square.into())
+}
+
+/// The lowest of the lines of a channel, with the numbers of all.
+pub(super) fn periodic(lines: &[(Multiple, Line)]) -> Effect {
+    let multiples = (lines.len() > 1).then(|| multiples(lines));
+    match lines[0].1.effect.clone() {
+        Effect::SinusoidalLine(line) => SinusoidalLine { multiples, ..line }.into(),
+        Effect::ResonantLine(line) => ResonantLine { multiples, ..line }.into(),
+        other => other,
     }
+}
+
+/// What these lines are to the fundamental.
+fn multiples(lines: &[(Multiple, Line)]) -> Multiples {
+    let harmonic = |(multiple, _): &(Multiple, Line)| match multiple {
+        Multiple::Harmonic(number) => Some(*number),
+        Multiple::Sideband => None,
+    };
+    let harmonics: Vec<u32> = lines.iter().filter_map(harmonic).collect();
+    Multiples { sidebands: lines.len() - harmonics.len(), harmonics }
 }

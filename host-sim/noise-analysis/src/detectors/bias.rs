@@ -11,8 +11,10 @@ use super::gls_regression::{GlsRegression, RegressionEstimate};
 use super::noise_grid::{NoiseGrid, NoiseGrids};
 use super::thermal_response::{self, Lag, TemperatureCourse};
 use super::vibration_rectification::{Acceleration, Vibration};
+use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
-use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::effects::{LinearDrift, LinearDriftEvidence};
+use crate::findings::{Detection, SIGNIFICANCE};
 use crate::series::Series;
 use nalgebra::DVector;
 
@@ -253,11 +255,9 @@ fn best_candidate(
 fn ramp_detection(series: &Series, blocks: &BlockMeans, estimate: &RegressionEstimate, p_value: f64) -> Detection {
     let block_s = blocks.width as f64 * series.period_s;
     let (slope, half) = (estimate.size / block_s, NORMAL_975 * estimate.error / block_s);
-    let evidence = format!(
-        "the level moves by {slope:.3e} {}/s throughout, by chance {p_value:.0e} in white, flicker and walking noise of any \
-         mixture; warm-up that no sensor shows, or aging",
-        series.unit,
-    );
-    let slope = Parameter::new(slope, slope - half, slope + half, format!("{}/s", series.unit));
-    Detection { effect: Effect::new("rate_ramp", [("slope", slope)], evidence), correction: None }
+    let drift = LinearDrift {
+        slope: BoundedEstimate::new(slope, slope - half, slope + half).in_unit(series.unit),
+        evidence: LinearDriftEvidence::Regression { p_value },
+    };
+    Detection { effect: drift.into(), correction: None }
 }

@@ -3,8 +3,9 @@
 
 use super::block_means::BlockMeans;
 use super::gls_regression::RegressionEstimate;
+use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
-use crate::findings::{Effect, Parameter};
+use crate::effects::Effect;
 use nalgebra::DVector;
 
 /// Fractions of a block in which a course is known.
@@ -68,8 +69,8 @@ impl BiasResponse {
     }
 }
 
-/// A regression coefficient with its 95 % interval.
-pub(super) fn interval(of: &RegressionEstimate, unit: String) -> Parameter {
+/// A regression coefficient with its 95 % interval, of a channel in `unit`.
+pub(super) fn interval(of: &RegressionEstimate, unit: &'static str) -> ChannelEstimate {
     let half = NORMAL_975 * of.error;
-    Parameter::new(of.size, of.size - half, of.size + half, unit)
+    BoundedEstimate::new(of.size, of.size - half, of.size + half).in_unit(unit)
 }

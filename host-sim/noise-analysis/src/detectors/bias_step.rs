@@ -6,8 +6,10 @@
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate, StepSizes};
 use super::noise_grid::NoiseGrid;
+use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
-use crate::findings::{Correction, Detection, Effect, Parameter};
+use crate::effects::LevelStep;
+use crate::findings::{Correction, Detection};
 use crate::series::Series;
 use nalgebra::DVector;
 
@@ -94,22 +96,13 @@ pub(super) fn detection(
     let time = |slot: f64| slot * series.period_s;
     let at = series.slots[position.sample] as f64;
     let (size, half) = (estimate.size, NORMAL_975 * estimate.error);
-    let evidence = format!(
-        "the level changes by {size:.3e} {} at {:.1} s and stays, by chance anywhere {:.0e} in white, flicker and walking \
-         noise of any mixture; a mechanical or thermal shock, or a fault that begins",
-        series.unit,
-        time(at),
+    let step = LevelStep {
+        time_s: BoundedEstimate::new(time(at), time(position.low), time(position.high)),
+        size: BoundedEstimate::new(size, size - half, size + half).in_unit(series.unit),
         p_value,
-    );
+    };
     Detection {
-        effect: Effect::new(
-            "bias_step",
-            [
-                ("time", Parameter::new(time(at), time(position.low), time(position.high), "s")),
-                ("size", Parameter::new(size, size - half, size + half, series.unit)),
-            ],
-            evidence,
-        ),
+        effect: step.into(),
         correction: Some(Correction::Offset { from: series.slots[position.sample], size }),
     }
 }

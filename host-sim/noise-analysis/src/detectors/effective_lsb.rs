@@ -4,7 +4,9 @@
 //! Where the noise is larger than the step, such rounding adds white noise of variance step²/12, which no curve and no
 //! spectrum distinguishes from other white noise; the values themselves show it.
 
-use crate::findings::{Detection, Effect, Parameter};
+use crate::bounds::BoundedEstimate;
+use crate::effects::EffectiveLsb;
+use crate::findings::Detection;
 use crate::series::Series;
 
 /// Fewest changes of the value; all must be multiples of the step. Without such rounding about half of the changes would be odd numbers of counts.
@@ -28,16 +30,13 @@ pub(crate) fn find(series: &Series) -> Option<Detection> {
         return None;
     }
     let step = f64::from(counts) * series.resolution;
-    let changes = series.values.windows(2).filter(|pair| pair[0] != pair[1]).count() as f64;
-    let evidence = format!(
-        "all {} values lie {counts} counts or a multiple of that apart, {changes} changes without an exception; \
-         a converter of fewer bits, or rounding on the way",
-        series.values.len(),
-    );
-    Some(Detection {
-        effect: Effect::new("quantization", [("step", Parameter::new(step, step, step, series.unit))], evidence),
-        correction: None,
-    })
+    let found = EffectiveLsb {
+        step: BoundedEstimate::exact(step).in_unit(series.unit),
+        counts,
+        values: series.values.len(),
+        changes: series.values.windows(2).filter(|pair| pair[0] != pair[1]).count(),
+    };
+    Some(Detection { effect: found.into(), correction: None })
 }
 
 fn greatest_common_divisor(a: u64, b: u64) -> u64 {

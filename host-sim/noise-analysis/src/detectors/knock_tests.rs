@@ -199,9 +199,9 @@ fn assert_knocks_are_found(lost: f64) {
         let found = find(std::slice::from_ref(&record), DITHERED).remove(0);
         let [knock] = &found[..] else { panic!("{length_s} s at {level}: {found:?}") };
         let effect = knock.detection(&record, &["accl_x"]).effect;
-        assert_eq!(effect.kind, "knock");
+        assert_eq!(effect.name(), "knock");
         for (name, truth) in [("from", start_s), ("to", start_s + length_s), ("level", level)] {
-            let parameter = &effect.parameters[name];
+            let parameter = &effect.parameters()[name];
             println!("{length_s} s at {level}: {name} {truth}: {parameter:?}");
             covered += usize::from((parameter.low..=parameter.high).contains(&truth));
             all += 1;

@@ -9,8 +9,10 @@ use super::noise_levels::{
     DIFFERENCES, HALF_EFFICIENCY, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, averaging_factors, doublings,
     exceedance, freedom_by_scatter, longer_levels, median, neighbouring_level, neighbours_freedom,
 };
+use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
-use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::effects::NoisyInterval;
+use crate::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::parallel::in_parallel;
 use crate::series::Series;
 use std::ops::Range;
@@ -367,33 +369,19 @@ impl Knock {
     }
 
     /// The knock as it is reported; `channels` are the names of those that show it, the channel's own included.
-    pub(crate) fn detection(&self, series: &Series, channels: &[&str]) -> Detection {
+    pub(crate) fn detection(&self, series: &Series, channels: &[&'static str]) -> Detection {
         let time = |slot: u64| slot as f64 * series.period_s;
-        let bounded = |of: BoundedSlot| Parameter::new(time(of.value), time(of.low), time(of.high), "s");
+        let bounded = |of: BoundedSlot| BoundedEstimate::new(time(of.value), time(of.low), time(of.high));
         let (low, high) = self.level_bounds;
-        let shown = if channels.len() > 1 {
-            format!("{} channels ({})", channels.len(), channels.join(", "))
-        } else {
-            "this channel alone".to_owned()
+        let interval = NoisyInterval {
+            from_s: bounded(self.from),
+            to_s: bounded(self.to),
+            level: BoundedEstimate::new(self.level, low, high),
+            tau_s: self.n as f64 * series.period_s,
+            p_value: self.p_value,
+            channels: channels.to_vec(),
         };
-        let evidence = format!(
-            "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance {:.0e}, in \
-             {shown}; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
-            time(self.from.value),
-            time(self.to.value),
-            self.n as f64 * series.period_s,
-            self.level,
-            self.p_value,
-        );
-        let parameters = [
-            ("from", bounded(self.from)),
-            ("to", bounded(self.to)),
-            ("level", Parameter::new(self.level, low, high, "")),
-        ];
         let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
-        Detection {
-            effect: Effect::new("knock", parameters, evidence),
-            correction: Some(Correction::Exclude(excluded)),
-        }
+        Detection { effect: interval.into(), correction: Some(Correction::Exclude(excluded)) }
     }
 }

@@ -1,8 +1,10 @@
 //! What the output of a channel can express: whether its samples are cut off at the end of a range, and whether its noise
 //! reaches from one count to the next.
 
+use crate::bounds::BoundedEstimate;
 use crate::distributions::poisson_bounds;
-use crate::findings::{Detection, Effect, Parameter};
+use crate::effects::{NoiseBelowCount, Saturation};
+use crate::findings::Detection;
 use crate::gapped_cascade::GappedCascade;
 use crate::series::Series;
 use measurement::ChannelProfile;
@@ -93,16 +95,15 @@ impl ValueCounts {
         let &(level, _) = cut_off.iter().max_by_key(|(_, count)| *count)?;
         let (samples, all) = (cut_off.iter().map(|(_, count)| count).sum::<u64>() as f64, self.samples as f64);
         let (low, high) = poisson_bounds(samples);
-        let at = if is_end_of_range(level) { "the end of the range" } else { "a limit" };
-        let evidence = format!(
-            "{samples} of {all} samples lie at {at}, {level:.4} {}, no other value occurs more than {most_of_others} times: what is \
-             beyond is cut off, and N, B and K are lower limits",
-            channel.unit,
-        );
-        let share = Parameter::new(samples / all, low / all, (high / all).min(1.0), "");
-        let level = Parameter::new(level, level, level, channel.unit);
-        let effect = Effect::new("saturated", [("share", share), ("level", level)], evidence);
-        Some(Detection { effect, correction: None })
+        let saturation = Saturation {
+            fraction: BoundedEstimate::new(samples / all, low / all, (high / all).min(1.0)),
+            level: BoundedEstimate::exact(level).in_unit(channel.unit),
+            is_end_of_range: is_end_of_range(level),
+            cut_off: samples,
+            samples: all,
+            most_of_others,
+        };
+        Some(Detection { effect: saturation.into(), correction: None })
     }
 }
 
@@ -119,26 +120,22 @@ pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64
         return None;
     }
     let deviation = largest.sqrt() * series.resolution;
-    let evidence = if largest == 0.0 {
-        "the value never changes; nothing is known of its noise but that it is below a count".to_owned()
-    } else {
-        format!(
-            "the Allan deviation is at most {:.2} counts at the shortest averaging times, less than the {:.2} counts from which on \
-             rounding adds white noise alone; N, B and K are those of the rounded values",
-            largest.sqrt(),
-            dithered_avar_counts2.sqrt(),
-        )
-    };
+    let dithered_counts = dithered_avar_counts2.sqrt();
     // Before the rounding it may be anything up to the limit.
-    let limit = dithered_avar_counts2.sqrt() * series.resolution;
-    let parameter = Parameter::new(deviation, 0.0, limit, series.unit);
-    Some(Detection { effect: Effect::new("noise_below_count", [("deviation", parameter)], evidence), correction: None })
+    let limit = dithered_counts * series.resolution;
+    let noise = NoiseBelowCount {
+        deviation: BoundedEstimate::new(deviation, 0.0, limit).in_unit(series.unit),
+        counts: largest.sqrt(),
+        dithered_counts,
+    };
+    Some(Detection { effect: noise.into(), correction: None })
 }
 
 #[cfg(test)]
 mod tests {
     use super::{MOST_BINS, ValueCounts};
     use crate::distributions::upper_tail;
+    use crate::effects::Effect;
     use measurement::adis16405::profile;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -161,12 +158,12 @@ mod tests {
         for deviation in [10.0, MOST_BINS as f64] {
             let limit = (0.5 * deviation) as i32;
             let found = counted(deviation, limit).saturation(&channel, channel.lsb).expect("cut off");
-            let parameter = |name: &str| found.effect.parameters[name].value;
+            let Effect::Saturation(found) = found.effect else { panic!("{found:?}") };
             let expected = upper_tail((f64::from(limit) - 0.5) / deviation);
             // Four standard deviations of a share of 200,000 samples.
             let scatter = (expected * (1.0 - expected) / 200_000.0).sqrt();
-            assert!((parameter("share") - expected).abs() < 4.0 * scatter, "{deviation}: {}", parameter("share"));
-            assert_eq!(parameter("level"), f64::from(limit) * channel.lsb);
+            assert!((found.fraction.value - expected).abs() < 4.0 * scatter, "{deviation}: {found:?}");
+            assert_eq!(found.level.value, f64::from(limit) * channel.lsb);
             assert_eq!(counted(deviation, i32::MAX).saturation(&channel, channel.lsb), None);
         }
     }

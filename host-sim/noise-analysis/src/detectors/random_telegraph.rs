@@ -5,8 +5,10 @@
 //! variance and correlation time, on means of equal parts of the record.
 
 use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood, white_log_likelihood};
+use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
-use crate::findings::{Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::effects::{Spikes, TelegraphEvidence, TelegraphNoise};
+use crate::findings::SIGNIFICANCE;
 use crate::uniform_series::UniformSeries;
 
 /// Numbers of parts into which the record is divided: few parts for long correlation times, many for short ones.
@@ -31,7 +33,7 @@ const PER_CHANGE: f64 = 4.0;
 /// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
 /// in s.
 #[must_use]
-pub(crate) fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]) -> Option<Detection> {
+pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times: &[f64]) -> Option<TelegraphNoise> {
     let samples = series.values().len();
     let known = correlation_times.iter().map(|time| ((time / RESOLVED / series.sample_period()) as usize).max(1));
     let coarse = PARTS.iter().map(|parts| samples / parts).filter(|&size| size > 0);
@@ -47,7 +49,7 @@ pub(crate) fn find(series: &UniformSeries, unit: &str, correlation_times: &[f64]
         }
         let part_s = size as f64 * series.sample_period();
         let resolved = chain.correlation_time() > RESOLVED;
-        found = Some(detection(&chain, gain, part_s, unit));
+        found = Some(telegraph_noise(&chain, gain, part_s, unit));
         if resolved {
             break;
         }
@@ -77,13 +79,10 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
 /// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
 /// over the square of the time constant `1/(a + b)`.
 #[must_use]
-pub(crate) fn explains_spikes(telegraph: &Effect, spikes: &Effect, sample_period: f64) -> bool {
-    let bound = |effect: &Effect, name: &str, of: fn(&Parameter) -> f64| effect.parameters.get(name).map(of);
-    let visits = bound(telegraph, "time_constant", |of| of.low)
-        .map(|time_constant| 3600.0 * sample_period / (4.0 * time_constant * time_constant));
-    let is_at_most = |least: Option<f64>, most: Option<f64>| least.zip(most).is_some_and(|(least, most)| least <= most);
-    is_at_most(bound(spikes, "rate", |of| of.low), visits)
-        && is_at_most(bound(spikes, "size", |of| of.low), bound(telegraph, "amplitude", |of| of.high))
+pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {
+    let visits_per_hour =
+        3600.0 * sample_period / (4.0 * telegraph.time_constant_s.low * telegraph.time_constant_s.low);
+    spikes.rate_per_hour.low <= visits_per_hour && spikes.size.low <= telegraph.amplitude.high
 }
 
 /// Means of equal parts of a record, minus the mean of the record; `NaN` where half of the samples or more are missing.
@@ -174,34 +173,21 @@ fn stays_at_levels(chain: &TwoStateChain, parts: &PartMeans) -> bool {
     sums.iter().all(|(sum, information)| sum.abs() <= quantile(0.25 * SIGNIFICANCE) * information.sqrt())
 }
 
-/// The telegraph noise of `chain`, for parts of `part_s` seconds, as it is reported.
-fn detection(chain: &TwoStateChain, gain: f64, part_s: f64, unit: &str) -> Detection {
-    let bounded = |value: f64, error: f64, unit: &str| {
+/// The telegraph noise of `chain`, for parts of `part_s` seconds.
+fn telegraph_noise(chain: &TwoStateChain, gain: f64, part_s: f64, unit: &'static str) -> TelegraphNoise {
+    let bounded = |value: f64, error: f64| {
         let factor = (NORMAL_975 * error).exp();
-        Parameter::new(value, value / factor, value * factor, unit)
+        BoundedEstimate::new(value, value / factor, value * factor)
     };
     let steps = chain.correlation_time();
-    let time = part_s * steps;
     // One part in 2·steps contains a jump, and its mean is a quarter of the distance off its level on average, at either
     // level.
     let blurred = 0.25 / steps;
     let distance = chain.distance() / (1.0 - blurred);
-    let distance_error = chain.distance_error.hypot(0.5 * blurred);
-    let evidence = format!(
-        "two levels {:.3e} {unit} apart with {:.0} jumps between them, e^{gain:.0} times as likely as a Gaussian process of \
-         any correlation time; charges that are caught and let go in a transistor or a crystal",
-        distance, chain.jumps,
-    );
-    Detection {
-        effect: Effect::new(
-            "telegraph",
-            [
-                ("time_constant", bounded(time, chain.time_error, "s")),
-                ("amplitude", bounded(distance, distance_error, unit)),
-            ],
-            evidence,
-        ),
-        correction: None,
+    TelegraphNoise {
+        time_constant_s: bounded(part_s * steps, chain.time_error),
+        amplitude: bounded(distance, chain.distance_error.hypot(0.5 * blurred)).in_unit(unit),
+        evidence: TelegraphEvidence::Levels { jumps: chain.jumps, gain },
     }
 }
 
@@ -235,9 +221,12 @@ mod tests {
     /// Two levels with a correlation time of 0.1 s: of 40,000 samples `ab·T·40,000` begin a visit of one, 100 with the rates a = b = 5/s.
     #[test]
     fn visits_of_a_sample_are_no_spikes() {
-        let parameter = |value: f64| Parameter::new(value, 0.9 * value, 1.1 * value, "");
-        let telegraph =
-            Effect::new("telegraph", [("time_constant", parameter(0.1)), ("amplitude", parameter(5.0))], String::new());
+        let estimate = |value: f64| BoundedEstimate::new(value, 0.9 * value, 1.1 * value);
+        let telegraph = TelegraphNoise {
+            time_constant_s: estimate(0.1),
+            amplitude: estimate(5.0).in_unit("deg/s"),
+            evidence: TelegraphEvidence::Levels { jumps: 100.0, gain: 20.0 },
+        };
         let mut up = false;
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let levels: Vec<bool> = (0..SAMPLES)
@@ -249,8 +238,12 @@ mod tests {
         let visits = levels.windows(3).filter(|of| of[0] == of[2] && of[0] != of[1]).count();
         assert!((70..130).contains(&visits), "{visits}"); // three standard deviations of 100
         let hours = SAMPLES as f64 * PERIOD_S / 3600.0;
-        let spikes = |count: f64, size: f64| {
-            Effect::new("spikes", [("rate", parameter(count / hours)), ("size", parameter(size))], String::new())
+        let spikes = |count: f64, size: f64| Spikes {
+            rate_per_hour: estimate(count / hours),
+            size: estimate(size).in_unit("deg/s"),
+            count: count as usize,
+            threshold_sigmas: 5.0,
+            largest_sigmas: 6.0,
         };
         assert!(explains_spikes(&telegraph, &spikes(visits as f64, 5.0), PERIOD_S));
         assert!(!explains_spikes(&telegraph, &spikes(2.0 * visits as f64, 5.0), PERIOD_S));
@@ -268,10 +261,9 @@ mod tests {
                 series = UniformSeries::new(PERIOD_S, values.map(gap).collect());
             }
             let finding = find(&series, "g", &[]).unwrap_or_else(|| panic!("{amplitude} {time_s}"));
-            for (name, truth) in [("amplitude", amplitude), ("time_constant", time_s)] {
-                let parameter = &finding.effect.parameters[name];
-                assert!((parameter.value / truth).ln().abs() < 0.5, "{name} {truth}: {parameter:?}");
-                covered += usize::from((parameter.low..=parameter.high).contains(&truth));
+            for (of, truth) in [(finding.amplitude.estimate(), amplitude), (finding.time_constant_s, time_s)] {
+                assert!((of.value / truth).ln().abs() < 0.5, "{truth}: {of:?}");
+                covered += usize::from((of.low..=of.high).contains(&truth));
                 all += 1;
             }
         }
@@ -283,7 +275,7 @@ mod tests {
     fn finds_short_correlation_times_that_the_curve_shows() {
         let series = series(20, telegraph(3.0, 0.1));
         let finding = find(&series, "g", &[0.1]).unwrap();
-        assert!((finding.effect.parameters["time_constant"].value / 0.1 - 1.0).abs() < 0.2, "{finding:?}");
+        assert!((finding.time_constant_s.value / 0.1 - 1.0).abs() < 0.2, "{finding:?}");
     }
 
     #[test]

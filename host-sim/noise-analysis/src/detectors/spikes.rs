@@ -4,8 +4,10 @@
 //! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
 //! interpolation error is normal, so the threshold for N samples comes from N times the normal tail.
 
+use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
-use crate::findings::{Correction, Detection, Effect, Parameter, SIGNIFICANCE};
+use crate::effects::Spikes;
+use crate::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::series::Series;
 use nalgebra::{SMatrix, SVector};
@@ -126,29 +128,18 @@ impl SpikeRule {
         let count = sizes.len() as f64;
         let (fewest, most) = poisson_bounds(count);
         let rate = |count: f64, detected: f64| count / detected / hours;
-        let z = largest / interpolation.deviation;
-        let evidence = format!(
-            "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {z:.1} σ; \
-             an electrical disturbance or a damaged word",
-            sizes.len(),
-            threshold / interpolation.deviation,
-        );
-        let parameters = [
-            (
-                "rate",
-                Parameter::new(
-                    rate(count, size.detected),
-                    rate(fewest, size.detected_most),
-                    rate(most, size.detected_least),
-                    "1/h",
-                ),
+        let spikes = Spikes {
+            rate_per_hour: BoundedEstimate::new(
+                rate(count, size.detected),
+                rate(fewest, size.detected_most),
+                rate(most, size.detected_least),
             ),
-            ("size", Parameter::new(size.value, size.low, size.high, unit)),
-        ];
-        Some(Detection {
-            effect: Effect::new("spikes", parameters, evidence),
-            correction: Some(Correction::Exclude(found.slots.clone())),
-        })
+            size: BoundedEstimate::new(size.value, size.low, size.high).in_unit(unit),
+            count: sizes.len(),
+            threshold_sigmas: threshold / interpolation.deviation,
+            largest_sigmas: largest / interpolation.deviation,
+        };
+        Some(Detection { effect: spikes.into(), correction: Some(Correction::Exclude(found.slots.clone())) })
     }
 }
 

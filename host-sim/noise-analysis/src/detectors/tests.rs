@@ -3,6 +3,7 @@
 use super::bias::{self, BiasChanges};
 use super::noise_grid::NoiseGrids;
 use super::{effective_lsb, spikes};
+use crate::bounds::Parameter;
 use crate::distributions::{poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::findings::{Correction, Detection};
 use crate::sampling_faults;
@@ -63,8 +64,12 @@ fn bias_changes(series: &Series) -> BiasChanges {
     bias::find(series, &[], &[], &NoiseGrids::default())
 }
 
+fn value_of(detection: &Detection, name: &str) -> Parameter {
+    detection.effect.parameters()[name].clone()
+}
+
 fn assert_covers(detection: &Detection, name: &str, truth: f64) {
-    let parameter = &detection.effect.parameters[name];
+    let parameter = value_of(detection, name);
     assert!(parameter.low <= truth && truth <= parameter.high, "{name}: {truth} outside {parameter:?}");
     assert!(parameter.low <= parameter.value && parameter.value <= parameter.high, "{name}: {parameter:?}");
 }
@@ -94,10 +99,10 @@ fn spikes_are_counted_measured_and_removed() {
         Case::hiding(vec![InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
     let series = case.series(GYRO);
     let detection = spikes::find(&series).unwrap();
-    assert_eq!(detection.effect.kind, "spikes");
+    assert_eq!(detection.effect.name(), "spikes");
     assert_covers(&detection, "rate", 300.0);
     assert_covers(&detection, "size", size);
-    assert!((detection.effect.parameters["size"].value / size - 1.0).abs() < 0.05);
+    assert!((value_of(&detection, "size").value / size - 1.0).abs() < 0.05);
 
     let corrected = series.clone().corrected(detection.correction.as_ref().unwrap());
     let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
@@ -128,7 +133,7 @@ fn a_step_is_located_measured_and_removed() {
     let detection = bias_changes(&series).step.unwrap();
     assert_covers(&detection, "time", 333.0);
     assert_covers(&detection, "size", -0.15);
-    assert!((detection.effect.parameters["size"].value / -0.15 - 1.0).abs() < 0.2);
+    assert!((value_of(&detection, "size").value / -0.15 - 1.0).abs() < 0.2);
     assert_eq!(spikes::find(&series), None);
     assert_eq!(bias_changes(&series.corrected(detection.correction.as_ref().unwrap())).step, None);
     assert_eq!(bias_changes(&case.series(Channel::GyroZ)).step, None);
@@ -156,8 +161,8 @@ fn a_ramp_is_measured_and_is_no_step() {
     let series = case.series(GYRO);
     let detection = bias_changes(&series).ramp.unwrap();
     assert_covers(&detection, "slope", -1e-3);
-    assert!((detection.effect.parameters["slope"].value / -1e-3 - 1.0).abs() < 0.2);
-    let per_slot = detection.effect.parameters["slope"].value * series.period_s;
+    assert!((value_of(&detection, "slope").value / -1e-3 - 1.0).abs() < 0.2);
+    let per_slot = value_of(&detection, "slope").value * series.period_s;
     let mut levelled = series;
     let slots = levelled.slots.clone();
     for (value, &slot) in levelled.values_mut().iter_mut().zip(slots.iter()) {
@@ -180,7 +185,7 @@ fn a_ramp_and_a_step_are_found_together() {
     let step = step.unwrap();
     assert_covers(&step, "size", 0.3);
     // The sensor starts a little before the record.
-    assert!((step.effect.parameters["time"].value - 200.0).abs() < 1.0, "{step:?}");
+    assert!((value_of(&step, "time").value - 200.0).abs() < 1.0, "{step:?}");
 }
 
 #[test]
@@ -220,8 +225,8 @@ fn values_of_twelve_bits_have_an_lsb_of_four_counts() {
     let values = series.values.iter().map(|value| (value / count / 4.0).round() * 4.0 * count).collect();
     let coarse = Series { values, slots: series.slots.clone(), ..series };
     let detection = effective_lsb::find(&coarse).unwrap();
-    assert_eq!(detection.effect.kind, "quantization");
-    assert!((detection.effect.parameters["step"].value - 0.2).abs() < 1e-9);
+    assert_eq!(detection.effect.name(), "quantization");
+    assert!((value_of(&detection, "step").value - 0.2).abs() < 1e-9);
     // A channel that hardly ever changes has an unknown LSB.
     let values = (0..coarse.values.len()).map(|at| if at % 5_000 < 2_500 { 0.0 } else { 0.2 }).collect();
     assert_eq!(effective_lsb::find(&Series { values, slots: coarse.slots.clone(), ..coarse }), None);

@@ -4,8 +4,9 @@
 use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
+use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
-use crate::findings::{Effect, Parameter};
+use crate::effects::{TemperatureCurvature, ThermalLag};
 use crate::series::Series;
 use nalgebra::DVector;
 
@@ -117,18 +118,15 @@ impl TemperatureCourse {
     }
 
     /// The response of a bias behind a lag.
-    pub(super) fn lag_response(&self, lag: &Lag, estimate: &RegressionEstimate, unit: &str) -> BiasResponse {
-        let sensitivity = interval(estimate, format!("{unit}/degC"));
+    pub(super) fn lag_response(&self, lag: &Lag, estimate: &RegressionEstimate, unit: &'static str) -> BiasResponse {
         let times = (NORMAL_975 * lag.relative_error).exp();
-        let time_constant =
-            Parameter::new(lag.time_constant, lag.time_constant / times, lag.time_constant * times, "s");
-        let evidence = format!(
-            "follows the measured temperature behind a lag of {:.0} s, by chance {:.0e}, and better than without a lag; the \
-             sensing element warms up later than the thermometer",
-            lag.time_constant, estimate.p_value,
-        );
-        let parameters = [("sensitivity", sensitivity), ("time_constant", time_constant)];
-        self.lagged(lag.time_constant).response(estimate.size, Effect::new("thermal_lag", parameters, evidence))
+        let time_constant = lag.time_constant;
+        let effect = ThermalLag {
+            sensitivity: interval(estimate, unit),
+            time_constant_s: BoundedEstimate::new(time_constant, time_constant / times, time_constant * times),
+            p_value: estimate.p_value,
+        };
+        self.lagged(time_constant).response(estimate.size, effect.into())
     }
 
     /// The response of a bias to the squared temperature; `linear` is its sensitivity at the mean temperature.
@@ -136,21 +134,16 @@ impl TemperatureCourse {
         &self,
         linear: Option<&RegressionEstimate>,
         estimate: &RegressionEstimate,
-        unit: &str,
+        unit: &'static str,
     ) -> BiasResponse {
         let none = RegressionEstimate { size: 0.0, error: 0.0, ..*estimate };
-        let evidence = format!(
-            "follows the square of the measured temperature, by chance {:.0e} in white, flicker and walking noise of any \
-             mixture; a sensitivity that itself changes with temperature",
-            estimate.p_value,
-        );
-        let mean = self.measured.mean();
-        let parameters = [
-            ("sensitivity", interval(linear.unwrap_or(&none), format!("{unit}/degC"))),
-            ("curvature", interval(estimate, format!("{unit}/degC^2"))),
-            ("reference", Parameter::new(mean, mean, mean, "degC")),
-        ];
-        self.squared().response(estimate.size, Effect::new("temperature_squared", parameters, evidence))
+        let effect = TemperatureCurvature {
+            sensitivity: interval(linear.unwrap_or(&none), unit),
+            curvature: interval(estimate, unit),
+            reference_degc: self.measured.mean(),
+            p_value: estimate.p_value,
+        };
+        self.squared().response(estimate.size, effect.into())
     }
 }
 

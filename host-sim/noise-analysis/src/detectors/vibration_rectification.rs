@@ -4,7 +4,7 @@
 use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::block_means::BlockMeans;
 use super::gls_regression::RegressionEstimate;
-use crate::findings::Effect;
+use crate::effects::VibrationRectification;
 use crate::series::Series;
 use nalgebra::DVector;
 
@@ -61,18 +61,16 @@ impl<'a> Vibration<'a> {
     }
 
     /// The response of a bias in `unit`.
-    pub(super) fn response(&self, estimate: &RegressionEstimate, unit: &str) -> BiasResponse {
+    pub(super) fn response(&self, estimate: &RegressionEstimate, unit: &'static str) -> BiasResponse {
         let Acceleration { name, series, .. } = self.acceleration;
-        let per = series.unit;
-        let strongest = self.course.values.iter().copied().fold(0.0, f64::max).sqrt();
-        let evidence = format!(
-            "follows the variance of {name}, whose vibration reaches {strongest:.2e} {per} rms, by chance {:.0e} in white, flicker \
-             and walking noise of any mixture",
-            estimate.p_value,
-        );
-        let sensitivity = interval(estimate, format!("{unit}/{per}^2"));
-        let effect = Effect::new("vibration_rectification", [("sensitivity", sensitivity)], evidence);
-        self.course.response(estimate.size, effect)
+        let effect = VibrationRectification {
+            sensitivity: interval(estimate, unit),
+            per: series.unit,
+            accelerometer: name,
+            strongest: self.course.values.iter().copied().fold(0.0, f64::max).sqrt(),
+            p_value: estimate.p_value,
+        };
+        self.course.response(estimate.size, effect.into())
     }
 }
 

@@ -1,6 +1,6 @@
 //! The correlation time of a Markov process by the autocorrelation of the samples, independent of the Allan variance.
 
-use crate::findings::BoundedEstimate;
+use crate::bounds::BoundedEstimate;
 use crate::uniform_series::UniformSeries;
 use allan_core::{Model, NoiseTerm};
 use statrs::distribution::{ContinuousCDF, StudentsT};

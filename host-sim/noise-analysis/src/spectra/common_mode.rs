@@ -165,7 +165,7 @@ fn shapes(frequency: f64, period: f64, time: f64) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::CrossSpectra;
-    use crate::findings::BoundedEstimate;
+    use crate::bounds::BoundedEstimate;
     use crate::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;

@@ -13,8 +13,9 @@ use super::periodogram::{smooth_length, taper};
 use super::slow_background::SlowBackground;
 use super::smooth_shape::SpectralBand;
 use super::transforms;
+use crate::bounds::BoundedEstimate;
 use crate::distributions::{quantile, upper_tail};
-use crate::findings::{Parameter, SIGNIFICANCE};
+use crate::findings::SIGNIFICANCE;
 use crate::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::{SQRT_2, TAU};
@@ -53,7 +54,7 @@ const LARGEST_REVERSED: f64 = 0.75;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DecayingDisturbances {
     /// By the filter that responds most, to the next ones on either side, s.
-    pub time_constant: Parameter,
+    pub time_constant: BoundedEstimate,
     /// Sum over the responses in its standard deviations, above 0 where the disturbances go upwards; that of the reversed filter.
     pub sum: f64,
     pub reversed: f64,
@@ -83,7 +84,7 @@ impl DecayingDisturbances {
         let reversed = record.response(best.time, true)?;
         let time_s = best.time as f64 * blocks.sample_period();
         best.exceeds(&reversed).then(|| Self {
-            time_constant: Parameter::new(time_s, 0.5 * time_s, 2.0 * time_s, "s"),
+            time_constant: BoundedEstimate::new(time_s, 0.5 * time_s, 2.0 * time_s),
             sum: best.sum,
             reversed: reversed.sum,
             p_value,

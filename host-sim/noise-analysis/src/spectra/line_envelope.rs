@@ -7,7 +7,7 @@
 
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
-use crate::findings::MeasuredValue;
+use crate::bounds::MeasuredValue;
 use crate::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::TAU;

@@ -2,8 +2,8 @@
 //! Whittle's likelihood.
 
 use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
-use crate::findings::BoundedEstimate;
 
 /// White, flicker and random-walk noise, a Markov process of each channel's own, and a shared one.
 pub(super) const TERMS: usize = 5;

@@ -10,8 +10,9 @@ use super::periodogram::taper;
 use super::slow_background::SlowBackground;
 use super::smooth_shape::SpectralBand;
 use super::transforms;
+use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
-use crate::findings::{Parameter, SIGNIFICANCE};
+use crate::findings::SIGNIFICANCE;
 use crate::uniform_series::UniformSeries;
 
 /// Blocks of the record, at least: twice the highest harmonic is half their rate.
@@ -48,11 +49,11 @@ const LEAST_FUNDAMENTAL: f64 = 4.0;
 #[derive(Debug, Clone)]
 pub(crate) struct PeriodicSignal {
     /// Of the fundamental, Hz.
-    pub frequency: Parameter,
+    pub frequency: BoundedEstimate,
     /// Amplitude of the fundamental, in the unit of the series.
     pub amplitude: f64,
     /// Deviation of the harmonics over that of the fundamental, %.
-    pub harmonics_percent: Parameter,
+    pub harmonics_percent: BoundedEstimate,
     /// Sum of the ordinates of the harmonics without the fundamental, over the noise.
     pub sum: f64,
     /// Probability of such a sum at any frequency by chance.
@@ -133,12 +134,11 @@ impl PeriodicSignal {
             / (std::f64::consts::PI * (first / noise.density(fundamental)).sqrt());
         Some(Self {
             amplitude: sine.amplitude(),
-            frequency: Parameter::new(sine.frequency, sine.frequency - error, sine.frequency + error, "Hz"),
-            harmonics_percent: Parameter::new(
+            frequency: BoundedEstimate::new(sine.frequency, sine.frequency - error, sine.frequency + error),
+            harmonics_percent: BoundedEstimate::new(
                 percent,
                 percent * (1.0 - relative).max(0.0),
                 percent * (1.0 + relative),
-                "%",
             ),
             sum,
             p_value,

@@ -173,7 +173,7 @@ mod tests {
         });
         let [line] = found[..] else { panic!("{found:?}") };
         let measured = line.width.expect("wider than the resolution of 0.024 Hz");
-        let within = |measured: crate::findings::MeasuredValue, truth: f64| {
+        let within = |measured: crate::bounds::MeasuredValue, truth: f64| {
             assert!((measured.value - truth).abs() < 4.0 * measured.error, "{measured:?} {truth}");
         };
         within(line.frequency, frequency);

@@ -15,7 +15,7 @@
 
 use super::smooth_shape::{filter_gain, walk_amplitude};
 use super::welch::Welch;
-use crate::findings::BoundedEstimate;
+use crate::bounds::BoundedEstimate;
 use allan_core::{Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;

@@ -4,8 +4,8 @@ use super::line_envelope::Modulation;
 use super::line_models::{Lorentz, Sine};
 use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, LocalLevel, WINDOW};
+use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
-use crate::findings::MeasuredValue;
 use crate::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 

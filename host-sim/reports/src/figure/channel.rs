@@ -119,21 +119,16 @@ fn residual_panel(channel: &ChannelReport, has_terms: bool, across: Axis, frame:
     Panel::new(across, up, lines)
 }
 
-/// Whether a finding is a line in a spectrum.
-pub(super) fn is_line(finding: &Finding) -> bool {
-    matches!(finding.kind.as_str(), "sinusoid" | "resonance" | "square_wave")
-}
-
 /// Frequencies of the lines that were traced in a channel.
 fn traced_lines(report: &Report, channel: &ChannelReport) -> Vec<Place> {
     let of = |finding: &Finding| {
-        let frequency = finding.parameters.get("frequency")?.value;
+        let frequency = finding.effect.frequency_hz()?.value;
         Some(Place { label: quantity_digits(frequency, "Hz", 3), from: frequency, to: frequency })
     };
     report
         .findings
         .iter()
-        .filter(|finding| is_line(finding) && finding.channels.contains(&channel.name))
+        .filter(|finding| finding.effect.is_line() && finding.channels.contains(&channel.name))
         .filter_map(of)
         .collect()
 }

@@ -2,11 +2,14 @@
 //! histogram, or what the baseline model leaves of the curve.
 
 use super::axis::Axis;
-use super::channel::{deviation_plot, is_line, spectrum_plot, time_unit};
+use super::channel::{deviation_plot, spectrum_plot, time_unit};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
 use crate::finding_text::channel_list;
 use crate::formatting::words;
 use crate::rounding::{quantity_digits, span, unit};
+use noise_analysis::effects::{
+    Effect, MotionInterval, NoisyInterval, ResonantLine, SinusoidalLine, SquareWave, UnexplainedPlace,
+};
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
 /// A line is shown with the frequencies from this part of its own to its inverse.
@@ -19,27 +22,52 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
     let finding = report.findings.get(index)?;
     let shown = clearest(finding);
     let channel = report.channels.iter().find(|channel| Some(&channel.name) == shown)?;
-    let plot = match finding.kind.as_str() {
-        _ if is_line(finding) => line_in_spectrum(report, channel, finding),
-        "filter_bandwidth" | "sample_clock" => spectrum_plot(report, channel),
-        "bias_step" | "knock" | "motion" | "rate_ramp" | "common_mode" | "shared_drift" | "vibration_rectification" => {
-            in_time(report, channel, finding)
+    let plot = match &finding.effect {
+        Effect::SinusoidalLine(SinusoidalLine { frequency_hz, .. })
+        | Effect::ResonantLine(ResonantLine { frequency_hz, .. })
+        | Effect::SquareWave(SquareWave { frequency_hz, .. }) => line_in_spectrum(report, channel, frequency_hz.value),
+        Effect::OutputFilter(_) | Effect::FirstOrderFilter(_) | Effect::ClockDeviation(_) => {
+            spectrum_plot(report, channel)
         }
-        "temperature" | "temperature_squared" | "thermal_lag" => beside(report, channel, "temp"),
-        "supply" => beside(report, channel, "supply"),
-        "acceleration" => ["x", "y", "z"]
-            .iter()
-            .find(|axis| finding.parameters.contains_key(&format!("sensitivity_{axis}")))
-            .and_then(|axis| beside(report, channel, &format!("accl_{axis}"))),
-        "telegraph" => histogram(channel),
-        "unexplained" if finding.parameters.contains_key("time") => in_time(report, channel, finding),
-        // A line of the curve alone, which has an averaging time too, is not in the spectrum.
-        "unexplained" if finding.parameters.contains_key("frequency") && !finding.parameters.contains_key("tau") => {
-            line_in_spectrum(report, channel, finding)
+        Effect::LevelStep(of) => {
+            let at = of.time_s.value;
+            in_time(report, channel, finding, Some(TimePlace { label: span(at), from_s: at, to_s: at }))
         }
-        _ => Some(residual(report, channel)),
+        Effect::NoisyInterval(NoisyInterval { from_s, to_s, .. })
+        | Effect::MotionInterval(MotionInterval { from_s, to_s, .. }) => {
+            let (from_s, to_s) = (from_s.value, to_s.value);
+            let label = format!("{} … {}", span(from_s), span(to_s));
+            in_time(report, channel, finding, Some(TimePlace { label, from_s, to_s }))
+        }
+        Effect::LinearDrift(_) | Effect::CommonMode(_) | Effect::SharedDrift(_) | Effect::VibrationRectification(_) => {
+            in_time(report, channel, finding, None)
+        }
+        Effect::TemperatureSensitivity(_) | Effect::TemperatureCurvature(_) | Effect::ThermalLag(_) => {
+            beside(report, channel, "temp")
+        }
+        Effect::SupplySensitivity(_) => beside(report, channel, "supply"),
+        Effect::AccelerationSensitivity(of) => {
+            of.axes().next().and_then(|(axis, _)| beside(report, channel, &format!("accl_{axis}")))
+        }
+        Effect::TelegraphNoise(_) => histogram(channel),
+        Effect::Unexplained(of) => match of.place {
+            UnexplainedPlace::Frequency(frequency_hz) => line_in_spectrum(report, channel, frequency_hz.value),
+            // A line of the curve alone is not in the spectrum.
+            UnexplainedPlace::AveragingTime(_) | UnexplainedPlace::LineOfCurve { .. } => {
+                Some(residual(report, channel))
+            }
+        },
+        Effect::MarkovProcess(_)
+        | Effect::AngleQuantization(_)
+        | Effect::EffectiveLsb(_)
+        | Effect::NoiseBelowCount(_)
+        | Effect::Spikes(_)
+        | Effect::Saturation(_)
+        | Effect::DroppedSamples(_)
+        | Effect::RepeatedSamples(_) => Some(residual(report, channel)),
     }?;
-    let title = format!("Evidence {}: {} in {}", index + 1, words(&finding.kind), channel_list(&finding.channels));
+    let title =
+        format!("Evidence {}: {} in {}", index + 1, words(finding.effect.name()), channel_list(&finding.channels));
     Some(Plot { id: format!("finding-{}", index + 1), title, ..plot })
 }
 
@@ -50,8 +78,7 @@ fn clearest(finding: &Finding) -> Option<&String> {
 }
 
 /// The spectrum around a line.
-fn line_in_spectrum(report: &Report, channel: &ChannelReport, finding: &Finding) -> Option<Plot> {
-    let frequency = finding.parameters.get("frequency")?.value;
+fn line_in_spectrum(report: &Report, channel: &ChannelReport, frequency: f64) -> Option<Plot> {
     let whole = spectrum_plot(report, channel)?;
     let panel = whole.panels.first()?;
     let cut = |line: &Line| {
@@ -82,8 +109,15 @@ fn line_in_spectrum(report: &Report, channel: &ChannelReport, finding: &Finding)
     })
 }
 
+/// A place in time, s from the first sample.
+struct TimePlace {
+    label: String,
+    from_s: f64,
+    to_s: f64,
+}
+
 /// The bias over time of the channels of a finding, with the place in time.
-fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding) -> Option<Plot> {
+fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Option<TimePlace>) -> Option<Plot> {
     let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
     let same_unit =
         report.channels.iter().filter(|other| other.unit == channel.unit && finding.channels.contains(&other.name));
@@ -105,14 +139,7 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding) -> Optio
     let across = Axis::linear(&format!("time, {per}"), places(first).into_iter(), [LEFT, RIGHT]);
     let [frame] = frames([200.0]);
     let up = Axis::linear(&format!("bias, {}", unit(&channel.unit)), lines.iter().flat_map(heights), frame);
-    let at = |name: &str| finding.parameters.get(name).map(|parameter| parameter.value);
-    let place = match (at("time"), at("from"), at("to")) {
-        (Some(time), ..) => Some(Place { label: span(time), from: time / scale, to: time / scale }),
-        (None, Some(from), Some(to)) => {
-            Some(Place { label: format!("{} … {}", span(from), span(to)), from: from / scale, to: to / scale })
-        }
-        _ => None,
-    };
+    let place = at.map(|TimePlace { label, from_s, to_s }| Place { label, from: from_s / scale, to: to_s / scale });
     Some(Plot {
         id: String::new(),
         title: String::new(),

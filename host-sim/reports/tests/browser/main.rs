@@ -5,8 +5,13 @@
 #[allow(dead_code)]
 mod fixture;
 
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::{
+    CurveEvidence, Effect, LevelStep, LineEvidence, LineSource, MarkovEvidence, MarkovProcess, SinusoidalLine,
+    TelegraphEvidence, TelegraphNoise,
+};
 use noise_analysis::report::{BiasOverTime, DataSheetReport, SpectrumReport};
-use noise_analysis::report::{Finding, Parameter, Report, Validation};
+use noise_analysis::report::{Finding, Report, Validation};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -48,20 +53,34 @@ fn report() -> Report {
         data.bias_over_time =
             Some(BiasOverTime { block_s: 40.0, followed: mean.iter().map(|of| 0.8 * of).collect(), time_s, mean });
     }
-    let parameter = |value: f64, unit: &str| Parameter::new(value, 0.9 * value, 1.1 * value, unit);
-    let finding = |kind: &str, parameters: &[(&str, Parameter)]| Finding {
-        kind: kind.to_owned(),
+    let of = |value: f64| BoundedEstimate::new(value, 0.9 * value, 1.1 * value);
+    let size = |value: f64| of(value).in_unit("deg/s");
+    let curve = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.0, gain_sigmas: 9.0 };
+    let finding = |effect: Effect| Finding {
+        effect,
         channels: vec!["gyro_z".to_owned()],
-        parameters: parameters.iter().map(|(name, of)| ((*name).to_owned(), of.clone())).collect(),
-        evidence: "<made> for \"this\" test".to_owned(),
+        clearest: 0,
         validated: Validation::Yes,
         share_percent: [("gyro_z".to_owned(), 40.0)].into(),
     };
+    let line = SinusoidalLine {
+        frequency_hz: of(0.7),
+        amplitude: size(0.09),
+        multiples: None,
+        evidence: LineEvidence { has_width: false, source: LineSource::Curve(curve) },
+    };
+    let telegraph = TelegraphNoise {
+        time_constant_s: of(60.0),
+        amplitude: size(0.02),
+        evidence: TelegraphEvidence::Levels { jumps: 80.0, gain: 20.0 },
+    };
+    let markov =
+        MarkovProcess { deviation: size(0.02), time_constant_s: of(9.0), evidence: MarkovEvidence::Curve(curve) };
     report.findings = vec![
-        finding("sinusoid", &[("frequency", parameter(0.7, "Hz")), ("amplitude", parameter(0.09, "deg/s"))]),
-        finding("bias_step", &[("time", parameter(4000.0, "s")), ("size", parameter(0.01, "deg/s"))]),
-        finding("telegraph", &[("amplitude", parameter(0.02, "deg/s")), ("time_constant", parameter(60.0, "s"))]),
-        finding("markov", &[("deviation", parameter(0.02, "deg/s")), ("time_constant", parameter(9.0, "s"))]),
+        finding(line.into()),
+        finding(LevelStep { time_s: of(4000.0), size: size(0.01), p_value: 1e-9 }.into()),
+        finding(telegraph.into()),
+        finding(markov.into()),
     ];
     report
 }

@@ -21,7 +21,9 @@ fn view() -> LiveView {
         physics: String::new(),
         brief: "A vibration or hum at 21 Hz: a narrow line of 0.27 °/s.".to_owned(),
         advice: String::new(),
+        step: None,
         weight: String::new(),
+        is_weighed: false,
     }];
     view.unexplained = Some("gyro z: +9.0 % at averaging times around 80 s".to_owned());
     view

@@ -2,10 +2,12 @@
 
 use super::fixture::report;
 use super::phrases::{documentation, phrases};
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::{Effect, LineEvidence, LineSource, ResonantLine, SpectrumEvidence};
 use noise_analysis::nonstationarity::{
     Baselines, EpochParameters, FittedPart, IntervalCoverage, RelatedLine, Stationarity, TrackedSet, TrackingErrors,
 };
-use noise_analysis::report::{CommonModeRegression, Finding, Nonstationarity, Parameter, Report, Validation};
+use noise_analysis::report::{CommonModeRegression, Finding, Nonstationarity, Report, Validation};
 use reports::{explanation, summary};
 use std::collections::BTreeSet;
 
@@ -138,12 +140,24 @@ fn a_record_too_short_for_epochs_is_said_to_be() {
 fn every_report_tells_how_the_noise_changes() {
     let mut report = report();
     report.channels[2].nonstationarity = Some(changes());
-    let line = |frequency: f64| Finding {
-        kind: "resonance".to_owned(),
+    let line = |frequency_hz: f64| Finding {
+        effect: Effect::from(ResonantLine {
+            frequency_hz: BoundedEstimate::new(frequency_hz, frequency_hz - 0.1, frequency_hz + 0.1),
+            bandwidth_hz: BoundedEstimate::exact(0.5),
+            deviation: BoundedEstimate::exact(0.1).in_unit("deg/s"),
+            multiples: None,
+            evidence: LineEvidence {
+                has_width: true,
+                source: LineSource::Spectrum(SpectrumEvidence {
+                    frequency_hz,
+                    width_hz: Some(0.5),
+                    sigmas: 9.0,
+                    p_value: 1e-9,
+                }),
+            },
+        }),
         channels: vec!["gyro_z".to_owned()],
-        parameters: [("frequency".to_owned(), Parameter::new(frequency, frequency - 0.1, frequency + 0.1, "Hz"))]
-            .into(),
-        evidence: String::new(),
+        clearest: 0,
         validated: Validation::Yes,
         share_percent: Default::default(),
     };

@@ -1,6 +1,8 @@
 //! A report made by hand: the curve of known N, B and K, without an estimator or a fit.
 
 use noise_analysis::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::{LineEvidence, LineSource, SinusoidalLine, SpectrumEvidence};
 use noise_analysis::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -215,14 +217,14 @@ fn trace_sinusoid(channel: &mut ChannelReport) {
     }
     let mut sinusoid = term("sinusoid", "frequency_hz", FREQUENCY_HZ, "Hz");
     sinusoid.parameters.extend(term("sinusoid", "amplitude", AMPLITUDE, "deg/s").parameters);
-    channel.effects = vec![Effect {
-        kind: sinusoid.kind.clone(),
-        parameters: sinusoid.parameters.clone(),
-        evidence: "the residual rises to 41 % at 0.64 s and vanishes at the multiples of 1.43 s, as a line of \
-                   0.7 Hz does and no other candidate: 212 units of deviance are explained by two parameters"
-            .to_owned(),
-        finding: 0,
-    }];
+    let spectrum = SpectrumEvidence { frequency_hz: FREQUENCY_HZ, width_hz: None, sigmas: 41.0, p_value: 1e-30 };
+    let line = SinusoidalLine {
+        frequency_hz: BoundedEstimate::exact(FREQUENCY_HZ),
+        amplitude: BoundedEstimate::exact(AMPLITUDE).in_unit("deg/s"),
+        multiples: None,
+        evidence: LineEvidence { has_width: false, source: LineSource::Spectrum(spectrum) },
+    };
+    channel.effects = vec![ChannelEffect { effect: line.into(), finding: 0 }];
     channel.after.terms.push(sinusoid);
     channel.before.unseen.rms_percent = Some(21.84);
     channel.before.fitted.rms_percent = Some(22.03);

@@ -7,6 +7,11 @@ mod fixture;
 #[path = "../rendering/phrases.rs"]
 mod phrases;
 
+use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::effects::{
+    CurveEvidence, Effect, LineEvidence, LineSource, Observation, OutputFilter, SinusoidalLine, Unexplained,
+    UnexplainedPlace,
+};
 use noise_analysis::report::{Finding, Parameter, Report, Stretch, Validation};
 use phrases::{documentation, phrases};
 use reports::terminal::{MOST_LINES, Screen};
@@ -17,14 +22,36 @@ fn parameter(value: f64, half_width: f64, unit: &str) -> Parameter {
     Parameter::new(value, value - half_width, value + half_width, unit)
 }
 
-fn finding(kind: &str, channels: &[&str], parameters: &[(&str, Parameter)], share: f64) -> Finding {
+fn estimate(value: f64, half_width: f64) -> BoundedEstimate {
+    BoundedEstimate::new(value, value - half_width, value + half_width)
+}
+
+const CURVE: CurveEvidence = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.0, gain_sigmas: 9.0 };
+
+fn finding(effect: impl Into<Effect>, channels: &[&str], share: f64) -> Finding {
     Finding {
-        kind: kind.to_owned(),
+        effect: effect.into(),
         channels: channels.iter().map(|name| (*name).to_owned()).collect(),
-        parameters: parameters.iter().map(|(name, of)| ((*name).to_owned(), of.clone())).collect(),
-        evidence: "measured".to_owned(),
+        clearest: 0,
         validated: Validation::Yes,
         share_percent: BTreeMap::from([(channels[0].to_owned(), share)]),
+    }
+}
+
+fn line(frequency_hz: f64) -> SinusoidalLine {
+    SinusoidalLine {
+        frequency_hz: estimate(frequency_hz, 0.1),
+        amplitude: estimate(0.27, 0.01).in_unit("deg/s"),
+        multiples: None,
+        evidence: LineEvidence { has_width: false, source: LineSource::Curve(CURVE) },
+    }
+}
+
+fn departure(tau_s: BoundedEstimate, excess_percent: BoundedEstimate) -> Unexplained {
+    Unexplained {
+        place: UnexplainedPlace::AveragingTime(tau_s),
+        excess_percent: Some(excess_percent),
+        observation: Observation::PointOfCurve { p_value: 1e-9 },
     }
 }
 
@@ -38,25 +65,18 @@ fn report() -> Report {
     let error = &mut report.channels[4].after.unseen;
     (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(8.2), Some(81.92), Some(0.8));
     error.deviance_per_point = Some(33.1);
+    let filter = OutputFilter {
+        taps: BoundedEstimate::exact(8.0),
+        decimation: estimate(8.95, 0.02),
+        white_noise: estimate(0.05, 0.001).in_unit("deg/s"),
+        stages: 2,
+        internal_rate_hz: 819.2,
+        evidence: CURVE,
+    };
     report.findings = vec![
-        finding(
-            "filter_bandwidth",
-            &["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"],
-            &[("taps", Parameter::new(8.0, 8.0, 8.0, "")), ("decimation", parameter(8.95, 0.02, ""))],
-            12.0,
-        ),
-        finding(
-            "sinusoid",
-            &["gyro_z", "accl_x"],
-            &[("frequency", parameter(20.7, 0.1, "Hz")), ("amplitude", parameter(0.27, 0.01, "deg/s"))],
-            62.0,
-        ),
-        finding(
-            "unexplained",
-            &["gyro_z"],
-            &[("tau", parameter(80.0, 1.0, "s")), ("excess_percent", parameter(9.0, 2.0, "%"))],
-            9.0,
-        ),
+        finding(filter, &["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"], 12.0),
+        finding(line(20.7), &["gyro_z", "accl_x"], 62.0),
+        finding(departure(estimate(80.0, 1.0), estimate(9.0, 2.0)), &["gyro_z"], 9.0),
     ];
     report
 }
@@ -99,9 +119,8 @@ fn the_screen_keeps_to_its_lines_and_columns() {
     for columns in [10, 80, 97, 120, 200, 1000] {
         let mut crowded = report();
         for number in 0..60 {
-            let frequency = parameter(20.0 + f64::from(number), 0.1, "Hz");
             let channels = ["gyro_x", "gyro_z", "accl_y", "magn_x", "magn_y"];
-            crowded.findings.push(finding("sinusoid", &channels, &[("frequency", frequency)], 3.0));
+            crowded.findings.push(finding(line(20.0 + f64::from(number)), &channels, 3.0));
         }
         for report in [report(), crowded, fixture::report(), fixture::empty()] {
             let lines = plain(&report, columns);
@@ -193,15 +212,14 @@ fn a_failing_model_is_held_beside_the_first_half_s_own_curve() {
 #[test]
 fn departures_at_one_place_are_told_together() {
     let mut report = report();
-    let departure = |channel: &str, percent: f64| {
-        let tau = ("tau", parameter(0.0012, 0.0, "s"));
-        finding("unexplained", &[channel], &[tau, ("excess_percent", parameter(percent, 0.1, "%"))], 0.0)
+    let in_channel = |channel: &str, percent: f64| {
+        finding(departure(estimate(0.0012, 0.0), estimate(percent, 0.1)), &[channel], 0.0)
     };
-    report.findings = vec![departure("gyro_x", -3.6), departure("gyro_y", -2.1), departure("gyro_z", -2.1)];
+    report.findings = vec![in_channel("gyro_x", -3.6), in_channel("gyro_y", -2.1), in_channel("gyro_z", -2.1)];
     let told = reports::summary::unexplained(&report).expect("a text");
     assert_eq!(told, "gyros: −2.1 … −3.6 % at averaging times around 1.2 ms");
     // Above and below the model are two departures.
-    report.findings[2] = departure("gyro_z", 2.1);
+    report.findings[2] = in_channel("gyro_z", 2.1);
     let told = reports::summary::unexplained(&report).expect("a text");
     assert!(told.ends_with("; gyro z: +2.1 % at averaging times around 1.2 ms"), "{told}");
 }
@@ -238,11 +256,7 @@ fn the_documentation_explains_every_sentence_about_the_record() {
 fn every_finding_of_a_full_screen_has_a_line() {
     let mut crowded = report();
     for number in 0..9 {
-        let values = [
-            ("frequency", parameter(20.0 + f64::from(number), 0.1, "Hz")),
-            ("amplitude", parameter(0.27, 0.01, "deg/s")),
-        ];
-        crowded.findings.push(finding("sinusoid", &["accl_x", "accl_y"], &values, 3.0));
+        crowded.findings.push(finding(line(20.0 + f64::from(number)), &["accl_x", "accl_y"], 3.0));
     }
     crowded.part.note = Some("a note: that goes on and on ".repeat(40));
     let screen = plain(&crowded, 80);

@@ -5,7 +5,7 @@ use super::{HiddenKind, Stretch};
 use crate::undeclared::score::{ParameterScore, UNEXPLAINED, score_effect, score_parameters};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::{ChannelReport, Effect, ModelReport, Report};
+use noise_analysis::report::{ChannelEffect, ChannelReport, Effect, ModelReport, Parameter, Report};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -90,7 +90,7 @@ fn answer(
     let only_new = |channel: &Channel| {
         let mut of = channel_report(report, *channel)?.clone();
         let before = channel_report(untouched, *channel);
-        of.effects.retain(|effect| before.is_none_or(|before| is_new(effect, &before.effects)));
+        of.effects.retain(|shown| before.is_none_or(|before| is_new(&shown.effect, &before.effects)));
         Some((*channel, of))
     };
     let shown: Vec<(Channel, ChannelReport)> = own.iter().filter_map(only_new).collect();
@@ -106,29 +106,30 @@ fn answer(
             let HiddenKind::Outside(kind) = kind else { return (false, Vec::new(), Vec::new()) };
             let right: Vec<&'static str> = kind.right_names().iter().copied().chain([UNEXPLAINED]).collect();
             let mut found = scored.iter().flat_map(|(_, report)| &report.effects);
-            (found.any(|found| right.contains(&found.kind.as_str())), right, Vec::new())
+            (found.any(|found| right.contains(&found.effect.name())), right, Vec::new())
         }
     }
 }
 
 /// Whether none of `others` is of the same kind with parameters whose intervals meet those of `effect`.
-fn is_new(effect: &Effect, others: &[Effect]) -> bool {
-    let is_same = |other: &&Effect| {
-        let meets = |(name, parameter): (&String, &noise_analysis::report::Parameter)| {
-            let of_other = other.parameters.get(name);
-            of_other.is_none_or(|of| of.low <= parameter.high && parameter.low <= of.high)
+fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
+    let parameters = effect.parameters();
+    let is_same = |other: &ChannelEffect| {
+        let of_other = other.effect.parameters();
+        let meets = |(name, parameter): (&&str, &Parameter)| {
+            of_other.get(name).is_none_or(|of| of.low <= parameter.high && parameter.low <= of.high)
         };
-        other.kind == effect.kind && effect.parameters.iter().all(meets)
+        other.effect.name() == effect.name() && parameters.iter().all(meets)
     };
-    others.iter().find(is_same).is_none()
+    !others.iter().any(is_same)
 }
 
 /// The names of `report` that neither `untouched` has in the same channel nor are `right` in one of the channels `own`.
 fn wrong_names(own: &[Channel], right: &[&str], report: &Report, untouched: &Report) -> Vec<String> {
-    let names = |report: &Report| -> BTreeSet<(Channel, String)> {
+    let names = |report: &Report| -> BTreeSet<(Channel, &'static str)> {
         let of_channel = |channel: Channel| {
             let effects = channel_report(report, channel).map(|of| of.effects.as_slice()).unwrap_or_default();
-            effects.iter().map(move |effect| (channel, effect.kind.clone())).collect::<Vec<_>>()
+            effects.iter().map(move |shown| (channel, shown.effect.name())).collect::<Vec<_>>()
         };
         Channel::INERTIAL.into_iter().flat_map(of_channel).collect()
     };

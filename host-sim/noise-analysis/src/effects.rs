@@ -1,0 +1,244 @@
+//! The kinds of effects beyond the baseline noise model, one file each: what it is, the share of the Allan variance, the course over
+//! time, and what makes the effects of two channels one cause.
+//!
+//! An effect is numbers alone. Its [name](Effect::name) and those of its [parameters](Effect::parameters) are for tables and files;
+//! nothing in the analysis depends on them.
+
+mod acceleration;
+mod angle_quantization;
+mod bias_step;
+mod common_mode;
+mod dropped_samples;
+mod effective_lsb;
+mod evidence;
+mod first_order_filter;
+mod kind;
+mod knock;
+mod markov_process;
+mod motion;
+mod noise_below_count;
+mod output_filter;
+mod rate_ramp;
+mod repeated_samples;
+mod resonance;
+mod sample_clock;
+mod saturation;
+mod shared_drift;
+mod sinusoid;
+mod spikes;
+mod square_wave;
+mod supply;
+mod telegraph;
+mod temperature;
+mod temperature_curvature;
+mod thermal_lag;
+mod unexplained;
+mod vibration_rectification;
+
+pub use acceleration::AccelerationSensitivity;
+pub use angle_quantization::AngleQuantization;
+pub use bias_step::LevelStep;
+pub use common_mode::CommonMode;
+pub use dropped_samples::DroppedSamples;
+pub use effective_lsb::EffectiveLsb;
+pub use evidence::{CurveEvidence, LineEvidence, LineSource, Multiples, SpectrumEvidence};
+pub use first_order_filter::FirstOrderFilter;
+pub(crate) use kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+pub use knock::NoisyInterval;
+pub use markov_process::{MarkovEvidence, MarkovProcess};
+pub use motion::MotionInterval;
+pub use noise_below_count::NoiseBelowCount;
+pub use output_filter::OutputFilter;
+pub use rate_ramp::{LinearDrift, LinearDriftEvidence};
+pub use repeated_samples::RepeatedSamples;
+pub use resonance::ResonantLine;
+pub use sample_clock::ClockDeviation;
+pub use saturation::Saturation;
+pub use shared_drift::SharedDrift;
+pub use sinusoid::SinusoidalLine;
+pub use spikes::Spikes;
+pub use square_wave::SquareWave;
+pub use supply::SupplySensitivity;
+pub use telegraph::{TelegraphEvidence, TelegraphNoise};
+pub use temperature::TemperatureSensitivity;
+pub use temperature_curvature::TemperatureCurvature;
+pub use thermal_lag::ThermalLag;
+pub use unexplained::{BandMismatch, Observation, Refutation, Unexplained, UnexplainedPlace};
+pub use vibration_rectification::VibrationRectification;
+
+use crate::bounds::{BoundedEstimate, Parameter};
+use std::collections::BTreeMap;
+
+/// An effect beyond the baseline noise model, as a channel shows it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// The low-pass filter of the part.
+    OutputFilter(OutputFilter),
+    /// A low-pass filter of the first order in one channel.
+    FirstOrderFilter(FirstOrderFilter),
+    /// A line no wider than the record resolves.
+    SinusoidalLine(SinusoidalLine),
+    /// A line with a width.
+    ResonantLine(ResonantLine),
+    /// Odd harmonics of one fundamental.
+    SquareWave(SquareWave),
+    /// Jumps to and fro between two levels.
+    TelegraphNoise(TelegraphNoise),
+    /// Exponentially correlated noise.
+    MarkovProcess(MarkovProcess),
+    /// Drift that channels have in common.
+    CommonMode(CommonMode),
+    /// Drift in common with a channel on which none depends as much.
+    SharedDrift(SharedDrift),
+    /// A bias that changes in proportion to time.
+    LinearDrift(LinearDrift),
+    /// A bias that becomes another one.
+    LevelStep(LevelStep),
+    /// A bias in proportion to the temperature.
+    TemperatureSensitivity(TemperatureSensitivity),
+    /// A bias that follows a parabola of the temperature.
+    TemperatureCurvature(TemperatureCurvature),
+    /// A bias that follows the temperature behind a low-pass filter.
+    ThermalLag(ThermalLag),
+    /// A bias in proportion to the supply voltage.
+    SupplySensitivity(SupplySensitivity),
+    /// A rate in proportion to the specific force.
+    AccelerationSensitivity(AccelerationSensitivity),
+    /// A bias in proportion to the variance of an acceleration.
+    VibrationRectification(VibrationRectification),
+    /// White noise of the angle.
+    AngleQuantization(AngleQuantization),
+    /// Values that are multiples of several counts.
+    EffectiveLsb(EffectiveLsb),
+    /// Noise that does not reach from one count to the next.
+    NoiseBelowCount(NoiseBelowCount),
+    /// Single samples that stand out.
+    Spikes(Spikes),
+    /// A time in which the noise is larger.
+    NoisyInterval(NoisyInterval),
+    /// A motion of the platform.
+    MotionInterval(MotionInterval),
+    /// Values that are cut off.
+    Saturation(Saturation),
+    /// Samples that never arrived.
+    DroppedSamples(DroppedSamples),
+    /// Samples that were read twice.
+    RepeatedSamples(RepeatedSamples),
+    /// A sample rate other than the nominal one.
+    ClockDeviation(ClockDeviation),
+    /// What departs from every model that the analysis knows.
+    Unexplained(Unexplained),
+}
+
+/// Gives every variant of [`Effect`] what its [`Kind`] says.
+macro_rules! kinds {
+    ($($kind:ident),* $(,)?) => {
+        $(
+            impl From<$kind> for Effect {
+                fn from(of: $kind) -> Self {
+                    Self::$kind(of)
+                }
+            }
+        )*
+
+        impl Effect {
+            /// The name of every kind; two kinds may share one.
+            pub const NAMES: &[&str] = &[$($kind::NAME),*];
+
+            /// Name of the kind in tables and files, such as `sinusoid`.
+            #[must_use]
+            pub fn name(&self) -> &'static str {
+                match self { $(Self::$kind(_) => $kind::NAME),* }
+            }
+
+            /// Its parameters by their names in tables and files.
+            #[must_use]
+            pub fn parameters(&self) -> BTreeMap<&'static str, Parameter> {
+                match self { $(Self::$kind(of) => of.parameters()),* }.into_iter().collect()
+            }
+
+            /// [`Kind::sizes`].
+            pub(crate) fn sizes(&self) -> Vec<BoundedEstimate> {
+                match self { $(Self::$kind(of) => of.sizes()),* }
+            }
+
+            /// [`Kind::lasting`].
+            pub(crate) fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+                match self { $(Self::$kind(of) => of.lasting()),* }
+            }
+
+            /// [`Kind::occurrence`].
+            pub(crate) fn occurrence(&self) -> Occurrence {
+                match self { $(Self::$kind(of) => of.occurrence()),* }
+            }
+
+            /// [`Kind::avar`].
+            pub(crate) fn avar(&self, at: &AveragingTime) -> Option<f64> {
+                match self { $(Self::$kind(of) => of.avar(at)),* }
+            }
+
+            /// [`Kind::course`].
+            pub(crate) fn course(&self, means: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+                match self { $(Self::$kind(of) => of.course(means)),* }
+            }
+        }
+    };
+}
+
+kinds!(
+    OutputFilter,
+    FirstOrderFilter,
+    SinusoidalLine,
+    ResonantLine,
+    SquareWave,
+    TelegraphNoise,
+    MarkovProcess,
+    CommonMode,
+    SharedDrift,
+    LinearDrift,
+    LevelStep,
+    TemperatureSensitivity,
+    TemperatureCurvature,
+    ThermalLag,
+    SupplySensitivity,
+    AccelerationSensitivity,
+    VibrationRectification,
+    AngleQuantization,
+    EffectiveLsb,
+    NoiseBelowCount,
+    Spikes,
+    NoisyInterval,
+    MotionInterval,
+    Saturation,
+    DroppedSamples,
+    RepeatedSamples,
+    ClockDeviation,
+    Unexplained,
+);
+
+impl Effect {
+    /// Whether both are of one kind.
+    pub(crate) fn is_of_kind(&self, other: &Self) -> bool {
+        std::mem::discriminant(self) == std::mem::discriminant(other)
+    }
+
+    /// Whether it is a periodic signal that has lines in the spectrum.
+    #[must_use]
+    pub const fn is_line(&self) -> bool {
+        matches!(self, Self::SinusoidalLine(_) | Self::ResonantLine(_) | Self::SquareWave(_))
+    }
+
+    /// Its frequency, Hz; `None` if it is not at one.
+    #[must_use]
+    pub fn frequency_hz(&self) -> Option<BoundedEstimate> {
+        match self.occurrence() {
+            Occurrence::AtFrequency(frequency_hz) => Some(frequency_hz),
+            _ => None,
+        }
+    }
+
+    /// Whether both are one cause, in channels of the same unit or not.
+    pub(crate) fn is_one_cause(&self, other: &Self, is_same_unit: bool) -> bool {
+        self.is_of_kind(other) && self.occurrence().is_one_cause(other.occurrence(), is_same_unit)
+    }
+}

@@ -1,0 +1,48 @@
+//! Slow drift that channels have in common, without a measured cause.
+
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use allan_core::NoiseTerm;
+use allan_core::term::Markov;
+
+/// A drift in common.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonMode {
+    /// Standard deviation.
+    pub deviation: ChannelEstimate,
+    /// Correlation time, s.
+    pub time_constant_s: BoundedEstimate,
+    /// Names of the other channels that have it.
+    pub others: Vec<&'static str>,
+    /// Gain in ln likelihood over channels with nothing in common.
+    pub gain: f64,
+}
+
+impl Kind for CommonMode {
+    const NAME: &'static str = "common_mode";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![("deviation", self.deviation.parameter()), ("time_constant", self.time_constant_s.parameter("s"))]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.deviation.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.deviation.estimate()), Some(self.time_constant_s)]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::OnceAUnit
+    }
+
+    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
+        Some(at.of_term(&term, self.deviation.value))
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

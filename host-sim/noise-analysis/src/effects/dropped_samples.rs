@@ -1,0 +1,45 @@
+//! Samples that never arrived: the sample indices or time stamps have room for them.
+
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, Parameter};
+
+/// Lost samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DroppedSamples {
+    /// Part of all samples.
+    pub fraction: BoundedEstimate,
+    /// Their number.
+    pub missing: f64,
+    /// Number of all samples, those that were used and those that were dropped.
+    pub samples: f64,
+    /// Number of gaps.
+    pub gaps: usize,
+}
+
+impl Kind for DroppedSamples {
+    const NAME: &'static str = "dropped_samples";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![("fraction", self.fraction.parameter(""))]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        Vec::new()
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.fraction)]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::Once
+    }
+
+    fn avar(&self, _: &AveragingTime) -> Option<f64> {
+        None
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,68 @@
+//! What several kinds of effects were told by.
+
+use crate::bounds::{BoundedEstimate, Parameter};
+
+/// Where the curve departs from the model without an added term.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurveEvidence {
+    /// `σ/σ_model − 1` at the averaging time where it is most significant.
+    pub excess: f64,
+    /// That averaging time, s.
+    pub tau_s: f64,
+    /// The excess in standard deviations.
+    pub sigmas: f64,
+    /// What the term takes off the fit, in standard deviations.
+    pub gain_sigmas: f64,
+}
+
+/// What shows a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineEvidence {
+    /// Whether the line has a width.
+    pub has_width: bool,
+    /// The curve or the spectrum.
+    pub source: LineSource,
+}
+
+/// Where a line was seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LineSource {
+    /// In the curve alone.
+    Curve(CurveEvidence),
+    /// In the spectrum.
+    Spectrum(SpectrumEvidence),
+}
+
+/// A line of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpectrumEvidence {
+    /// Hz
+    pub frequency_hz: f64,
+    /// Full width at half maximum, Hz; `None` of a line no wider than the record resolves.
+    pub width_hz: Option<f64>,
+    /// Significance of the strongest peak, standard deviations.
+    pub sigmas: f64,
+    /// Probability of such a peak anywhere by chance.
+    pub p_value: f64,
+}
+
+/// The lines of one periodic signal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Multiples {
+    /// Numbers of the harmonics, by frequency.
+    pub harmonics: Vec<u32>,
+    /// Number of sidebands of these.
+    pub sidebands: usize,
+}
+
+impl Multiples {
+    /// Number of lines.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.harmonics.len() + self.sidebands
+    }
+
+    pub(super) fn parameter(&self) -> (&'static str, Parameter) {
+        ("harmonics", BoundedEstimate::exact(self.count() as f64).parameter(""))
+    }
+}

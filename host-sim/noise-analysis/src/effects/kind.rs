@@ -1,0 +1,111 @@
+//! What every kind of effect says of itself.
+
+use crate::bounds::{BoundedEstimate, Parameter};
+use allan_core::NoiseTerm;
+use measurement::Quantity;
+
+/// A kind of effect.
+pub(crate) trait Kind {
+    /// In tables and files.
+    const NAME: &'static str;
+
+    /// Its parameters by their names in tables and files.
+    fn parameters(&self) -> Vec<(&'static str, Parameter)>;
+
+    /// The estimates that say how large it is: the channel with the narrowest of these for their value shows it most clearly.
+    fn sizes(&self) -> Vec<BoundedEstimate>;
+
+    /// What two parts of a record have alike where the effect lasts, in one order for the whole kind; nothing of what happens once or is
+    /// no statement about the samples' distribution. Of lines the first is the frequency, and then come amplitude, deviation and
+    /// bandwidth.
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>>;
+
+    /// How often a part has it.
+    fn occurrence(&self) -> Occurrence;
+
+    /// The Allan variance that it adds to its channel, at one averaging time. `None` where it adds none of its own or none that is
+    /// known.
+    fn avar(&self, at: &AveragingTime) -> Option<f64>;
+
+    /// What it adds to the bias of its channel in each block: factors, each with the values that it multiplies. Empty of noise.
+    fn course(&self, means: &BiasBlocks) -> Vec<(f64, Vec<f64>)>;
+}
+
+/// How often a part has an effect, which decides whether two channels show the same one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Occurrence {
+    /// The part, its bus or its environment has it once: whatever channels show it show the same cause.
+    Once,
+    /// The channels of one unit have it once.
+    OnceAUnit,
+    /// At a time, between the earliest and the latest possible one in s: one cause where these overlap.
+    AtTime {
+        /// s
+        from_s: f64,
+        /// s
+        to_s: f64,
+    },
+    /// At a frequency, Hz: one cause where each is within the bounds of the other.
+    AtFrequency(BoundedEstimate),
+    /// In each channel by itself.
+    InChannel,
+}
+
+impl Occurrence {
+    /// Whether two effects of one kind are one cause.
+    pub(super) fn is_one_cause(self, other: Self, is_same_unit: bool) -> bool {
+        match (self, other) {
+            (Self::Once, Self::Once) => true,
+            (Self::OnceAUnit, Self::OnceAUnit) => is_same_unit,
+            (Self::AtTime { from_s, to_s }, Self::AtTime { from_s: other_from_s, to_s: other_to_s }) => {
+                from_s <= other_to_s && other_from_s <= to_s
+            }
+            (Self::AtFrequency(one), Self::AtFrequency(other)) => {
+                let has = |of: BoundedEstimate, value: f64| (of.low..=of.high).contains(&value);
+                has(one, other.value) && has(other, one.value)
+            }
+            _ => false,
+        }
+    }
+}
+
+/// An averaging time of a channel of a record.
+pub(crate) struct AveragingTime<'a> {
+    /// Averaging factor, samples.
+    pub n: u64,
+    /// Sample period, s.
+    pub period_s: f64,
+    /// Samples of the record.
+    pub samples: u64,
+    /// Allan variance of the channel's model.
+    pub model_avar: f64,
+    /// Allan deviation of the channel of this quantity and axis, where there is one.
+    pub adev_of: &'a dyn Fn(Quantity, &str) -> Option<f64>,
+}
+
+impl AveragingTime<'_> {
+    /// The Allan variance of a term of the noise model with this coefficient.
+    pub(crate) fn of_term(&self, term: &NoiseTerm, coefficient: f64) -> f64 {
+        coefficient * coefficient * term.avar(self.n, self.period_s)
+    }
+
+    /// The Allan variance of `sensitivity` times a channel.
+    pub(crate) fn followed(&self, quantity: Quantity, axis: &str, sensitivity: f64) -> Option<f64> {
+        Some((sensitivity * (self.adev_of)(quantity, axis)?).powi(2))
+    }
+}
+
+/// The blocks in which a bias is shown over time.
+pub(crate) struct BiasBlocks<'a> {
+    /// Middle of each block, s.
+    pub time_s: &'a [f64],
+    /// Means of the channel of this quantity and axis at these times, less the mean of them all, where there is one.
+    pub of: &'a dyn Fn(Quantity, &str) -> Option<Vec<f64>>,
+}
+
+impl BiasBlocks<'_> {
+    /// `sensitivity` times the means of a channel.
+    pub(crate) fn followed(&self, quantity: Quantity, axis: &str, sensitivity: f64) -> Vec<(f64, Vec<f64>)> {
+        (self.of)(quantity, axis).map(|means| (sensitivity, means)).into_iter().collect()
+    }
+}

@@ -1,0 +1,54 @@
+//! A time in which the noise is larger than before and after: a knock.
+
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, Parameter};
+
+/// A time of larger noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoisyInterval {
+    /// Beginning, s from the first sample.
+    pub from_s: BoundedEstimate,
+    /// End, s.
+    pub to_s: BoundedEstimate,
+    /// Deviation of the noise over that of the stretches around it.
+    pub level: BoundedEstimate,
+    /// Averaging time at which the levels are compared, s.
+    pub tau_s: f64,
+    /// Probability of such a level by chance.
+    pub p_value: f64,
+    /// Names of the channels that show it at the same time, this one included.
+    pub channels: Vec<&'static str>,
+}
+
+impl Kind for NoisyInterval {
+    const NAME: &'static str = "knock";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![
+            ("from", self.from_s.parameter("s")),
+            ("to", self.to_s.parameter("s")),
+            ("level", self.level.parameter("")),
+        ]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        Vec::new()
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        Vec::new()
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::AtTime { from_s: self.from_s.value, to_s: self.to_s.value }
+    }
+
+    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+        let part = (self.to_s.value - self.from_s.value) / (at.samples as f64 * at.period_s);
+        Some((self.level.value.powi(2) - 1.0).max(0.0) * part * at.model_avar)
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,61 @@
+//! Exponentially correlated noise: a first-order Gauss-Markov process.
+
+use super::evidence::CurveEvidence;
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use allan_core::NoiseTerm;
+use allan_core::term::Markov;
+
+/// A Markov process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkovProcess {
+    /// Standard deviation.
+    pub deviation: ChannelEstimate,
+    /// Correlation time, s.
+    pub time_constant_s: BoundedEstimate,
+    /// What shows it.
+    pub evidence: MarkovEvidence,
+}
+
+/// What shows a Markov process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MarkovEvidence {
+    /// The curve.
+    Curve(CurveEvidence),
+    /// The spectrum, which is flat below a corner where a random walk would rise.
+    Spectrum {
+        /// Hz
+        corner_hz: f64,
+        /// Gain in ln likelihood.
+        gain: f64,
+    },
+}
+
+impl Kind for MarkovProcess {
+    const NAME: &'static str = "markov";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![("deviation", self.deviation.parameter()), ("time_constant", self.time_constant_s.parameter("s"))]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.deviation.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.deviation.estimate()), Some(self.time_constant_s)]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::InChannel
+    }
+
+    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
+        Some(at.of_term(&term, self.deviation.value))
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

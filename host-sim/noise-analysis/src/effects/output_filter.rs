@@ -1,0 +1,59 @@
+//! The low-pass filter of the part: moving averages before its output, of which every so many values are read.
+
+use super::evidence::CurveEvidence;
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use crate::units::coefficient_unit;
+use allan_core::NoiseTerm;
+
+/// The part's filter, as one channel shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutputFilter {
+    /// Taps of each moving average.
+    pub taps: BoundedEstimate,
+    /// Samples of the part's own clock from one recorded sample to the next.
+    pub decimation: BoundedEstimate,
+    /// N of the white noise before the filter, in the unit times √s.
+    pub white_noise: ChannelEstimate,
+    /// Number of moving averages behind each other.
+    pub stages: u8,
+    /// The part's own sample rate, Hz.
+    pub internal_rate_hz: f64,
+    /// What the curve shows of it.
+    pub evidence: CurveEvidence,
+}
+
+impl Kind for OutputFilter {
+    const NAME: &'static str = "filter_bandwidth";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        let white_noise = self.white_noise.estimate();
+        let unit = coefficient_unit(&NoiseTerm::AngleRandomWalk, self.white_noise.unit);
+        vec![
+            ("taps", self.taps.parameter("")),
+            ("decimation", self.decimation.parameter("")),
+            ("value", white_noise.parameter(unit)),
+        ]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.white_noise.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        // The white noise may change over the record while the filter does not.
+        vec![Some(self.decimation)]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::Once
+    }
+
+    fn avar(&self, _: &AveragingTime) -> Option<f64> {
+        None
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

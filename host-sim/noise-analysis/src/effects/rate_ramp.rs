@@ -1,0 +1,69 @@
+//! A bias that changes in proportion to time.
+
+use super::evidence::CurveEvidence;
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use crate::units::coefficient_unit;
+use allan_core::NoiseTerm;
+
+/// A steady drift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearDrift {
+    /// In the unit per s.
+    pub slope: ChannelEstimate,
+    /// What shows it.
+    pub evidence: LinearDriftEvidence,
+}
+
+/// What shows a steady drift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LinearDriftEvidence {
+    /// The curve.
+    Curve(CurveEvidence),
+    /// A regression on time.
+    Regression {
+        /// Probability of such a slope by chance in white, flicker and walking noise of any mixture.
+        p_value: f64,
+    },
+}
+
+impl Kind for LinearDrift {
+    const NAME: &'static str = "rate_ramp";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![("slope", self.slope_parameter())]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.slope.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.slope.estimate())]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::InChannel
+    }
+
+    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+        Some(at.of_term(&NoiseTerm::RateRamp, self.slope.value))
+    }
+
+    fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        vec![(self.slope.value, blocks.time_s.to_vec())]
+    }
+}
+
+impl LinearDrift {
+    /// The slope with its unit.
+    #[must_use]
+    pub fn slope_parameter(&self) -> Parameter {
+        match self.evidence {
+            LinearDriftEvidence::Curve(_) => {
+                self.slope.estimate().parameter(coefficient_unit(&NoiseTerm::RateRamp, self.slope.unit))
+            }
+            LinearDriftEvidence::Regression { .. } => self.slope.parameter_per("s"),
+        }
+    }
+}

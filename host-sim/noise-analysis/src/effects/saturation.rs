@@ -1,0 +1,49 @@
+//! Values that are cut off: at an end of the range, or at another limit.
+
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+
+/// Values at a limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Saturation {
+    /// Part of the samples that lie at a limit.
+    pub fraction: BoundedEstimate,
+    /// The limit with the most samples; it is exact.
+    pub level: ChannelEstimate,
+    /// Whether that is an end of the range.
+    pub is_end_of_range: bool,
+    /// Number of samples at a limit.
+    pub cut_off: f64,
+    /// Number of all samples.
+    pub samples: f64,
+    /// Most samples that have another value in common.
+    pub most_of_others: u64,
+}
+
+impl Kind for Saturation {
+    const NAME: &'static str = "saturated";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![("share", self.fraction.parameter("")), ("level", self.level.parameter())]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.level.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        Vec::new()
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::InChannel
+    }
+
+    fn avar(&self, _: &AveragingTime) -> Option<f64> {
+        None
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,50 @@
+//! A line no wider than the record resolves.
+
+use super::evidence::{LineEvidence, Multiples};
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use allan_core::NoiseTerm;
+use allan_core::term::Sinusoid;
+
+/// A steady line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SinusoidalLine {
+    /// Hz
+    pub frequency_hz: BoundedEstimate,
+    /// Amplitude.
+    pub amplitude: ChannelEstimate,
+    /// The lines of the same signal, this one among them; `None` where it is alone.
+    pub multiples: Option<Multiples>,
+    /// What shows it.
+    pub evidence: LineEvidence,
+}
+
+impl Kind for SinusoidalLine {
+    const NAME: &'static str = "sinusoid";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        let own = [("frequency", self.frequency_hz.parameter("Hz")), ("amplitude", self.amplitude.parameter())];
+        own.into_iter().chain(self.multiples.as_ref().map(Multiples::parameter)).collect()
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.amplitude.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::AtFrequency(self.frequency_hz)
+    }
+
+    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+        let term = NoiseTerm::Sinusoid(Sinusoid { frequency: self.frequency_hz.value });
+        Some(at.of_term(&term, self.amplitude.value))
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,69 @@
+//! Random telegraph noise: jumps to and fro between two levels at random times.
+
+use super::evidence::CurveEvidence;
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use allan_core::NoiseTerm;
+use allan_core::term::Markov;
+
+/// Two levels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TelegraphNoise {
+    /// Time constant of the autocorrelation, s: half of the mean time between two jumps, where the levels are as frequent.
+    pub time_constant_s: BoundedEstimate,
+    /// Distance of the levels.
+    pub amplitude: ChannelEstimate,
+    /// What tells it from a Markov process.
+    pub evidence: TelegraphEvidence,
+}
+
+/// What tells random telegraph noise from a Gaussian process of the same spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TelegraphEvidence {
+    /// The kurtosis behind the term of the curve.
+    Kurtosis {
+        /// Excess kurtosis over that of two equally frequent levels.
+        ratio: f64,
+        /// Standard deviation of the ratio.
+        error: f64,
+        /// What the curve shows of the term.
+        curve: CurveEvidence,
+    },
+    /// The levels in the samples.
+    Levels {
+        /// Number of jumps.
+        jumps: f64,
+        /// Gain in ln likelihood over a Gaussian process of any correlation time.
+        gain: f64,
+    },
+}
+
+impl Kind for TelegraphNoise {
+    const NAME: &'static str = "telegraph";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![("time_constant", self.time_constant_s.parameter("s")), ("amplitude", self.amplitude.parameter())]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.amplitude.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.time_constant_s), Some(self.amplitude.estimate())]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::InChannel
+    }
+
+    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
+        // Two levels that are equally frequent are two standard deviations apart.
+        Some(at.of_term(&term, 0.5 * self.amplitude.value))
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}

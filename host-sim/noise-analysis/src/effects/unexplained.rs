@@ -1,0 +1,221 @@
+//! What departs from every model that the analysis knows: where, by how much, and what was seen.
+
+use super::evidence::{CurveEvidence, LineEvidence, Multiples};
+use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, Parameter};
+
+/// Something that no kind describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unexplained {
+    /// Where it is.
+    pub place: UnexplainedPlace,
+    /// By how much the deviation there exceeds that of the model, %; `None` where it is not known to better than itself.
+    pub excess_percent: Option<BoundedEstimate>,
+    /// What was seen.
+    pub observation: Observation,
+}
+
+/// Where something is unexplained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum UnexplainedPlace {
+    /// At an averaging time, s.
+    AveragingTime(BoundedEstimate),
+    /// At an averaging time of the curve, as by a line.
+    LineOfCurve {
+        /// s
+        tau_s: BoundedEstimate,
+        /// Hz
+        frequency_hz: BoundedEstimate,
+    },
+    /// Around a frequency of the spectrum, Hz.
+    Frequency(BoundedEstimate),
+}
+
+/// What was seen of something unexplained.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Observation {
+    /// A point of the curve that the model does not reach.
+    PointOfCurve {
+        /// Probability anywhere in the curve by chance.
+        p_value: f64,
+    },
+    /// A term that fits an octave of the curve, and that something else contradicts.
+    RefutedTerm {
+        /// What the curve shows of it.
+        curve: CurveEvidence,
+        /// What contradicts it.
+        by: Refutation,
+    },
+    /// A band of the spectrum that is no resonance.
+    Band {
+        /// Full width at half maximum, Hz.
+        width_hz: f64,
+        /// Significance, standard deviations.
+        sigmas: f64,
+        /// What contradicts a resonance.
+        mismatch: BandMismatch,
+    },
+    /// A line whose amplitude or phase goes to and fro.
+    ModulatedLine {
+        /// Significance, standard deviations.
+        sigmas: f64,
+        /// Distance of the sidebands, Hz.
+        sideband_hz: f64,
+        /// Amplitude of the change over that of the line, or of the phase in rad.
+        depth: f64,
+        /// Whether the phase changes, and not the amplitude.
+        of_phase: bool,
+    },
+    /// A line between two equal ones.
+    EqualSidebands {
+        /// Distance of the outer ones, Hz.
+        distance_hz: f64,
+        /// What shows the line between them.
+        line: LineEvidence,
+    },
+    /// A signal that rises evenly and jumps back.
+    Sawtooth {
+        /// Its lines.
+        multiples: Multiples,
+        /// What shows the fundamental.
+        line: LineEvidence,
+    },
+    /// A slow signal that is the same every period, and no sinusoid.
+    PeriodicSignal {
+        /// Harmonics that were examined.
+        harmonics: f64,
+        /// Power of the harmonics over the noise.
+        sum: f64,
+        /// Probability at any period by chance.
+        p_value: f64,
+    },
+    /// A line whose frequency runs from one value to another.
+    RunningLine {
+        /// At the beginning and at the end of the record, Hz.
+        frequencies_hz: [f64; 2],
+        /// Power over the noise of short spectra.
+        excess: f64,
+        /// Probability anywhere by chance.
+        p_value: f64,
+    },
+    /// Disturbances that begin at once and decay.
+    DecayingDisturbances {
+        /// s
+        time_constant_s: f64,
+        /// Third moment behind a filter for such, in standard deviations; above 0 of disturbances upwards.
+        sum: f64,
+        /// The same behind the filter in reversed time.
+        reversed: f64,
+        /// Probability by chance.
+        p_value: f64,
+    },
+    /// A level of the noise that follows the temperature.
+    LevelByTemperature {
+        /// Lowest and highest temperature, °C.
+        range_degc: [f64; 2],
+        /// Part of the changes of the level that follow the temperature.
+        explained: f64,
+    },
+}
+
+/// What contradicts a term that fits an octave of the curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Refutation {
+    /// A line of a few periods in the record, which its curve does not tell from a drift.
+    FewPeriods,
+    /// The spectrum has no line there.
+    NotInSpectrum {
+        /// Hz
+        frequency_hz: f64,
+    },
+    /// The changes up and down differ.
+    Irreversible {
+        /// Of the term, s.
+        time_constant_s: f64,
+    },
+    /// The kurtosis is that of rare disturbances.
+    RareDisturbances {
+        /// Of the term, s.
+        time_constant_s: f64,
+        /// Excess kurtosis over that of two equally frequent levels, and its standard deviation.
+        kurtosis: [f64; 2],
+    },
+    /// The kurtosis does not tell whether the process has two levels.
+    UndecidedLevels {
+        /// Of the term, s.
+        time_constant_s: f64,
+        /// Excess kurtosis over that of two equally frequent levels, and its standard deviation.
+        kurtosis: [f64; 2],
+    },
+}
+
+/// What contradicts a resonance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BandMismatch {
+    /// The form of its spectrum.
+    Shape {
+        /// Probability by chance.
+        p_value: f64,
+    },
+    /// The Allan deviation.
+    Curve,
+}
+
+impl Kind for Unexplained {
+    const NAME: &'static str = "unexplained";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        let tau = self.tau_s().map(|of| ("tau", of.parameter("s")));
+        let frequency = self.frequency_hz().map(|of| ("frequency", of.parameter("Hz")));
+        let excess = self.excess_percent.map(|of| ("excess_percent", of.parameter("%")));
+        let harmonics = match self.observation {
+            Observation::PeriodicSignal { harmonics, .. } => {
+                Some(("harmonics", BoundedEstimate::exact(harmonics).parameter("")))
+            }
+            _ => None,
+        };
+        [tau, frequency, excess, harmonics].into_iter().flatten().collect()
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        self.excess_percent.into_iter().collect()
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        Vec::new()
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        self.frequency_hz().map_or(Occurrence::InChannel, Occurrence::AtFrequency)
+    }
+
+    fn avar(&self, _: &AveragingTime) -> Option<f64> {
+        None
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}
+
+impl Unexplained {
+    /// The averaging time around which it is, s; `None` if it is in the spectrum alone.
+    #[must_use]
+    pub const fn tau_s(&self) -> Option<BoundedEstimate> {
+        match self.place {
+            UnexplainedPlace::AveragingTime(tau_s) | UnexplainedPlace::LineOfCurve { tau_s, .. } => Some(tau_s),
+            UnexplainedPlace::Frequency(_) => None,
+        }
+    }
+
+    /// The frequency around which it is, Hz; `None` if it is at none.
+    #[must_use]
+    pub const fn frequency_hz(&self) -> Option<BoundedEstimate> {
+        match self.place {
+            UnexplainedPlace::AveragingTime(_) => None,
+            UnexplainedPlace::LineOfCurve { frequency_hz, .. } | UnexplainedPlace::Frequency(frequency_hz) => {
+                Some(frequency_hz)
+            }
+        }
+    }
+}

@@ -1,0 +1,511 @@
+//! What an effect was told by, in words: what was measured, against which threshold, and the usual causes.
+
+use crate::rounding::quantity_digits;
+use noise_analysis::effects::{
+    BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, Multiples,
+    Observation, OutputFilter, Refutation, TelegraphEvidence, Unexplained,
+};
+use noise_analysis::report::Finding;
+
+/// How the numbers of a sentence are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NumberStyle {
+    /// With exponents and the units of the report, as in its JSON.
+    Plain,
+    /// With prefixes, for the screen and the page.
+    Prefixed,
+}
+
+/// A sentence on the evidence, in two parts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct EvidenceText {
+    /// What was measured.
+    pub measured: String,
+    /// What else is said of it, with the sign between the two; may be empty.
+    pub rest: String,
+}
+
+impl EvidenceText {
+    /// For an effect of one channel.
+    pub(crate) fn of_effect(effect: &Effect, style: NumberStyle) -> Self {
+        Wording(style).effect(effect)
+    }
+
+    /// For a finding, which may be in several channels.
+    pub(crate) fn of_finding(finding: &Finding, style: NumberStyle) -> Self {
+        let Self { measured, rest } = Self::of_effect(&finding.effect, style);
+        match finding.channels.len() {
+            0 | 1 => Self { measured, rest },
+            count => Self {
+                measured: format!("{}: {measured}", finding.channels[finding.clearest]),
+                rest: format!("{rest}; one cause in {count} channels"),
+            },
+        }
+    }
+
+    /// The whole sentence.
+    pub(crate) fn sentence(&self) -> String {
+        format!("{}{}", self.measured, self.rest)
+    }
+}
+
+fn text(measured: String, rest: impl Into<String>) -> EvidenceText {
+    EvidenceText { measured, rest: rest.into() }
+}
+
+/// A time in s with three decimals, below 0.1 s with four.
+fn seconds(tau: f64) -> String {
+    if tau < 0.1 { format!("{tau:.4}") } else { format!("{tau:.3}") }
+}
+
+/// Where the curve departs from the model.
+fn excess(curve: &CurveEvidence) -> String {
+    format!("{:+.1} % at tau = {} s ({:.0} sigma)", 100.0 * curve.excess, seconds(curve.tau_s), curve.sigmas.abs())
+}
+
+/// A term that was added, with what it usually is.
+fn added(curve: &CurveEvidence, meaning: &str) -> EvidenceText {
+    let gain = curve.gain_sigmas;
+    text(excess(curve), format!(" before it was added, which takes {gain:.0} sigma off the fit; {meaning}"))
+}
+
+/// What a Markov process usually is.
+const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
+
+/// How the numbers of a sentence are written, and the sentences.
+struct Wording(NumberStyle);
+
+impl Wording {
+    /// A probability; one below the smallest number is not 0.
+    fn chance(&self, p_value: f64) -> String {
+        match (self.0, format!("{p_value:.0e}")) {
+            (NumberStyle::Prefixed, none) if none == "0e0" => "below 1e-300".to_owned(),
+            (_, some) => some,
+        }
+    }
+
+    /// A number with its unit, with so many decimals in front of an exponent.
+    fn amount(&self, value: f64, unit: &str, decimals: usize) -> String {
+        match self.0 {
+            NumberStyle::Plain => format!("{value:.decimals$e} {unit}"),
+            NumberStyle::Prefixed => quantity_digits(value, unit, 3),
+        }
+    }
+
+    fn effect(&self, effect: &Effect) -> EvidenceText {
+        match effect {
+            Effect::OutputFilter(of) => added(&of.evidence, &filter_meaning(of)),
+            Effect::FirstOrderFilter(of) => text(
+                excess(&of.evidence),
+                format!(
+                    "; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
+                    seconds(of.time_constant_s)
+                ),
+            ),
+            Effect::SinusoidalLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
+            Effect::ResonantLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
+            Effect::SquareWave(of) => text(
+                format!(
+                    "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic",
+                    harmonics(&of.multiples),
+                    of.frequency_hz.value
+                ),
+                format!("; {}", self.line(&of.line).sentence()),
+            ),
+            Effect::TelegraphNoise(of) => match &of.evidence {
+                TelegraphEvidence::Kurtosis { ratio, error, curve } => text(
+                    format!(
+                        "two levels: excess kurtosis {ratio:.2} ± {error:.2} of that of a telegraph signal, a Gaussian process has 0"
+                    ),
+                    format!("; {}", added(curve, CORRELATED).sentence()),
+                ),
+                TelegraphEvidence::Levels { jumps, gain } => text(
+                    format!(
+                        "two levels {} apart with {jumps:.0} jumps between them, e^{gain:.0} times as likely as a Gaussian process of \
+                         any correlation time",
+                        self.amount(of.amplitude.value, of.amplitude.unit, 3)
+                    ),
+                    "; charges that are caught and let go in a transistor or a crystal",
+                ),
+            },
+            Effect::MarkovProcess(of) => match &of.evidence {
+                MarkovEvidence::Curve(curve) => added(curve, CORRELATED),
+                MarkovEvidence::Spectrum { corner_hz, gain } => text(
+                    format!(
+                        "the spectrum is flat below {} Hz, where a random walk would rise: e^{gain:.0} times as likely",
+                        seconds(*corner_hz)
+                    ),
+                    format!("; {CORRELATED}"),
+                ),
+            },
+            Effect::CommonMode(of) => text(
+                format!(
+                    "moves with {}: their spectra are e^{:.0} times as likely as those of channels with nothing in common, and no \
+                     measured cause explains it",
+                    of.others.join(" and "),
+                    of.gain
+                ),
+                "; a shared reference, supply or temperature gradient",
+            ),
+            Effect::SharedDrift(of) => text(
+                format!(
+                    "moves with {} at {}, {:.0} sigma, which is more than {:.0} times the data sheet's sensitivity: both share a \
+                     drift whose cause was not measured",
+                    of.with,
+                    self.amount(of.ratio.value, &format!("{}/{}", of.ratio.unit, of.per), 2),
+                    of.sigmas,
+                    of.largest_multiple
+                ),
+                "",
+            ),
+            Effect::LinearDrift(of) => match &of.evidence {
+                LinearDriftEvidence::Curve(curve) => added(curve, "a steady drift: warming up, or ageing"),
+                LinearDriftEvidence::Regression { p_value } => text(
+                    format!(
+                        "the level moves by {} throughout, by chance {} in white, flicker and walking noise of any mixture",
+                        self.amount(of.slope.value, &format!("{}/s", of.slope.unit), 3),
+                        self.chance(*p_value)
+                    ),
+                    "; warm-up that no sensor shows, or aging",
+                ),
+            },
+            Effect::LevelStep(of) => text(
+                format!(
+                    "the level changes by {} at {:.1} s and stays, by chance anywhere {} in white, flicker and walking noise of any \
+                     mixture",
+                    self.amount(of.size.value, of.size.unit, 3),
+                    of.time_s.value,
+                    self.chance(of.p_value)
+                ),
+                "; a mechanical or thermal shock, or a fault that begins",
+            ),
+            Effect::TemperatureSensitivity(of) => text(
+                format!("follows the measured temperature, {:.0} sigma", of.sigmas),
+                "; a bias that drifts with temperature",
+            ),
+            Effect::TemperatureCurvature(of) => text(
+                format!(
+                    "follows the square of the measured temperature, by chance {} in white, flicker and walking noise of any mixture",
+                    self.chance(of.p_value)
+                ),
+                "; a sensitivity that itself changes with temperature",
+            ),
+            Effect::ThermalLag(of) => text(
+                format!(
+                    "follows the measured temperature behind a lag of {:.0} s, by chance {}, and better than without a lag",
+                    of.time_constant_s.value,
+                    self.chance(of.p_value)
+                ),
+                "; the sensing element warms up later than the thermometer",
+            ),
+            Effect::SupplySensitivity(of) => {
+                text(format!("follows the measured supply, {:.0} sigma", of.sigmas), "; a bias that is not regulated")
+            }
+            Effect::AccelerationSensitivity(of) => text(
+                format!("follows the measured specific force, {:.0} sigma", of.sigmas),
+                "; g-sensitivity of the gyro",
+            ),
+            Effect::VibrationRectification(of) => text(
+                format!(
+                    "follows the variance of {}, whose vibration reaches {} rms, by chance {} in white, flicker and walking noise of \
+                     any mixture",
+                    of.accelerometer,
+                    self.amount(of.strongest, of.per, 2),
+                    self.chance(of.p_value)
+                ),
+                "",
+            ),
+            Effect::AngleQuantization(of) => {
+                added(&of.evidence, "steps of the angle: a counter or an integrator before the output")
+            }
+            Effect::EffectiveLsb(of) => text(
+                format!(
+                    "all {} values lie {} counts or a multiple of that apart, {} changes without an exception",
+                    of.values, of.counts, of.changes
+                ),
+                "; a converter of fewer bits, or rounding on the way",
+            ),
+            Effect::NoiseBelowCount(of) if of.deviation.value == 0.0 => text(
+                "the value never changes".to_owned(),
+                "; nothing is known of its noise but that it is below a count",
+            ),
+            Effect::NoiseBelowCount(of) => text(
+                format!(
+                    "the Allan deviation is at most {:.2} counts at the shortest averaging times, less than the {:.2} counts from which \
+                     on rounding adds white noise alone",
+                    of.counts, of.dithered_counts
+                ),
+                "; N, B and K are those of the rounded values",
+            ),
+            Effect::Spikes(of) => text(
+                format!(
+                    "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ",
+                    of.count, of.threshold_sigmas, of.largest_sigmas
+                ),
+                "; an electrical disturbance or a damaged word",
+            ),
+            Effect::NoisyInterval(of) => {
+                let shown = match of.channels.len() {
+                    0 | 1 => "this channel alone".to_owned(),
+                    count => format!("{count} channels ({})", of.channels.join(", ")),
+                };
+                text(
+                    format!(
+                        "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance \
+                         {}, in {shown}",
+                        of.from_s.value,
+                        of.to_s.value,
+                        of.tau_s,
+                        of.level.value,
+                        self.chance(of.p_value)
+                    ),
+                    "; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
+                )
+            }
+            Effect::MotionInterval(of) => text(
+                format!(
+                    "the mean of a second leaves the median by up to {:.3} {unit}, more than three times the {:.3} {unit} by which the \
+                     biases of parts differ, in {} stretches of together {} s: the platform was moved",
+                    of.size.value,
+                    of.bias_error,
+                    of.stretches,
+                    of.moved_s,
+                    unit = of.size.unit
+                ),
+                "",
+            ),
+            Effect::Saturation(of) => text(
+                format!(
+                    "{} of {} samples lie at {}, {:.4} {}, no other value occurs more than {} times: what is beyond is cut off, and N, \
+                     B and K are lower limits",
+                    of.cut_off,
+                    of.samples,
+                    if of.is_end_of_range { "the end of the range" } else { "a limit" },
+                    of.level.value,
+                    of.level.unit,
+                    of.most_of_others
+                ),
+                "",
+            ),
+            Effect::DroppedSamples(of) => text(
+                format!("{} of {} samples never arrived, in {} gaps", of.missing, of.samples, of.gaps),
+                "; a reader that comes too late, or a full queue",
+            ),
+            Effect::RepeatedSamples(of) => text(
+                format!(
+                    "{} of {} samples equal the one before in all {} channels, {:.1} at most by chance",
+                    of.equal, of.samples, of.channels, of.by_chance
+                ),
+                "; a register that is read before it is renewed",
+            ),
+            Effect::ClockDeviation(of) => text(
+                format!(
+                    "{:.4} Hz by the time stamps, {:+.1} ppm from the nominal {:.4} Hz, {:.1} σ of an ordinary host's clock",
+                    of.rate_hz.value,
+                    1e6 * (of.rate_hz.value / of.nominal_hz - 1.0),
+                    of.nominal_hz,
+                    of.sigmas
+                ),
+                "; the tolerance of the part's oscillator",
+            ),
+            Effect::Unexplained(of) => self.unexplained(of),
+        }
+    }
+
+    /// A line by itself.
+    fn line(&self, line: &LineEvidence) -> EvidenceText {
+        let meaning = if line.has_width {
+            "a narrow band: a mechanical resonance or an unsteady vibration"
+        } else {
+            "a steady line: a vibration, or an interference folded into the band"
+        };
+        match &line.source {
+            LineSource::Curve(curve) => added(curve, meaning),
+            LineSource::Spectrum(of) => {
+                let width = of.width_hz.map_or_else(
+                    || "no wider than the record resolves".to_owned(),
+                    |width_hz| format!("{width_hz:.4} Hz wide"),
+                );
+                text(
+                    format!(
+                        "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {}",
+                        of.frequency_hz,
+                        of.sigmas,
+                        self.chance(of.p_value)
+                    ),
+                    format!("; {meaning}"),
+                )
+            }
+        }
+    }
+
+    /// A line that may be one of several of one signal.
+    fn harmonic(&self, multiples: Option<&Multiples>, line: &LineEvidence) -> EvidenceText {
+        match multiples {
+            None => self.line(line),
+            Some(multiples) => text(
+                format!("{} of one periodic signal", harmonics(multiples)),
+                format!("; {}", self.line(line).sentence()),
+            ),
+        }
+    }
+
+    fn unexplained(&self, of: &Unexplained) -> EvidenceText {
+        let percent = of.excess_percent.map_or(0.0, |of| of.value);
+        let frequency_hz = of.frequency_hz().map_or(0.0, |of| of.value);
+        match &of.observation {
+            Observation::PointOfCurve { p_value } => text(
+                format!(
+                    "{percent:+.0} % of the model's Allan deviation at tau = {:.3} s, by chance anywhere in the curve {}",
+                    of.tau_s().map_or(0.0, |of| of.value),
+                    self.chance(*p_value)
+                ),
+                "; no effect that is known here explains it",
+            ),
+            Observation::RefutedTerm { curve, by } => text(format!("{} {}", excess(curve), refutation(by)), ""),
+            Observation::Band { width_hz, sigmas, mismatch } => {
+                let why = match mismatch {
+                    BandMismatch::Shape { p_value } => format!(
+                        "has not the spectrum of a resonance, by chance {}: a frequency or a strength that changes",
+                        self.chance(*p_value)
+                    ),
+                    BandMismatch::Curve => "the Allan deviation contradicts a resonance there".to_owned(),
+                };
+                text(
+                    format!(
+                        "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} sigma) and {why}"
+                    ),
+                    "",
+                )
+            }
+            Observation::ModulatedLine { sigmas, sideband_hz, depth, of_phase } => {
+                let (changes, depth) = if *of_phase {
+                    ("its phase goes to and fro", format!("{depth:.2} rad"))
+                } else {
+                    ("its amplitude swells and fades", format!("{:.0} %", 100.0 * depth))
+                };
+                text(
+                    format!(
+                        "a line at {frequency_hz:.4} Hz, {sigmas:.0} sigma, whose sidebands are {sideband_hz:.4} Hz away: {changes} by \
+                         {depth} every {:.0} s, which no sinusoid does",
+                        1.0 / sideband_hz
+                    ),
+                    "",
+                )
+            }
+            Observation::EqualSidebands { distance_hz, line } => text(
+                format!(
+                    "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every {:.0} s, \
+                     which no sinusoid of one amplitude does",
+                    0.5 * distance_hz,
+                    2.0 / distance_hz
+                ),
+                format!("; {}", self.line(line).sentence()),
+            ),
+            Observation::Sawtooth { multiples, line } => text(
+                format!(
+                    "{} of one signal, even and odd ones with amplitudes that fall with their number: it rises evenly and jumps back \
+                     every {:.1} s, which no sinusoid and no square wave does",
+                    harmonics(multiples),
+                    1.0 / frequency_hz
+                ),
+                format!("; {}", self.line(line).sentence()),
+            ),
+            Observation::PeriodicSignal { sum, p_value, .. } => text(
+                format!(
+                    "the same every {:.1} s, but no sinusoid: the harmonics have {percent:.0} % of the deviation of the fundamental, \
+                     {sum:.0} times the noise, by chance at any period {}",
+                    1.0 / frequency_hz,
+                    self.chance(*p_value)
+                ),
+                "",
+            ),
+            Observation::RunningLine { frequencies_hz: [first, last], excess, p_value } => text(
+                format!(
+                    "a line whose frequency runs from {first:.2} to {last:.2} Hz over the record, {:+.0} % of the noise of short \
+                     spectra, by chance anywhere {}: a speed that changes",
+                    100.0 * excess,
+                    self.chance(*p_value)
+                ),
+                "",
+            ),
+            Observation::DecayingDisturbances { time_constant_s, sum, reversed, p_value } => text(
+                format!(
+                    "disturbances {} that begin at once and decay within {time_constant_s:.2} s: the third moment behind a filter for \
+                     such is {:.1} standard deviations from that of a Gaussian process, by chance {}, and {:.1} behind the same filter \
+                     in reversed time",
+                    if *sum > 0.0 { "upwards" } else { "downwards" },
+                    sum.abs(),
+                    self.chance(*p_value),
+                    reversed.abs()
+                ),
+                "",
+            ),
+            Observation::LevelByTemperature { range_degc: [coldest, warmest], explained } => text(
+                format!(
+                    "the level of the noise changes by {percent:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes \
+                     follow the measured temperature, and no effect that is known here changes it",
+                    100.0 * explained
+                ),
+                "",
+            ),
+        }
+    }
+}
+
+/// What contradicts a term that fits an octave of the curve.
+fn refutation(by: &Refutation) -> String {
+    let forgets = |time_constant_s: f64| {
+        format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))
+    };
+    match *by {
+        Refutation::FewPeriods => {
+            "as by a line of a few periods in the record, which its curve does not tell from a drift".to_owned()
+        }
+        Refutation::NotInSpectrum { frequency_hz } => {
+            format!("as by a line at {frequency_hz:.4} Hz, where the spectrum has none")
+        }
+        Refutation::Irreversible { time_constant_s } => format!(
+            "{}, but its changes up and down differ: disturbances that begin at once and decay",
+            forgets(time_constant_s)
+        ),
+        Refutation::RareDisturbances { time_constant_s, kurtosis: [ratio, error] } => format!(
+            "{}, but an excess kurtosis {ratio:.1} ± {error:.1} times that of a telegraph signal: rare disturbances",
+            forgets(time_constant_s)
+        ),
+        Refutation::UndecidedLevels { time_constant_s, kurtosis: [ratio, error] } => format!(
+            "{}: its excess kurtosis, {ratio:.1} ± {error:.1} times that of a telegraph signal, does not tell whether that has two \
+             levels",
+            forgets(time_constant_s)
+        ),
+    }
+}
+
+fn filter_meaning(of: &OutputFilter) -> String {
+    let window = if of.stages == 2 { "Bartlett window" } else { "moving average" };
+    let (taps, decimation) = (of.taps.value, of.decimation.value);
+    if decimation == 1.0 {
+        return format!("neighbours correlate as behind a {window} of {taps} taps a stage");
+    }
+    format!(
+        "neighbours correlate as behind a {window} of {taps} taps a stage that is read every {decimation:.2} values; at the part's own \
+         {} Hz that is a sample rate of {:.1} Hz",
+        of.internal_rate_hz,
+        of.internal_rate_hz / decimation
+    )
+}
+
+/// Such as `harmonics 1, 3 and 5 with 2 sidebands`.
+fn harmonics(of: &Multiples) -> String {
+    let numbers: Vec<String> = of.harmonics.iter().map(u32::to_string).collect();
+    let harmonics = match numbers.as_slice() {
+        [] => String::new(),
+        [one] => format!("harmonic {one}"),
+        [others @ .., last] => format!("harmonics {} and {last}", others.join(", ")),
+    };
+    match of.sidebands {
+        0 => harmonics,
+        count if numbers.is_empty() => format!("{count} sidebands"),
+        count => format!("{harmonics} with {count} sidebands"),
+    }
+}

@@ -1,0 +1,156 @@
+//! The JSON of a report, schema 1. Effects and findings have names for their kinds and their parameters, and a sentence on their
+//! evidence; the rest is as in [`Report`].
+
+use crate::evidence::{EvidenceText, NumberStyle};
+use noise_analysis::assessment::Assessment;
+use noise_analysis::report::{
+    ChannelEffect, ChannelReport, CommonModeRegression, CurvePoint, FigureData, Finding, MissingSamples,
+    ModelErrorReport, ModelReport, Nonstationarity, Parameter, PartReport, Report, SlopeMethodReport, Stretch,
+    Validation,
+};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A report as JSON has it.
+#[derive(Debug, Serialize)]
+pub struct ReportJson<'a> {
+    schema: u32,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    quick: bool,
+    sample_rate_hz: f64,
+    samples: u64,
+    dropped: &'a BTreeMap<String, u64>,
+    flagged: &'a BTreeMap<String, u64>,
+    part: &'a PartReport,
+    findings: Vec<FindingJson<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    common_mode: Option<&'a CommonModeRegression>,
+    channels: Vec<ChannelJson<'a>>,
+}
+
+/// A [`Finding`].
+#[derive(Debug, Serialize)]
+struct FindingJson<'a> {
+    kind: &'static str,
+    channels: &'a [String],
+    parameters: BTreeMap<&'static str, Parameter>,
+    evidence: String,
+    validated: Validation,
+    share_percent: &'a BTreeMap<String, f64>,
+}
+
+/// A [`ChannelReport`].
+#[derive(Debug, Serialize)]
+struct ChannelJson<'a> {
+    name: &'a str,
+    unit: &'a str,
+    samples: u64,
+    #[serde(flatten)]
+    missing: &'a MissingSamples,
+    curve: &'a [CurvePoint],
+    read_off: &'a SlopeMethodReport,
+    before: &'a ModelReport,
+    effects: Vec<EffectJson>,
+    after: &'a ModelReport,
+    first_half_curve: &'a ModelErrorReport,
+    #[serde(rename = "final")]
+    refitted: &'a ModelReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nonstationarity: Option<&'a Nonstationarity>,
+    at_rest: &'a [Stretch],
+    practice: &'a Assessment,
+    #[serde(flatten)]
+    figure_data: &'a FigureData,
+}
+
+/// A [`ChannelEffect`].
+#[derive(Debug, Serialize)]
+struct EffectJson {
+    kind: &'static str,
+    parameters: BTreeMap<&'static str, Parameter>,
+    evidence: String,
+    finding: usize,
+}
+
+impl<'a> From<&'a Report> for ReportJson<'a> {
+    fn from(report: &'a Report) -> Self {
+        let Report { schema, quick, sample_rate_hz, samples, dropped, flagged, part, findings, common_mode, channels } =
+            report;
+        Self {
+            schema: *schema,
+            quick: *quick,
+            sample_rate_hz: *sample_rate_hz,
+            samples: *samples,
+            dropped,
+            flagged,
+            part,
+            findings: findings.iter().map(FindingJson::from).collect(),
+            common_mode: common_mode.as_ref(),
+            channels: channels.iter().map(ChannelJson::from).collect(),
+        }
+    }
+}
+
+impl<'a> From<&'a Finding> for FindingJson<'a> {
+    fn from(finding: &'a Finding) -> Self {
+        let Finding { effect, channels, clearest: _, validated, share_percent } = finding;
+        Self {
+            kind: effect.name(),
+            channels,
+            parameters: effect.parameters(),
+            evidence: EvidenceText::of_finding(finding, NumberStyle::Plain).sentence(),
+            validated: *validated,
+            share_percent,
+        }
+    }
+}
+
+impl<'a> From<&'a ChannelReport> for ChannelJson<'a> {
+    fn from(channel: &'a ChannelReport) -> Self {
+        let ChannelReport {
+            name,
+            unit,
+            samples,
+            missing,
+            curve,
+            read_off,
+            before,
+            effects,
+            after,
+            first_half_curve,
+            refitted,
+            nonstationarity,
+            at_rest,
+            assessment,
+            figure_data,
+        } = channel;
+        Self {
+            name,
+            unit,
+            samples: *samples,
+            missing,
+            curve,
+            read_off,
+            before,
+            effects: effects.iter().map(EffectJson::from).collect(),
+            after,
+            first_half_curve,
+            refitted,
+            nonstationarity: nonstationarity.as_ref(),
+            at_rest,
+            practice: assessment,
+            figure_data,
+        }
+    }
+}
+
+impl From<&ChannelEffect> for EffectJson {
+    fn from(ChannelEffect { effect, finding }: &ChannelEffect) -> Self {
+        Self {
+            kind: effect.name(),
+            parameters: effect.parameters(),
+            evidence: EvidenceText::of_effect(effect, NumberStyle::Plain).sentence(),
+            finding: *finding,
+        }
+    }
+}
