@@ -21,6 +21,7 @@ mod output_filter;
 mod rate_ramp;
 mod repeated_samples;
 mod resonance;
+mod response;
 mod sample_clock;
 mod saturation;
 mod shared_drift;
@@ -43,7 +44,7 @@ pub use dropped_samples::DroppedSamples;
 pub use effective_lsb::EffectiveLsb;
 pub use evidence::{CurveEvidence, LineEvidence, LineSource, Multiples, SpectrumEvidence};
 pub use first_order_filter::FirstOrderFilter;
-pub(crate) use kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+pub(crate) use kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 pub use knock::NoisyInterval;
 pub use markov_process::{MarkovEvidence, MarkovProcess};
 pub use motion::MotionInterval;
@@ -52,6 +53,7 @@ pub use output_filter::OutputFilter;
 pub use rate_ramp::{LinearDrift, LinearDriftEvidence};
 pub use repeated_samples::RepeatedSamples;
 pub use resonance::ResonantLine;
+pub use response::ResponseVariance;
 pub use sample_clock::ClockDeviation;
 pub use saturation::Saturation;
 pub use shared_drift::SharedDrift;
@@ -173,7 +175,7 @@ macro_rules! kinds {
             }
 
             /// [`Kind::avar`].
-            pub(crate) fn avar(&self, at: &AveragingTime) -> Option<f64> {
+            pub(crate) fn avar(&self, at: &AveragingTime) -> AddedVariance {
                 match self { $(Self::$kind(of) => of.avar(at)),* }
             }
 

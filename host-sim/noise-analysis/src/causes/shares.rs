@@ -4,13 +4,14 @@
 //! |---|---|
 //! | terms of the noise model | their closed form |
 //! | temperature, supply, acceleration | sensitivity² times that of the measured covariate |
+//! | a lag, a curvature, a rectified vibration | that of the bias which the samples are corrected for |
 //! | spikes of size A, λ a second | white noise: λτ₀A²/n |
 //! | a step of size A | A²·n/(3(M − 2n + 1)): the squared second differences that it touches, averaged over all |
 //! | values rounded to steps of Δ | white noise: Δ²/(12n) |
 //! | a knock at L times the level for a part p of the record | (L² − 1)·p times that of the channel without it |
 
 use super::cause::Shown;
-use crate::effects::{AveragingTime, Effect};
+use crate::effects::{AddedVariance, AveragingTime};
 use crate::report::{ChannelReport, CurvePoint};
 use measurement::{Quantity, SensorProfile};
 
@@ -36,15 +37,11 @@ pub(super) fn percent(shown: &Shown, channels: &[ChannelReport], profile: &Senso
             model_avar: adev * adev,
             adev_of: &adev_of,
         };
-        let own: f64 = shown.parts.iter().filter_map(|part| part.avar(&at)).sum();
-        let total = if is_in_model(&shown.effect) { at.model_avar.max(own) } else { at.model_avar + own };
+        let added: AddedVariance = shown.parts.iter().map(|part| part.avar(&at)).sum();
+        let own = added.modelled + added.corrected;
+        let total = at.model_avar.max(added.modelled) + added.corrected;
         // Rounding can take a whole share beyond 100.
         (own > 0.0 && total.is_finite()).then(|| (100.0 * own / total).min(100.0))
     };
     modelled.filter_map(share).reduce(f64::max)
-}
-
-/// Whether the models have the effect: of others they leave out the samples, or these are corrected for it.
-fn is_in_model(effect: &Effect) -> bool {
-    !matches!(effect, Effect::Spikes(_) | Effect::LevelStep(_) | Effect::NoisyInterval(_))
 }

@@ -5,7 +5,7 @@ use super::block_means::BlockMeans;
 use super::gls_regression::RegressionEstimate;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
-use crate::effects::Effect;
+use crate::effects::{Effect, ResponseVariance};
 use nalgebra::DVector;
 
 /// Fractions of a block in which a course is known.
@@ -46,6 +46,12 @@ impl Course {
 
     pub(super) fn mean(&self) -> f64 {
         self.values.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    /// The Allan variance of the bias that follows the course with `sensitivity`.
+    pub(super) fn variance(&self, sensitivity: f64) -> ResponseVariance {
+        let values: Vec<f64> = self.values.iter().map(|value| sensitivity * value).collect();
+        ResponseVariance::from_means(&values, self.width)
     }
 
     /// The bias that follows the course with `sensitivity`; 0 at the mean of the course.

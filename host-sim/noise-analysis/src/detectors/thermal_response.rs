@@ -121,12 +121,14 @@ impl TemperatureCourse {
     pub(super) fn lag_response(&self, lag: &Lag, estimate: &RegressionEstimate, unit: &'static str) -> BiasResponse {
         let times = (NORMAL_975 * lag.relative_error).exp();
         let time_constant = lag.time_constant;
+        let lagged = self.lagged(time_constant);
         let effect = ThermalLag {
             sensitivity: interval(estimate, unit),
             time_constant_s: BoundedEstimate::new(time_constant, time_constant / times, time_constant * times),
             p_value: estimate.p_value,
+            response: lagged.variance(estimate.size),
         };
-        self.lagged(time_constant).response(estimate.size, effect.into())
+        lagged.response(estimate.size, effect.into())
     }
 
     /// The response of a bias to the squared temperature; `linear` is its sensitivity at the mean temperature.
@@ -137,13 +139,15 @@ impl TemperatureCourse {
         unit: &'static str,
     ) -> BiasResponse {
         let none = RegressionEstimate { size: 0.0, error: 0.0, ..*estimate };
+        let squared = self.squared();
         let effect = TemperatureCurvature {
             sensitivity: interval(linear.unwrap_or(&none), unit),
             curvature: interval(estimate, unit),
             reference_degc: self.measured.mean(),
             p_value: estimate.p_value,
+            response: squared.variance(estimate.size),
         };
-        self.squared().response(estimate.size, effect.into())
+        squared.response(estimate.size, effect.into())
     }
 }
 

@@ -69,6 +69,7 @@ impl<'a> Vibration<'a> {
             accelerometer: name,
             strongest: self.course.values.iter().copied().fold(0.0, f64::max).sqrt(),
             p_value: estimate.p_value,
+            response: self.course.variance(estimate.size),
         };
         self.course.response(estimate.size, effect.into())
     }

@@ -1,6 +1,6 @@
 //! A rate in proportion to the measured specific force: g-sensitivity of a gyro.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
 
@@ -33,8 +33,8 @@ impl Kind for AccelerationSensitivity {
         Occurrence::Once
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
-        Some(self.axes().filter_map(|(axis, of)| at.followed(Quantity::SpecificForce, axis, of.value)).sum())
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        self.axes().map(|(axis, of)| at.followed(Quantity::SpecificForce, axis, of.value)).sum()
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,7 +1,7 @@
 //! Quantization noise: steps of the angle, as of a counter or an integrator before the output.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::units::coefficient_unit;
 use allan_core::NoiseTerm;
@@ -34,8 +34,8 @@ impl Kind for AngleQuantization {
         Occurrence::InChannel
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
-        Some(at.of_term(&NoiseTerm::Quantization, self.coefficient.value))
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        at.of_term(&NoiseTerm::Quantization, self.coefficient.value)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,6 +1,6 @@
 //! A bias that becomes another one from one sample to the next.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A step of the bias.
@@ -33,10 +33,12 @@ impl Kind for LevelStep {
         Occurrence::AtTime { from_s: self.time_s.low, to_s: self.time_s.high }
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         // The squared second differences that it touches, averaged over all of them.
-        let count = (at.samples + 1).checked_sub(2 * at.n).filter(|count| *count > 0)?;
-        Some(self.size.value.powi(2) * at.n as f64 / (3.0 * count as f64))
+        match (at.samples + 1).checked_sub(2 * at.n) {
+            None | Some(0) => AddedVariance::NONE,
+            Some(count) => AddedVariance::corrected(self.size.value.powi(2) * at.n as f64 / (3.0 * count as f64)),
+        }
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

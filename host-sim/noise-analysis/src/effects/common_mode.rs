@@ -1,6 +1,6 @@
 //! Slow drift that channels have in common, without a measured cause.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Markov;
@@ -37,9 +37,9 @@ impl Kind for CommonMode {
         Occurrence::OnceAUnit
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
-        Some(at.of_term(&term, self.deviation.value))
+        at.of_term(&term, self.deviation.value)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,6 +1,6 @@
 //! Samples that never arrived: the sample indices or time stamps have room for them.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// Lost samples.
@@ -35,8 +35,8 @@ impl Kind for DroppedSamples {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> Option<f64> {
-        None
+    fn avar(&self, _: &AveragingTime) -> AddedVariance {
+        AddedVariance::NONE
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

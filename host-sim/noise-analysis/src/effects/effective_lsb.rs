@@ -1,6 +1,6 @@
 //! Values that are multiples of several counts: they were rounded before they were recorded.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A resolution of several counts.
@@ -35,9 +35,9 @@ impl Kind for EffectiveLsb {
         Occurrence::InChannel
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         // Rounding error is uniform within a step, and white where noise reaches over several steps.
-        Some(self.step.value.powi(2) / 12.0 / at.n as f64)
+        AddedVariance::modelled(self.step.value.powi(2) / 12.0 / at.n as f64)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -23,9 +23,8 @@ pub(crate) trait Kind {
     /// How often a part has it.
     fn occurrence(&self) -> Occurrence;
 
-    /// The Allan variance that it adds to its channel, at one averaging time. `None` where it adds none of its own or none that is
-    /// known.
-    fn avar(&self, at: &AveragingTime) -> Option<f64>;
+    /// The Allan variance that it adds to its channel, at one averaging time.
+    fn avar(&self, at: &AveragingTime) -> AddedVariance;
 
     /// What it adds to the bias of its channel in each block: factors, each with the values that it multiplies. Empty of noise.
     fn course(&self, means: &BiasBlocks) -> Vec<(f64, Vec<f64>)>;
@@ -69,6 +68,39 @@ impl Occurrence {
     }
 }
 
+/// The Allan variance that an effect adds to a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AddedVariance {
+    /// What the channel's model has of it.
+    pub modelled: f64,
+    /// What the model lacks: the samples are corrected for it, or are left out.
+    pub corrected: f64,
+}
+
+impl AddedVariance {
+    /// Of an effect that adds none of its own: a filter, a clock, lost samples.
+    pub(crate) const NONE: Self = Self { modelled: 0.0, corrected: 0.0 };
+
+    /// Of an effect that the model has.
+    pub(crate) const fn modelled(modelled: f64) -> Self {
+        Self { modelled, ..Self::NONE }
+    }
+
+    /// Of an effect that the samples are corrected for, or whose samples are left out.
+    pub(crate) const fn corrected(corrected: f64) -> Self {
+        Self { corrected, ..Self::NONE }
+    }
+}
+
+impl std::iter::Sum for AddedVariance {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::NONE, |sum, of| Self {
+            modelled: sum.modelled + of.modelled,
+            corrected: sum.corrected + of.corrected,
+        })
+    }
+}
+
 /// An averaging time of a channel of a record.
 pub(crate) struct AveragingTime<'a> {
     /// Averaging factor, samples.
@@ -84,14 +116,15 @@ pub(crate) struct AveragingTime<'a> {
 }
 
 impl AveragingTime<'_> {
-    /// The Allan variance of a term of the noise model with this coefficient.
-    pub(crate) fn of_term(&self, term: &NoiseTerm, coefficient: f64) -> f64 {
-        coefficient * coefficient * term.avar(self.n, self.period_s)
+    /// Of a term of the noise model with this coefficient.
+    pub(crate) fn of_term(&self, term: &NoiseTerm, coefficient: f64) -> AddedVariance {
+        AddedVariance::modelled(coefficient * coefficient * term.avar(self.n, self.period_s))
     }
 
-    /// The Allan variance of `sensitivity` times a channel.
-    pub(crate) fn followed(&self, quantity: Quantity, axis: &str, sensitivity: f64) -> Option<f64> {
-        Some((sensitivity * (self.adev_of)(quantity, axis)?).powi(2))
+    /// Of `sensitivity` times a channel; none where there is no such channel.
+    pub(crate) fn followed(&self, quantity: Quantity, axis: &str, sensitivity: f64) -> AddedVariance {
+        let adev = (self.adev_of)(quantity, axis).unwrap_or(0.0);
+        AddedVariance::modelled((sensitivity * adev).powi(2))
     }
 }
 

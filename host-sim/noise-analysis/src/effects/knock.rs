@@ -1,6 +1,6 @@
 //! A time in which the noise is larger than before and after: a knock.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// A time of larger noise.
@@ -43,9 +43,9 @@ impl Kind for NoisyInterval {
         Occurrence::AtTime { from_s: self.from_s.value, to_s: self.to_s.value }
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         let part = (self.to_s.value - self.from_s.value) / (at.samples as f64 * at.period_s);
-        Some((self.level.value.powi(2) - 1.0).max(0.0) * part * at.model_avar)
+        AddedVariance::corrected((self.level.value.powi(2) - 1.0).max(0.0) * part * at.model_avar)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

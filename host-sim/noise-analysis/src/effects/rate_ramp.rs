@@ -1,7 +1,7 @@
 //! A bias that changes in proportion to time.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::units::coefficient_unit;
 use allan_core::NoiseTerm;
@@ -46,8 +46,8 @@ impl Kind for LinearDrift {
         Occurrence::InChannel
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
-        Some(at.of_term(&NoiseTerm::RateRamp, self.slope.value))
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        at.of_term(&NoiseTerm::RateRamp, self.slope.value)
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

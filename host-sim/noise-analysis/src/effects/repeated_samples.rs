@@ -1,6 +1,6 @@
 //! Samples that equal the one before in all channels: a register that is read before it is renewed.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// Samples that were read twice.
@@ -37,8 +37,8 @@ impl Kind for RepeatedSamples {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> Option<f64> {
-        None
+    fn avar(&self, _: &AveragingTime) -> AddedVariance {
+        AddedVariance::NONE
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

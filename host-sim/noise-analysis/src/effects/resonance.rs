@@ -1,7 +1,7 @@
 //! A line that is wider than the record resolves: a damped oscillation, or a frequency that wanders.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Resonance;
@@ -45,10 +45,10 @@ impl Kind for ResonantLine {
         Occurrence::AtFrequency(self.frequency_hz)
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         let (frequency, bandwidth) = (self.frequency_hz.value, self.bandwidth_hz.value);
         let term = NoiseTerm::Resonance(Resonance { frequency, bandwidth });
-        Some(at.of_term(&term, self.deviation.value))
+        at.of_term(&term, self.deviation.value)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

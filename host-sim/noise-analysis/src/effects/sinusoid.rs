@@ -1,7 +1,7 @@
 //! A line no wider than the record resolves.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
@@ -39,9 +39,9 @@ impl Kind for SinusoidalLine {
         Occurrence::AtFrequency(self.frequency_hz)
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         let term = NoiseTerm::Sinusoid(Sinusoid { frequency: self.frequency_hz.value });
-        Some(at.of_term(&term, self.amplitude.value))
+        at.of_term(&term, self.amplitude.value)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,6 +1,6 @@
 //! Single samples that are farther from what their neighbours tell than chance explains.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// Samples that stand out.
@@ -40,9 +40,10 @@ impl Kind for Spikes {
         Occurrence::InChannel
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         // White noise.
-        Some(self.rate_per_hour.value / HOUR_S * at.period_s * self.size.value.powi(2) / at.n as f64)
+        let rate = self.rate_per_hour.value / HOUR_S;
+        AddedVariance::corrected(rate * at.period_s * self.size.value.powi(2) / at.n as f64)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,6 +1,6 @@
 //! A bias in proportion to the measured supply voltage.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
 
@@ -32,7 +32,7 @@ impl Kind for SupplySensitivity {
         Occurrence::Once
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         at.followed(Quantity::SupplyVoltage, "", self.sensitivity.value)
     }
 

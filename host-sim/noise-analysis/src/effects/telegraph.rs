@@ -1,7 +1,7 @@
 //! Random telegraph noise: jumps to and fro between two levels at random times.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Markov;
@@ -57,10 +57,10 @@ impl Kind for TelegraphNoise {
         Occurrence::InChannel
     }
 
-    fn avar(&self, at: &AveragingTime) -> Option<f64> {
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
         let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
         // Two levels that are equally frequent are two standard deviations apart.
-        Some(at.of_term(&term, 0.5 * self.amplitude.value))
+        at.of_term(&term, 0.5 * self.amplitude.value)
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,11 +1,12 @@
 //! A bias that follows a parabola of the measured temperature.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
 
 /// A sensitivity that changes with the temperature.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TemperatureCurvature {
     /// At the reference temperature, in the unit per °C.
     pub sensitivity: ChannelEstimate,
@@ -15,6 +16,8 @@ pub struct TemperatureCurvature {
     pub reference_degc: f64,
     /// Probability of such a curvature by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
+    /// Allan variance of the part that follows the square.
+    pub response: ResponseVariance,
 }
 
 impl Kind for TemperatureCurvature {
@@ -40,8 +43,12 @@ impl Kind for TemperatureCurvature {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> Option<f64> {
-        None
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        // The model has the part that is proportional, and the samples are corrected for the square.
+        AddedVariance {
+            corrected: self.response.at(at.n),
+            ..at.followed(Quantity::Temperature, "", self.sensitivity.value)
+        }
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,11 +1,12 @@
 //! A bias that follows the temperature behind a low-pass filter: the sensing element warms up later than the thermometer.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
 
 /// A sensitivity to the temperature of some time ago.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ThermalLag {
     /// In the unit per °C.
     pub sensitivity: ChannelEstimate,
@@ -13,6 +14,8 @@ pub struct ThermalLag {
     pub time_constant_s: BoundedEstimate,
     /// Probability of such a sensitivity by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
+    /// Allan variance of the bias that follows.
+    pub response: ResponseVariance,
 }
 
 impl Kind for ThermalLag {
@@ -37,8 +40,8 @@ impl Kind for ThermalLag {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> Option<f64> {
-        None
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        AddedVariance::corrected(self.response.at(at.n))
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

@@ -1,10 +1,11 @@
 //! A bias in proportion to the variance of an acceleration: vibration that an even-order non-linearity rectifies.
 
-use super::kind::{AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A sensitivity to the strength of the vibration.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct VibrationRectification {
     /// In the unit over the square of `per`.
     pub sensitivity: ChannelEstimate,
@@ -16,6 +17,8 @@ pub struct VibrationRectification {
     pub strongest: f64,
     /// Probability of such a sensitivity by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
+    /// Allan variance of the bias that follows.
+    pub response: ResponseVariance,
 }
 
 impl Kind for VibrationRectification {
@@ -37,8 +40,8 @@ impl Kind for VibrationRectification {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> Option<f64> {
-        None
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        AddedVariance::corrected(self.response.at(at.n))
     }
 
     fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

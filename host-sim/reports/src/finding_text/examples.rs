@@ -76,8 +76,21 @@ pub(super) fn examples() -> Vec<Effect> {
         LinearDrift { slope: size(), evidence: LinearDriftEvidence::Curve(CURVE) }.into(),
         LevelStep { time_s: estimate(), size: size(), p_value: 1e-9 }.into(),
         TemperatureSensitivity { sensitivity: size(), sigmas: 9.0 }.into(),
-        TemperatureCurvature { sensitivity: size(), curvature: size(), reference_degc: 30.0, p_value: 1e-9 }.into(),
-        ThermalLag { sensitivity: size(), time_constant_s: estimate(), p_value: 1e-9 }.into(),
+        TemperatureCurvature {
+            sensitivity: size(),
+            curvature: size(),
+            reference_degc: 30.0,
+            p_value: 1e-9,
+            response: ResponseVariance::default(),
+        }
+        .into(),
+        ThermalLag {
+            sensitivity: size(),
+            time_constant_s: estimate(),
+            p_value: 1e-9,
+            response: ResponseVariance::default(),
+        }
+        .into(),
         SupplySensitivity { sensitivity: size(), sigmas: 9.0 }.into(),
         AccelerationSensitivity { sensitivity: [Some(size()), None, Some(size())], sigmas: 9.0 }.into(),
         VibrationRectification {
@@ -86,6 +99,7 @@ pub(super) fn examples() -> Vec<Effect> {
             accelerometer: "accl_x",
             strongest: 0.1,
             p_value: 1e-9,
+            response: ResponseVariance::default(),
         }
         .into(),
         AngleQuantization { coefficient: size(), evidence: CURVE }.into(),
