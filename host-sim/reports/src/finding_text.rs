@@ -318,8 +318,8 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 ".",
             ),
         ),
-        Effect::Saturation(_) => (
-            "The channel reached the end of its range.".to_owned(),
+        Effect::Saturation(of) => (
+            format!("The channel reached the end of its range in {} of the samples.", part_in_percent(of.fraction)),
             Advice::new("Use a larger range", "; what was cut off makes the noise look too small."),
         ),
         Effect::DroppedSamples(of) => (
@@ -519,6 +519,13 @@ mod tests {
         };
         let physics = describe(&finding(square)).physics;
         assert!(physics.ends_with("with an amplitude of 900 ± 100 µg."), "{physics}");
+    }
+
+    #[test]
+    fn the_part_of_the_samples_that_is_cut_off_is_told() {
+        let saturation = examples().into_iter().find(|effect| matches!(effect, Effect::Saturation(_))).expect("one");
+        let physics = describe(&finding(saturation)).physics;
+        assert_eq!(physics, "The channel reached the end of its range in 0.30 % of the samples.");
     }
 
     #[test]
