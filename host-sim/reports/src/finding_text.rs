@@ -221,8 +221,12 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             format!("A slow drift of {} in common, which nothing recorded explains.", size(of.deviation)),
             Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
         ),
-        Effect::SharedDrift(_) => (
-            "A slow drift in common, which nothing recorded explains.".to_owned(),
+        Effect::SharedDrift(of) => (
+            format!(
+                "A slow drift in common with {}, {} of it, which nothing recorded explains.",
+                channel_list(&[of.with.to_owned()]),
+                per(of.ratio, of.per)
+            ),
             Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
         ),
         Effect::LinearDrift(of) => (
@@ -414,7 +418,7 @@ mod tests {
     use super::*;
     use crate::formatting::capital;
     use noise_analysis::effects::{
-        LevelStep, LineEvidence, LineSource, Multiples, SinusoidalLine, SpectrumEvidence, SquareWave,
+        LevelStep, LineEvidence, LineSource, Multiples, SharedDrift, SinusoidalLine, SpectrumEvidence, SquareWave,
         TelegraphEvidence, TelegraphNoise,
     };
 
@@ -519,6 +523,20 @@ mod tests {
         };
         let physics = describe(&finding(square)).physics;
         assert!(physics.ends_with("with an amplitude of 900 ± 100 µg."), "{physics}");
+    }
+
+    #[test]
+    fn a_drift_in_common_with_a_channel_says_how_much_of_it() {
+        let drift = SharedDrift {
+            ratio: BoundedEstimate::new(2.9, 2.3, 3.5).in_unit("deg/s"),
+            per: "g",
+            with: "accl_x",
+            sigmas: 9.0,
+            largest_multiple: 31.6,
+        };
+        let physics = describe(&finding(drift)).physics;
+        let expected = "A slow drift in common with accel x, 2.9 ± 0.6 °/s/g of it, which nothing recorded explains.";
+        assert_eq!(physics, expected);
     }
 
     #[test]
