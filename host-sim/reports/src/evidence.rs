@@ -163,7 +163,7 @@ impl Wording {
                 LinearDriftEvidence::Regression { p_value } => text(
                     format!(
                         "the level moves by {} throughout, by chance {} in white, flicker and walking noise of any mixture",
-                        self.amount(of.slope.value, &format!("{}/s", of.slope.unit), 3),
+                        self.amount(of.slope.value, &of.slope_parameter().unit, 3),
                         self.chance(*p_value)
                     ),
                     "; warm-up that no sensor shows, or aging",

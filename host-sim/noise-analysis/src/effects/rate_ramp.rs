@@ -59,11 +59,23 @@ impl LinearDrift {
     /// The slope with its unit.
     #[must_use]
     pub fn slope_parameter(&self) -> Parameter {
-        match self.evidence {
-            LinearDriftEvidence::Curve(_) => {
-                self.slope.estimate().parameter(coefficient_unit(&NoiseTerm::RateRamp, self.slope.unit))
+        self.slope.estimate().parameter(coefficient_unit(&NoiseTerm::RateRamp, self.slope.unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rate is an angle per second, its slope one per second squared.
+    #[test]
+    fn a_slope_has_one_unit_whatever_shows_it() {
+        let curve = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.0, gain_sigmas: 9.0 };
+        for evidence in [LinearDriftEvidence::Curve(curve), LinearDriftEvidence::Regression { p_value: 1e-9 }] {
+            for (unit, expected) in [("deg/s", "deg/s^2"), ("g", "g/s")] {
+                let slope = BoundedEstimate::exact(1e-3).in_unit(unit);
+                assert_eq!(LinearDrift { slope, evidence }.slope_parameter().unit, expected);
             }
-            LinearDriftEvidence::Regression { .. } => self.slope.parameter_per("s"),
         }
     }
 }
