@@ -21,7 +21,7 @@
 //! [`quick`] makes the report of the curves alone, from samples that are read in blocks.
 //!
 //! [`analysis::analyze`] is the pipeline to a [`report::Report`]. `spectra` and `detectors` depend neither on the model nor on
-//! the report.
+//! the report. [`effects`] has every kind of effect, one file each, as numbers; the crate `reports` has the words.
 
 pub mod analysis;
 pub mod assessment;
