@@ -8,7 +8,8 @@
 
 use super::coherent_track::CoherentTrack;
 use super::transforms;
-use crate::distributions::exponential_sum_tail;
+use crate::bounds::BoundedEstimate;
+use crate::distributions::{NORMAL_975, exponential_sum_tail};
 use crate::findings::SIGNIFICANCE;
 use crate::uniform_series::UniformSeries;
 
@@ -24,6 +25,9 @@ const LOWEST: usize = 4;
 const FEWEST_ORDINATES: usize = 8;
 /// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
 const LARGEST: f64 = 32.0;
+/// Part of a line's power that is left in the ordinates of a straight track, and its bounds: between two ordinates, and where the track goes
+/// from one to the next, up to half is lost.
+const LEFT: BoundedEstimate = BoundedEstimate::new(0.7, 0.5, 1.0);
 /// Number of lines with such a sum that chance has, at most, where the phases are tried.
 const MOST_BY_CHANCE: f64 = 3.0;
 
@@ -37,6 +41,10 @@ pub(crate) struct FrequencyTrack {
     /// Mean of the ordinates on the track over the noise, less 1, and its standard deviation.
     pub excess: f64,
     pub excess_error: f64,
+    /// Length of the record, s.
+    pub duration_s: f64,
+    /// Amplitude of the line, by its power over that of the noise at the same frequencies.
+    pub amplitude: BoundedEstimate,
     /// Number of segments.
     segments: f64,
     /// Power of a sinusoid of the same energy over the noise, at least: some is lost between the ordinates.
@@ -81,11 +89,20 @@ impl FrequencyTrack {
         let count = segments as f64;
         let low = spectrogram.frequency(line.first);
         let high = spectrogram.frequency(line.first + line.drift);
+        let (excess, excess_error) = (f64::from(line.sum) / count - 1.0, 1.0 / count.sqrt());
+        let half = NORMAL_975 * excess_error;
+        let amplitude = |excess: f64, left: f64| spectrogram.amplitude(&line, excess) / left.sqrt();
         Some(Self {
             frequencies: if is_rising { [low, high] } else { [high, low] },
             error: 0.5 * spectrogram.spacing,
-            excess: f64::from(line.sum) / count - 1.0,
-            excess_error: 1.0 / count.sqrt(),
+            excess,
+            excess_error,
+            duration_s: series.duration(),
+            amplitude: BoundedEstimate::new(
+                amplitude(excess, LEFT.value),
+                amplitude(excess - half, LEFT.high),
+                amplitude(excess + half, LEFT.low),
+            ),
             segments: count,
             energy: f64::from(line.sum) - count,
             p_value: trials * exponential_sum_tail(count, f64::from(line.sum)),
@@ -108,6 +125,10 @@ impl FrequencyTrack {
 struct Spectrogram {
     /// Of each segment, from the lowest frequency on.
     rows: Vec<Vec<f32>>,
+    /// Mean of the ordinates of all segments, from the lowest frequency on: squares of sums over a segment.
+    means: Vec<f32>,
+    /// Samples of a segment.
+    size: usize,
     /// Hz between ordinates.
     spacing: f64,
 }
@@ -144,7 +165,19 @@ impl Spectrogram {
             let scale = if level > 0.0 { level.recip() } else { 0.0 };
             row.iter_mut().for_each(|power| *power = (*power * scale).min(LARGEST as f32));
         }
-        Some(Self { rows, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
+        Some(Self { rows, means: by_column, size, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
+    }
+
+    /// Amplitude of a sinusoid that exceeds the mean of the ordinates along a line by this part of them.
+    ///
+    /// A sinusoid of amplitude A has `(A·size/2)²`. The mean at a frequency has the line too, in two ordinates of each segment that lies
+    /// there; steady lines that the track crosses are no part of its median.
+    fn amplitude(&self, line: &Line, excess: f64) -> f64 {
+        let mut crossed = self.means[line.first..=(line.first + line.drift).min(self.means.len() - 1)].to_vec();
+        crossed.sort_by(f32::total_cmp);
+        let own = PADDING as f64 / (line.drift + 1) as f64;
+        let power = f64::from(crossed[crossed.len() / 2]) * excess.max(0.0) / (1.0 - own);
+        2.0 * power.sqrt() / self.size as f64
     }
 
     /// Of an ordinate, Hz.
@@ -232,6 +265,17 @@ mod tests {
                 assert!((found_hz - expected).abs() < 0.5, "{found:?}");
             }
             assert!(found.passes(0.5 * (frequencies[0] + frequencies[1])) && !found.passes(90.0));
+        }
+    }
+
+    /// The part of the power that is left is within its bounds for every track, and what the scatter of the sum adds is on top of that.
+    #[test]
+    fn the_amplitude_is_within_its_bounds() {
+        for seed in 60..80 {
+            let amplitude = if seed % 2 == 0 { 0.08 } else { 0.3 };
+            let found = FrequencyTrack::find(&series(seed, amplitude, [6.0, 17.0])).expect("clear").amplitude;
+            assert!((found.low..=found.high).contains(&amplitude), "{seed}: {found:?}");
+            assert!((found.value / amplitude - 1.0).abs() < 0.3, "{seed}: {found:?}");
         }
     }
 
