@@ -7,6 +7,7 @@
 mod acceleration;
 mod angle_quantization;
 mod bias_step;
+mod chirp;
 mod common_mode;
 mod dropped_samples;
 mod effective_lsb;
@@ -39,6 +40,7 @@ mod vibration_rectification;
 pub use acceleration::AccelerationSensitivity;
 pub use angle_quantization::AngleQuantization;
 pub use bias_step::LevelStep;
+pub use chirp::Chirp;
 pub use common_mode::CommonMode;
 pub use dropped_samples::DroppedSamples;
 pub use effective_lsb::EffectiveLsb;
@@ -82,6 +84,8 @@ pub enum Effect {
     SinusoidalLine(SinusoidalLine),
     /// A line with a width.
     ResonantLine(ResonantLine),
+    /// A line whose frequency runs.
+    Chirp(Chirp),
     /// Odd harmonics of one fundamental.
     SquareWave(SquareWave),
     /// Jumps to and fro between two levels.
@@ -192,6 +196,7 @@ kinds!(
     FirstOrderFilter,
     SinusoidalLine,
     ResonantLine,
+    Chirp,
     SquareWave,
     TelegraphNoise,
     MarkovProcess,

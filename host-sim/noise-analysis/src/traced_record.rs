@@ -118,7 +118,7 @@ impl<'a> TracedRecord<'a> {
         }
         effects.extend(by_curve.map(Effect::from));
         effects.retain(|effect| !trace.signals.has(effect, &trace.lines));
-        effects.extend(trace.signals.effects());
+        effects.extend(trace.signals.effects(own.unit));
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
         let level = temperature.and_then(|of| unexplained::level_by_temperature(own, &self.series[of]));
         if level.is_some() {

@@ -1,9 +1,8 @@
-//! Signals in the samples of a channel that no effect of a name has: a slow periodic one that is no sinusoid, a line whose
+//! Signals in the samples of a channel that no term of the noise model has: a slow periodic one that is no sinusoid, a line whose
 //! frequency runs, and disturbances that begin at once and decay. What was named in their place is taken back.
 
 use crate::bounds::BoundedEstimate;
-use crate::distributions::NORMAL_975;
-use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
+use crate::effects::{Chirp, Effect, Observation, Unexplained, UnexplainedPlace};
 use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
@@ -103,11 +102,12 @@ impl UnexplainedSignals {
         }
     }
 
-    /// As they are reported.
-    pub(crate) fn effects(&self) -> impl Iterator<Item = Effect> {
-        let periodic = self.periodic.as_ref().map(periodic_effect);
-        let track = self.track.as_ref().map(track_effect);
-        periodic.into_iter().chain(track).chain(self.decays.as_ref().map(decays_effect)).map(Effect::from)
+    /// As they are reported, of a channel in `unit`.
+    pub(crate) fn effects(&self, unit: &'static str) -> impl Iterator<Item = Effect> {
+        let periodic = self.periodic.as_ref().map(|periodic| Effect::from(periodic_effect(periodic)));
+        let track = self.track.as_ref().map(|track| Effect::from(chirp(track, unit)));
+        let decays = self.decays.as_ref().map(|decays| Effect::from(decays_effect(decays)));
+        periodic.into_iter().chain(track).chain(decays)
     }
 }
 
@@ -123,25 +123,17 @@ fn periodic_effect(periodic: &PeriodicSignal) -> Unexplained {
     }
 }
 
-fn track_effect(track: &FrequencyTrack) -> Unexplained {
-    let [first, last] = track.frequencies;
-    let middle = 0.5 * (first + last);
-    let frequency_hz = BoundedEstimate::new(middle, first.min(last) - track.error, first.max(last) + track.error);
-    // Of the Allan deviation of what a filter around the line would pass.
-    let percent = |excess: f64| 100.0 * ((1.0 + excess.max(0.0)).sqrt() - 1.0);
-    let half = NORMAL_975 * track.excess_error;
-    Unexplained {
-        place: UnexplainedPlace::Frequency(frequency_hz),
-        excess_percent: Some(BoundedEstimate::new(
-            percent(track.excess),
-            percent(track.excess - half),
-            percent(track.excess + half),
-        )),
-        observation: Observation::RunningLine {
-            frequencies_hz: track.frequencies,
-            excess: track.excess,
-            p_value: track.p_value,
-        },
+fn chirp(track: &FrequencyTrack, unit: &'static str) -> Chirp {
+    let FrequencyTrack { frequencies, error, duration_s, .. } = *track;
+    let bounded = |value: f64, error: f64| BoundedEstimate::new(value, value - error, value + error);
+    let [first, last] = frequencies;
+    Chirp {
+        start_hz: bounded(first, error),
+        end_hz: bounded(last, error),
+        rate_hz_per_s: bounded((last - first) / duration_s, 2.0 * error / duration_s),
+        amplitude: track.amplitude.in_unit(unit),
+        excess: track.excess,
+        p_value: track.p_value,
     }
 }
 
@@ -208,7 +200,7 @@ mod tests {
     fn names_in_the_place_of_a_slow_signal_are_taken_back() {
         // Harmonics of 40,000/4·(0.3/(πk))², 91/k², over the noise.
         let of_40_s = signals(|time_s| 0.3 * (time_s / 40.0).fract());
-        let found: Vec<Effect> = of_40_s.effects().collect();
+        let found: Vec<Effect> = of_40_s.effects("g").collect();
         let [effect_of_40_s] = &found[..] else { panic!("{found:?}") };
         assert!(matches!(effect_of_40_s, Effect::Unexplained(_)), "{found:?}");
         // The resolution is 2.5 mHz, of which the frequency is known to a tenth.
@@ -223,15 +215,17 @@ mod tests {
     fn names_in_the_place_of_a_running_frequency_are_taken_back() {
         // 0.15²·40,000/4 = 225 over the noise.
         let running = signals(|time_s| 0.15 * (TAU * (4.0 + 0.005 * time_s) * time_s).sin());
-        let found: Vec<Effect> = running.effects().collect();
+        let found: Vec<Effect> = running.effects("g").collect();
         let [track] = &found[..] else { panic!("{found:?}") };
+        let Effect::Chirp(chirp) = track else { panic!("{track:?}") };
         // From 4 to 8 Hz, within the ordinates of 64 segments of 6.25 s.
-        let frequency = track.frequency_hz().expect("a range");
-        assert!((frequency.low - 4.0).abs() < 0.2 && (frequency.high - 8.0).abs() < 0.2, "{track:?}");
+        assert!((chirp.start_hz.value - 4.0).abs() < 0.2 && (chirp.end_hz.value - 8.0).abs() < 0.2, "{chirp:?}");
+        assert!((chirp.rate_hz_per_s.low..=chirp.rate_hz_per_s.high).contains(&0.01), "{chirp:?}");
+        assert!((chirp.amplitude.low..=chirp.amplitude.high).contains(&0.15), "{chirp:?}");
         assert!(running.has(&resonance(6.0), &[]));
         assert!(running.has(&markov(0.05), &[]));
         assert!(!running.has(&markov(5.0), &[]));
         assert!(!running.has(&resonance(12.0), &[]));
-        assert_eq!(signals(|_| 0.0).effects().count(), 0);
+        assert_eq!(signals(|_| 0.0).effects("g").count(), 0);
     }
 }

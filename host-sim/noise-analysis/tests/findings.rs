@@ -3,6 +3,7 @@
 
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use noise_analysis::analysis::analyze;
+use noise_analysis::effects::Effect;
 use noise_analysis::report::{Report, Validation};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -303,8 +304,17 @@ fn a_chirp_is_not_a_resonance() {
     let waveform = |name: &str, time: f64| if name == "accl_y" { chirp(time) } else { 0.0 };
     let report = analyze(&recorded(600.0, 4, &waveform));
     assert!(report.findings.iter().all(|finding| finding.channels == ["accl_y"]), "{:?}", kinds(&report));
-    assert!(report.findings.iter().any(|finding| finding.effect.name() == "unexplained"), "{:?}", kinds(&report));
     assert!(report.findings.iter().all(|finding| finding.effect.name() != "resonance"), "{:?}", kinds(&report));
+    let chirp = report.findings.iter().find_map(|finding| match &finding.effect {
+        Effect::Chirp(chirp) => Some(*chirp),
+        _ => None,
+    });
+    let chirp = chirp.unwrap_or_else(|| panic!("{:?}", kinds(&report)));
+    let amplitude = chirp.amplitude.estimate();
+    for (of, truth) in [(chirp.start_hz, 8.0), (chirp.end_hz, 14.0), (chirp.rate_hz_per_s, 0.01), (amplitude, 0.004)] {
+        assert!((of.low..=of.high).contains(&truth), "{truth}: {of:?}");
+        assert!((of.value / truth - 1.0).abs() < 0.3, "{truth}: {of:?}");
+    }
 }
 
 #[test]

@@ -104,6 +104,17 @@ impl Wording {
             ),
             Effect::SinusoidalLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
             Effect::ResonantLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
+            Effect::Chirp(of) => text(
+                format!(
+                    "a line whose frequency runs from {:.2} to {:.2} Hz over the record, {:+.0} % of the noise of short spectra, by \
+                     chance anywhere {}",
+                    of.start_hz.value,
+                    of.end_hz.value,
+                    100.0 * of.excess,
+                    self.chance(of.p_value)
+                ),
+                "; a speed that changes",
+            ),
             Effect::SquareWave(of) => text(
                 format!(
                     "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic",
@@ -416,15 +427,6 @@ impl Wording {
                     "the same every {:.1} s, but no sinusoid: the harmonics have {percent:.0} % of the deviation of the fundamental, \
                      {sum:.0} times the noise, by chance at any period {}",
                     1.0 / frequency_hz,
-                    self.chance(*p_value)
-                ),
-                "",
-            ),
-            Observation::RunningLine { frequencies_hz: [first, last], excess, p_value } => text(
-                format!(
-                    "a line whose frequency runs from {first:.2} to {last:.2} Hz over the record, {:+.0} % of the noise of short \
-                     spectra, by chance anywhere {}: a speed that changes",
-                    100.0 * excess,
                     self.chance(*p_value)
                 ),
                 "",

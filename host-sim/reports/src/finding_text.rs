@@ -192,6 +192,16 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 format!("; stiffen the mount or notch the band.{}", off()),
             ),
         ),
+        Effect::Chirp(of) => (
+            format!(
+                "A line whose frequency runs from {} to {}, by {}{reaches}: an amplitude of {}.",
+                hertz(of.start_hz),
+                hertz(of.end_hz),
+                amount(&of.rate_hz_per_s.parameter("Hz/s")),
+                size(of.amplitude)
+            ),
+            Advice::new("Look for a motor whose speed changes over the record", format!(".{}", off())),
+        ),
         Effect::SquareWave(of) => (
             format!("A square wave of {} with an amplitude of {}.", hertz(of.frequency_hz), size(of.amplitude)),
             Advice::new("Look for a load on the supply or a heater that switches at this rate", format!(".{}", off())),

@@ -89,15 +89,6 @@ pub enum Observation {
         /// Probability at any period by chance.
         p_value: f64,
     },
-    /// A line whose frequency runs from one value to another.
-    RunningLine {
-        /// At the beginning and at the end of the record, Hz.
-        frequencies_hz: [f64; 2],
-        /// Power over the noise of short spectra.
-        excess: f64,
-        /// Probability anywhere by chance.
-        p_value: f64,
-    },
     /// Disturbances that begin at once and decay.
     DecayingDisturbances {
         /// s

@@ -26,7 +26,7 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
         Effect::SinusoidalLine(SinusoidalLine { frequency_hz, .. })
         | Effect::ResonantLine(ResonantLine { frequency_hz, .. })
         | Effect::SquareWave(SquareWave { frequency_hz, .. }) => line_in_spectrum(report, channel, frequency_hz.value),
-        Effect::OutputFilter(_) | Effect::FirstOrderFilter(_) | Effect::ClockDeviation(_) => {
+        Effect::Chirp(_) | Effect::OutputFilter(_) | Effect::FirstOrderFilter(_) | Effect::ClockDeviation(_) => {
             spectrum_plot(report, channel)
         }
         Effect::LevelStep(of) => {

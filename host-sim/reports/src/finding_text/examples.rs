@@ -57,6 +57,15 @@ pub(super) fn examples() -> Vec<Effect> {
         line(0.12).into(),
         resonance(20.5).into(),
         resonance(0.12).into(),
+        Chirp {
+            start_hz: estimate(),
+            end_hz: estimate(),
+            rate_hz_per_s: estimate(),
+            amplitude: size(),
+            excess: 1.0,
+            p_value: 1e-9,
+        }
+        .into(),
         SquareWave {
             frequency_hz: estimate(),
             amplitude: size(),

@@ -1,0 +1,115 @@
+//! A chirp: a line whose frequency runs evenly from one end of the record to the other, as that of a motor whose speed changes.
+
+use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use allan_core::NoiseTerm;
+use allan_core::term::Sinusoid;
+
+/// Frequencies of a chirp whose Allan variances are averaged.
+const FREQUENCIES: u32 = 32;
+
+/// A line whose frequency runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chirp {
+    /// Frequency at the beginning of the record, Hz.
+    pub start_hz: BoundedEstimate,
+    /// Frequency at its end, Hz.
+    pub end_hz: BoundedEstimate,
+    /// Change of the frequency, Hz/s.
+    pub rate_hz_per_s: BoundedEstimate,
+    /// Amplitude.
+    pub amplitude: ChannelEstimate,
+    /// Power over the noise of short spectra.
+    pub excess: f64,
+    /// Probability anywhere by chance.
+    pub p_value: f64,
+}
+
+impl Kind for Chirp {
+    const NAME: &'static str = "chirp";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![
+            ("start", self.start_hz.parameter("Hz")),
+            ("end", self.end_hz.parameter("Hz")),
+            ("rate", self.rate_hz_per_s.parameter("Hz/s")),
+            ("amplitude", self.amplitude.parameter()),
+        ]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.amplitude.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        // Half a record has another end.
+        vec![Some(self.rate_hz_per_s), Some(self.amplitude.estimate())]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        let ends = [self.start_hz, self.end_hz];
+        Occurrence::AtFrequency(BoundedEstimate {
+            value: 0.5 * (self.start_hz.value + self.end_hz.value),
+            low: ends.iter().map(|of| of.low).fold(f64::INFINITY, f64::min),
+            high: ends.iter().map(|of| of.high).fold(0.0, f64::max),
+        })
+    }
+
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        // Of a sinusoid at each of the frequencies, for as long as it is there. The models have no term for it.
+        let run = self.end_hz.value - self.start_hz.value;
+        let frequency = |number: u32| self.start_hz.value + run * (f64::from(number) + 0.5) / f64::from(FREQUENCIES);
+        let of = |frequency: f64| NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(at.n, at.period_s);
+        let mean = (0..FREQUENCIES).map(|number| of(frequency(number))).sum::<f64>() / f64::from(FREQUENCIES);
+        AddedVariance::corrected(self.amplitude.value.powi(2) * mean)
+    }
+
+    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{AveragingTime, Kind};
+    use std::f64::consts::TAU;
+
+    /// The Allan variance of a sampled chirp from 4 to 12 Hz, by its definition.
+    #[test]
+    fn the_variance_is_that_of_its_samples() {
+        const SAMPLES: usize = 60_000;
+        let (period_s, [start, end]) = (0.01, [4.0, 12.0]);
+        let exact = |value: f64| BoundedEstimate::exact(value);
+        let duration_s = SAMPLES as f64 * period_s;
+        let chirp = Chirp {
+            start_hz: exact(start),
+            end_hz: exact(end),
+            rate_hz_per_s: exact((end - start) / duration_s),
+            amplitude: exact(0.3).in_unit("g"),
+            excess: 1.0,
+            p_value: 1e-9,
+        };
+        let sample = |at: usize| {
+            let time_s = at as f64 * period_s;
+            0.3 * (TAU * (start + 0.5 * (end - start) * time_s / duration_s) * time_s).sin()
+        };
+        let mut sums = vec![0.0];
+        (0..SAMPLES).for_each(|at| sums.push(sums[at] + sample(at)));
+        for n in [1_usize, 2, 4, 8, 16] {
+            let differences = sums.windows(2 * n + 1).map(|of| (of[2 * n] - 2.0 * of[n] + of[0]) / n as f64);
+            let count = (SAMPLES + 1 - 2 * n) as f64;
+            let expected = 0.5 * differences.map(|of| of * of).sum::<f64>() / count;
+            let at = AveragingTime {
+                n: n as u64,
+                period_s,
+                samples: SAMPLES as u64,
+                model_avar: 0.0,
+                adev_of: &|_, _| None,
+            };
+            let found = chirp.avar(&at).corrected;
+            assert!((found / expected - 1.0).abs() < 0.01, "{n}: {found} {expected}");
+        }
+        assert_eq!(chirp.parameters().len(), 4);
+    }
+}
