@@ -1,9 +1,11 @@
 //! The program `benchmarks`: runs a benchmark, prints its tables, writes them as JSON.
 
 use anyhow::{Context, Result};
+use benchmarks::contradictions::ContradictionPlan;
+use benchmarks::filtered_noise::FilteredNoisePlan;
 use benchmarks::losses::LossPlan;
 use benchmarks::reproduction::Reproduction;
-use benchmarks::undeclared::{EffectKind, SEEDS_PER_GROUP, UndeclaredPlan};
+use benchmarks::undeclared::{EffectKind, MeasuredNoisePlan, NoiseRecording, SEEDS_PER_GROUP, UndeclaredPlan};
 use clap::{Args, Parser, Subcommand, value_parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -16,7 +18,7 @@ use std::process::ExitCode;
 /// Most recordings of a benchmark: each has a seed of its own, and its result is kept until the end.
 const MOST_RECORDINGS: u64 = 100_000;
 
-/// Benchmarks of the noise analysis, on simulated recordings whose noise and effects are known.
+/// Benchmarks of the noise analysis, on recordings whose noise or whose effects are known.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Cli {
@@ -31,6 +33,12 @@ struct Cli {
 enum Benchmark {
     /// Hide random effects in recordings and score how well the analysis names them.
     Undeclared(UndeclaredArguments),
+    /// Hide effects in the measured noise of recordings and score how well the analysis names them.
+    Measured(MeasuredArguments),
+    /// Count the sentences under "Contradicted" in the reports of noise with nothing hidden.
+    Contradictions(ContradictionArguments),
+    /// Compare N, B and K behind the part's filter with their truth, nothing else hidden.
+    Filters(FilterArguments),
     /// Repeat the published characterisation on simulated hours: slope method beside the fit.
     Paper(PaperArguments),
     /// Take samples out of records and compare variance and coefficients with those of the complete records.
@@ -75,6 +83,63 @@ struct UndeclaredArguments {
 }
 
 #[derive(Debug, Args)]
+struct MeasuredArguments {
+    /// Recordings of sensors at rest, in files of any format that `analyze` reads.
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// Sample rate of those without time stamps, Hz.
+    #[arg(long)]
+    rate: Option<f64>,
+    /// Stretches, in each of which every kind of effect is hidden alone; they are taken from the recordings in turn.
+    #[arg(long, default_value_t = 6, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
+    stretches: u64,
+    /// Length of a stretch, s.
+    #[arg(long, default_value_t = 600.0, value_parser = positive)]
+    seconds: f64,
+    /// Size of each effect over the detection limit in the noise of its channel.
+    #[arg(long, default_value_t = 3.0, value_parser = positive)]
+    strength: f64,
+    /// Seed of the first stretch.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Stretches that are examined at a time [default: one a core].
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+}
+
+#[derive(Debug, Args)]
+struct ContradictionArguments {
+    /// Records.
+    #[arg(long, default_value_t = 200, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
+    records: u64,
+    /// Length of a record, s.
+    #[arg(long, default_value_t = 900.0, value_parser = positive)]
+    seconds: f64,
+    /// Seed of the first record.
+    #[arg(long, default_value_t = 0, value_parser = value_parser!(u64).range(..SEEDS_PER_GROUP / 2))]
+    seed: u64,
+    /// Records that are examined at a time [default: one a core].
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+}
+
+#[derive(Debug, Args)]
+struct FilterArguments {
+    /// Records of three gyros behind each filter.
+    #[arg(long, default_value_t = 300, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
+    records: u64,
+    /// Length of a record, s.
+    #[arg(long, default_value_t = 1800.0, value_parser = positive)]
+    seconds: f64,
+    /// Seed of the first record.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Records that are examined at a time [default: one a core].
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+}
+
+#[derive(Debug, Args)]
 struct PaperArguments {
     /// Hours to simulate; a scatter needs two.
     #[arg(long, default_value_t = 100, value_parser = value_parser!(u64).range(2..=MOST_RECORDINGS))]
@@ -105,6 +170,14 @@ fn loss_percent(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
         _ => Err("not a percentage from 0 to 50".to_owned()),
+    }
+}
+
+/// A number above 0.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("not a number above 0".to_owned()),
     }
 }
 
@@ -157,6 +230,26 @@ fn run(Cli { benchmark, json }: Cli) -> Result<()> {
                 jobs: threads(arguments.jobs),
             };
             let table = plan.run(progress)?;
+            bar.finish_and_clear();
+            conclude(&table, json, |out| table.write(out))
+        }
+        Benchmark::Measured(MeasuredArguments { recordings, rate, stretches, seconds, strength, seed, jobs }) => {
+            let recordings =
+                recordings.iter().map(|file| NoiseRecording::read(file, rate)).collect::<Result<_, _>>()?;
+            let plan = MeasuredNoisePlan { recordings, stretches, seconds, strength, seed, jobs: threads(jobs) };
+            let table = plan.run(progress);
+            bar.finish_and_clear();
+            conclude(&table, json, |out| table.write(out))
+        }
+        Benchmark::Contradictions(ContradictionArguments { records, seconds, seed, jobs }) => {
+            let plan = ContradictionPlan { records, seconds, first_seed: seed, jobs: threads(jobs) };
+            let table = plan.run(progress)?;
+            bar.finish_and_clear();
+            conclude(&table, json, |out| table.write(out))
+        }
+        Benchmark::Filters(FilterArguments { records, seconds, seed, jobs }) => {
+            let plan = FilteredNoisePlan { records, seconds, first_seed: seed, jobs: threads(jobs) };
+            let table = plan.run(progress);
             bar.finish_and_clear();
             conclude(&table, json, |out| table.write(out))
         }

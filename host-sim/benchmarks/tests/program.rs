@@ -18,6 +18,11 @@ fn benchmarks_have_limits() {
         &["undeclared", "--outside", "1000000000"],
         &["paper", "--seeds", "18446744073709551615"],
         &["losses", "--records", "18446744073709551615"],
+        &["measured", "noise.csv", "--stretches", "1000000000"],
+        &["measured"],
+        &["contradictions", "--records", "1000000000"],
+        &["filters", "--records", "1000000000"],
+        &["filters", "--seconds", "-1"],
     ] {
         let output = benchmarks(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -48,4 +53,23 @@ fn json_goes_to_a_file_beside_the_tables_or_alone_to_standard_output() {
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("absent/losses.json"), "{error}");
     assert!(output.stdout.is_empty(), "checked before the work is done");
+}
+
+/// A table without time stamps needs a rate; with one it is hidden in.
+#[test]
+fn measured_noise_is_read_from_a_table_and_an_unusable_one_is_named() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let file = dir.path().join("noise.csv");
+    let count = |row: u32, axis: u32| (row.wrapping_mul(2_654_435_761).rotate_left(axis * 7) >> 16) % 41;
+    let rows = (0..4_000).map(|row| format!("{},{},{}\n", count(row, 0), count(row, 1), count(row, 2)));
+    let text = "gyro_x_counts,gyro_y_counts,gyro_z_counts\n".to_owned() + &rows.collect::<String>();
+    std::fs::write(&file, text).expect("written");
+    let name = file.to_str().expect("UTF-8");
+    let without = benchmarks(&["measured", name]);
+    let error = String::from_utf8_lossy(&without.stderr).into_owned();
+    assert!(without.status.code() == Some(1) && error.contains("noise.csv") && error.contains("--rate"), "{error}");
+    let with = benchmarks(&["measured", name, "--rate", "100", "--stretches", "1", "--seconds", "30", "--jobs", "1"]);
+    assert_eq!(with.status.code(), Some(0), "{}", String::from_utf8_lossy(&with.stderr));
+    let table = String::from_utf8(with.stdout).expect("UTF-8");
+    assert!(table.contains("noise.csv") && table.contains("telegraph"), "{table}");
 }
