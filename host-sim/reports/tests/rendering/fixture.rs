@@ -2,7 +2,7 @@
 
 use noise_analysis::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
 use noise_analysis::bounds::BoundedEstimate;
-use noise_analysis::effects::{LineEvidence, LineSource, SinusoidalLine, SpectrumEvidence};
+use noise_analysis::effects::{CurveEvidence, LineEvidence, LineSource, SinusoidalLine};
 use noise_analysis::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -217,12 +217,12 @@ fn trace_sinusoid(channel: &mut ChannelReport) {
     }
     let mut sinusoid = term("sinusoid", "frequency_hz", FREQUENCY_HZ, "Hz");
     sinusoid.parameters.extend(term("sinusoid", "amplitude", AMPLITUDE, "deg/s").parameters);
-    let spectrum = SpectrumEvidence { frequency_hz: FREQUENCY_HZ, width_hz: None, sigmas: 41.0, p_value: 1e-30 };
+    let curve = CurveEvidence { excess: 0.41, tau_s: 0.64, sigmas: 33.0, gain_sigmas: 14.6 };
     let line = SinusoidalLine {
         frequency_hz: BoundedEstimate::exact(FREQUENCY_HZ),
         amplitude: BoundedEstimate::exact(AMPLITUDE).in_unit("deg/s"),
         multiples: None,
-        evidence: LineEvidence { has_width: false, source: LineSource::Spectrum(spectrum) },
+        evidence: LineEvidence { has_width: false, source: LineSource::Curve(curve) },
     };
     channel.effects = vec![ChannelEffect { effect: line.into(), finding: 0 }];
     channel.after.terms.push(sinusoid);
