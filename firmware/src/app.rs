@@ -11,7 +11,7 @@ use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
 use crate::learner::{EpochFit, Learner};
 use crate::report_frames::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::statistics::CHANNELS;
 use crate::status_flags::StatusFlags;
@@ -111,7 +111,7 @@ impl App {
                 bad_commands: 0,
                 recovery: SensorRecovery::default(),
                 status_flags: StatusFlags::new(),
-                report_scale: Scale::new(config, None),
+                report_scale: ReportScale::new(config, None),
             },
             retained,
             parser: CommandParser::default(),

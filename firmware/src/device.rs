@@ -8,7 +8,7 @@ use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
 use crate::retained::RetainedSettings;
 use crate::sample_intake::SensorTrouble;
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdentity, probe, read_diagnosis};
 use crate::status_flags::StatusFlags;
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
@@ -58,8 +58,8 @@ pub(crate) struct DeviceState {
     pub(crate) bad_commands: u32,
     pub(crate) recovery: SensorRecovery,
     pub(crate) status_flags: StatusFlags,
-    /// Scale of the report that is being sent.
-    pub(crate) report_scale: Scale,
+    /// ReportScale of the report that is being sent.
+    pub(crate) report_scale: ReportScale,
 }
 
 /// Whether the sensor is in use.

@@ -5,7 +5,7 @@
 //! `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`, so that no second estimator is needed.
 
 use crate::sample_intake::Estimators;
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::statistics::{
     AllanCovariances, CHANNELS, CROSS_OCTAVES, ChannelMeans, ChannelSums, FIRST_CROSS_OCTAVE, GYROS, OCTAVES,
 };
@@ -49,8 +49,8 @@ impl FinishedEpoch {
 
     /// The scale of the samples, which were taken with this configuration.
     #[must_use]
-    pub fn scale(&self, config: Config) -> Scale {
-        Scale::new(config, self.measured_hz)
+    pub fn scale(&self, config: Config) -> ReportScale {
+        ReportScale::new(config, self.measured_hz)
     }
 
     /// The sums of [`CHANNELS`]`[index]`; `None` if there is no such channel.
@@ -66,7 +66,7 @@ impl FinishedEpoch {
     }
 
     /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
-    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, scale: Scale) {
+    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, scale: ReportScale) {
         self.sums[index].rebuild_curve(curve, CHANNELS[index], scale);
     }
 
@@ -104,7 +104,7 @@ type Candidates = Vec<usize, MAX_COVARIATES>;
 pub fn estimate_regressors(
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
     keep_on: &mut dyn FnMut() -> bool,
 ) -> Option<Regressors> {
     let Some(covariances) = epoch.covariances() else { return Some(Regressors::new()) };
@@ -151,7 +151,7 @@ pub(crate) fn rebuild_compensated_curve(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
     regressors: &[Regressor],
 ) -> Option<()> {
     epoch.rebuild_curve(curve, index, scale);
@@ -163,7 +163,7 @@ fn subtract(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
     regressors: &[Regressor],
 ) -> Option<()> {
     let covariances = epoch.covariances()?;
@@ -189,7 +189,7 @@ fn subtract(
 pub(crate) fn mean_shift(
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
     regressors: &[Regressor],
     before: &ChannelMeans,
 ) -> Option<ReportedShift> {
@@ -209,13 +209,18 @@ fn candidates(index: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Allan covariance of two channels at averaging factor `n`, in the product of their units.
-fn scaled_covariance(covariances: &AllanCovariances, (a, b): (usize, usize), n: u64, scale: Scale) -> Option<f64> {
+fn scaled_covariance(
+    covariances: &AllanCovariances,
+    (a, b): (usize, usize),
+    n: u64,
+    scale: ReportScale,
+) -> Option<f64> {
     Some(covariances.covariance(a, b, n)? * lsb(a, scale) * lsb(b, scale))
 }
 
 /// The covariate [`CHANNELS`]`[index]` at the octaves of the cross sums, with its own noise modelled (`modelled`, for an
 /// estimate) or as measured (for a subtraction).
-fn covariate(epoch: &FinishedEpoch, index: usize, scale: Scale, modelled: bool) -> Covariate<CROSS_OCTAVES> {
+fn covariate(epoch: &FinishedEpoch, index: usize, scale: ReportScale, modelled: bool) -> Covariate<CROSS_OCTAVES> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, scale);
     if modelled {
@@ -225,7 +230,7 @@ fn covariate(epoch: &FinishedEpoch, index: usize, scale: Scale, modelled: bool) 
     }
 }
 
-fn lsb(index: usize, scale: Scale) -> f64 {
+fn lsb(index: usize, scale: ReportScale) -> f64 {
     scale.lsb(CHANNELS[index])
 }
 
@@ -236,7 +241,7 @@ fn lsb(index: usize, scale: Scale) -> f64 {
 fn degrades(
     epoch: &FinishedEpoch,
     candidates: &Candidates,
-    scale: Scale,
+    scale: ReportScale,
     sensitivities: &[Sensitivity],
     regression: &CovariateRegression<'_, OCTAVES, CROSS_OCTAVES>,
 ) -> bool {

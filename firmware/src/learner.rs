@@ -3,7 +3,7 @@
 
 use crate::epoch::{FinishedEpoch, Regressor, Regressors, mean_shift, rebuild_compensated_curve};
 use crate::report_messages::{model_error, reported_term};
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL};
 use adis16405_driver::Config;
 use allan_core::confidence::NORMAL_975;
@@ -45,7 +45,7 @@ impl EpochModel {
 
     /// N, B and K of the stream itself; `None` before the first fit.
     #[must_use]
-    pub(crate) fn baseline(&self, scale: Scale) -> Option<Model> {
+    pub(crate) fn baseline(&self, scale: ReportScale) -> Option<Model> {
         Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), scale))
     }
 
@@ -56,12 +56,12 @@ impl EpochModel {
 
     /// All terms of the compensated stream; `None` before the first fit.
     #[must_use]
-    fn full(&self, scale: Scale) -> Option<Model> {
+    fn full(&self, scale: ReportScale) -> Option<Model> {
         (!self.full.is_empty()).then(|| model(self.full.iter().copied(), scale))
     }
 }
 
-fn model(terms: impl Iterator<Item = (NoiseTerm, f64)>, scale: Scale) -> Model {
+fn model(terms: impl Iterator<Item = (NoiseTerm, f64)>, scale: ReportScale) -> Model {
     Model::new(scale.period_s(), terms.map(|(kind, value)| FittedTerm::exact(kind, value)))
 }
 
@@ -110,7 +110,7 @@ impl EpochFit {
         &mut self,
         epoch: &FinishedEpoch,
         index: usize,
-        scale: Scale,
+        scale: ReportScale,
         keep_on: &mut dyn FnMut() -> bool,
     ) -> bool {
         let done = self.search(epoch, index, scale, keep_on);
@@ -123,7 +123,13 @@ impl EpochFit {
     }
 
     /// Traces what N, B and K lack in the compensated stream. Returns false if it was cancelled.
-    fn search(&mut self, epoch: &FinishedEpoch, index: usize, scale: Scale, keep_on: &mut dyn FnMut() -> bool) -> bool {
+    fn search(
+        &mut self,
+        epoch: &FinishedEpoch,
+        index: usize,
+        scale: ReportScale,
+        keep_on: &mut dyn FnMut() -> bool,
+    ) -> bool {
         let mut curve = Curve::empty();
         // Without covariances there are no regressors, and the curve is that of the stream itself.
         let _ = rebuild_compensated_curve(&mut curve, epoch, index, scale, &self.regressors);
@@ -154,7 +160,7 @@ impl EpochFit {
     }
 }
 
-fn refit_baseline(epoch: &FinishedEpoch, index: usize, scale: Scale) -> Option<BaselineCoefficients> {
+fn refit_baseline(epoch: &FinishedEpoch, index: usize, scale: ReportScale) -> Option<BaselineCoefficients> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, scale);
     baseline_coefficients(&fit(&curve, &NoiseTerm::BASELINE))
@@ -168,7 +174,7 @@ pub fn validate(
     means: Option<&ChannelMeans>,
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
 ) -> Option<ValidationMessage> {
     let mut message = ValidationMessage {
         channel: CHANNELS[index] as u8,
@@ -187,7 +193,7 @@ fn baseline_error(
     model: &EpochModel,
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
 ) -> Option<Option<ReportedModelError>> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, scale);
@@ -199,7 +205,7 @@ fn fill_compensated(
     model: &EpochModel,
     epoch: &FinishedEpoch,
     index: usize,
-    scale: Scale,
+    scale: ReportScale,
     message: &mut ValidationMessage,
 ) -> Option<()> {
     let mut curve = Curve::empty();
@@ -260,7 +266,7 @@ pub(crate) struct ValidationResult {
 }
 
 impl ValidationResult {
-    fn from_message(message: &ValidationMessage, samples: u64, scale: Scale) -> Option<Self> {
+    fn from_message(message: &ValidationMessage, samples: u64, scale: ReportScale) -> Option<Self> {
         let deviance_per_point = (message.before?.deviance_per_point, message.after?.deviance_per_point);
         let drift = *message.drift.iter().rfind(|drift| drift.n <= samples / 8)?;
         Some(Self { deviance_per_point, drift, tau_s: drift.n as f64 * scale.period_s() })

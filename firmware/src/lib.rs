@@ -86,6 +86,6 @@ pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;
 pub use retained::RetainedRam;
 pub use sample_intake::{Estimators, estimate};
-pub use scale::Scale;
+pub use scale::ReportScale;
 pub use statistics::{CHANNELS, ChannelEstimator, ChannelSums, OCTAVES, OVERLAP, Statistics};
 pub use transmit::{TransmitBuffer, TransmitQueue};

@@ -4,7 +4,7 @@
 use crate::board::Board;
 use crate::device::DeviceState;
 use crate::learner::EpochModel;
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelSums, INERTIAL};
 use adis16405_driver::{Channel, GyroRange};
 use link::{Hello, MessageRef, ReportedModelError};
@@ -33,7 +33,7 @@ impl DeviceState {
             finished.map_or((self.settings.epoch, None), |epoch| (epoch.number, epoch.measured_hz));
         let measured_hz =
             if ends_epoch { finished_hz } else { board.estimators(|estimators| estimators.measured_hz()) };
-        self.report_scale = Scale::new(self.config, measured_hz);
+        self.report_scale = ReportScale::new(self.config, measured_hz);
         Hello {
             firmware: VERSION,
             product_id: self.product_id,

@@ -1,7 +1,7 @@
 //! The messages of a report that are made of one channel's sums: octaves and coefficients, and the error of a model.
 
 use crate::channels::{ChannelEstimator, OCTAVES};
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::statistics::ChannelSums;
 use adis16405_driver::Channel;
 use allan_core::{Curve, Model, NoiseTerm, model};
@@ -11,7 +11,7 @@ use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOcta
 impl ChannelSums {
     /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
     #[must_use]
-    pub(crate) fn error_of(&self, model: &Model, channel: Channel, scale: Scale) -> Option<ReportedModelError> {
+    pub(crate) fn error_of(&self, model: &Model, channel: Channel, scale: ReportScale) -> Option<ReportedModelError> {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, scale);
         model_error(model, &curve)

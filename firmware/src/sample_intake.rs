@@ -4,7 +4,7 @@ use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
 use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
 use crate::channels::ChannelSet;
 use crate::gross_error_gate::GrossErrorGate;
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
 use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults};
@@ -247,8 +247,8 @@ impl<'m> Estimators<'m> {
 
     /// What turns counts and numbers of samples into units.
     #[must_use]
-    pub fn scale(&self) -> Scale {
-        Scale::new(self.config, self.measured_hz())
+    pub fn scale(&self) -> ReportScale {
+        ReportScale::new(self.config, self.measured_hz())
     }
 
     /// The counters of sampling and estimating; those of the application and the board are 0.

@@ -4,12 +4,12 @@ use adis16405_driver::{Channel, Config};
 
 /// Configuration and sample rate of a stream of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scale {
+pub struct ReportScale {
     config: Config,
     rate_hz: f64,
 }
 
-impl Scale {
+impl ReportScale {
     /// With the measured rate in Hz, or the programmed one where none was measured. The sensor's clock is within 3 % of its
     /// nominal rate (ADIS16400/ADIS16405 data sheet Rev. B, Table 1), and σ(τ) scales N by the root of that error.
     #[must_use]

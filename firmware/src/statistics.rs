@@ -7,7 +7,7 @@ pub(crate) use crate::cross_sums::{AllanCovariances, CROSS_OCTAVES, ChannelMeans
 
 use crate::channels::ChannelSet;
 use crate::cross_sums::CrossSums;
-use crate::scale::Scale;
+use crate::scale::ReportScale;
 use adis16405_driver::Channel;
 use allan_core::{Cascade, Curve, Interpolation, Model, NoiseTerm, OctaveSums, fit::fit};
 
@@ -145,14 +145,14 @@ impl ChannelSums {
     }
 
     /// Rebuilds the Allan variance curve of a channel in its unit.
-    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, scale: Scale) {
+    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, scale: ReportScale) {
         ChannelEstimator::rebuild_curve(curve, scale.period_s(), self.samples, |octave| self.octave(octave));
         curve.scale(scale.lsb(channel));
     }
 
     /// Fits the baseline model (N, B and K) to the curve of a channel, in its unit.
     #[must_use]
-    pub fn fit_baseline(&self, channel: Channel, scale: Scale) -> Model {
+    pub fn fit_baseline(&self, channel: Channel, scale: ReportScale) -> Model {
         let mut curve = Curve::empty();
         self.rebuild_curve(&mut curve, channel, scale);
         fit(&curve, &NoiseTerm::BASELINE)

@@ -11,7 +11,7 @@
 
 mod table;
 
-pub use table::{FilterCell, FilteredCoefficient, FilteredNoiseTable};
+pub use table::{FilterCell, FilteredChannel, FilteredCoefficient, FilteredNoiseTable};
 
 use crate::parallel;
 use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
@@ -20,7 +20,6 @@ use noise_analysis::analysis::analyze;
 use noise_analysis::report::{ChannelReport, Parameter};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -47,21 +46,6 @@ pub struct FilteredNoisePlan {
     pub first_seed: u64,
     /// Number of threads.
     pub jobs: usize,
-}
-
-/// What a report says of one channel.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FilteredChannel {
-    /// Seed of the record.
-    pub seed: u64,
-    /// Name of the channel.
-    pub channel: &'static str,
-    /// Taps and decimation of the filter that the model has.
-    pub filter: Option<[f64; 2]>,
-    /// N, B and K with their truth; absent where the model has none.
-    pub coefficients: [Option<FilteredCoefficient>; 3],
-    /// Every effect that is named, without the filter itself where there is one.
-    pub named: Vec<String>,
 }
 
 impl FilteredNoisePlan {

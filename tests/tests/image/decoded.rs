@@ -1,7 +1,7 @@
 //! The output of an image, decoded by the host's decoder, and the report that the host computes from the same bursts.
 
 use adis16405_driver::{BURST_BYTES, Burst, GyroRange, SamplePeriod};
-use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, Scale, Statistics, TimedBurst};
+use firmware::{CHANNELS, ChannelEstimator, ChannelSums, Estimators, ReportScale, Statistics, TimedBurst};
 use link::{ChannelMessage, Decoder, DecoderCounters, Health, Hello, Message, RawMessage, Received};
 
 pub(crate) struct Decoded {
@@ -97,6 +97,6 @@ pub(crate) fn in_stretches(
     }
     let channel = CHANNELS[index];
     let sums = ChannelSums::from_estimator(&estimator);
-    let model = (index < 6).then(|| sums.fit_baseline(channel, Scale::new(config, hello.measured_rate_hz)));
+    let model = (index < 6).then(|| sums.fit_baseline(channel, ReportScale::new(config, hello.measured_rate_hz)));
     sums.report(channel, model.as_ref(), None)
 }

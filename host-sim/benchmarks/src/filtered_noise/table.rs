@@ -1,6 +1,5 @@
 //! Bias and coverage of N, B and K behind each filter.
 
-use super::FilteredChannel;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -16,6 +15,21 @@ pub struct FilteredCoefficient {
     pub low: f64,
     /// Upper 95 % bound.
     pub high: f64,
+}
+
+/// What a report says of one channel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FilteredChannel {
+    /// Seed of the record.
+    pub seed: u64,
+    /// Name of the channel.
+    pub channel: &'static str,
+    /// Taps and decimation of the filter that the model has.
+    pub filter: Option<[f64; 2]>,
+    /// N, B and K with their truth; absent where the model has none.
+    pub coefficients: [Option<FilteredCoefficient>; 3],
+    /// Every effect that is named, without the filter itself where there is one.
+    pub named: Vec<String>,
 }
 
 /// All channels of one filter and reading.

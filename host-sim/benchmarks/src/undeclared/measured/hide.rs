@@ -1,7 +1,7 @@
 //! An effect in samples that were measured.
 
-use super::no_environment;
 use crate::undeclared::effect::EffectKind;
+use crate::undeclared::environment::EnvironmentCourse;
 use crate::undeclared::generator::{add_sensed, quantized_angle};
 use crate::undeclared::outside::OutsideEffect;
 use crate::undeclared::sample_loss::lose_samples;
@@ -113,4 +113,9 @@ fn repeat_samples(measurement: &mut Measurement, share: f64, seed: u64) {
             measurement.channels.iter_mut().for_each(|channel| channel.counts[at] = channel.counts[at - 1]);
         }
     }
+}
+
+/// The courses over time that a recording of noise does not tell.
+pub(super) fn no_environment() -> EnvironmentCourse {
+    EnvironmentCourse { temperature_c: Vec::new(), supply_v: Vec::new(), force_g: [const { Vec::new() }; 3] }
 }

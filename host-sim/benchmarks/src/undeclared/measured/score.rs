@@ -1,7 +1,8 @@
 //! The score of an effect that is hidden in a stretch of measured noise.
 
+use super::hidden_kind::HiddenKind;
 use super::hide::{HiddenEffect, hide};
-use super::{HiddenKind, Stretch};
+use super::stretch::Stretch;
 use crate::undeclared::score::{ParameterScore, UNEXPLAINED, score_effect, score_parameters};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;

@@ -1,6 +1,6 @@
 //! The scores of all effects in measured noise, and their tables.
 
-use super::HiddenKind;
+use super::hidden_kind::HiddenKind;
 use super::score::{MeasuredErrors, MeasuredScore};
 use crate::undeclared::score::ParameterScore;
 use crate::undeclared::table::{Proportion, quantile};

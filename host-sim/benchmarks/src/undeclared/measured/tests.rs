@@ -3,8 +3,9 @@
 use super::hide::{HiddenEffect, hide};
 use super::recording::part;
 use super::*;
+use crate::undeclared::effect::EffectKind;
 use crate::undeclared::{DrawnRecording, RecordingGroup};
-use virtual_sensor::InjectedEffect;
+use virtual_sensor::{InjectedEffect, OutputRegister, SensorScenario};
 
 /// Noise of the benchmark's own generator, as a recording.
 fn recorded(seconds: f64, seed: u64) -> NoiseRecording {
