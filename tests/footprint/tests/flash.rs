@@ -5,7 +5,7 @@ use driver_footprint::{M0_PLUS, M4F, added_bytes, built, flash_bytes, panic_symb
 /// The limits are the sizes measured when the test was written, and a tenth.
 #[test]
 fn the_driver_takes_at_most_a_tenth_more_flash_than_when_it_was_measured() {
-    for (features, limit) in [("burst", 6_600), ("everything", 21_100), ("asynchronous", 31_300)] {
+    for (features, limit) in [("burst", 7_300), ("everything", 21_100), ("asynchronous", 31_300)] {
         let bytes = added_bytes(M4F, features);
         println!("{features}: {bytes} bytes");
         assert!(bytes <= limit, "{features}: {bytes} bytes of flash, more than {limit}");
