@@ -10,6 +10,9 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Effect, ModelReport, 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
+/// Deviance per point from which on a model is said to fail.
+pub(super) const FAILS: f64 = 3.0;
+
 /// Deviances per point on the unseen half of the stretch, in the first channel that the effect is in; absent where there are too few
 /// samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -172,6 +175,6 @@ impl MeasuredErrors {
     /// Whether the model with the added terms is farther from the unseen half, as it was recorded, than N, B and K, and fails there.
     #[must_use]
     pub fn grew(&self) -> bool {
-        self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(super::table::FAILS))
+        self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(FAILS))
     }
 }

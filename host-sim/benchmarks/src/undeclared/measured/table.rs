@@ -8,9 +8,6 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-/// Deviance per point from which on a model is said to fail.
-pub(super) const FAILS: f64 = 3.0;
-
 /// The scores, in the order of the stretches.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct MeasuredNoiseTable {
