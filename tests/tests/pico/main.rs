@@ -113,7 +113,9 @@ fn a_failed_transfer_is_recovered_from() {
     let counter = |name: &str| counter(&decoded.lines, name).unwrap_or(0);
     println!("{:#?}", decoded.lines);
     assert_eq!((counter("bus_errors"), counter("recoveries"), counter("shifted")), (1, 1, 0));
-    assert!(counter("bursts").abs_diff(counter("used")) <= 1 && f64::from(counter("used")) > 1.5 * RATE_HZ);
+    assert!(counter("bursts").abs_diff(counter("used")) <= 1, "{:?}", decoded.lines);
+    // Samples that the sensor's filter still mixes after its start are counted and not used.
+    assert!(f64::from(counter("used") + counter("settling")) > 1.5 * RATE_HZ, "{:?}", decoded.lines);
     assert!((4..=6).contains(&led_changes), "{led_changes} changes of the LED in 2.6 s");
 }
 
