@@ -2,10 +2,10 @@
 
 use anyhow::Result;
 use measurement::SampleBlock;
-use noise_analysis::condensed_record::CondensedRecord;
-use noise_analysis::long_record::LongRecordReader;
 use noise_analysis::parallel;
 use noise_analysis::quick::CurveEstimators;
+use noise_analysis::record::condensed_record::CondensedRecord;
+use noise_analysis::record::long_record::LongRecordReader;
 use recordings::sample_stream::{SampleStream, StreamError};
 use std::sync::mpsc;
 use std::thread;

@@ -11,21 +11,21 @@
 //! fitted to the first half.
 
 use crate::OCTAVES;
-use crate::assessment::{AssessedModels, Assessment};
-use crate::causes;
-use crate::condensed_record::CondensedRecord;
-use crate::figure_data;
-use crate::first_half::{Epochs, FirstHalf};
-use crate::long_record;
+use crate::halves::first_half::{Epochs, FirstHalf};
+use crate::halves::traced_part::ChannelTrace;
+use crate::halves::traced_record::TracedRecord;
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::per_channel;
-use crate::part_report;
+use crate::record::condensed_record::CondensedRecord;
+use crate::record::long_record;
+use crate::report::assessment::{AssessedModels, Assessment};
+use crate::report::figure_data;
+use crate::report::part_report;
 use crate::report::{ChannelReport, MissingSamples, Report, SCHEMA, by_cause};
-use crate::series::Series;
+use crate::rivals::causes;
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::allan_deviations_by_spectrum;
-use crate::traced_part::ChannelTrace;
-use crate::traced_record::TracedRecord;
-use crate::uniform_series::UniformSeries;
 use measurement::{ChannelId, Measurement, RecordingDescription};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -60,8 +60,8 @@ impl fmt::Display for Stage {
     }
 }
 
-/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](crate::long_record::MOST_SAMPLES)
-/// samples, or [`MOST_SAMPLES_WITH_LOSSES`](crate::long_record::MOST_SAMPLES_WITH_LOSSES).
+/// Analyses every channel of a measurement, condensed if it has more than [`MOST_SAMPLES`](crate::record::long_record::MOST_SAMPLES)
+/// samples, or [`MOST_SAMPLES_WITH_LOSSES`](crate::record::long_record::MOST_SAMPLES_WITH_LOSSES).
 /// Effects are traced in the inertial channels only; the others get the baseline model.
 #[must_use]
 pub fn analyze(measurement: &Measurement) -> Report {

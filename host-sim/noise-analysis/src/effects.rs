@@ -12,6 +12,7 @@ mod common_mode;
 mod dropped_samples;
 mod effective_lsb;
 mod evidence;
+pub mod findings;
 mod first_order_filter;
 mod kind;
 mod knock;

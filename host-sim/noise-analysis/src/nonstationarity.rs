@@ -27,7 +27,7 @@ mod tracked_parameters;
 mod tests;
 
 pub use common_mode_regression::{CommonModeRegression, HoldOutGain, OctaveShares};
-pub(crate) use epochs::{EpochCurves, epochs};
+pub(crate) use epochs::EpochCurves;
 pub use epochs::{FittedPart, Stationarity};
 pub use prediction::{Baselines, TrackingErrors};
 pub use prediction_intervals::IntervalCoverage;
@@ -36,8 +36,8 @@ pub use related_line::RelatedLine;
 pub use tracked_parameters::TrackedSet;
 
 use crate::OCTAVES;
-use crate::sample_curves::SampleCurves;
-use crate::series::Series;
+use crate::record::sample_curves::SampleCurves;
+use crate::samples::series::Series;
 use allan_core::{Curve, Model};
 use prediction::{beyond_drift, expected_drift, select_tracked, track};
 use serde::Serialize;

@@ -6,18 +6,18 @@
 //! common, and changes of the noise. So a model may have a Markov process where the whole analysis has a temperature.
 
 use crate::analysis::missing;
-use crate::assessment::Assessment;
-use crate::causes;
 use crate::effects::Effect;
-use crate::estimators::{RecordEstimators, RecordPart};
-use crate::figure_data;
-use crate::first_half::FirstHalf;
-use crate::gapped_cascade::GappedCascade;
+use crate::halves::first_half::FirstHalf;
+use crate::halves::traced_part::{PartData, TracedPart};
 use crate::parallel::{self, per_channel};
-use crate::part_report::NOT_SOUGHT;
+use crate::record::estimators::{RecordEstimators, RecordPart};
+use crate::report::assessment::Assessment;
+use crate::report::figure_data;
+use crate::report::part_report::NOT_SOUGHT;
 use crate::report::{ChannelReport, FigureData, PartReport, Report, SCHEMA, by_cause};
-use crate::streamed_curves::StreamedCurves;
-use crate::traced_part::{PartData, TracedPart};
+use crate::rivals::causes;
+use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::streamed_curves::StreamedCurves;
 use measurement::{ChannelId, ChannelProfile, Measurement, PerChannel, RecordingDescription, SampleBlock};
 
 /// The estimators of a recording whose samples come in blocks.

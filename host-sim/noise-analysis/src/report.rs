@@ -3,12 +3,18 @@
 //! A report does not name the source of its samples: a recording that is read from a file and the same recording replayed
 //! over the bus give the same bytes.
 
-use crate::assessment::Assessment;
+pub mod assessment;
+pub mod comparison;
+pub mod figure_data;
+pub(crate) mod part_report;
+pub mod several;
+
 pub use crate::bounds::Parameter;
-pub use crate::contradiction::Contradiction;
 pub use crate::effects::Effect;
-pub use crate::findings::{ChannelEffect, Finding, Validation};
+pub use crate::effects::findings::{ChannelEffect, Finding, Validation};
+pub use crate::fit::contradiction::Contradiction;
 pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
+use crate::report::assessment::Assessment;
 use crate::units::coefficient_unit;
 use allan_core::model::cube_root_deviation;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};

@@ -34,6 +34,7 @@ pub(crate) mod periodic_signal;
 mod periodogram;
 mod slow_background;
 mod smooth_shape;
+pub(crate) mod spectral_lines;
 pub(crate) mod stacked_spectrum;
 mod transforms;
 mod welch;

@@ -78,7 +78,7 @@ fn contradictions(report: &Report) -> Vec<String> {
 fn white_noise(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let Some(fitted) = angle_random_walk(&channel.refitted) else { return };
     let practice = &channel.assessment;
-    let same_unit = |of: &&noise_analysis::assessment::Coefficient| {
+    let same_unit = |of: &&noise_analysis::report::assessment::Coefficient| {
         of.kind == "angle_random_walk" && !of.discrete && of.value.unit == fitted.unit
     };
     if let Some(of) = practice.coefficients.iter().find(same_unit)

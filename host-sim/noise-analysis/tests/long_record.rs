@@ -4,7 +4,7 @@
 use measurement::adis16405::profile;
 use measurement::{MeasuredChannel, Measurement, RecordingDescription};
 use noise_analysis::analysis::{analyze, analyze_condensed, analyze_samples};
-use noise_analysis::long_record::LongRecordReader;
+use noise_analysis::record::long_record::LongRecordReader;
 use noise_analysis::report::{ChannelReport, Parameter, Report, Validation};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

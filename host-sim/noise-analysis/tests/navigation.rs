@@ -3,9 +3,9 @@
 use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
-use noise_analysis::assessment::innovations::{Innovations, filter_innovations};
-use noise_analysis::assessment::navigation::integrated_errors;
-use noise_analysis::uniform_series::UniformSeries;
+use noise_analysis::report::assessment::innovations::{Innovations, filter_innovations};
+use noise_analysis::report::assessment::navigation::integrated_errors;
+use noise_analysis::samples::uniform_series::UniformSeries;
 use virtual_sensor::NoiseSource;
 use virtual_sensor::{NoiseModel, OutputRegister};
 

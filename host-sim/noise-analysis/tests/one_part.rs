@@ -87,7 +87,8 @@ fn one_channel_has_one_n() {
                 terms.iter().filter(|term| ["filter_bandwidth", "angle_random_walk"].contains(&term.kind.as_str()));
             white.map(|term| term.parameters["value"].value.powi(2)).sum::<f64>().sqrt()
         };
-        let white = |of: &&noise_analysis::assessment::Coefficient| of.kind == "angle_random_walk" && !of.discrete;
+        let white =
+            |of: &&noise_analysis::report::assessment::Coefficient| of.kind == "angle_random_walk" && !of.discrete;
         let coefficients: Vec<&Parameter> =
             channel.assessment.coefficients.iter().filter(white).map(|of| &of.value).collect();
         // Of gyroscopes in deg/sqrt(s), of accelerometers in ug/sqrt(Hz).

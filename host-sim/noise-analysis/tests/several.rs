@@ -1,7 +1,7 @@
 //! Recordings of the same and of different noise: how often they are told apart, and the interval of an inflation.
 
 use measurement::{MeasuredChannel, Measurement, adis16405};
-use noise_analysis::several::{IncomparableRecordings, compare, inflation};
+use noise_analysis::report::several::{IncomparableRecordings, compare, inflation};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -1,8 +1,8 @@
 //! A coefficient of a model, whose white noise may have two terms; and the rows of the coefficient tables on the terminal and on
 //! the page: by the slope method, beside the fit.
 
-use noise_analysis::assessment::sum_of_white_noise;
 use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::report::assessment::sum_of_white_noise;
 use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue};
 
 /// The coefficient `kind` of a model with these terms: of each its kind, its `value` with bounds, and the unit. N is that of all white

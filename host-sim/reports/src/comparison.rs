@@ -4,7 +4,7 @@ use crate::formatting::number;
 use crate::rounding::probability;
 use crate::saved_report::{SavedChannel, SavedPoint, SavedReport};
 use noise_analysis::bounds::BoundedEstimate;
-use noise_analysis::comparison::{Verdict, verdicts};
+use noise_analysis::report::comparison::{Verdict, verdicts};
 use serde::Serialize;
 use std::io::{self, Write};
 

@@ -2,7 +2,7 @@
 
 use crate::rounding::{NONE, quantity_digits, significant};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
-use noise_analysis::assessment::{Innovations, RecordLength};
+use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
 use std::fmt;
 

@@ -11,8 +11,8 @@ use crate::formatting::{
 };
 use crate::rounding::{NONE, Scale, bounded_quantity, parameter_magnitude, probability, quantity_digits, unit};
 use crate::summary;
-use noise_analysis::assessment::navigation::CALIBRATION_S;
-use noise_analysis::assessment::{Assessment, Coefficient, NavigationDrift};
+use noise_analysis::report::assessment::navigation::CALIBRATION_S;
+use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelEffect, ChannelReport, Report, TermReport};
 use std::collections::BTreeMap;
 use std::io::{self, Write};

@@ -2,7 +2,7 @@
 //! evidence; the rest is as in [`Report`].
 
 use crate::evidence::{EvidenceText, NumberStyle};
-use noise_analysis::assessment::Assessment;
+use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{
     ChannelEffect, ChannelReport, CommonModeRegression, CurvePoint, FigureData, Finding, MissingSamples,
     ModelErrorReport, ModelReport, Nonstationarity, Parameter, PartReport, Report, SlopeMethodReport, Stretch,

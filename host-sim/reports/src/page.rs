@@ -14,7 +14,7 @@ use crate::formatting::{
 use crate::rounding::{bounded_quantity, probability, unit};
 use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use noise_analysis::assessment::Assessment;
+use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{ChannelReport, Finding, Report};
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,7 @@
 use crate::formatting::number;
 use crate::rounding::probability;
 use comfy_table::{Table, presets};
-use noise_analysis::several::{NoiseAgreement, NoiseInflation};
+use noise_analysis::report::several::{NoiseAgreement, NoiseInflation};
 use std::io::{self, Write};
 
 /// Writes one row a channel: the verdict, its p-value, where the recordings differ most, and the joint coefficients.

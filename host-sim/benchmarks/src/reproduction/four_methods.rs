@@ -8,9 +8,9 @@ use super::published_gyro::{
 use allan_core::fit::{fit, fit_shapes};
 use allan_core::term::Markov;
 use allan_core::{Curve, Model, NoiseTerm};
-use noise_analysis::assessment::innovations::filter_innovations;
+use noise_analysis::report::assessment::innovations::filter_innovations;
+use noise_analysis::samples::uniform_series::UniformSeries;
 use noise_analysis::spectra::{Welch, correlation_time};
-use noise_analysis::uniform_series::UniformSeries;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::{E, PI};

@@ -13,9 +13,9 @@ use super::thermal_response::{self, Lag, TemperatureCourse};
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
+use crate::effects::findings::{Detection, SIGNIFICANCE};
 use crate::effects::{LinearDrift, LinearDriftEvidence};
-use crate::findings::{Detection, SIGNIFICANCE};
-use crate::series::Series;
+use crate::samples::series::Series;
 use nalgebra::DVector;
 
 /// Least fraction of a channel's samples that a regressor must have too.

@@ -9,8 +9,8 @@ use super::noise_grid::NoiseGrid;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
 use crate::effects::LevelStep;
-use crate::findings::{Correction, Detection};
-use crate::series::Series;
+use crate::effects::findings::{Correction, Detection};
+use crate::samples::series::Series;
 use nalgebra::DVector;
 
 /// Highest p-value of a step. The bias of a real part at rest moves less regularly than any mixture of the noises: p-values

@@ -1,6 +1,6 @@
 //! Means of equal blocks of a record.
 
-use crate::series::Series;
+use crate::samples::series::Series;
 use nalgebra::DVector;
 
 /// Number of blocks in a record.

@@ -6,8 +6,8 @@
 
 use crate::bounds::BoundedEstimate;
 use crate::effects::EffectiveLsb;
-use crate::findings::Detection;
-use crate::series::Series;
+use crate::effects::findings::Detection;
+use crate::samples::series::Series;
 
 /// Fewest changes of the value; all must be multiples of the step. Without such rounding about half of the changes would be odd numbers of counts.
 const FEWEST_CHANGES: usize = 50;

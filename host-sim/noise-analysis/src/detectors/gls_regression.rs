@@ -311,7 +311,7 @@ fn normal_equivalent(t: f64, freedom: f64) -> f64 {
 mod tests {
     use super::super::noise_grid::NoiseGrids;
     use super::*;
-    use crate::series::Series;
+    use crate::samples::series::Series;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

@@ -1,8 +1,8 @@
 //! The detector of knocks on simulated channels: how often it sees one in noise, and which ones it finds.
 
 use super::knocks::{KnockRule, find, find_by};
-use crate::findings::SIGNIFICANCE;
-use crate::series::Series;
+use crate::effects::findings::SIGNIFICANCE;
+use crate::samples::series::Series;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -12,9 +12,9 @@ use super::noise_levels::{
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 use crate::effects::NoisyInterval;
-use crate::findings::{Correction, Detection, SIGNIFICANCE};
+use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::parallel::in_parallel;
-use crate::series::Series;
+use crate::samples::series::Series;
 use std::ops::Range;
 
 /// Highest probability by which chance shows a knock in a channel at a time when another channel has one.

@@ -5,7 +5,7 @@
 //! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
 //! by itself have the false-alarm rate that is asked for.
 
-use crate::series::Series;
+use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 

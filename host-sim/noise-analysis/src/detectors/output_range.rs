@@ -3,10 +3,10 @@
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::poisson_bounds;
+use crate::effects::findings::Detection;
 use crate::effects::{NoiseBelowCount, Saturation};
-use crate::findings::Detection;
-use crate::gapped_cascade::GappedCascade;
-use crate::series::Series;
+use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::series::Series;
 use measurement::ChannelProfile;
 
 /// Samples at an end of the values from which on the channel is cut off there. Three times as many as at any other value, by

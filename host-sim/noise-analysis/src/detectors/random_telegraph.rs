@@ -7,9 +7,9 @@
 use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood, white_log_likelihood};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
+use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{Spikes, TelegraphEvidence, TelegraphNoise};
-use crate::findings::SIGNIFICANCE;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 
 /// Numbers of parts into which the record is divided: few parts for long correlation times, many for short ones.
 const PARTS: [usize; 3] = [256, 1024, 4096];

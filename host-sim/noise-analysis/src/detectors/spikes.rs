@@ -7,9 +7,9 @@
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
 use crate::effects::Spikes;
-use crate::findings::{Correction, Detection, SIGNIFICANCE};
-use crate::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
-use crate::series::Series;
+use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
+use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
+use crate::samples::series::Series;
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -7,7 +7,7 @@ use super::gls_regression::{GlsRegression, RegressionEstimate};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 use crate::effects::{TemperatureCurvature, ThermalLag};
-use crate::series::Series;
+use crate::samples::series::Series;
 use nalgebra::DVector;
 
 /// Shortest and longest time constant of a lag, s: a package of a few grams, and a housing of a kilogram.

@@ -5,7 +5,7 @@ use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::block_means::BlockMeans;
 use super::gls_regression::RegressionEstimate;
 use crate::effects::VibrationRectification;
-use crate::series::Series;
+use crate::samples::series::Series;
 use nalgebra::DVector;
 
 /// Fewest samples of which a variance is taken: it then scatters by a third of itself, √(2/16).

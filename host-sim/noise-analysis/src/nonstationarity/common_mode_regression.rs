@@ -3,8 +3,8 @@
 //! Each channel is regressed on all others by the covariances of their second differences at one octave. The weights are
 //! estimated in the first half at one octave and applied to the second half at all octaves.
 
-use crate::estimators::CoupledEstimators;
 use crate::parallel::in_parallel;
+use crate::record::estimators::CoupledEstimators;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::PowerLaw;
 use measurement::{ChannelId, MeasuredChannel, Measurement};

@@ -1,10 +1,11 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
 use crate::OCTAVES;
-use crate::exclusion::Exclusion;
-use crate::gapped_cascade::GappedCascade;
-use crate::sample_curves::SampleCurves;
-use crate::series::Series;
+use crate::record::sample_curves::SampleCurves;
+use crate::samples::epoch_ranges::epochs;
+use crate::samples::exclusion::Exclusion;
+use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::series::Series;
 use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -12,13 +13,6 @@ use std::ops::Range;
 
 /// Highest probability, over all that is compared in a channel, at which stationary noise is taken to be non-stationary.
 pub(crate) const SIGNIFICANCE: f64 = 0.01;
-
-/// Longest epoch, samples: five minutes at 100 Hz.
-const LONGEST_EPOCH: u64 = 1 << 15;
-/// Shortest epoch, samples, whose curve separates the white noise from a line.
-const SHORTEST_EPOCH: u64 = 1 << 10;
-/// Fewest epochs of a half.
-const MIN_EPOCHS: u64 = 12;
 
 /// An epoch's Allan variance is used up to averaging factors of a `MIN_AVERAGES`th of its samples.
 pub(crate) const MIN_AVERAGES: u64 = 64;
@@ -109,18 +103,6 @@ impl EpochCurves {
         curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));
         curve
     }
-}
-
-/// Sample periods in an epoch, a power of 2, and those of each epoch up to the middle of a record and from there on; `None` of a record
-/// that is too short.
-pub(crate) fn epochs(record: Range<u64>, middle: u64) -> Option<(u64, [Vec<Range<u64>>; 2])> {
-    let half = middle.checked_sub(record.start)?.min(record.end.checked_sub(middle)?);
-    let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;
-    if epoch < SHORTEST_EPOCH {
-        return None;
-    }
-    let from = |from: u64| -> Vec<_> { (0..half / epoch).map(|k| from + k * epoch..from + (k + 1) * epoch).collect() };
-    Some((epoch, [from(middle - half / epoch * epoch), from(middle)]))
 }
 
 /// The curve of the sample periods `slots`.

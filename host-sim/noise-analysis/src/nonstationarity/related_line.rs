@@ -6,10 +6,10 @@
 use super::epochs::{ComparedCurve, EpochCurves, SIGNIFICANCE};
 use super::prediction::mean_avar;
 use super::tracked_parameters::{TrackedModel, minimum};
-use crate::sample_curves::SampleCurves;
-use crate::series::Series;
+use crate::record::sample_curves::SampleCurves;
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
-use crate::uniform_series::UniformSeries;
 use allan_core::Model;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};

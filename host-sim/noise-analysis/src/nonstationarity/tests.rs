@@ -4,7 +4,7 @@ use super::epochs::{ComparedCurve, SIGNIFICANCE, curve};
 use super::prediction::{beyond_drift, expected_drift, select_tracked, track};
 use super::{EpochCurves, FittedPart, IntervalCoverage, Stationarity, TrackedModel, TrackedSet};
 use crate::OCTAVES;
-use crate::series::Series;
+use crate::samples::series::Series;
 use allan_core::fit::{fit, fit_shapes};
 use allan_core::term::{Resonance, Sinusoid};
 use allan_core::{Curve, Model, NoiseTerm};

@@ -1,7 +1,7 @@
 //! The correlation time of a Markov process by the autocorrelation of the samples, independent of the Allan variance.
 
 use crate::bounds::BoundedEstimate;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use allan_core::{Model, NoiseTerm};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 

@@ -6,7 +6,7 @@
 //! "Searching for periodic sources with LIGO. II", Phys. Rev. D 61, 2000).
 
 use super::transforms;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::{PI, TAU};
 

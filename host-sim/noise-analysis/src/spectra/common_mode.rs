@@ -7,7 +7,7 @@
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, SHARED, TERMS, most_likely, time_constants};
 use super::periodogram::{SineTapered, low_frequency_bands};
 use super::smooth_shape::{SpectralBand, walk_amplitude};
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
 /// Samples whose means are transformed: up to [`HIGHEST`] the mean over a block lowers a density by 2 % at most.
@@ -166,7 +166,7 @@ fn shapes(frequency: f64, period: f64, time: f64) -> [f64; 4] {
 mod tests {
     use super::CrossSpectra;
     use crate::bounds::BoundedEstimate;
-    use crate::uniform_series::UniformSeries;
+    use crate::samples::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

@@ -9,7 +9,7 @@
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
 use super::smooth_shape::SpectralBand;
 use crate::detectors::noise_grid::markov_covariance;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -191,7 +191,7 @@ fn expected_squares(covariance: impl Fn(usize) -> f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::{BLOCKS, CosineSpectrum, bands, expected_squares, noise_shapes};
-    use crate::uniform_series::UniformSeries;
+    use crate::samples::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

@@ -15,8 +15,8 @@ use super::smooth_shape::SpectralBand;
 use super::transforms;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{quantile, upper_tail};
-use crate::findings::SIGNIFICANCE;
-use crate::uniform_series::UniformSeries;
+use crate::effects::findings::SIGNIFICANCE;
+use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::{SQRT_2, TAU};
 

@@ -1,7 +1,7 @@
 //! Spectra of parts of a record whose samples are not kept, such as its epochs.
 
 use super::welch::{Welch, WelchSum};
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use std::sync::Arc;
 
 /// Samples of a segment: lines between a hundredth and two fifths of the sample rate are resolved to a 20th of their frequency or better.
@@ -86,8 +86,8 @@ impl EpochSpectra {
 #[cfg(test)]
 mod tests {
     use super::{EpochSpectra, SEGMENT};
+    use crate::samples::uniform_series::UniformSeries;
     use crate::spectra::Welch;
-    use crate::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

@@ -1,7 +1,7 @@
 //! The Allan deviation from a measured spectrum, by the relation of IEEE Std 952 that is equation (5) of the paper.
 
 use super::welch::Welch;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
 /// Shortest segment of a spectrum, samples.

@@ -10,8 +10,8 @@ use super::coherent_track::CoherentTrack;
 use super::transforms;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, exponential_sum_tail};
-use crate::findings::SIGNIFICANCE;
-use crate::uniform_series::UniformSeries;
+use crate::effects::findings::SIGNIFICANCE;
+use crate::samples::uniform_series::UniformSeries;
 
 /// Numbers of segments that are tried.
 const SEGMENTS: [usize; 4] = [32, 64, 128, 256];

@@ -8,7 +8,7 @@
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
 use crate::bounds::MeasuredValue;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::TAU;
 

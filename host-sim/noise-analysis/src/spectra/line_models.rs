@@ -1,7 +1,7 @@
 //! The two models of a line: a sinusoid, fitted to the samples, and a resonance, fitted to the spectrum.
 
 use super::periodogram::taper;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use nalgebra::{Matrix4, Vector4};
 use realfft::num_complex::Complex;
 use std::f64::consts::{PI, TAU};

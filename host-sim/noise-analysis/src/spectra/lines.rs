@@ -11,7 +11,7 @@ use super::periodogram::{PADDING, Periodogram};
 use super::whitened_spectrum::{
     Candidate, FEWEST_PERIODS, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit, sine_line,
 };
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 
 /// Largest number of lines that are returned.
 pub(super) const MOST: usize = 6;

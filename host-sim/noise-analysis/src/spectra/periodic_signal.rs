@@ -12,8 +12,8 @@ use super::smooth_shape::SpectralBand;
 use super::transforms;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
-use crate::findings::SIGNIFICANCE;
-use crate::uniform_series::UniformSeries;
+use crate::effects::findings::SIGNIFICANCE;
+use crate::samples::uniform_series::UniformSeries;
 
 /// Blocks of the record, at least: twice the highest harmonic is half their rate.
 const BLOCKS: usize = 1024;

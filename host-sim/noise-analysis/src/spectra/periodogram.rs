@@ -2,7 +2,7 @@
 //! allows, and transforms under sine tapers for its lowest frequencies.
 
 use super::transforms;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::PI;
 use std::ops::Range;

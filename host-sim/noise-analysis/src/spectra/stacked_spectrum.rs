@@ -8,7 +8,7 @@
 use super::lines::MOST;
 use super::smooth_shape::median;
 use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 
 /// The mean of the spectra of stretches of equal length.
 pub(crate) struct StackedSpectrum {

@@ -2,7 +2,7 @@
 
 use super::smooth_shape::{SpectralBand, SpectralShape};
 use super::transforms;
-use crate::uniform_series::UniformSeries;
+use crate::samples::uniform_series::UniformSeries;
 use realfft::RealToComplex;
 use realfft::num_complex::Complex;
 use std::f64::consts::PI;

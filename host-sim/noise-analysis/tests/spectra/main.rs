@@ -4,8 +4,8 @@ mod noise;
 mod white_noise;
 
 use noise::{Output, PAPER, RATE_HZ, gain, resonance, sine};
+use noise_analysis::samples::uniform_series::UniformSeries;
 use noise_analysis::spectra::{SpectralLine, Welch, allan_deviations_by_spectrum, find_lines};
-use noise_analysis::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
 /// About eleven minutes.

@@ -1,6 +1,6 @@
 //! Simulated output of a sensor with known noise coefficients: filtered by two cascaded averages and rounded to counts.
 
-use noise_analysis::uniform_series::UniformSeries;
+use noise_analysis::samples::uniform_series::UniformSeries;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

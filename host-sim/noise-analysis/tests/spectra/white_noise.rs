@@ -1,8 +1,8 @@
 //! N by the spectrum of records whose N is known: how often its 95 % interval holds it, and when there is none.
 
 use allan_core::Model;
+use noise_analysis::samples::uniform_series::UniformSeries;
 use noise_analysis::spectra::{FilterSpectrum, KnownShapes, Welch, WhiteNoiseFit, fit_white_noise};
-use noise_analysis::uniform_series::UniformSeries;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -3,7 +3,7 @@
 use super::exported_file::{Export, ExportError, rate, scientific};
 use super::inertial_noise::{AxisNoise, Coefficient, Sensor, gauss_markov};
 use crate::saved_report::SavedReport;
-use noise_analysis::gauss_markov::GaussMarkovFit;
+use noise_analysis::fit::gauss_markov::GaussMarkovFit;
 use std::fmt::Write;
 
 /// Milligal in m/s².

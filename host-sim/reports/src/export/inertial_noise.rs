@@ -5,7 +5,7 @@ use crate::saved_report::{SavedChannel, SavedParameter, SavedPoint, SavedReport}
 use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
-use noise_analysis::gauss_markov::{self, GaussMarkovFit, SlowNoise, SlowOctave};
+use noise_analysis::fit::gauss_markov::{self, GaussMarkovFit, SlowNoise, SlowOctave};
 
 /// Standard gravity, m/s².
 pub(super) const GRAVITY: f64 = 9.806_65;

@@ -6,7 +6,7 @@ use crate::formatting::words;
 use crate::rounding::{quantity, quantity_digits, span, unit};
 use allan_core::NoiseTerm;
 use allan_core::model::cube_root_deviation;
-use noise_analysis::figure_data::noise_term;
+use noise_analysis::report::figure_data::noise_term;
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
 
 /// Standard deviations that the panel of the residual shows at least and at most.

@@ -5,7 +5,7 @@ use crate::formatting::{duration, number, optional, parameter_name, percent, wor
 use crate::rounding::{NONE, Scale, parameter_magnitude};
 use crate::summary;
 use maud::{Markup, html};
-use noise_analysis::assessment::{Coefficient, NavigationDrift};
+use noise_analysis::report::assessment::{Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Report};
 
 /// Content of a column's heading, and whether the column holds numbers.

@@ -1,8 +1,8 @@
 //! A report made by hand: the curve of known N, B and K, without an estimator or a fit.
 
-use noise_analysis::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{CurveEvidence, LineEvidence, LineSource, SinusoidalLine};
+use noise_analysis::report::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
 use noise_analysis::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};

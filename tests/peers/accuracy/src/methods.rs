@@ -6,7 +6,7 @@ use allan_core::model::FittedTerm;
 use allan_core::{Cascade, Model, NoiseTerm, fit::fit};
 use anyhow::{Context, Result, ensure};
 use imu_calib::allan::{AllanConfig, AllanEstimator, Sensor};
-use noise_analysis::assessment::record_length::relative_error;
+use noise_analysis::report::assessment::record_length::relative_error;
 use serde::Deserialize;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};

@@ -1,0 +1,12 @@
+//! The noise model of one channel: what is fitted to a curve, how a model is edited, and the filter that all channels share.
+
+pub(crate) mod channel_fit;
+pub(crate) mod channel_lines;
+pub mod contradiction;
+pub(crate) mod covariates;
+pub mod gauss_markov;
+pub(crate) mod minimum;
+pub(crate) mod noise_terms;
+pub(crate) mod octave_covariance;
+pub(crate) mod part_filter;
+pub(crate) mod traced_model;

@@ -1,0 +1,181 @@
+//! The deviance of the curve of one channel as a function of the filter, and the decimation at which several have the least.
+
+use crate::OCTAVES;
+use crate::distributions::ROUNDING;
+use crate::fit::minimum::golden_section;
+use crate::fit::noise_terms::is_white;
+use crate::fit::octave_covariance::relative_covariance;
+use allan_core::host::DevianceComparison;
+use allan_core::model::{FittedTerm, MAX_TERMS};
+use allan_core::term::MovingAverageFilter;
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+use nalgebra::{DMatrix, DVector};
+
+/// Rounding takes at most this part of a measured variance: it is white only where the noise is larger.
+const MOST_ROUNDING: f64 = 0.5;
+/// Decimations are tried in steps of this factor, a quarter of an octave: with the shape of the filter known, the curve of the
+/// deviance has one minimum within an octave.
+pub(super) const STEP: f64 = 1.189_207_115_002_721;
+/// Least decimation that is told from 1 (every value read).
+pub(super) const LEAST_DECIMATION: f64 = 1.02;
+/// Steps of a golden-section search: the bracket of two steps shrinks to `1e-6` of the decimation.
+pub(super) const SEARCH_STEPS: usize = 26;
+/// Relative step of numerical derivatives.
+const DERIVATIVE_STEP: f64 = 1e-3;
+
+/// An inertial channel and what it says of the filter.
+pub(crate) struct FilteredChannel<'a> {
+    /// As in reports.
+    pub name: &'static str,
+    /// Without the share of its covariates.
+    pub curve: &'a Curve<OCTAVES>,
+    /// Its own model, whose terms beside the white noise it keeps.
+    pub model: &'a Model,
+    /// Smallest distance of two values, in the channel's unit.
+    pub resolution: f64,
+    /// Whether rounding adds white noise and nothing else. A channel that is not dithered says nothing of the filter.
+    pub is_dithered: bool,
+}
+
+/// The curve of a channel without the white noise of its rounding.
+pub(super) fn without_rounding(channel: &FilteredChannel) -> Curve<OCTAVES> {
+    let mut curve = channel.curve.clone();
+    let rounding = ROUNDING * channel.resolution * channel.resolution;
+    curve.replace_avar(|point| point.avar - (rounding / point.n as f64).min(MOST_ROUNDING * point.avar));
+    curve
+}
+
+/// The deviance of one channel as a function of the filter.
+pub(super) struct ChannelDeviance<'a> {
+    pub(super) name: &'static str,
+    comparison: DevianceComparison<'a>,
+    curve: &'a Curve<OCTAVES>,
+    model: &'a Model,
+    /// The terms of the channel beside its white noise.
+    others: Vec<NoiseTerm>,
+    /// By how much the deviance exceeds that of a curve which a filter describes, at least 1; what it is divided by.
+    pub(super) dispersion: f64,
+    /// Each filter that may be read slowly, at the decimation that fits this channel best.
+    pub(super) slowest: Vec<MovingAverageFilter>,
+}
+
+impl<'a> ChannelDeviance<'a> {
+    pub(super) fn new(channel: &FilteredChannel<'a>, curve: &'a Curve<OCTAVES>) -> Self {
+        let model = channel.model;
+        let kinds = model.terms().iter().map(|term| term.kind).filter(|kind| !is_white(kind));
+        // With room for the filter and the white noise after it.
+        let others = kinds.take(MAX_TERMS - 2).collect();
+        Self {
+            name: channel.name,
+            comparison: DevianceComparison::new(curve, model),
+            curve,
+            model,
+            others,
+            dispersion: 1.0,
+            slowest: Vec::new(),
+        }
+    }
+
+    /// Sets the dispersion by the least deviance with any of `filters`, at their own rate or read slowly, or with none; and the
+    /// decimations that fit best.
+    pub(super) fn fit_alone(&mut self, filters: &[MovingAverageFilter]) {
+        let mut least = self.unfiltered();
+        for &filter in filters {
+            least = least.min(self.deviance(filter));
+            if let Some(slow) = slowest_deviance(std::slice::from_mut(self), filter) {
+                least = least.min(self.deviance(slow));
+                self.slowest.push(slow);
+            }
+        }
+        self.dispersion = self.dispersion_by(least);
+    }
+
+    /// The dispersion, if this is the least deviance.
+    pub(super) fn dispersion_by(&self, least: f64) -> f64 {
+        // The white noise, the other terms, and the decimation are fitted.
+        let freedom = self.curve.points().len().saturating_sub(self.others.len() + 2).max(1);
+        if least.is_finite() { (least / freedom as f64).max(1.0) } else { 1.0 }
+    }
+
+    pub(super) fn unfiltered(&mut self) -> f64 {
+        self.comparison.deviance(&[&[NoiseTerm::AngleRandomWalk], self.others.as_slice()].concat()) / self.dispersion
+    }
+
+    pub(super) fn deviance(&mut self, filter: MovingAverageFilter) -> f64 {
+        let kinds = self.kinds(filter);
+        self.comparison.deviance(&kinds) / self.dispersion
+    }
+
+    /// At the filter's own rate the curve tells white noise after the filter from what passed it; read slowly it does not.
+    fn kinds(&self, filter: MovingAverageFilter) -> Vec<NoiseTerm> {
+        let after = (filter.decimation == 1.0).then_some(NoiseTerm::AngleRandomWalk);
+        let first = NoiseTerm::Filtered(filter);
+        std::iter::once(first).chain(self.others.iter().copied()).chain(after).collect()
+    }
+
+    /// Variance of the decimation's score over its information, at least 1: by how much the deviance falls and rises more
+    /// than for independent points.
+    pub(super) fn scatter(&self, filter: MovingAverageFilter) -> f64 {
+        let period = self.model.sample_period();
+        let model = allan_core::fit::fit(self.curve, &self.kinds(filter));
+        let points: Vec<&AllanPoint> =
+            self.curve.points().iter().filter(|point| point.avar > 0.0 && model.avar(point.n) > 0.0).collect();
+        let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
+        let filtered = present.iter().find(|term| matches!(term.kind, NoiseTerm::Filtered(_)));
+        let Some(filtered) = filtered else { return 1.0 };
+        let shorter = |factor: f64| {
+            let read = MovingAverageFilter { decimation: filter.decimation * factor, ..filter };
+            NoiseTerm::Filtered(read)
+        };
+        let share = |point: &AllanPoint, term: &FittedTerm, kind: NoiseTerm| {
+            term.value * term.value * kind.avar(point.n, period) / model.avar(point.n)
+        };
+        let direction = DVector::from_iterator(
+            points.len(),
+            points.iter().map(|point| {
+                let (from, to) = (shorter(1.0 - DERIVATIVE_STEP), shorter(1.0 + DERIVATIVE_STEP));
+                (share(point, filtered, to) - share(point, filtered, from)) / (2.0 * DERIVATIVE_STEP)
+            }),
+        );
+        let amounts = DMatrix::from_fn(points.len(), present.len(), |at, term| {
+            share(points[at], present[term], present[term].kind)
+        });
+        let weights = DVector::from_iterator(points.len(), points.iter().map(|point| model.edf(point) / 2.0));
+        let weighted = DMatrix::from_diagonal(&weights) * &amounts;
+        let Some(information) = (amounts.transpose() * &weighted).cholesky() else { return 1.0 };
+        // What the amounts of the terms cannot imitate.
+        let own = &direction - &amounts * information.solve(&(weighted.transpose() * &direction));
+        let score = own.component_mul(&weights);
+        let variance = (score.transpose() * relative_covariance(&model, &points) * &score)[(0, 0)];
+        (variance / score.dot(&own)).max(1.0)
+    }
+}
+
+/// The largest decimation at which a filter is tried: its length, beyond which no two samples are correlated.
+pub(super) fn longest_decimation(filter: MovingAverageFilter) -> f64 {
+    f64::from(filter.stages) * f64::from(filter.taps)
+}
+
+/// The decimations at which a filter that is read slowly is tried, from just above 1 to its length.
+pub(super) fn decimations(filter: MovingAverageFilter) -> impl Iterator<Item = f64> {
+    let longest = longest_decimation(filter);
+    std::iter::successors(Some(LEAST_DECIMATION), |decimation| Some(decimation * STEP))
+        .take_while(move |decimation| *decimation < longest)
+}
+
+/// The filter read at the decimation with the least deviance of all channels: from just above 1 to the filter's length. `None` for
+/// a filter that is shorter than that.
+pub(super) fn slowest_deviance(
+    joint: &mut [ChannelDeviance],
+    filter: MovingAverageFilter,
+) -> Option<MovingAverageFilter> {
+    let mut total = |decimation: f64| -> f64 {
+        let read = MovingAverageFilter { decimation, ..filter };
+        joint.iter_mut().map(|channel| channel.deviance(read)).sum()
+    };
+    let tried = decimations(filter).map(|decimation| (decimation, total(decimation)));
+    let (start, _) = tried.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
+    let (from, to) = ((start / STEP).max(LEAST_DECIMATION), (start * STEP).min(longest_decimation(filter)));
+    let least = golden_section((from.ln(), to.ln()), SEARCH_STEPS, |log| total(log.exp()));
+    Some(MovingAverageFilter { decimation: least.exp(), ..filter })
+}

@@ -1,0 +1,250 @@
+//! A noise model that is fitted to a curve, each of its terms with what added it to the baseline. Every edit fits the terms again and
+//! keeps the bounds, the goodness and the additions with them.
+
+use crate::OCTAVES;
+use crate::bounds::BoundedEstimate;
+use crate::fit::noise_terms::{is_filter, is_white};
+use crate::fit::octave_covariance::with_bounds_behind_a_filter;
+use allan_core::fit::{Goodness, fit, goodness};
+use allan_core::host::fit_shapes_except;
+use allan_core::model::{FittedTerm, MAX_TERMS};
+use allan_core::trace::{Residual, Trace};
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+
+/// Smallest share of a line in the variance of a point of the curve, in standard deviations of it, that moves the other terms: a
+/// smaller one is hidden by the scatter of each point.
+const VISIBLE_SIGMAS: f64 = 0.5;
+/// Least part of the variance of a point that is left to the other terms beside a line: a line that takes more is traced in the curve.
+const LEAST_LEFT: f64 = 0.1;
+/// Least decrease of the deviance by a term of two parameters that a trace adds.
+const COST_OF_A_TERM: f64 = 18.0;
+
+/// What added a term to the baseline model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Addition {
+    /// Decrease of the deviance, in units of its scatter: the square of a significance in standard deviations.
+    pub score: f64,
+    /// The residual that the term explains.
+    pub residual: Residual,
+    /// Place in the order in which the terms were added.
+    rank: i32,
+}
+
+/// A term to be fitted, with what added it; the baseline's terms, and lines whose size the spectrum has measured, have no addition.
+pub(crate) type PlannedTerm = (NoiseTerm, Option<Addition>);
+
+/// Which shapes of the terms a fit searches for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Shapes {
+    /// None.
+    Kept,
+    /// All but frequencies of sinusoids and filters.
+    OfProcesses,
+    /// All but filters.
+    AllButFilters,
+}
+
+/// A model with the curve's verdict on it.
+#[derive(Debug, Clone)]
+pub(crate) struct TracedModel {
+    model: Model,
+    /// Of each term of the model.
+    additions: Vec<Option<Addition>>,
+    pub goodness: Goodness,
+    /// What is known of the filter that all channels have.
+    decimation: Option<BoundedEstimate>,
+}
+
+impl TracedModel {
+    /// The model of a trace.
+    pub(crate) fn new(trace: &Trace) -> Self {
+        let mut additions = vec![None; trace.after.terms().len()];
+        for (rank, found) in (0..).zip(&trace.added) {
+            additions[found.term] = Some(Addition { score: found.score, residual: found.residual, rank });
+        }
+        Self { model: trace.after.clone(), additions, goodness: trace.after_goodness, decimation: None }
+    }
+
+    /// The model of at most the first [`MAX_TERMS`] of these `terms` that fits `curve` best, with the bounds of that fit.
+    pub(crate) fn fit(curve: &Curve<OCTAVES>, terms: &[PlannedTerm], shapes: Shapes) -> Self {
+        let kinds: Vec<NoiseTerm> = terms.iter().map(|(kind, _)| *kind).collect();
+        let filters = || kinds.iter().copied().filter(is_filter).collect::<Vec<NoiseTerm>>();
+        let model = match shapes {
+            Shapes::Kept => fit(curve, &kinds),
+            Shapes::OfProcesses => fit_shapes_except(curve, &kinds, &kinds),
+            Shapes::AllButFilters => fit_shapes_except(curve, &kinds, &filters()),
+        };
+        let additions = terms.iter().map(|(_, addition)| *addition).take(MAX_TERMS).collect();
+        Self { goodness: goodness(curve, &model), model, additions, decimation: None }
+    }
+
+    /// The model itself.
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The terms with what added them.
+    pub(crate) fn terms(&self) -> impl DoubleEndedIterator<Item = PlannedTerm> + Clone {
+        self.model.terms().iter().map(|term| term.kind).zip(self.additions.iter().copied())
+    }
+
+    /// The terms that were added to the baseline, in the order in which they were.
+    pub(crate) fn added(&self) -> Vec<(&FittedTerm, &Addition)> {
+        self.added_at()
+            .into_iter()
+            .filter_map(|at| Some((&self.model.terms()[at], self.additions[at].as_ref()?)))
+            .collect()
+    }
+
+    /// Positions of these.
+    pub(crate) fn added_at(&self) -> Vec<usize> {
+        let rank = |at: &usize| self.additions[*at].map(|addition| addition.rank);
+        let mut added: Vec<usize> = (0..self.additions.len()).filter(|at| self.additions[*at].is_some()).collect();
+        added.sort_by_key(rank);
+        added
+    }
+
+    /// Whether it has a filter.
+    pub(crate) fn has_filter(&self) -> bool {
+        self.model.terms().iter().any(|term| is_filter(&term.kind))
+    }
+
+    /// Whether another term has room.
+    pub(crate) fn has_room(&self) -> bool {
+        self.model.terms().len() < MAX_TERMS
+    }
+
+    /// Deviance with what the added terms must take off at least.
+    pub(crate) fn cost(&self) -> f64 {
+        self.goodness.deviance + COST_OF_A_TERM * self.additions.iter().flatten().count() as f64
+    }
+
+    /// What adds a term behind all others.
+    pub(crate) fn next_addition(&self, score: f64, residual: Residual) -> Addition {
+        let rank = self.additions.iter().flatten().map(|addition| addition.rank + 1).max().unwrap_or(0);
+        Addition { score, residual, rank }
+    }
+
+    /// The same with the term at a position, which nothing has added, as added before all others.
+    pub(crate) fn with_first_addition(mut self, at: usize, score: f64, residual: Residual) -> Self {
+        let rank = self.additions.iter().flatten().map(|addition| addition.rank - 1).min().unwrap_or(0);
+        self.additions[at].get_or_insert(Addition { score, residual, rank });
+        self
+    }
+
+    /// Other `terms` in place of all, fitted to `curve`.
+    pub(crate) fn replaced(&self, curve: &Curve<OCTAVES>, terms: &[PlannedTerm], shapes: Shapes) -> Self {
+        Self::fit(curve, terms, shapes).bounded(curve, self.decimation)
+    }
+
+    /// Without the term at a position, fitted to `curve`.
+    pub(crate) fn removed(&self, curve: &Curve<OCTAVES>, removed: usize) -> Self {
+        let kept: Vec<PlannedTerm> =
+            self.terms().enumerate().filter(|(at, _)| *at != removed).map(|(_, term)| term).collect();
+        self.replaced(curve, &kept, Shapes::OfProcesses)
+    }
+
+    /// With one more term, the last one, fitted to `curve` with all shapes as they are. Of that term `bounds` makes what is known of it
+    /// elsewhere. `None` if the curve gives it no variance.
+    pub(crate) fn added_to(
+        &self,
+        curve: &Curve<OCTAVES>,
+        term: PlannedTerm,
+        bounds: impl FnOnce(&FittedTerm) -> FittedTerm,
+    ) -> Option<Self> {
+        let terms: Vec<PlannedTerm> = self.terms().chain([term]).collect();
+        let fitted = self.replaced(curve, &terms, Shapes::Kept);
+        let (last, others) = fitted.model.terms().split_last()?;
+        let last = (last.value > 0.0).then(|| bounds(last))?;
+        let model = Model::new(curve.sample_period(), others.iter().copied().chain([last]));
+        Some(Self { model, ..fitted })
+    }
+
+    /// With `lines`, whose sizes the spectrum has measured: the coefficients of the other terms are fitted to what they leave of
+    /// `curve`, their shapes and relative bounds stay. `None` if there is no room for them, or if the share of the last one in every
+    /// point is hidden by the scatter of the point.
+    pub(crate) fn with_lines(&self, curve: &Curve<OCTAVES>, lines: &[FittedTerm]) -> Option<Self> {
+        let (model, period_s) = (&self.model, curve.sample_period());
+        let share = |line: &FittedTerm, point: &AllanPoint| line.value * line.value * line.kind.avar(point.n, period_s);
+        let last = lines.last()?;
+        let is_visible =
+            |point: &AllanPoint| share(last, point) * (0.5 * model.edf(point)).sqrt() > VISIBLE_SIGMAS * point.avar;
+        if model.terms().len() + lines.len() > MAX_TERMS || !curve.points().iter().any(is_visible) {
+            return None;
+        }
+        let mut others = curve.clone();
+        let shares = |point: &AllanPoint| lines.iter().map(|line| share(line, point)).sum::<f64>();
+        others.replace_avar(|point| (point.avar - shares(point)).max(LEAST_LEFT * point.avar));
+        let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
+        let fitted = fit(&others, &kinds);
+        // The spectrum knows the lines much better than the curve knows the others: their relative errors stay.
+        let kept = |(new, old): (&FittedTerm, &FittedTerm)| {
+            let scaled = |bound: f64, limit: f64| if old.value > 0.0 { bound * new.value / old.value } else { limit };
+            FittedTerm { low: scaled(old.low, 0.0), high: scaled(old.high, new.high), shape: old.shape, ..*new }
+        };
+        let kept = fitted.terms().iter().zip(model.terms()).map(kept);
+        let model = Model::new(period_s, kept.chain(lines.iter().copied()));
+        let additions = self.additions.iter().copied().chain(lines.iter().map(|_| None)).collect();
+        Some(Self { goodness: goodness(curve, &model), model, additions, decimation: self.decimation })
+    }
+
+    /// Without the term at a position; the others are as they were, to be fitted [with lines](Self::with_lines).
+    pub(crate) fn before_lines_without(&self, removed: usize) -> Self {
+        let is_kept = |at: &usize| *at != removed;
+        let kept = (0..self.additions.len()).filter(is_kept);
+        let model = Model::new(self.model.sample_period(), kept.clone().map(|at| self.model.terms()[at]));
+        Self { model, additions: kept.map(|at| self.additions[at]).collect(), ..*self }
+    }
+
+    /// The same with the bounds that `curve`, which it was fitted to, gives to white noise behind a filter, those of the `decimation` of
+    /// the sensor, and bounds of shapes that the record can [resolve](resolvable).
+    pub(crate) fn bounded(mut self, curve: &Curve<OCTAVES>, decimation: Option<BoundedEstimate>) -> Self {
+        let resolved = |term: &FittedTerm| {
+            let mut term = *term;
+            for ((name, value), bounds) in term.kind.shape().named().zip(term.shape.iter_mut()) {
+                if let Some(common) = decimation.filter(|_| name == "decimation") {
+                    *bounds = (common.low, common.high);
+                } else if let Some((least, most)) = resolvable(name, curve) {
+                    // `max` and `min` take the limit in place of a bound that is not a number.
+                    *bounds = (bounds.0.max(least).min(value), bounds.1.min(most).max(value));
+                }
+            }
+            term
+        };
+        let bounded = with_bounds_behind_a_filter(curve, &self.model);
+        self.model = Model::new(bounded.sample_period(), bounded.terms().iter().map(resolved));
+        self.decimation = decimation;
+        self
+    }
+
+    /// Position of the first added term that may be absent and of whose shape the record resolves nothing.
+    pub(crate) fn unresolved(&self, curve: &Curve<OCTAVES>) -> Option<usize> {
+        let is_unresolved = |at: &usize| {
+            let term = &self.model.terms()[*at];
+            let mut shapes = term.shape.named();
+            let is_whole_range = |(name, bounds): (&str, (f64, f64))| {
+                resolvable(name, curve).is_some_and(|(least, most)| bounds.0 <= least && bounds.1 >= most)
+            };
+            term.low == 0.0 && !is_white(&term.kind) && shapes.any(is_whole_range)
+        };
+        self.added_at().into_iter().find(is_unresolved)
+    }
+}
+
+/// The residual of a model at a point of a curve.
+pub(crate) fn residual(model: &Model, point: &AllanPoint) -> Residual {
+    let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
+    Residual { n: point.n, excess, sigmas: excess * (2.0 * model.edf(point)).sqrt() }
+}
+
+/// The range of a shape parameter that a record can resolve: times from a sample period to its length, frequencies and
+/// bandwidths from one over its length to half the sample rate.
+fn resolvable(name: &str, curve: &Curve<OCTAVES>) -> Option<(f64, f64)> {
+    let period = curve.sample_period();
+    let duration = curve.samples() as f64 * period;
+    match name {
+        "time_constant" => Some((period, duration)),
+        "frequency" | "bandwidth" => Some((1.0 / duration, 0.5 / period)),
+        _ => None,
+    }
+}

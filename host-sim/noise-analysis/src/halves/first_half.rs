@@ -1,0 +1,215 @@
+//! Models of the first half of a recording, and their errors on the second half, which they have not seen.
+
+use crate::OCTAVES;
+use crate::detectors::bias::{self, BiasSensitivity};
+use crate::fit::channel_fit::ChannelFit;
+use crate::fit::covariates::CovariateFit;
+use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
+use crate::halves::traced_record::TracedRecord;
+use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
+use crate::parallel::per_channel;
+use crate::record::estimators::{RecordEstimators, RecordPart};
+use crate::report::assessment::Assessment;
+use crate::report::{
+    ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, SlopeMethodReport,
+    term_reports,
+};
+use crate::samples::exclusion::Exclusion;
+use crate::samples::series::Series;
+use allan_core::{Curve, Model};
+use measurement::{ChannelId, PerChannel, SensorProfile};
+
+/// The models of every channel by the first half alone.
+pub(crate) struct FirstHalf {
+    /// Without what the rules of the first half exclude. Of noise that changes, the model is fitted to the later quarter.
+    pub part: TracedPart,
+    /// The baseline models of the first half as it was recorded, with its spikes and knocks.
+    raw: PerChannel<Model>,
+}
+
+/// How the noise of each channel changes.
+pub(crate) struct Epochs {
+    /// The series of [`TracedRecord::series`] without what the rules of the first half exclude, in both halves.
+    series: PerChannel<Series>,
+    /// Curves of the channel's epochs, with the part of the first half that its model is fitted to; `None` of a record that is too
+    /// short for them, and of a channel that is not traced.
+    channels: PerChannel<Option<ChannelEpochs>>,
+}
+
+impl FirstHalf {
+    /// The models, and how the noise changes.
+    pub(crate) fn fit(record: &TracedRecord) -> (Self, Epochs) {
+        let TracedRecord { estimators, preprocessing, .. } = record;
+        let series = record.series_without(Exclusion::ByFirstHalf);
+        let middle = record.measurement().middle();
+        let halves = series.map(|series| series.before(middle));
+        let biases = per_channel(series.ids(), |channel| BiasByBlocks {
+            has_ramp: preprocessing.has_ramp(channel),
+            sensitivities: sensitivities(record, &halves, channel),
+        });
+        let samples =
+            PartSamples { record: record.record, series: &halves, biases: biases.clone(), seeks_signals: false };
+        let profile = &record.measurement().profile;
+        let data = PartData { profile, curves: &estimators.ruled[0], samples: Some(samples) };
+        // The filter of the whole record is the one that is reported.
+        let mut part = TracedPart::fit(&data);
+        let has_rules = series.ids().any(|of| record.has_rules(of));
+        let raw = per_channel(series.ids(), |channel| {
+            if !has_rules {
+                return part.channels[channel].fit.before.clone();
+            }
+            let bias = &biases[channel];
+            let raw = &estimators.raw[0];
+            let covariates = CovariateFit::estimate(raw, channel, bias.has_ramp, |to| bias.sensitivity(to));
+            ChannelFit::fit_baseline(covariates).before
+        });
+        let channels = per_channel(series.ids(), |channel| {
+            let (fit, own) = (&part.channels[channel].fit, &series[channel]);
+            let followed = fit.covariates.compensated_series(own, &series);
+            let curves = || EpochCurves::from_series(followed.as_ref().unwrap_or(own), middle);
+            let curves = record.record.is_traced(channel).then(curves).flatten()?;
+            let curves = curves.in_samples(&record.record.channels[channel].samples);
+            Some(ChannelEpochs::compare(curves, fit.after()))
+        });
+        for (trace, epochs) in part.channels.iter_mut().zip(&channels) {
+            if let Some(recent) = epochs.as_ref().and_then(ChannelEpochs::recent_curve) {
+                trace.fit.fit_to(&recent);
+            }
+        }
+        (Self { part, raw }, Epochs { series, channels })
+    }
+
+    /// The models by the curves of the halves alone.
+    pub(crate) fn fit_curves(profile: &SensorProfile, estimators: &RecordEstimators) -> Self {
+        let part = TracedPart::fit(&PartData { profile, curves: &estimators.ruled[0], samples: None });
+        Self { raw: part.channels.map(|trace| trace.fit.before.clone()), part }
+    }
+
+    /// What is reported of a channel by the curves and the models of the first half and of the `whole`. Where the first half `has_rules`
+    /// for what is excluded, the errors without that are reported too.
+    pub(crate) fn report(
+        &self,
+        whole: &TracedPart,
+        estimators: &RecordEstimators,
+        channel: ChannelId,
+        has_rules: bool,
+    ) -> ChannelReport {
+        let unit = estimators.both.channels[channel].unit;
+        let fit = &whole.channels[channel].fit;
+        let baseline = &self.part.channels[channel].fit.before;
+        let curve = estimators.measured[channel].clone();
+        let curve = curve.with_confidence(|point| baseline.variance_fractions(point.n));
+        let after = self.after(estimators, channel, &curve, has_rules);
+        // The model with the added terms, fitted to the whole record, with the errors of `after`.
+        let refitted = ModelReport {
+            terms: term_reports(fit.after(), unit),
+            adev: fit.deviations(estimators, channel, &curve),
+            ..after.clone()
+        };
+        ChannelReport {
+            name: estimators.both.channels[channel].name.to_owned(),
+            unit: unit.to_owned(),
+            samples: curve.samples(),
+            missing: MissingSamples::default(),
+            curve: curve.points().iter().map(|point| CurvePoint::new(point, curve.samples())).collect(),
+            read_off: SlopeMethodReport::from_curve(&curve, unit),
+            before: self.before(estimators, channel, &curve, has_rules),
+            effects: Vec::new(),
+            first_half_curve: self.curve_error(estimators, channel),
+            after,
+            refitted,
+            nonstationarity: None,
+            at_rest: Vec::new(),
+            assessment: Assessment::default(),
+            figure_data: FigureData::default(),
+        }
+    }
+
+    /// The error on the second half of the curve of the first half itself.
+    fn curve_error(&self, estimators: &RecordEstimators, channel: ChannelId) -> ModelErrorReport {
+        let fit = &self.part.channels[channel].fit;
+        let unseen = fit.covariates.compensated(&estimators.raw[1], channel);
+        ModelErrorReport::of_curve(&fit.covariates.curve, &unseen, fit.after())
+    }
+
+    /// The baseline model of the first half as it was recorded, at the points of the curve of the `whole` record.
+    fn before(
+        &self,
+        estimators: &RecordEstimators,
+        channel: ChannelId,
+        whole: &Curve<OCTAVES>,
+        has_rules: bool,
+    ) -> ModelReport {
+        let model = &self.raw[channel];
+        let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve(channel));
+        ModelReport {
+            terms: term_reports(model, estimators.both.channels[channel].unit),
+            adev: whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
+            fitted: error(&estimators.raw[0]),
+            unseen: error(&estimators.raw[1]),
+            unseen_excluding: has_rules.then(|| error(&estimators.ruled[1])),
+        }
+    }
+
+    /// The same of the model with the added terms.
+    fn after(
+        &self,
+        estimators: &RecordEstimators,
+        channel: ChannelId,
+        whole: &Curve<OCTAVES>,
+        has_rules: bool,
+    ) -> ModelReport {
+        let fit = &self.part.channels[channel].fit;
+        let model = fit.after();
+        let unseen = |part: &RecordPart| ModelErrorReport::new(model, &fit.covariates.compensated(part, channel));
+        ModelReport {
+            terms: term_reports(model, estimators.both.channels[channel].unit),
+            adev: fit.deviations(estimators, channel, whole),
+            fitted: ModelErrorReport::new(model, fit.fitted_curve()),
+            unseen: unseen(&estimators.raw[1]),
+            unseen_excluding: has_rules.then(|| unseen(&estimators.ruled[1])),
+        }
+    }
+}
+
+/// Sensitivities of a channel to temperature and supply by the block means of the first half.
+fn sensitivities(
+    record: &TracedRecord,
+    halves: &PerChannel<Series>,
+    channel: ChannelId,
+) -> Vec<(ChannelId, BiasSensitivity)> {
+    if !record.record.is_traced(channel) {
+        return Vec::new();
+    }
+    let quantity = |of: ChannelId| record.measurement()[of].profile.quantity;
+    let slow: Vec<ChannelId> = halves.ids().filter(|&of| quantity(of).is_environment()).collect();
+    let regressors: Vec<&Series> = slow.iter().map(|&of| &halves[of]).collect();
+    let found = bias::find(&halves[channel], &regressors, &[], &record.noise_grids);
+    found.sensitivities.into_iter().map(|(number, sensitivity)| (slow[number], sensitivity)).collect()
+}
+
+impl Epochs {
+    /// How the noise of each traced channel changes.
+    pub(crate) fn nonstationarities(
+        &self,
+        record: &TracedRecord,
+        first_half: &FirstHalf,
+    ) -> PerChannel<Option<Nonstationarity>> {
+        let traced: Vec<ChannelId> = record.measurement().inertial().collect();
+        let of = |&channel: &ChannelId| {
+            let fit = &first_half.part.channels[channel].fit;
+            TracedChannel {
+                name: record.measurement()[channel].profile.name,
+                series: &self.series[channel],
+                samples: &record.record.channels[channel].samples,
+                epochs: self.channels[channel].as_ref(),
+                baseline: &fit.before,
+                model: fit.after(),
+            }
+        };
+        let channels: Vec<TracedChannel> = traced.iter().map(of).collect();
+        per_channel(self.series.ids(), |channel| {
+            nonstationarity::describe(&channels, traced.iter().position(|of| *of == channel)?)
+        })
+    }
+}

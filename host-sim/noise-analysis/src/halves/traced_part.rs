@@ -1,0 +1,211 @@
+//! One part of a recording, fitted: the whole, its first half, or curves alone. The noise model of each channel with what its baseline
+//! lacks, and the filter that the sensor has once.
+
+use crate::detectors::bias::BiasSensitivity;
+use crate::detectors::random_telegraph;
+use crate::effects::{Effect, TelegraphNoise, Unexplained};
+use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::fit::channel_lines::fit_with_lines;
+use crate::fit::contradiction::Contradiction;
+use crate::fit::covariates::CovariateFit;
+use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
+use crate::parallel::per_channel;
+use crate::record::condensed_record::CondensedRecord;
+use crate::record::estimators::RecordPart;
+use crate::rivals::naming::{ChannelFindings, name_effects};
+use crate::rivals::slow_drift::ChannelsInCommon;
+use crate::rivals::unexplained;
+use crate::rivals::unexplained_signals::UnexplainedSignals;
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
+use crate::spectra::cosine_spectrum::CosineSpectrum;
+use crate::spectra::spectral_lines::MergedLine;
+use allan_core::model::FittedTerm;
+use allan_core::regression::Sensitivity;
+use measurement::{ChannelId, PerChannel, SensorProfile};
+
+/// What a part of a recording is fitted from.
+pub(crate) struct PartData<'a> {
+    pub profile: &'a SensorProfile,
+    pub curves: &'a RecordPart,
+    /// `None` where the samples are not kept: what they alone show is not looked for.
+    pub samples: Option<PartSamples<'a>>,
+}
+
+/// The samples of a part of a recording.
+pub(crate) struct PartSamples<'a> {
+    pub record: &'a CondensedRecord<'a>,
+    pub series: &'a PerChannel<Series>,
+    /// What block means show of each channel.
+    pub biases: PerChannel<BiasByBlocks>,
+    /// Whether signals are looked for that the model has no term for.
+    pub seeks_signals: bool,
+}
+
+/// What the block means of a channel show.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct BiasByBlocks {
+    pub has_ramp: bool,
+    /// To temperature and supply.
+    pub sensitivities: Vec<(ChannelId, BiasSensitivity)>,
+}
+
+/// A part of a recording with its models.
+pub(crate) struct TracedPart {
+    pub channels: PerChannel<ChannelTrace>,
+    /// The filter that the sensor has, by this part.
+    pub filter: Result<PartFilter, Unidentified>,
+}
+
+/// The noise of one channel in one part of a recording.
+pub(crate) struct ChannelTrace {
+    pub fit: ChannelFit,
+    /// Lines in the spectrum.
+    pub lines: Vec<MergedLine>,
+    /// The samples less the share of the covariates; `None` where they were not used.
+    pub rest: Option<UniformSeries>,
+    /// Random telegraph noise.
+    pub telegraph: Option<TelegraphNoise>,
+    /// Signals that have no name.
+    pub signals: UnexplainedSignals,
+    slowest: Option<CosineSpectrum>,
+}
+
+impl BiasByBlocks {
+    /// The sensitivity to a channel.
+    pub(crate) fn sensitivity(&self, regressor: ChannelId) -> Option<BiasSensitivity> {
+        self.sensitivities.iter().find(|(to, _)| *to == regressor).map(|(_, sensitivity)| *sensitivity)
+    }
+}
+
+impl TracedPart {
+    /// Fits the baseline model to every channel, and adds to that of the inertial ones what it lacks.
+    pub(crate) fn fit(part: &PartData) -> Self {
+        let mut channels = per_channel(part.curves.channels.ids(), |channel| ChannelTrace::fit(part, channel));
+        if part.samples.is_none() {
+            return Self { channels, filter: Err(Unidentified::NotSought) };
+        }
+        let filter = agree_on_filter(part, &mut channels);
+        for ChannelTrace { fit, slowest, lines, .. } in &mut channels {
+            let frequencies = || lines.iter().map(|line| line.frequency.value);
+            slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
+        }
+        Self { channels, filter }
+    }
+
+    /// Makes the terms of `first_half` those of this part, the whole, where the second half, `unseen`, does not contradict them.
+    pub(crate) fn take_terms_that_held(&mut self, first_half: &Self, unseen: &RecordPart) {
+        let filter = self.filter.as_ref().ok();
+        for (channel, ChannelTrace { fit, .. }) in first_half.channels.with_ids() {
+            let held = || Contradiction::find(fit.after(), &fit.covariates.compensated(unseen, channel)).is_none();
+            if unseen.channels[channel].quantity.is_inertial() && held() {
+                self.channels[channel].fit.take_terms_that_held(&fit.traced, filter);
+            }
+        }
+    }
+
+    /// Completes the models with the lines of the spectrum that the curve does not resolve.
+    pub(crate) fn add_lines_of_spectrum(&mut self) {
+        for trace in &mut self.channels {
+            let lines: Vec<FittedTerm> = trace.lines.iter().map(MergedLine::fitted_term).collect();
+            trace.fit.add_lines_of_spectrum(&lines);
+        }
+    }
+
+    /// The effects that the model of a channel shows, and what that leaves unexplained of the curve; `common` is the drift that the
+    /// channel has in common with others.
+    pub(crate) fn named_effects(
+        &self,
+        profile: &SensorProfile,
+        curves: &RecordPart,
+        channel: ChannelId,
+        common: Option<&ChannelsInCommon>,
+    ) -> (Vec<Effect>, Option<Unexplained>) {
+        let ChannelTrace { fit, lines, rest, telegraph, .. } = &self.channels[channel];
+        let sensitivities = || fit.covariates.sensitivities();
+        let findings = ChannelFindings {
+            channel: curves.channels[channel],
+            resolution: curves.resolution(channel),
+            fit,
+            sensitivities: sensitivities().map(|(covariate, of)| (curves.channels[covariate], *of)).collect(),
+            lines: rest.is_some().then_some(lines),
+            telegraph: telegraph.as_ref(),
+            common,
+            rest: rest.as_ref(),
+        };
+        let in_steps = |(covariate, of): (ChannelId, &Sensitivity)| (of.value * curves.resolution(covariate)).powi(2);
+        let of_covariates = sensitivities().map(in_steps).sum();
+        let unexplained = unexplained::by_curve(fit, profile, curves.resolution(channel), of_covariates);
+        (name_effects(profile, &findings), unexplained)
+    }
+}
+
+impl ChannelTrace {
+    fn fit(part: &PartData, channel: ChannelId) -> Self {
+        let PartData { profile, curves, samples } = part;
+        let by_curve = || CovariateFit::estimate(curves, channel, false, |_| None);
+        match samples {
+            _ if !curves.channels[channel].quantity.is_inertial() => {
+                Self::without_samples(ChannelFit::fit_baseline(by_curve()))
+            }
+            None => Self::without_samples(ChannelFit::fit_curve(by_curve(), &profile.filters)),
+            Some(samples) => Self::fit_with_samples(profile, curves, samples, channel),
+        }
+    }
+
+    fn without_samples(fit: ChannelFit) -> Self {
+        let signals = UnexplainedSignals::default();
+        Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals, slowest: None }
+    }
+
+    fn fit_with_samples(
+        profile: &SensorProfile,
+        curves: &RecordPart,
+        samples: &PartSamples,
+        channel: ChannelId,
+    ) -> Self {
+        let (own, bias) = (&samples.series[channel], &samples.biases[channel]);
+        let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
+        let rest = covariates.compensated_series(own, samples.series);
+        let faster = &samples.record.channels[channel].faster_lines;
+        let (fit, mut lines) =
+            fit_with_lines(covariates, own, rest.as_ref(), profile, (samples.record.samples_per_mean, faster));
+        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
+        let (mut telegraph, mut signals) = (None, UnexplainedSignals::default());
+        if samples.seeks_signals {
+            let correlation_times: Vec<f64> = fit.correlation_times().collect();
+            let is_reversible =
+                |found: &TelegraphNoise| random_telegraph::is_reversible(&rest, found.time_constant_s.value);
+            telegraph = random_telegraph::find(&rest, own.unit, &correlation_times).filter(is_reversible);
+            signals = UnexplainedSignals::find(&rest, &mut lines, &fit.bands());
+        }
+        Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals }
+    }
+}
+
+/// Gives the models of the inertial channels in a part of a recording the filter that the sensor has once, as they show it together.
+fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> Result<PartFilter, Unidentified> {
+    let PartData { profile, curves, .. } = part;
+    let decimation = profile.internal_rate_hz * curves.sample_period();
+    let inertial: Vec<ChannelId> =
+        curves.channels.ids().filter(|&channel| curves.channels[channel].quantity.is_inertial()).collect();
+    let filtered: Vec<FilteredChannel> = inertial
+        .iter()
+        .map(|&channel| {
+            let (fit, resolution) = (&channels[channel].fit, curves.resolution(channel));
+            FilteredChannel {
+                name: curves.channels[channel].name,
+                curve: &fit.covariates.curve,
+                model: fit.after(),
+                resolution,
+                is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
+            }
+        })
+        .collect();
+    let filter = part_filter::estimate(&filtered, &profile.filters, decimation);
+    let dithered: Vec<bool> = filtered.iter().map(|channel| channel.is_dithered).collect();
+    for (channel, is_dithered) in inertial.into_iter().zip(dithered) {
+        channels[channel].fit.agree(filter.as_ref().ok(), is_dithered);
+    }
+    filter
+}

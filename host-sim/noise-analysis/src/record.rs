@@ -1,0 +1,10 @@
+//! A recording as it is analysed: condensed to means, preprocessed, and in curves.
+
+pub mod condensed_record;
+pub(crate) mod estimators;
+pub mod long_record;
+pub(crate) mod preprocessing;
+pub(crate) mod sample_curves;
+pub(crate) mod sample_effects;
+mod sample_screen;
+pub(crate) mod sampling_faults;

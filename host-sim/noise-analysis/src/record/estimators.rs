@@ -1,0 +1,314 @@
+//! Estimators of several channels of a recording: Allan variances of the whole as it was measured, and Allan variances and
+//! covariances of its two halves.
+//!
+//! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
+//! channels are taken where both have a sample.
+
+use crate::parallel::in_parallel;
+use crate::record::condensed_record::CondensedRecord;
+use crate::record::preprocessing::Preprocessing;
+use crate::record::sample_curves::SampleCurves;
+use crate::samples::exclusion::Exclusion;
+use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::streamed_curves::STEPS_PER_COUNT;
+use crate::{OCTAVES, OVERLAP};
+use allan_core::regression::CovarianceCurve;
+use allan_core::{Cascade, Coupling, Curve};
+use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, Quantity};
+use nalgebra::DMatrix;
+
+/// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
+#[derive(Clone)]
+pub(crate) struct CoupledEstimators {
+    cascades: Vec<GappedCascade>,
+    couplings: Vec<CoupledPair>,
+}
+
+/// The covariance of two channels, by their positions.
+#[derive(Clone)]
+struct CoupledPair {
+    channels: [usize; 2],
+    coupling: Coupling<OCTAVES>,
+}
+
+impl CoupledEstimators {
+    /// Estimators of so many channels, of which those at the positions `coupled` have a covariance with each other.
+    pub(crate) fn new(channels: usize, coupled: &[usize]) -> Self {
+        let pairs = coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]));
+        Self {
+            cascades: vec![GappedCascade::default(); channels],
+            couplings: pairs.map(|channels| CoupledPair { channels, coupling: Coupling::new() }).collect(),
+        }
+    }
+
+    /// Takes the sample of every channel in the next sample period; `None` where a channel has none.
+    pub(crate) fn push(&mut self, values: impl Iterator<Item = Option<i32>>) {
+        self.cascades.iter_mut().zip(values).for_each(|(cascade, value)| cascade.push_one(value));
+        for CoupledPair { channels: [a, b], coupling } in &mut self.couplings {
+            // Products are taken where both channels have a sample.
+            let (a, b) = (&self.cascades[*a], &self.cascades[*b]);
+            if a.has_latest() && b.has_latest() {
+                coupling.observe(a.cascade(), b.cascade());
+            }
+        }
+    }
+
+    /// Records that the samples of `missing` sample periods are missing in every channel.
+    pub(crate) fn gap(&mut self, missing: u32) {
+        self.cascades.iter_mut().for_each(|cascade| cascade.miss(missing.into()));
+    }
+
+    /// The estimators of these samples followed, after a gap, by those of `later`.
+    pub(crate) fn followed_by(mut self, later: &Self) -> Self {
+        self.cascades.iter_mut().zip(&later.cascades).for_each(|(cascade, later)| cascade.merge(later));
+        self.couplings.iter_mut().zip(&later.couplings).for_each(|(pair, later)| pair.coupling.merge(&later.coupling));
+        self
+    }
+
+    /// The cascade of a channel.
+    pub(crate) fn cascade(&self, channel: usize) -> &Cascade<OCTAVES, OVERLAP> {
+        self.cascades[channel].cascade()
+    }
+
+    /// Covariances of the second differences of all channels at one octave, up to a common factor, 0 of channels that are not coupled;
+    /// `None` where the octave has no differences.
+    pub(crate) fn covariances(&self, octave: usize) -> Option<DMatrix<f64>> {
+        let mut covariances = DMatrix::zeros(self.cascades.len(), self.cascades.len());
+        for (i, cascade) in self.cascades.iter().enumerate() {
+            let (squares, count) = cascade.cascade().sum_of_squares(octave).filter(|&(_, count)| count > 0)?;
+            covariances[(i, i)] = squares as f64 / count as f64;
+        }
+        for CoupledPair { channels: [i, j], coupling } in &self.couplings {
+            let (products, count) = coupling.sum_of_products(octave).filter(|&(_, count)| count > 0)?;
+            covariances[(*i, *j)] = products as f64 / count as f64;
+            covariances[(*j, *i)] = covariances[(*i, *j)];
+        }
+        Some(covariances)
+    }
+}
+
+/// Estimators of one half of a recording, or of both halves, in physical units.
+#[derive(Clone)]
+pub(crate) struct RecordPart {
+    pub channels: PerChannel<ChannelProfile>,
+    estimators: CoupledEstimators,
+    /// Smallest distance of two values, in the channel's unit: one count, or several.
+    resolutions: PerChannel<f64>,
+    period_s: f64,
+    /// Samples of a mean, where the estimators have means; otherwise 1.
+    samples_per_mean: u64,
+    /// Averaging factor from which on the estimators are used, samples.
+    until: u64,
+    /// The curves at shorter averaging times, with the samples that were replaced.
+    shorter: PerChannel<(Curve<OCTAVES>, u64)>,
+}
+
+/// The curves of the recording as measured, and the estimators of its halves.
+pub(crate) struct RecordEstimators {
+    /// Of the recording as measured, without preprocessing.
+    pub measured: PerChannel<Curve<OCTAVES>>,
+    /// The halves with spikes and knocks.
+    pub raw: [RecordPart; 2],
+    /// The halves without what the rules of the first half exclude.
+    pub ruled: [RecordPart; 2],
+    /// Both halves, with a gap between them, without what the whole record shows.
+    pub both: RecordPart,
+}
+
+impl RecordEstimators {
+    /// Estimates from the means of `record`, and from the curves of its samples at shorter averaging times.
+    pub(crate) fn estimate(record: &CondensedRecord, preprocessing: &Preprocessing) -> Self {
+        let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
+        // Nothing is estimated twice.
+        let mut distinct = vec![Exclusion::None];
+        let is_distinct =
+            |of: Exclusion| preprocessing.excludes_any(of) || (of == both && preprocessing.has_responses());
+        distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
+        let work: Vec<(Exclusion, Half)> =
+            distinct.iter().flat_map(|&of| [Half::First, Half::Second].map(|half| (of, half))).collect();
+        let parts = in_parallel(&work, |&(exclusion, of)| half(record, preprocessing, exclusion, of));
+        let of = |exclusion: Exclusion| {
+            let position = distinct.iter().position(|of| *of == exclusion).unwrap_or(0);
+            [parts[2 * position].clone(), parts[2 * position + 1].clone()]
+        };
+        let (raw, ruled, [first, second]) = (of(Exclusion::None), of(ruled), of(both));
+        let both = first.followed_by(&second);
+        let halves = |parts: [RecordPart; 2], exclusion: Exclusion| {
+            let [first, second] = parts;
+            [(0, first), (1, second)]
+                .map(|(half, part)| part.with_shorter(record, exclusion, |of| of.half(half, exclusion)))
+        };
+        Self {
+            measured: record.channels.map(|channel| channel.samples.measured.clone()),
+            raw: halves(raw, Exclusion::None),
+            ruled: halves(ruled, Exclusion::ByFirstHalf),
+            both: both.with_shorter(record, Exclusion::ByWhole, |of| of.both(Exclusion::ByWhole)),
+        }
+    }
+}
+
+/// The estimators of a half of a recording, by time, without the samples of `exclusion`.
+fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Exclusion, half: Half) -> RecordPart {
+    let measurement = record.means.as_ref();
+    let is_coupled = |quantity: Quantity| quantity.is_inertial() || quantity.is_environment();
+    let coupled = measurement.ids().filter(|&channel| is_coupled(measurement[channel].profile.quantity));
+    let coupled: Vec<usize> = coupled.map(ChannelId::position).collect();
+    let mut estimators = CoupledEstimators::new(measurement.channels.len(), &coupled);
+    let recorded: Vec<RecordedSamples> = measurement
+        .ids()
+        .map(|id| {
+            let channel = &measurement[id];
+            let excluded = preprocessing.excluded(id, exclusion);
+            let is_corrected = preprocessing.corrects(id, exclusion);
+            RecordedSamples { id, channel, is_excluded: positions(measurement, channel, &excluded), is_corrected }
+        })
+        .collect();
+    let middle = measurement.middle();
+    let second = measurement.slots.partition_point(|&slot| slot < middle);
+    let (positions, begins_at) = match half {
+        Half::First => (0..second, 0),
+        Half::Second => (second..measurement.len(), middle),
+    };
+    for position in positions {
+        let slot = measurement.slots[position];
+        // Of a gap over the middle, each half has the samples on its side.
+        let own = u32::try_from(slot - begins_at).unwrap_or(u32::MAX);
+        estimators.gap(measurement.missing_before(position).min(own));
+        estimators.push(recorded.iter().map(|of| {
+            (!of.is_excluded[position]).then(|| {
+                let steps = f64::from(of.channel.counts[position]) * STEPS_PER_COUNT;
+                if !of.is_corrected {
+                    return steps as i32;
+                }
+                let offset = preprocessing.offset(of.id, exclusion, slot);
+                (steps - STEPS_PER_COUNT * offset / of.channel.profile.lsb).round() as i32
+            })
+        }));
+    }
+    RecordPart {
+        channels: measurement.profiles().collect(),
+        estimators,
+        resolutions: record.channels.map(|of| of.samples.resolution),
+        period_s: measurement.period_s(),
+        samples_per_mean: record.samples_per_mean,
+        until: 1,
+        shorter: measurement.ids().map(|_| (Curve::empty(), 0)).collect(),
+    }
+}
+
+/// A half of a recording, by time.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Half {
+    First,
+    Second,
+}
+
+/// A channel's samples, and whether each is left out.
+struct RecordedSamples<'a> {
+    id: ChannelId,
+    channel: &'a MeasuredChannel,
+    is_excluded: Vec<bool>,
+    /// Whether an offset is subtracted from any of them.
+    is_corrected: bool,
+}
+
+/// For each sample of a channel whether it was refused or its sample period is one of `excluded`.
+fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u64]) -> Vec<bool> {
+    let mut is_excluded = vec![false; channel.counts.len()];
+    let refused = channel.refused.values().flatten().copied();
+    let of_slots = excluded.iter().filter_map(|slot| measurement.slots.binary_search(slot).ok());
+    for position in refused.chain(of_slots) {
+        if let Some(of) = is_excluded.get_mut(position) {
+            *of = true;
+        }
+    }
+    is_excluded
+}
+
+impl RecordPart {
+    /// This part followed, after a gap, by `later`.
+    pub(crate) fn followed_by(&self, later: &Self) -> Self {
+        Self { estimators: self.estimators.clone().followed_by(&later.estimators), ..self.clone() }
+    }
+
+    /// Of channels that are not coupled, whose estimators have counts of [`STEPS_PER_COUNT`] steps.
+    pub(crate) fn new(channels: PerChannel<ChannelProfile>, cascades: Vec<GappedCascade>, period_s: f64) -> Self {
+        Self {
+            resolutions: channels.map(|channel| channel.lsb),
+            shorter: channels.map(|_| (Curve::empty(), 0)),
+            channels,
+            estimators: CoupledEstimators { cascades, couplings: Vec::new() },
+            period_s,
+            samples_per_mean: 1,
+            until: 1,
+        }
+    }
+
+    /// The part with the curves of the samples of `record` at averaging times that are too short for its means.
+    fn with_shorter(
+        self,
+        record: &CondensedRecord,
+        exclusion: Exclusion,
+        curve: impl Fn(&SampleCurves) -> Curve<OCTAVES>,
+    ) -> Self {
+        let until = record.channels.iter().map(|of| of.samples.until()).max().unwrap_or(1);
+        let shorter = record.channels.map(|of| (curve(&of.samples), of.samples.replaced(exclusion)));
+        Self { until, shorter, ..self }
+    }
+
+    /// Seconds between samples.
+    pub(crate) fn sample_period(&self) -> f64 {
+        self.period_s / self.samples_per_mean as f64
+    }
+
+    /// Least averaging factor at which the covariances of channels are known, samples.
+    pub(crate) fn coupled_from(&self) -> u64 {
+        self.until
+    }
+
+    /// Channels whose covariance with `channel` is known, in their order.
+    pub(crate) fn coupled_with(&self, channel: ChannelId) -> impl Iterator<Item = ChannelId> {
+        self.channels.ids().filter(move |&other| other != channel && self.pair(channel, other).is_some())
+    }
+
+    fn pair(&self, a: ChannelId, b: ChannelId) -> Option<&CoupledPair> {
+        let [a, b] = [a, b].map(ChannelId::position);
+        self.estimators.couplings.iter().find(|pair| pair.channels == [a, b] || pair.channels == [b, a])
+    }
+
+    /// Allan variances of a channel, in its unit squared.
+    pub(crate) fn curve(&self, channel: ChannelId) -> Curve<OCTAVES> {
+        let own = self.estimators.cascade(channel.position()).curve(self.period_s).scaled(self.step_size(channel));
+        self.shorter[channel].0.clone().continued_by_means(&own, self.samples_per_mean, self.until)
+    }
+
+    /// Samples of a channel that were replaced because they are missing.
+    pub(crate) fn replaced(&self, channel: ChannelId) -> u64 {
+        match self.samples_per_mean {
+            1 => self.estimators.cascade(channel.position()).replaced(),
+            _ => self.shorter[channel].1,
+        }
+    }
+
+    /// Smallest distance of two values of a channel, in its unit.
+    pub(crate) fn resolution(&self, channel: ChannelId) -> f64 {
+        self.resolutions[channel]
+    }
+
+    /// Allan covariances of two channels, in the product of their units; none of channels that are not coupled.
+    pub(crate) fn covariance(&self, a: ChannelId, b: ChannelId) -> CovarianceCurve<OCTAVES> {
+        let Some(pair) = self.pair(a, b) else { return CovarianceCurve::new() };
+        let mut points = pair.coupling.points();
+        for point in points.iter_mut() {
+            point.n *= self.samples_per_mean;
+            point.covariance *= self.step_size(a) * self.step_size(b);
+        }
+        points.retain(|point| point.n >= self.until);
+        points
+    }
+
+    /// Physical size of 1 in what the estimators take.
+    fn step_size(&self, channel: ChannelId) -> f64 {
+        self.channels[channel].lsb / STEPS_PER_COUNT
+    }
+}

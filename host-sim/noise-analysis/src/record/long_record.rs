@@ -1,0 +1,358 @@
+//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁷ of them, the
+//! curves at averaging times that are too short for the means, and the first samples.
+//!
+//! ```text
+//! first samples ─► SampleEffects: resolution, repeated samples, sample clock
+//!        └─► rules ─┐
+//! blocks of samples ─► SampleScreen (spikes, repeated samples) ─► means ─► what is slow: drift, steps, temperature, lines
+//!        │                           ├─► StackedSpectrum ─► faster lines
+//!        │                           ├─► EpochSpectra ─► lines of two channels that move with each other
+//!        ├─► ValueCounts ─► saturation
+//!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
+//! ```
+//!
+//! The second differences of means are those of the samples at longer averaging times, so that the two curves of a channel are
+//! one. Memory does not depend on the length of the recording.
+
+use crate::detectors::output_range::ValueCounts;
+use crate::detectors::spikes::SpikeRule;
+use crate::effects::Effect;
+use crate::parallel::{self, in_parallel};
+use crate::record::condensed_record::{CondensedChannel, CondensedRecord};
+use crate::record::sample_curves::SampleCurves;
+use crate::record::sample_effects::SampleEffects;
+use crate::record::sample_screen::SampleScreen;
+use crate::record::sampling_faults;
+use crate::samples::epoch_ranges::epochs;
+use crate::samples::series::Series;
+use crate::samples::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
+use crate::spectra::epoch_spectra::{EpochSpectra, PartSpectra};
+use crate::spectra::spectral_lines::{self, MergedLine};
+use crate::spectra::stacked_spectrum::StackedSpectrum;
+use measurement::{
+    ChannelId, ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, lost_part,
+};
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Samples of the longest recording that is analysed without being condensed.
+pub const MOST_SAMPLES: u64 = 1 << 18;
+/// The same of a recording of which more than [`MOST_LOST`] of the samples are missing: the means of fewer samples have more noise.
+pub const MOST_SAMPLES_WITH_LOSSES: u64 = 1 << 20;
+/// Largest part of the samples of a shorter recording that may be missing where it is condensed.
+pub const MOST_LOST: f64 = 1.0 / 32.0;
+/// Samples that are taken at a time of a recording that is in memory.
+const BLOCK: usize = 1 << 14;
+/// Means of a longer recording, at most.
+const MOST_MEANS: u64 = 1 << 17;
+/// Sample periods at the start of the recording whose samples are analysed.
+const FIRST_PERIODS: u64 = 1 << 16;
+/// Sample periods of each of the stretches whose spectra are averaged: a line is known to a 2¹⁶th of the sample rate or better.
+const STRETCH_PERIODS: u64 = 1 << 16;
+/// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
+/// deviation of the mean of their roundings, `1/√(12·256)` of a count.
+const MEAN_STEPS_LOG2: u32 = 8;
+/// Largest mean in steps, which the estimators divide further.
+const LARGEST_MEAN: f64 = (i32::MAX as f64) / STEPS_PER_COUNT;
+/// Least part of the samples of a mean that is there.
+const LEAST_FILL: f64 = 0.5;
+/// Means are rates of at least this many times the highest frequency at which a line is sought in them.
+const MEANS_PER_PERIOD: f64 = 2.5;
+/// A block mean at this place has no sample.
+const MISSING: i32 = i32::MIN;
+
+/// Reads a long recording block by block.
+pub struct LongRecordReader {
+    description: RecordingDescription,
+    first: Measurement,
+    samples_per_mean: u64,
+    /// First sample period of the second half.
+    middle: u64,
+    screen: SampleScreen,
+    channels: Vec<LongChannel>,
+    fast: Vec<FastFindings>,
+    last: Option<u64>,
+    gaps: usize,
+}
+
+/// What the samples of a channel at the start of the recording show.
+struct FastFindings {
+    effects: Vec<Effect>,
+    /// Smallest distance of two values, in the channel's unit.
+    resolution: f64,
+}
+
+impl FastFindings {
+    /// Of the channel with this profile, which is `first` among the first samples, of which `shown` is known.
+    fn new(profile: &ChannelProfile, first: Option<ChannelId>, shown: &SampleEffects) -> Self {
+        let effects = first.into_iter().flat_map(|of| shown.of(of));
+        Self {
+            effects: effects.filter(|effect| is_fast(effect)).cloned().collect(),
+            resolution: profile.lsb * f64::from(first.map_or(1, |of| shown.counts_per_step(of))),
+        }
+    }
+}
+
+/// Whether only the samples themselves show an effect, and the first of them as well as all.
+fn is_fast(effect: &Effect) -> bool {
+    matches!(
+        effect,
+        Effect::NoiseBelowCount(_) | Effect::EffectiveLsb(_) | Effect::RepeatedSamples(_) | Effect::ClockDeviation(_)
+    )
+}
+
+/// What is kept of one channel.
+struct LongChannel {
+    recorded: StreamedCurves,
+    /// Without what the screen leaves out.
+    screened: StreamedCurves,
+    means: Means,
+    values: ValueCounts,
+    /// Of the inertial channels.
+    spectra: Option<SampleSpectra>,
+}
+
+/// Spectra of the samples of a channel.
+struct SampleSpectra {
+    stacked: StackedSpectrum,
+    epochs: EpochSpectra,
+}
+
+impl LongChannel {
+    fn push_to_spectra(&mut self, slots: &[u64], channel: &MeasuredChannel) {
+        let Some(SampleSpectra { stacked, epochs }) = &mut self.spectra else { return };
+        for (slot, count) in channel.used_samples(slots) {
+            let value = f64::from(count) * channel.profile.lsb;
+            stacked.push(slot, value);
+            epochs.push(slot, value);
+        }
+    }
+
+    /// The lines that are too fast for the means.
+    fn faster_lines(&self, description: &RecordingDescription, samples_per_mean: u64) -> Vec<MergedLine> {
+        let Some(SampleSpectra { stacked, .. }) = &self.spectra else { return Vec::new() };
+        let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
+        let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
+        let [resolved_s, duration_s] = [STRETCH_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
+        let lines = spectral_lines::merged(stacked.lines(), resolved_s, duration_s, rate_error);
+        lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect()
+    }
+}
+
+/// A measurement of which only means are kept; `None` where its analysis needs all samples.
+pub(crate) fn condensed_from(measurement: &Measurement) -> Option<CondensedRecord<'static>> {
+    let (samples, periods) = (measurement.len() as u64, measurement.periods());
+    let has_losses = lost_part(samples, periods) > MOST_LOST;
+    let most = if has_losses { MOST_SAMPLES_WITH_LOSSES } else { MOST_SAMPLES };
+    (samples > most).then(|| {
+        let mut reader = LongRecordReader::new(RecordingDescription::from(measurement), measurement);
+        measurement.blocks(BLOCK).for_each(|block| reader.push(&block));
+        reader.finish()
+    })
+}
+
+impl LongRecordReader {
+    /// For the recording of this description, which begins with the samples of `beginning`.
+    #[must_use]
+    pub fn new(description: RecordingDescription, beginning: &Measurement) -> Self {
+        let first = beginning.before(FIRST_PERIODS);
+        let samples_per_mean = description.periods.div_ceil(MOST_MEANS).next_power_of_two();
+        let means = description.periods / samples_per_mean;
+        let halves = [means / 2 / 2, means / 2].map(|start| start * samples_per_mean);
+        let epochs: Vec<u64> = epoch_starts(means).map(|start| start * samples_per_mean).collect();
+        // The same channels, of which the size of a count may be another one.
+        let of_first: Vec<Option<ChannelId>> = description.channels.iter().map(|of| first.named(of.name)).collect();
+        let shown = SampleEffects::detect(&first);
+        let fast: Vec<FastFindings> = description
+            .channels
+            .iter()
+            .zip(&of_first)
+            .map(|(of, first)| FastFindings::new(of, *first, &shown))
+            .collect();
+        let repeated = shown.repeated();
+        let rules = in_parallel(&of_first, |of_first| {
+            let is_screened = |of: &ChannelId| first[*of].profile.quantity.is_inertial() && !shown.is_saturated(*of);
+            let channel = of_first.filter(is_screened)?;
+            let series = Series::from_measurement(&first, channel).with_counts_per_step(shown.counts_per_step(channel));
+            SpikeRule::fit_for(&series.without(&repeated), description.samples)
+        });
+        let screen = SampleScreen::new(&description.channels, rules, !repeated.is_empty());
+        let period_s = description.period_s();
+        let spectra = |fast: &FastFindings| SampleSpectra {
+            stacked: StackedSpectrum::new(period_s, STRETCH_PERIODS as usize, fast.resolution),
+            epochs: EpochSpectra::new(period_s, &epochs),
+        };
+        let channel = |((profile, fast), of_first): ((&ChannelProfile, &FastFindings), &Option<ChannelId>)| {
+            let counts = of_first.iter().flat_map(|&of| &first[of].counts);
+            let largest = counts.map(|count| count.unsigned_abs()).max();
+            LongChannel {
+                recorded: StreamedCurves::new(&halves),
+                screened: StreamedCurves::new(&epochs),
+                means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
+                values: ValueCounts::default(),
+                spectra: profile.quantity.is_inertial().then(|| spectra(fast)),
+            }
+        };
+        let channels = description.channels.iter().zip(&fast).zip(&of_first).map(channel).collect();
+        let [_, middle] = halves;
+        Self { description, first, samples_per_mean, middle, screen, channels, fast, last: None, gaps: 0 }
+    }
+
+    /// Takes the next samples, the channels on as many threads as there are cores.
+    pub fn push(&mut self, block: &SampleBlock) {
+        for &slot in &block.slots {
+            self.gaps += usize::from(self.last.is_some_and(|last| slot > last + 1));
+            self.last = Some(slot);
+        }
+        parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
+            of.recorded.push(&block.slots, channel);
+            channel.used_samples(&block.slots).for_each(|(_, count)| of.values.push(count));
+        });
+        let channels = &mut self.channels;
+        self.screen.push(block, |screened| push_screened(channels, screened));
+    }
+
+    /// The recording, all of which was read.
+    #[must_use]
+    pub fn finish(mut self) -> CondensedRecord<'static> {
+        push_screened(&mut self.channels, &self.screen.finish());
+        let Self { description, first, samples_per_mean, middle, screen, channels, fast, gaps, .. } = self;
+        let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
+        let period_s = description.period_s();
+        let means = measurement_of_means(&description, samples_per_mean, &channels);
+        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
+        let spikes = screen.spikes(description.periods, period_s).zip(screen.spikes(middle, period_s));
+        let mut condensed = Vec::new();
+        for ((((channel, fast), profile), faster_lines), (spikes, spikes_of_first_half)) in
+            channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(spikes)
+        {
+            let is_inertial = profile.quantity.is_inertial();
+            let saturation = channel.values.saturation(profile, fast.resolution);
+            let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
+            let found = found.chain(saturation.into_iter().chain(spikes).map(|found| found.effect));
+            let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
+            condensed.push(CondensedChannel {
+                samples: SampleCurves {
+                    samples_per_mean,
+                    resolution: fast.resolution,
+                    measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
+                    recorded: parts(&channel.recorded),
+                    screened: parts(&channel.screened),
+                    middle,
+                    spectra: channel
+                        .spectra
+                        .map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
+                    is_screened: channel.screened.refused != channel.recorded.refused,
+                    period_s,
+                    lsb: profile.lsb,
+                },
+                counts_per_step: 1,
+                can_show_spikes: false,
+                faster_lines,
+                effects: found.filter(|_| is_inertial).collect(),
+                effects_of_first_half: spikes_of_first_half.map(|found| found.effect).into_iter().collect(),
+                refused: channel.screened.refused,
+            });
+        }
+        CondensedRecord {
+            means: Cow::Owned(means),
+            first: Some(first),
+            samples_per_mean,
+            repeated: Vec::new(),
+            channels: condensed.into(),
+            description,
+        }
+    }
+}
+
+/// The means with which the quarters of the first half, the second half and the epochs of a record of so many begin, and the one
+/// behind the last epoch.
+fn epoch_starts(means: u64) -> impl Iterator<Item = u64> {
+    let middle = means / 2;
+    let ranges = epochs(0..means, middle).into_iter().flat_map(|(_, ranges)| ranges).flatten();
+    let starts: BTreeSet<u64> = ranges.flat_map(|range| [range.start, range.end]).chain([middle / 2, middle]).collect();
+    starts.into_iter().filter(move |start| (1..means).contains(start))
+}
+
+fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
+    parallel::for_each_pair(channels, &block.channels, |of, channel| {
+        of.screened.push(&block.slots, channel);
+        of.means.push(&block.slots, channel);
+        of.push_to_spectra(&block.slots, channel);
+    });
+}
+
+fn measurement_of_means(
+    description: &RecordingDescription,
+    samples_per_mean: u64,
+    channels: &[LongChannel],
+) -> Measurement {
+    let rate = description.sample_rate_hz / samples_per_mean as f64;
+    let count = channels.iter().map(|channel| channel.means.counts.len()).max().unwrap_or(0);
+    let mean = |of: &LongChannel, at: usize| of.means.counts.get(at).copied().filter(|mean| *mean != MISSING);
+    let present: Vec<usize> =
+        (0..count).filter(|&at| channels.iter().any(|channel| mean(channel, at).is_some())).collect();
+    let channel = |(profile, of): (&ChannelProfile, &LongChannel)| {
+        let counts: Vec<i32> = present.iter().map(|&at| mean(of, at).unwrap_or(0)).collect();
+        let missing: Vec<usize> =
+            (0..present.len()).filter(|&position| mean(of, present[position]).is_none()).collect();
+        let refused = if missing.is_empty() { BTreeMap::new() } else { BTreeMap::from([("incomplete_mean", missing)]) };
+        let profile = ChannelProfile { lsb: profile.lsb / f64::from(1_u32 << of.means.steps_log2), ..*profile };
+        MeasuredChannel { profile, counts, refused }
+    };
+    Measurement {
+        profile: description.profile.clone(),
+        sample_rate_hz: rate,
+        stated_rate_hz: Some(rate),
+        slots: present.iter().map(|&at| at as u64).collect(),
+        times_s: None,
+        channels: description.channels.iter().zip(channels).map(channel).collect(),
+        dropped: BTreeMap::new(),
+        flagged: BTreeMap::new(),
+    }
+}
+
+/// Means of samples in a row, of one channel.
+struct Means {
+    samples_per_mean: u64,
+    /// Means that the record has; what is left over at its end is in none.
+    most: u64,
+    /// Steps of a count, as a power of two.
+    steps_log2: u32,
+    /// In steps, [`MISSING`] where too few samples are there.
+    counts: Vec<i32>,
+    sum: i64,
+    present: u64,
+}
+
+impl Means {
+    /// For a channel whose first samples reach to `largest` counts; it may reach four times as far.
+    fn new(samples_per_mean: u64, most: u64, largest: u32) -> Self {
+        let room = (LARGEST_MEAN / (4.0 * f64::from(largest.max(1)))).max(1.0).log2() as u32;
+        let steps_log2 = MEAN_STEPS_LOG2.min(room);
+        Self { samples_per_mean, most, steps_log2, counts: Vec::new(), sum: 0, present: 0 }
+    }
+
+    fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
+        for (slot, count) in channel.used_samples(slots) {
+            self.end_before(slot / self.samples_per_mean);
+            self.sum += i64::from(count);
+            self.present += 1;
+        }
+        // The last mean is complete with the last sample period of the record.
+        if let Some(&last) = slots.last() {
+            self.end_before((last + 1) / self.samples_per_mean);
+        }
+    }
+
+    /// Ends the means before the one of this number.
+    fn end_before(&mut self, number: u64) {
+        let number = number.min(self.most);
+        while (self.counts.len() as u64) < number {
+            let is_filled = self.present as f64 >= LEAST_FILL * self.samples_per_mean as f64;
+            let mean = self.sum as f64 / self.present.max(1) as f64 * f64::from(1_u32 << self.steps_log2);
+            self.counts.push(if is_filled { mean.round().clamp(-LARGEST_MEAN, LARGEST_MEAN) as i32 } else { MISSING });
+            (self.sum, self.present) = (0, 0);
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Preprocessing: what the detectors find in the samples of each channel, and the series without it.
+//!
+//! Repeated samples become gaps of every channel, knocks and spikes gaps of the channel that shows them; a bias step is
+//! subtracted, and so is a response to vibration, or to temperature behind a lag or with a curvature. A ramp is reported and
+//! stays in the samples, because the noise model has a term for it. A sensitivity to temperature or supply stays in them too,
+//! and is kept for the regression on covariates.
+
+use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
+use crate::detectors::bias_response::BiasResponse;
+use crate::detectors::knocks::{self, Knock, KnockRule};
+use crate::detectors::noise_grid::NoiseGrids;
+use crate::detectors::spikes::{self, SpikeRule};
+use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
+use crate::effects::Effect;
+use crate::effects::findings::{Correction, Detection};
+use crate::parallel::{in_parallel, per_channel};
+use crate::record::condensed_record::CondensedRecord;
+use crate::samples::exclusion::Exclusion;
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
+use crate::spectra;
+use measurement::{ChannelId, Measurement, PerChannel, Quantity};
+use std::sync::Arc;
+
+/// Sample periods that one channel does not use, in ascending order.
+#[derive(Default)]
+struct ChannelExclusion {
+    knocks: Vec<u64>,
+    spikes: Vec<u64>,
+    /// Both, by the rules of the first half.
+    by_first_half: Vec<u64>,
+}
+
+/// Effects in the samples, and the corrections that remove them.
+pub(crate) struct Preprocessing {
+    /// Sample periods of all samples.
+    slots: Arc<[u64]>,
+    /// How many counts the smallest step of the values of each channel has.
+    counts_per_step: PerChannel<u32>,
+    /// Sample periods that no channel uses: their sample equals the one before in all channels.
+    repeated: Vec<u64>,
+    channels: PerChannel<ChannelPreprocessing>,
+}
+
+/// What was found in the samples of one channel; nothing in one that is not inertial.
+#[derive(Default)]
+struct ChannelPreprocessing {
+    effects: Vec<Effect>,
+    exclusion: ChannelExclusion,
+    /// The first sample period from which on an offset is subtracted, and the offset in the channel's unit.
+    offset: Option<(u64, f64)>,
+    /// Responses to temperature and vibration that are subtracted, as the first half and as the whole record show them.
+    responses: [Vec<BiasResponse>; 2],
+    /// The temperature or supply that it depends on, and how much.
+    sensitivities: Vec<(ChannelId, BiasSensitivity)>,
+}
+
+impl Preprocessing {
+    /// Looks for knocks, spikes, steps, ramps and sensitivities in the inertial channels.
+    pub(crate) fn detect(record: &CondensedRecord, noise_grids: &NoiseGrids) -> Self {
+        let measurement = record.means.as_ref();
+        let slots = measurement.slots.as_slice().into();
+        let channels = measurement.ids().map(|_| ChannelPreprocessing::default()).collect();
+        let counts_per_step = record.channels.map(|of| of.counts_per_step);
+        let preprocessing = Self { slots, counts_per_step, repeated: record.repeated.clone(), channels };
+        let series = per_channel(measurement.ids(), |channel| preprocessing.measured(measurement, channel));
+        let knocks = KnocksInChannels::find(measurement, &series);
+        // What a channel may depend on, without its own knocks.
+        let quiet: PerChannel<Series> =
+            series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
+        let found = per_channel(measurement.ids(), |channel| {
+            if !record.is_traced(channel) {
+                return ChannelPreprocessing::default();
+            }
+            ChannelPreprocessing::detect(record, channel, (&series, &quiet, &knocks), noise_grids)
+        });
+        Self { channels: found, ..preprocessing }
+    }
+
+    /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
+    pub(crate) fn excludes(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
+        !self.channels[channel].exclusion.slots(exclusion).is_empty()
+    }
+
+    /// Whether `exclusion` leaves out a sample of any channel, beyond those that were read twice.
+    pub(crate) fn excludes_any(&self, exclusion: Exclusion) -> bool {
+        self.channels.ids().any(|channel| self.excludes(channel, exclusion))
+    }
+
+    /// Whether the series of a channel is the same for two exclusions.
+    pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
+        let responses = |exclusion| self.channels[channel].responses(exclusion);
+        responses(one) == responses(other) && self.excluded(channel, one) == self.excluded(channel, other)
+    }
+
+    /// Sample periods that a channel does not use, in ascending order.
+    pub(crate) fn excluded(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
+        merged([&self.repeated, &self.channels[channel].exclusion.slots(exclusion)])
+    }
+
+    /// Samples of a channel that arrived and are not used, by cause.
+    pub(crate) fn refused(&self, channel: ChannelId) -> impl Iterator<Item = (&'static str, u64)> {
+        let own = &self.channels[channel].exclusion;
+        let causes = [("repeated", &self.repeated), ("knock", &own.knocks), ("spikes", &own.spikes)];
+        causes.map(|(cause, slots)| (cause, slots.len() as u64)).into_iter().filter(|(_, count)| *count > 0)
+    }
+
+    /// Whether anything is subtracted from samples of a channel.
+    pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
+        let own = &self.channels[channel];
+        own.offset.is_some() || !own.responses(exclusion).is_empty()
+    }
+
+    /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
+    pub(crate) fn offset(&self, channel: ChannelId, exclusion: Exclusion, slot: u64) -> f64 {
+        let own = &self.channels[channel];
+        let step = own.offset.filter(|(from, _)| slot >= *from).map(|(_, size)| size);
+        step.into_iter().chain(own.responses(exclusion).iter().map(|response| response.bias(slot))).sum()
+    }
+
+    /// Whether the first half may show other responses to temperature and vibration than the whole record.
+    pub(crate) fn has_responses(&self) -> bool {
+        self.channels.iter().any(|of| !of.responses(Exclusion::ByWhole).is_empty())
+    }
+
+    /// Whether a channel responds to temperature behind a lag or with a curvature.
+    pub(crate) fn responds_to_temperature(&self, channel: ChannelId) -> bool {
+        let responses = self.channels[channel].responses(Exclusion::ByWhole);
+        responses.iter().any(|of| !matches!(of.effect, Effect::VibrationRectification(_)))
+    }
+
+    /// A channel's series as measured, with its resolution.
+    pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelId) -> Series {
+        let series = Series::with_shared_slots(measurement, channel, || Arc::clone(&self.slots));
+        series.with_counts_per_step(self.counts_per_step[channel])
+    }
+
+    /// A channel's series after preprocessing.
+    pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelId, exclusion: Exclusion) -> Series {
+        let mut series = self.measured(measurement, channel);
+        let own = &self.channels[channel];
+        if let Some((from, size)) = own.offset {
+            series = series.lowered_from(from, size);
+        }
+        for response in own.responses(exclusion) {
+            let values = Arc::make_mut(&mut series.values);
+            values.iter_mut().zip(series.slots.iter()).for_each(|(value, slot)| *value -= response.bias(*slot));
+        }
+        series.without(&self.excluded(channel, exclusion))
+    }
+
+    /// Whether a ramp was found in a channel.
+    pub(crate) fn has_ramp(&self, channel: ChannelId) -> bool {
+        self.effects(channel).iter().any(|effect| matches!(effect, Effect::LinearDrift(_)))
+    }
+
+    /// The temperature and supply that a channel depends on, and how much.
+    pub(crate) fn sensitivities(&self, channel: ChannelId) -> &[(ChannelId, BiasSensitivity)] {
+        &self.channels[channel].sensitivities
+    }
+
+    /// The effects of a channel.
+    pub(crate) fn effects(&self, channel: ChannelId) -> &[Effect] {
+        &self.channels[channel].effects
+    }
+}
+
+impl ChannelPreprocessing {
+    /// What the samples of `channel` show. `series` and `quiet` are those of all channels, with and without `knocks`.
+    fn detect(
+        record: &CondensedRecord,
+        channel: ChannelId,
+        (series, quiet, knocks): (&PerChannel<Series>, &PerChannel<Series>, &KnocksInChannels),
+        noise_grids: &NoiseGrids,
+    ) -> Self {
+        let measurement = record.means.as_ref();
+        let middle = measurement.middle();
+        let spikes = if record.channels[channel].can_show_spikes { spikes::find(&quiet[channel]) } else { None };
+        let exclusion = ChannelExclusion {
+            spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
+            knocks: slots_within(&series[channel], &knocks.by_whole[channel]),
+            by_first_half: excluded_by_first_half(&series[channel], &knocks.by_first_half[channel], middle),
+        };
+        let regressors: Vec<ChannelId> =
+            measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
+        let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
+        let own = without_slow_lines(quiet[channel].clone().without(&exclusion.spikes));
+        let BiasChanges { step, ramp, sensitivities, responses } =
+            bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids);
+        let responses_of_first_half = if responses.is_empty() {
+            Vec::new()
+        } else {
+            let others: Vec<Series> = others.iter().map(|of| of.before(middle)).collect();
+            let others: Vec<&Series> = others.iter().collect();
+            let all = series.map(|of| of.before(middle));
+            let own = all[channel].clone().without(&exclusion.by_first_half);
+            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids).responses
+        };
+        let offset = match &step {
+            Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) => Some((*from, *size)),
+            _ => None,
+        };
+        // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its own drift.
+        let slow = sensitivities.into_iter().map(|(place, sensitivity)| (regressors[place], sensitivity));
+        let found = knocks.detections(measurement, &series[channel], channel).into_iter();
+        let found = found.chain(spikes).chain(step).chain(ramp).map(|detection| detection.effect);
+        Self {
+            effects: responses.iter().map(|of| of.effect.clone()).chain(found).collect(),
+            exclusion,
+            offset,
+            responses: [responses_of_first_half, responses],
+            sensitivities: slow
+                .filter(|(regressor, _)| measurement[*regressor].profile.quantity.is_environment())
+                .collect(),
+        }
+    }
+
+    /// The responses to temperature and vibration that are subtracted from the samples.
+    fn responses(&self, exclusion: Exclusion) -> &[BiasResponse] {
+        let [first_half, whole] = &self.responses;
+        if exclusion == Exclusion::ByWhole { whole } else { first_half }
+    }
+}
+
+impl ChannelExclusion {
+    fn slots(&self, exclusion: Exclusion) -> Vec<u64> {
+        match exclusion {
+            Exclusion::None => Vec::new(),
+            Exclusion::ByFirstHalf => self.by_first_half.clone(),
+            Exclusion::ByWhole => merged([&self.knocks, &self.spikes]),
+        }
+    }
+}
+
+/// The knocks in the inertial channels.
+struct KnocksInChannels {
+    by_whole: PerChannel<Vec<Knock>>,
+    /// By the rules of the first half, in both halves.
+    by_first_half: PerChannel<Vec<Knock>>,
+}
+
+impl KnocksInChannels {
+    fn find(measurement: &Measurement, series: &PerChannel<Series>) -> Self {
+        let (middle, dithered) = (measurement.middle(), measurement.profile.dithered_avar_counts2);
+        let inertial: Vec<ChannelId> = measurement.inertial().collect();
+        let of_all = |part: &dyn Fn(&Series) -> Series| inertial.iter().map(|&of| part(&series[of])).collect();
+        let whole: Vec<Series> = of_all(&Series::clone);
+        let first: Vec<Series> = of_all(&|of| of.before(middle));
+        let second: Vec<Series> = of_all(&|of| of.from(middle));
+        let rules = in_parallel(&first, |first| KnockRule::fit(first, dithered));
+        let parts = in_parallel(&[first, second], |part| knocks::find_by(&rules, part));
+        let nothing = || measurement.ids().map(|_| Vec::new()).collect::<PerChannel<Vec<Knock>>>();
+        let (mut by_whole, mut by_first_half) = (nothing(), nothing());
+        for (at, (&channel, found)) in inertial.iter().zip(knocks::find(&whole, dithered)).enumerate() {
+            by_whole[channel] = found;
+            by_first_half[channel] = parts.iter().flat_map(|part| part[at].clone()).collect();
+        }
+        Self { by_whole, by_first_half }
+    }
+
+    /// The series of a channel without the knocks of the whole record.
+    fn removed_from(&self, series: &Series, channel: ChannelId) -> Series {
+        let knocks = &self.by_whole[channel];
+        if knocks.is_empty() { series.clone() } else { series.clone().without(&slots_within(series, knocks)) }
+    }
+
+    /// The knocks of a channel as they are reported.
+    fn detections(&self, measurement: &Measurement, series: &Series, channel: ChannelId) -> Vec<Detection> {
+        let detection = |knock: &Knock| {
+            let shows = |others: &Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
+            let shown: Vec<&'static str> = self
+                .by_whole
+                .with_ids()
+                .filter(|(_, others)| shows(others))
+                .map(|(of, _)| measurement[of].profile.name)
+                .collect();
+            knock.detection(series, &shown)
+        };
+        self.by_whole[channel].iter().map(detection).collect()
+    }
+}
+
+/// The accelerometers, of which these are the `series`, as what may shake `channel`.
+fn accelerations<'s>(
+    measurement: &Measurement,
+    series: &'s PerChannel<Series>,
+    channel: ChannelId,
+) -> Vec<Acceleration<'s>> {
+    let acceleration = |of: ChannelId| {
+        let profile = &measurement[of].profile;
+        let largest = largest_sensitivity(measurement[channel].profile.range, profile.range);
+        Acceleration { name: profile.name, series: &series[of], largest }
+    };
+    measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
+}
+
+/// A series without sinusoids of a few periods, which the regressions on its block means would take for ramps and steps; the
+/// series itself where there are none, or where a long gap splits it.
+fn without_slow_lines(series: Series) -> Series {
+    let uniform = UniformSeries::from_series(&series);
+    if uniform.values().len() as u64 != series.span.end.saturating_sub(series.span.start) {
+        return series;
+    }
+    let (without, lines) = spectra::without_slow_sines(uniform);
+    if lines.is_empty() {
+        return series;
+    }
+    let value = |slot: &u64| without.values()[(slot - series.span.start) as usize];
+    let values = series.slots.iter().map(value).collect();
+    Series { values, ..series }
+}
+
+/// Sample periods of the samples of a series within knocks, in ascending order.
+fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
+    let is_within = |slot: &u64| knocks.iter().any(|knock| knock.slots.contains(slot));
+    if knocks.is_empty() { Vec::new() } else { series.slots.iter().copied().filter(is_within).collect() }
+}
+
+/// Sample periods within `knocks`, and those of spikes by the rule of the samples before `middle`, in ascending order.
+fn excluded_by_first_half(series: &Series, knocks: &[Knock], middle: u64) -> Vec<u64> {
+    let loud = slots_within(series, knocks);
+    let quiet = series.clone().without(&loud);
+    let (first, second) = (quiet.before(middle), quiet.from(middle));
+    let spikes = SpikeRule::fit(&first).map(|rule| [rule.slots(&first), rule.slots(&second)].concat());
+    merged([&loud, &spikes.unwrap_or_default()])
+}
+
+/// Both lists in ascending order, without duplicates.
+fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
+    let mut all = lists.concat();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Whether the bias of `channel` may depend on `regressor`: on temperature and supply, and that of a gyroscope on the
+/// specific force.
+fn may_depend(measurement: &Measurement, channel: ChannelId, regressor: ChannelId) -> bool {
+    let [channel, regressor] = [channel, regressor].map(|of| measurement[of].profile.quantity);
+    let motion = regressor == Quantity::SpecificForce && channel == Quantity::AngularRate;
+    regressor.is_environment() || motion
+}

@@ -1,0 +1,133 @@
+//! Leaves spikes and repeated samples out of a recording that is read in blocks, by rules that are known beforehand.
+
+use crate::detectors::spikes::{FoundSpikes, SpikeRule};
+use crate::effects::findings::Detection;
+use crate::parallel::in_parallel;
+use crate::samples::interpolation::REACH;
+use crate::samples::series::Series;
+use measurement::{ChannelProfile, MeasuredChannel, SampleBlock};
+use std::ops::Range;
+
+/// Samples that are looked at together: the bias around which a spike stands out is that of their mean.
+const TOGETHER: usize = 1 << 16;
+
+/// Marks spikes and repeated samples.
+pub(crate) struct SampleScreen {
+    /// Of each channel, the rule for its spikes, if any are sought, and what it has found.
+    rules: Vec<Option<SpikeRule>>,
+    found: Vec<FoundSpikes>,
+    leaves_out_repeated: bool,
+    /// Samples that were not passed on, behind a few that were.
+    held: SampleBlock,
+    /// How many of these were.
+    settled: usize,
+}
+
+impl SampleScreen {
+    /// For these channels, each with the rule for its spikes.
+    pub(crate) fn new(channels: &[ChannelProfile], rules: Vec<Option<SpikeRule>>, leaves_out_repeated: bool) -> Self {
+        let empty = |profile: &ChannelProfile| MeasuredChannel::new(*profile, Vec::new());
+        let held = SampleBlock { slots: Vec::new(), channels: channels.iter().map(empty).collect() };
+        let found = channels.iter().map(|_| FoundSpikes::default()).collect();
+        Self { rules, found, leaves_out_repeated, held, settled: 0 }
+    }
+
+    /// Takes the next samples, and passes on those whose neighbours on both sides are known. Spikes and repeated samples are refused
+    /// in these.
+    pub(crate) fn push(&mut self, block: &SampleBlock, mut pass: impl FnMut(&SampleBlock)) {
+        let mut from = 0;
+        while from < block.slots.len() {
+            let to = (from + TOGETHER - self.held.slots.len()).min(block.slots.len());
+            append(&mut self.held, part(block, from..to));
+            from = to;
+            if self.held.slots.len() == TOGETHER {
+                pass(&self.settle(TOGETHER - REACH));
+                let kept = TOGETHER - 2 * REACH;
+                self.held = part(&self.held, kept..TOGETHER);
+                self.settled = REACH;
+            }
+        }
+    }
+
+    /// The samples that are left at the end.
+    pub(crate) fn finish(&mut self) -> SampleBlock {
+        self.settle(self.held.slots.len())
+    }
+
+    /// The spikes of each channel in the first `periods` sample periods of `period_s` s each.
+    pub(crate) fn spikes(&self, periods: u64, period_s: f64) -> impl Iterator<Item = Option<Detection>> {
+        let hours = periods as f64 * period_s / 3600.0;
+        let of_channel = move |((rule, found), channel): ((&Option<SpikeRule>, &FoundSpikes), &MeasuredChannel)| {
+            let rule = rule.as_ref()?;
+            // Where they are no spikes in the whole recording, those of a part of it are none.
+            rule.detection(found, hours, channel.profile.unit)?;
+            rule.detection(&found.before(periods), hours, channel.profile.unit)
+        };
+        self.rules.iter().zip(&self.found).zip(&self.held.channels).map(of_channel)
+    }
+
+    /// The samples up to `end` that were not passed on, with those refused that are spikes or repeated.
+    fn settle(&mut self, end: usize) -> SampleBlock {
+        let mut settled = part(&self.held, self.settled..end);
+        let numbered: Vec<usize> = (0..self.rules.len()).collect();
+        let spikes = in_parallel(&numbered, |&at| {
+            let found = self.rules[at].as_ref()?.find(&series(&self.held, at));
+            Some(found.within(*settled.slots.first()?..settled.slots.last()? + 1))
+        });
+        let is_repeated = |&at: &usize| {
+            let at = at + self.settled;
+            at > 0 && self.held.channels.iter().all(|channel| channel.counts[at] == channel.counts[at - 1])
+        };
+        let all = if self.leaves_out_repeated { settled.slots.len() } else { 0 };
+        let repeated: Vec<usize> = (0..all).filter(is_repeated).collect();
+        for ((channel, found), spikes) in settled.channels.iter_mut().zip(&mut self.found).zip(spikes) {
+            let spikes = spikes.unwrap_or_default();
+            let position = |slot: &u64| settled.slots.binary_search(slot).ok();
+            for (cause, positions) in
+                [("spikes", spikes.slots.iter().filter_map(position).collect()), ("repeated", repeated.clone())]
+            {
+                if !positions.is_empty() {
+                    channel.refused.insert(cause, positions);
+                }
+            }
+            found.extend(spikes);
+        }
+        settled
+    }
+}
+
+/// Some samples of a block.
+fn part(block: &SampleBlock, positions: Range<usize>) -> SampleBlock {
+    let channels = block.channels.iter().map(|channel| channel.part(positions.clone())).collect();
+    SampleBlock { slots: block.slots[positions].to_vec(), channels }
+}
+
+/// Adds the samples that follow.
+fn append(block: &mut SampleBlock, later: SampleBlock) {
+    let offset = block.slots.len();
+    block.slots.extend(later.slots);
+    for (channel, later) in block.channels.iter_mut().zip(later.channels) {
+        channel.counts.extend(later.counts);
+        for (cause, positions) in later.refused {
+            channel.refused.entry(cause).or_default().extend(positions.iter().map(|position| position + offset));
+        }
+    }
+}
+
+/// The samples of a channel in a block.
+fn series(block: &SampleBlock, at: usize) -> Series {
+    let channel = &block.channels[at];
+    let profile = channel.profile;
+    let (slots, values): (Vec<u64>, Vec<f64>) =
+        channel.used_samples(&block.slots).map(|(slot, count)| (slot, f64::from(count) * profile.lsb)).unzip();
+    let span = block.slots.first().copied().unwrap_or(0)..block.slots.last().map_or(0, |last| last + 1);
+    Series {
+        slots: slots.into(),
+        values: values.into(),
+        span,
+        // Spikes are told by the order of samples alone.
+        period_s: 1.0,
+        resolution: profile.lsb,
+        unit: profile.unit,
+    }
+}

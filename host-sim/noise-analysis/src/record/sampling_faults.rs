@@ -1,0 +1,186 @@
+//! Detectors of faults of the sampling: lost samples, repeated samples, and a sample rate other than the nominal one.
+
+use crate::bounds::{BoundedEstimate, MeasuredValue};
+use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
+use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
+use crate::effects::{ClockDeviation, DroppedSamples, RepeatedSamples};
+use measurement::{Measurement, SensorProfile};
+use std::collections::BTreeMap;
+
+/// How many times more often than in independent channels equal neighbours may occur by chance.
+const DEPENDENCE: f64 = 3.0;
+/// A measured rate is compared with the nearest usual rate only if it deviates from it by at most this part.
+const MAX_RATE_DEVIATION: f64 = 0.04;
+/// Round rates at which hosts read: a power of ten times a power of two with these exponents, or a power of two in Hz.
+const DOUBLINGS: std::ops::RangeInclusive<i32> = -3..=3;
+/// The standard deviation of the rate is estimated from the rates of so many segments.
+const SEGMENTS: usize = 8;
+/// Shortest recording, in samples, whose sample rate is compared.
+const MIN_SAMPLES: usize = 100 * SEGMENTS;
+
+/// Lost samples, repeated samples and a wrong sample rate, as far as they are found, in this order.
+#[must_use]
+pub(crate) fn detect(measurement: &Measurement) -> Vec<Detection> {
+    [lost_samples_of(measurement), repeated_samples(measurement), sample_clock(measurement)]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+pub(crate) fn lost_samples_of(measurement: &Measurement) -> Option<Detection> {
+    lost_samples(measurement.len() as u64, &measurement.dropped, measurement.gaps())
+}
+
+/// Samples that never arrived, beside the `used` ones: the sample indices or time stamps have room for them. A single one is
+/// reported, because only a loss leaves such room.
+#[must_use]
+pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gaps: usize) -> Option<Detection> {
+    let missing = dropped.get("gap").copied().unwrap_or(0);
+    if missing == 0 {
+        return None;
+    }
+    let all = (used + dropped.values().sum::<u64>()) as f64;
+    let missing = missing as f64;
+    // The events that are counted are the gaps, each of several samples.
+    let per_gap = missing / (gaps.max(1) as f64);
+    let (low, high) = poisson_bounds(gaps.max(1) as f64);
+    let fraction = |count: f64| (count / all).min(1.0);
+    let lost = DroppedSamples {
+        fraction: BoundedEstimate::new(fraction(missing), fraction(low * per_gap), fraction(high * per_gap)),
+        missing,
+        samples: all,
+        gaps,
+    };
+    Some(Detection { effect: lost.into(), correction: None })
+}
+
+/// Samples that equal the sample before in all channels, if there are more of them than by chance.
+#[must_use]
+pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
+    let channels = &measurement.channels;
+    let mut equal = vec![0u64; channels.len()];
+    let mut positions = Vec::new();
+    for at in 1..measurement.len() {
+        let mut all = true;
+        for (channel, equal) in channels.iter().zip(&mut equal) {
+            let same = channel.counts[at] == channel.counts[at - 1];
+            *equal += u64::from(same);
+            all &= same;
+        }
+        if all {
+            positions.push(measurement.slots[at]);
+        }
+    }
+    let refused = measurement.dropped.get("repeated").copied().unwrap_or(0);
+    let (pairs, seen) = (measurement.len().saturating_sub(1) as f64, positions.len() as f64);
+    let shares: Vec<f64> = equal.iter().map(|&equal| equal as f64 / pairs.max(1.0)).collect();
+    let expected = DEPENDENCE * pairs * shares.iter().product::<f64>();
+    let p_value = poisson_tail(positions.len() as u64 + refused, expected);
+    if p_value > SIGNIFICANCE {
+        return None;
+    }
+    let count = pairs * repeated_fraction(seen / pairs.max(1.0), &shares) + refused as f64;
+    let (low, high) = poisson_bounds(count);
+    let all = pairs + 1.0 + refused as f64;
+    let repeated = RepeatedSamples {
+        fraction: BoundedEstimate::new(count / all, low / all, high / all),
+        equal: positions.len() as u64 + refused,
+        samples: all,
+        by_chance: expected,
+        channels: channels.len(),
+    };
+    Some(Detection { effect: repeated.into(), correction: Some(Correction::Exclude(positions)) })
+}
+
+/// The fraction f of the samples that are repeated, where the fraction `all` of them equals the one before in all channels
+/// and the fractions `shares` in each: the solution of `all = f + (1 − f)·Π (share − f)/(1 − f)`.
+fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
+    let (mut low, mut high) = (0.0, all);
+    for _ in 0..50 {
+        let repeated = 0.5 * (low + high);
+        let by_chance: f64 = shares.iter().map(|share| ((share - repeated) / (1.0 - repeated)).max(0.0)).product();
+        if repeated + (1.0 - repeated) * by_chance < all { low = repeated } else { high = repeated }
+    }
+    0.5 * (low + high)
+}
+
+/// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
+/// can be set to or that hosts usually read at.
+#[must_use]
+pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
+    let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
+    let nominal = measurement.stated_rate_hz.unwrap_or_else(|| nearest_usual_rate(&measurement.profile, measured));
+    let off = measured / nominal - 1.0;
+    let z = off.abs() * measured / error;
+    let p_value = 2.0 * upper_tail(z);
+    let unusual = measurement.stated_rate_hz.is_none() && off.abs() > MAX_RATE_DEVIATION;
+    if unusual || p_value > SIGNIFICANCE {
+        return None;
+    }
+    let half = NORMAL_975 * error;
+    let clock = ClockDeviation {
+        rate_hz: BoundedEstimate::new(measured, measured - half, measured + half),
+        nominal_hz: nominal,
+        sigmas: z,
+    };
+    Some(Detection { effect: clock.into(), correction: None })
+}
+
+/// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
+/// [`SensorProfile::host_clock_error`]. `None` without time stamps or with fewer than [`MIN_SAMPLES`].
+#[must_use]
+pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
+    let times = measurement.times_s.as_ref()?;
+    let slots: Vec<f64> = measurement.slots.iter().map(|&slot| slot as f64).collect();
+    if slots.len() < MIN_SAMPLES {
+        return None;
+    }
+    let rates: Option<Vec<f64>> = (0..SEGMENTS)
+        .map(|segment| {
+            let range = slots.len() * segment / SEGMENTS..slots.len() * (segment + 1) / SEGMENTS;
+            rate(&slots[range.clone()], &times[range])
+        })
+        .collect();
+    let rates = rates?;
+    let measured = rate(&slots, times)?;
+    let mean = rates.iter().sum::<f64>() / SEGMENTS as f64;
+    let scatter = rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>() / (SEGMENTS * (SEGMENTS - 1)) as f64;
+    let host = measurement.profile.host_clock_error;
+    let error = (scatter / (measured * measured) + host * host).sqrt();
+    Some(MeasuredValue { value: measured, error: error * measured })
+}
+
+/// The nearest rate, in Hz, that the sensor can be set to or that is round.
+fn nearest_usual_rate(profile: &SensorProfile, measured: f64) -> f64 {
+    let native = profile.nearest_native_rate_hz(measured);
+    let decade = |power: i32| DOUBLINGS.map(move |doublings| 10f64.powi(power) * 2f64.powi(doublings));
+    let round = (-1..=3).flat_map(decade).chain((0..=10).map(|power| 2f64.powi(power)));
+    let distance = |rate: &f64| (rate / measured - 1.0).abs();
+    native.into_iter().chain(round).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(measured)
+}
+
+/// Sample rate in Hz: one over the slope of the least-squares line of the time stamps over the sample periods.
+fn rate(slots: &[f64], times: &[f64]) -> Option<f64> {
+    let count = slots.len() as f64;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
+    let (mean_slot, mean_time) = (mean(slots), mean(times));
+    let (squares, products) = slots.iter().zip(times).fold((0.0, 0.0), |(squares, products), (slot, time)| {
+        (squares + (slot - mean_slot).powi(2), products + (slot - mean_slot) * (time - mean_time))
+    });
+    let rate = squares / products;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest_usual_rate;
+
+    /// The ADIS16405 samples at 1638.4 Hz over whole numbers from 2 on, and at 52.85 Hz over whole numbers (data sheet).
+    #[test]
+    fn the_nearest_usual_rate_is_one_of_the_sensor_or_a_round_one() {
+        for (measured, usual) in [(816.43, 819.2), (204.1, 204.8), (100.02, 100.0), (101.9, 102.4), (199.5, 200.0)] {
+            let nearest = nearest_usual_rate(&measurement::adis16405::profile(0.05), measured);
+            assert!((nearest / usual - 1.0).abs() < 1e-4, "{measured}: {nearest}");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! One finding a cause: merges what the channels show of one cause, and says how much of each channel it explains and whether
+//! the second half of the record agrees with the first.
+//!
+//! ```text
+//! effects of every channel ─► periodic (lines and their harmonics) ─► Cause ─► shares
+//! effects of the first half alone ──────────────────────────────────────────┴► validation
+//! ```
+
+mod cause;
+mod harmonic_series;
+mod line;
+mod periodic;
+mod shares;
+mod validation;
+mod waveform;
+
+#[cfg(test)]
+mod tests;
+
+use crate::effects::findings::{ChannelEffect, Finding, Validation};
+use crate::effects::{CommonMode, Effect};
+use crate::report::ChannelReport;
+use cause::{Cause, Shown};
+use measurement::SensorProfile;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Frequency of a line, in units of `1/(2πT)` of a common-mode drift with the time constant T, at which the drift has a tenth of
+/// its density at low frequencies: 1/(1 + 3²).
+const WITHIN_COMMON_MODE: f64 = 3.0;
+
+/// The causes of the `effects` of all channels. Each channel is given the effects by which it reports a cause, which refer to the
+/// finding; `first_half` are the effects of the same channels from the first half alone.
+pub(crate) fn find(
+    channels: &mut [ChannelReport],
+    effects: &[Vec<Effect>],
+    first_half: &[Vec<Effect>],
+    profile: &SensorProfile,
+    duration_s: f64,
+) -> Vec<Finding> {
+    let causes = merged(&with_units(channels, effects), duration_s);
+    let half = merged(&with_units(channels, first_half), 0.5 * duration_s);
+    let findings: Vec<Finding> = causes.iter().map(|cause| finding(cause, channels, &half, profile)).collect();
+    let mut reported: Vec<Vec<ChannelEffect>> = vec![Vec::new(); channels.len()];
+    for (finding, cause) in causes.into_iter().enumerate() {
+        for Shown { channel, effect, .. } in cause.shown {
+            reported[channel].push(ChannelEffect { effect, finding });
+        }
+    }
+    for (channel, effects) in channels.iter_mut().zip(reported) {
+        channel.effects = effects;
+    }
+    findings
+}
+
+fn with_units<'e>(channels: &'e [ChannelReport], effects: &'e [Vec<Effect>]) -> Vec<(&'e str, &'e [Effect])> {
+    channels.iter().map(|channel| channel.unit.as_str()).zip(effects.iter().map(Vec::as_slice)).collect()
+}
+
+/// The causes of the effects of all channels, each with its unit, in the order in which the channels first show them.
+fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
+    let mut causes = periodic::causes(channels, duration_s);
+    let periodic = causes.len();
+    for (channel, (unit, effects)) in channels.iter().enumerate() {
+        for effect in effects.iter().filter(|effect| !effect.is_line()) {
+            if is_common_line(effect, channel, &causes[..periodic]) {
+                continue;
+            }
+            let is_same = |cause: &&mut Cause| {
+                let known = &cause.shown[0];
+                let is_known_here = cause.shown.iter().any(|shown| shown.channel == channel);
+                // Bands of one channel are two of them.
+                let is_other_band = is_known_here && matches!(effect, Effect::Unexplained(_));
+                !is_other_band && known.effect.is_one_cause(effect, channels[known.channel].0 == *unit)
+            };
+            let shown = Shown { channel, effect: effect.clone(), parts: vec![effect.clone()] };
+            match causes.iter_mut().find(is_same) {
+                Some(cause) => cause.shown.push(shown),
+                None => causes.push(Cause { shown: vec![shown] }),
+            }
+        }
+    }
+    // What is left in one channel of a drift that others showed as a line is that line's.
+    causes.retain(|cause| cause.shown.len() > 1 || !matches!(cause.shown[0].effect, Effect::CommonMode(_)));
+    causes.sort_by_key(|cause| cause.shown[0].channel);
+    causes
+}
+
+/// Whether a common-mode drift of a channel is a line that the channel has in common with others, in its band.
+fn is_common_line(effect: &Effect, channel: usize, periodic: &[Cause]) -> bool {
+    let Effect::CommonMode(CommonMode { time_constant_s, .. }) = effect else { return false };
+    let is_in_band = |shown: &Shown| {
+        let frequency_hz = shown.effect.frequency_hz();
+        shown.channel == channel
+            && frequency_hz.is_some_and(|of| TAU * of.value * time_constant_s.value < WITHIN_COMMON_MODE)
+    };
+    periodic.iter().any(|cause| cause.shown.len() > 1 && cause.shown.iter().any(is_in_band))
+}
+
+/// A cause as it is reported.
+fn finding(cause: &Cause, channels: &[ChannelReport], half: &[Cause], profile: &SensorProfile) -> Finding {
+    let clearest = cause.clearest();
+    let name = |shown: &Shown| channels[shown.channel].name.clone();
+    let share = |shown: &Shown| Some((name(shown), shares::percent(shown, channels, profile)?));
+    Finding {
+        effect: cause.shown[clearest].effect.clone(),
+        channels: cause.shown.iter().map(name).collect(),
+        clearest,
+        validated: validate(cause, half),
+        share_percent: cause.shown.iter().filter_map(share).collect::<BTreeMap<_, _>>(),
+    }
+}
+
+/// Compares what the whole record shows of a cause with what the first half alone shows.
+fn validate(cause: &Cause, half: &[Cause]) -> Validation {
+    let in_half = |shown: &Shown| {
+        let of_channel = half.iter().flat_map(|cause| &cause.shown).filter(|other| other.channel == shown.channel);
+        of_channel.map(|other| &other.effect).filter(|other| validation::is_same(&shown.effect, other)).min_by(
+            |a, b| {
+                let distance = |of: &Effect| validation::distance(&shown.effect, of);
+                distance(a).total_cmp(&distance(b))
+            },
+        )
+    };
+    let pairs: Vec<(&Effect, &Effect)> =
+        cause.shown.iter().filter_map(|shown| Some((&shown.effect, in_half(shown)?))).collect();
+    validation::compare(&pairs)
+}

@@ -1,0 +1,212 @@
+//! Motion of the platform, and the stretches of a recording in which it was at rest.
+//!
+//! Over a second noise is averaged, and the bias of a channel at rest moves by less than the biases of two parts differ. A
+//! channel whose means of a second leave their median by three times that is moved: an accelerometer of 50 mg (1 σ over
+//! parts) by a turn of 9° or more, a gyroscope of 3 deg/s by 9 deg/s.
+//!
+//! Drift of a bias may go as far, given time. A turn of the platform changes the specific force along two axes at least, and begins and
+//! ends at some time. So a motion is in two channels of one quantity in the same seconds, or it is sudden: faster than a Gaussian process
+//! with the changes of the rest of the record. A jump to and fro in one channel alone is that of random telegraph noise where that is
+//! found.
+
+use crate::bounds::BoundedEstimate;
+use crate::distributions::quantile;
+use crate::effects::MotionInterval;
+use crate::effects::findings::SIGNIFICANCE;
+use crate::report::Stretch;
+use crate::samples::series::Series;
+use measurement::{ChannelId, ChannelProfile, PerChannel, Quantity};
+use std::ops::Range;
+
+/// Length of a mean, s.
+const BLOCK_S: f64 = 1.0;
+/// Distance from the median from which a channel is moved, in initial bias errors.
+const BIAS_ERRORS: f64 = 3.0;
+/// Means on either side of one that is moved that belong to the motion: its beginning and its end.
+const AROUND: usize = 2;
+/// Seconds within which a sudden motion begins.
+const BEGINS_WITHIN: usize = AROUND + 1;
+/// Median of the absolute value of a standard normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_75;
+
+/// The motion of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PlatformMotion {
+    quantity: Quantity,
+    /// Numbers of the seconds in which the channel is moved, in ascending order.
+    seconds: Vec<Range<usize>>,
+    /// Whether the channel changes faster than a Gaussian process would.
+    is_sudden: bool,
+    /// As reported.
+    pub effect: MotionInterval,
+}
+
+/// The motion that a channel shows, if any.
+pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<PlatformMotion> {
+    let limit = BIAS_ERRORS * channel.initial_bias_error?;
+    let width = (BLOCK_S / series.period_s).round().max(1.0) as u64;
+    let mut sums: Vec<(f64, u64)> = Vec::new();
+    for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
+        let number = (slot / width) as usize;
+        if sums.len() <= number {
+            sums.resize(number + 1, (0.0, 0));
+        }
+        sums[number].0 += value;
+        sums[number].1 += 1;
+    }
+    let means: Vec<Option<f64>> = sums.iter().map(|(sum, count)| (*count > 0).then(|| sum / *count as f64)).collect();
+    let mut sorted: Vec<f64> = means.iter().copied().flatten().collect();
+    sorted.sort_by(f64::total_cmp);
+    let median = *sorted.get(sorted.len() / 2)?;
+    let mut seconds: Vec<Range<usize>> = Vec::new();
+    let mut largest = 0.0_f64;
+    for (number, mean) in means.iter().enumerate() {
+        let Some(distance) = mean.map(|mean| mean - median).filter(|distance| distance.abs() > limit) else { continue };
+        if distance.abs() > largest.abs() {
+            largest = distance;
+        }
+        let moved = number.saturating_sub(AROUND)..(number + AROUND + 1).min(means.len());
+        match seconds.last_mut() {
+            Some(last) if last.end >= moved.start => last.end = moved.end,
+            _ => seconds.push(moved),
+        }
+    }
+    let (from, to) = (seconds.first()?.start as f64 * BLOCK_S, seconds.last()?.end as f64 * BLOCK_S);
+    let moved: usize = seconds.iter().map(Range::len).sum();
+    let exact = |value: f64, error: f64| BoundedEstimate::new(value, value - error, value + error);
+    let effect = MotionInterval {
+        from_s: exact(from, BLOCK_S),
+        to_s: exact(to, BLOCK_S),
+        size: exact(largest, channel.initial_bias_error?).in_unit(channel.unit),
+        bias_error: limit / BIAS_ERRORS,
+        stretches: seconds.len(),
+        moved_s: moved,
+    };
+    Some(PlatformMotion { quantity: channel.quantity, seconds, is_sudden: is_sudden(&means), effect })
+}
+
+/// Whether one of the changes within three seconds is larger than chance has one in a Gaussian process of their median size.
+fn is_sudden(means: &[Option<f64>]) -> bool {
+    let pairs = means.iter().zip(means.iter().skip(BEGINS_WITHIN));
+    let mut changes: Vec<f64> =
+        pairs.filter_map(|(before, after)| Some((after.as_ref()? - before.as_ref()?).abs())).collect();
+    changes.sort_by(f64::total_cmp);
+    let (Some(median), Some(largest)) = (changes.get(changes.len() / 2), changes.last()) else { return false };
+    *largest > quantile(0.5 * SIGNIFICANCE / changes.len() as f64) * median / NORMAL_MEDIAN
+}
+
+/// Those of the `motions` of all channels that are of the platform. `distance_of_levels` is that of the levels of the random telegraph
+/// noise of a channel.
+pub(crate) fn of_platform(
+    motions: PerChannel<Option<PlatformMotion>>,
+    distance_of_levels: impl Fn(ChannelId) -> Option<f64>,
+) -> PerChannel<Option<PlatformMotion>> {
+    let is_of_platform = |(channel, motion): (ChannelId, &PlatformMotion)| {
+        let others = motions.with_ids().filter(|(other, _)| *other != channel).filter_map(|(_, other)| other.as_ref());
+        let is_shared = others.filter(|other| other.quantity == motion.quantity).any(|other| motion.overlaps(other));
+        let is_telegraph = || {
+            let size = motion.effect.size;
+            distance_of_levels(channel).is_some_and(|distance| size.low.abs().min(size.high.abs()) < distance)
+        };
+        is_shared || (motion.is_sudden && !is_telegraph())
+    };
+    let kept = |(channel, motion): (ChannelId, &Option<PlatformMotion>)| {
+        motion.as_ref().filter(|motion| is_of_platform((channel, motion))).cloned()
+    };
+    motions.with_ids().map(kept).collect()
+}
+
+impl PlatformMotion {
+    /// Whether both channels are moved in the same seconds.
+    fn overlaps(&self, other: &Self) -> bool {
+        let is_in = |range: &Range<usize>| other.seconds.iter().any(|of| of.start < range.end && range.start < of.end);
+        self.seconds.iter().any(is_in)
+    }
+}
+
+/// The stretches of a recording of `duration_s` seconds in which no channel was moved.
+pub(crate) fn at_rest<'a>(motions: impl Iterator<Item = &'a PlatformMotion>, duration_s: f64) -> Vec<Stretch> {
+    let mut moved: Vec<&Range<usize>> = motions.flat_map(|motion| &motion.seconds).collect();
+    moved.sort_by_key(|range| range.start);
+    let mut stretches = Vec::new();
+    let mut from_s = 0.0;
+    for range in moved {
+        let start = range.start as f64 * BLOCK_S;
+        if start > from_s {
+            stretches.push(Stretch { from_s, to_s: start });
+        }
+        from_s = f64::max(from_s, range.end as f64 * BLOCK_S);
+    }
+    if from_s < duration_s {
+        stretches.push(Stretch { from_s, to_s: duration_s });
+    }
+    stretches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{at_rest, find, of_platform};
+    use crate::report::Stretch;
+    use crate::samples::series::Series;
+    use measurement::PerChannel;
+    use measurement::adis16405::profile;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// An accelerometer at 10 Hz that is turned by `size` g from 40.0 s to 50.0 s.
+    fn series(size: f64) -> Series {
+        accelerometer(1000, |slot| if (400..500).contains(&slot) { 1.0 + size } else { 1.0 })
+    }
+
+    fn accelerometer(samples: u64, value: impl FnMut(u64) -> f64) -> Series {
+        let slots = 0..samples;
+        Series {
+            values: slots.clone().map(value).collect(),
+            span: slots.clone(),
+            slots: slots.collect(),
+            period_s: 0.1,
+            resolution: 3.33e-3,
+            unit: "g",
+        }
+    }
+
+    #[test]
+    fn a_drift_that_goes_far_in_one_channel_is_no_motion() {
+        let profile = profile(0.05);
+        let x = profile.channel("accl_x").unwrap();
+        for seed in 0..10 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            // A process of deviation 0.1 g with a time constant of 10 s over 1000 s leaves its median by 0.15 g many times.
+            let kept = (-0.1f64 / 10.0).exp();
+            let mut state = 0.0;
+            let drift = accelerometer(10_000, |_| {
+                state = kept * state + 0.1 * (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+                state
+            });
+            let found = find(&drift, &x).expect("goes far");
+            let alone = of_platform(PerChannel::from(vec![Some(found.clone()), None]), |_| None);
+            assert_eq!(alone, PerChannel::from(vec![None, None]), "{seed}");
+            let both = PerChannel::from(vec![Some(found.clone()), Some(found)]);
+            assert_eq!(of_platform(both.clone(), |_| None), both, "{seed}");
+        }
+        // A turn begins at once, and is one unless the channel jumps as far again and again.
+        let turn = PerChannel::from(vec![Some(find(&series(-0.7), &x).unwrap())]);
+        assert_eq!(of_platform(turn.clone(), |_| None), turn);
+        assert_eq!(of_platform(turn.clone(), |_| Some(0.3)), turn);
+        assert_eq!(of_platform(turn, |_| Some(0.7)), PerChannel::from(vec![None]));
+    }
+
+    #[test]
+    fn a_swing_is_a_motion_and_the_rest_is_at_rest() {
+        let channel = profile(0.05).channel("accl_x").unwrap();
+        // The data sheet: ±50 mg of initial bias error, 1 σ.
+        assert_eq!(find(&series(0.14), &channel), None);
+        let motion = find(&series(-0.7), &channel).unwrap();
+        assert!((motion.effect.size.value + 0.7).abs() < 1e-12);
+        assert_eq!((motion.effect.from_s.value, motion.effect.to_s.value), (38.0, 52.0), "two seconds around");
+        let rest = [Stretch { from_s: 0.0, to_s: 38.0 }, Stretch { from_s: 52.0, to_s: 100.0 }];
+        assert_eq!(at_rest([&motion].into_iter(), 100.0), rest);
+        assert_eq!(at_rest([].into_iter(), 100.0), [Stretch { from_s: 0.0, to_s: 100.0 }]);
+    }
+}

@@ -1,0 +1,49 @@
+//! Slow drift that several channels have in common.
+
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
+use crate::spectra::MarkovEstimate;
+use crate::spectra::common_mode::CrossSpectra;
+use measurement::ChannelId;
+
+/// Smallest gain in ln likelihood of a common-mode drift. Three channels can share a drift in 10 ways, each with a few
+/// distinct correlation times; a gain of 9 in one of them leaves a probability of about 1 in 500 by chance.
+const MIN_GAIN: f64 = 9.0;
+
+/// Drift that several channels of one quantity have in common, without a measured cause.
+pub(crate) struct ChannelsInCommon {
+    pub channels: Vec<ChannelId>,
+    /// Names of the channels.
+    pub names: Vec<&'static str>,
+    /// Increase of the ln likelihood of the spectra.
+    pub gain: f64,
+    pub drift: MarkovEstimate,
+}
+
+/// The drift that `channels` of one quantity, each with its name, have in common; `samples` are those of each less its covariates. All have a filter with
+/// an impulse response of `filter_length_s`, or none.
+pub(crate) fn common_mode(
+    channels: &[(ChannelId, &'static str)],
+    samples: &[UniformSeries],
+    filter_length_s: f64,
+) -> Option<ChannelsInCommon> {
+    let transforms = CrossSpectra::new(samples, filter_length_s)?;
+    let (members, gain) = transforms.most_likely_set().filter(|(_, gain)| *gain > MIN_GAIN)?;
+    let drift = transforms.fit_markov(&members)?;
+    let (channels, names) = members.iter().map(|&member| channels[member]).unzip();
+    Some(ChannelsInCommon { channels, names, gain, drift })
+}
+
+/// Whether the means of the first and of the last tenth of a series are at least half as far apart as a ramp of `slope`, in its
+/// unit per s, would take them. To the longest octaves of a curve a slow oscillation looks like a ramp, which would go much
+/// farther.
+pub(crate) fn goes_as_far_as_ramp(series: &Series, slope: f64) -> bool {
+    let tenth = series.values.len() / 10;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (Some(first), Some(last)) = (series.values.get(..tenth), series.values.get(series.values.len() - tenth..))
+    else {
+        return false;
+    };
+    let expected = slope * 0.9 * series.duration_s();
+    (mean(last) - mean(first)).abs() >= 0.5 * expected
+}

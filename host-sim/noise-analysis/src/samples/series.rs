@@ -1,0 +1,167 @@
+//! The samples of one channel on the recording's time base.
+
+use crate::effects::findings::Correction;
+use measurement::{ChannelId, MeasuredChannel, Measurement};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The samples of one channel, each with the sample period in which it was taken. A copy shares them until it is changed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Sample period of each sample, counted from the first; strictly increasing. A step of more than 1 is a gap.
+    pub slots: Arc<[u64]>,
+    /// One value for each slot, in [`unit`](Self::unit).
+    pub values: Arc<[f64]>,
+    /// Sample periods of the record, or of the part of it, that the series is from: those of `slots` and of samples that are
+    /// missing. Series of channels that were recorded together have the same span.
+    pub span: Range<u64>,
+    /// Sample period, s.
+    pub period_s: f64,
+    /// Smallest distance of two values, in [`unit`](Self::unit): one count, unless the values are known to be coarser.
+    pub resolution: f64,
+    /// Unit of the values.
+    pub unit: &'static str,
+}
+
+impl Series {
+    /// The samples of `channel` that were not refused.
+    #[must_use]
+    pub fn from_measurement(measurement: &Measurement, channel: ChannelId) -> Self {
+        Self::with_shared_slots(measurement, channel, || measurement.slots.as_slice().into())
+    }
+
+    /// The same; `slots` gives the sample periods of all samples, which the series shares if none of the channel was refused.
+    pub(crate) fn with_shared_slots(
+        measurement: &Measurement,
+        channel: ChannelId,
+        slots: impl FnOnce() -> Arc<[u64]>,
+    ) -> Self {
+        let MeasuredChannel { profile, counts, .. } = &measurement[channel];
+        let refused = measurement[channel].refused_positions();
+        let value = |count: &i32| f64::from(*count) * profile.lsb;
+        let (slots, values) = if refused.is_empty() {
+            (slots(), counts.iter().map(value).collect())
+        } else {
+            let used: Vec<usize> =
+                (0..counts.len()).filter(|position| refused.binary_search(position).is_err()).collect();
+            let slots = used.iter().map(|&position| measurement.slots[position]).collect();
+            (slots, used.iter().map(|&position| value(&counts[position])).collect())
+        };
+        Self {
+            slots,
+            values,
+            span: 0..measurement.periods(),
+            period_s: measurement.period_s(),
+            resolution: profile.lsb,
+            unit: profile.unit,
+        }
+    }
+
+    /// The same values, known to be multiples of `counts` counts.
+    #[must_use]
+    pub fn with_counts_per_step(self, counts: u32) -> Self {
+        Self { resolution: self.resolution * f64::from(counts), ..self }
+    }
+
+    /// The values, to change them; a copy no longer shares them.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        Arc::make_mut(&mut self.values)
+    }
+
+    /// Time from the start of the record to the last sample, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.slots.last().map_or(0.0, |&slot| slot as f64 * self.period_s)
+    }
+
+    /// The samples before the sample period `slot`.
+    #[must_use]
+    pub fn before(&self, slot: u64) -> Self {
+        let count = self.slots.partition_point(|&of| of < slot);
+        Self {
+            slots: self.slots[..count].into(),
+            values: self.values[..count].into(),
+            span: self.span.start..slot.min(self.span.end),
+            ..*self
+        }
+    }
+
+    /// The samples from the sample period `slot` on.
+    #[must_use]
+    pub fn from(&self, slot: u64) -> Self {
+        let count = self.slots.partition_point(|&of| of < slot);
+        Self {
+            slots: self.slots[count..].into(),
+            values: self.values[count..].into(),
+            span: slot.max(self.span.start)..self.span.end,
+            ..*self
+        }
+    }
+
+    /// The samples of the sample periods for which `is_kept` holds, which is asked for each in ascending order.
+    #[must_use]
+    pub fn filtered(mut self, mut is_kept: impl FnMut(u64) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.slots.len()).filter(|&position| is_kept(self.slots[position])).collect();
+        if kept.len() < self.slots.len() {
+            self.slots = kept.iter().map(|&position| self.slots[position]).collect();
+            self.values = kept.iter().map(|&position| self.values[position]).collect();
+        }
+        self
+    }
+
+    /// The samples without those of the sample periods `slots`, which are in ascending order.
+    #[must_use]
+    pub fn without(self, slots: &[u64]) -> Self {
+        let mut has = membership(slots);
+        if slots.is_empty() { self } else { self.filtered(|slot| !has(slot)) }
+    }
+
+    /// The samples of the sample periods in which each of `others` has one too.
+    #[must_use]
+    pub fn in_common(self, others: &[&Series]) -> Self {
+        let mut others: Vec<_> = others.iter().map(|other| membership(&other.slots)).collect();
+        self.filtered(|slot| others.iter_mut().all(|has| has(slot)))
+    }
+
+    /// Number of sample periods in which both have a sample.
+    #[must_use]
+    pub fn count_common(&self, other: &Series) -> usize {
+        let mut has = membership(&other.slots);
+        self.slots.iter().filter(|slot| has(**slot)).count()
+    }
+
+    /// The samples from the sample period `slot` on less `offset`.
+    #[must_use]
+    pub fn lowered_from(mut self, slot: u64, offset: f64) -> Self {
+        let from = self.slots.partition_point(|&of| of < slot);
+        self.values_mut()[from..].iter_mut().for_each(|value| *value -= offset);
+        self
+    }
+
+    /// The series without the effect that `correction` removes.
+    #[must_use]
+    pub fn corrected(self, correction: &Correction) -> Self {
+        match correction {
+            Correction::Exclude(slots) => self.without(slots),
+            &Correction::Offset { from, size } => self.lowered_from(from, size),
+        }
+    }
+
+    /// Whether the samples from `first` to `last` follow each other without a gap.
+    pub fn is_gapless(&self, first: usize, last: usize) -> bool {
+        self.slots[last] - self.slots[first] == (last - first) as u64
+    }
+}
+
+/// Whether each of some sample periods is among `slots`; both are in ascending order.
+fn membership(slots: &[u64]) -> impl FnMut(u64) -> bool {
+    let mut rest = slots;
+    move |slot| {
+        while let [first, later @ ..] = rest
+            && *first < slot
+        {
+            rest = later;
+        }
+        rest.first() == Some(&slot)
+    }
+}

@@ -1,0 +1,102 @@
+//! Curves of a channel whose samples come in blocks and are not kept: of the whole record, and of parts that follow each other in
+//! time.
+
+use crate::samples::gapped_cascade::GappedCascade;
+use crate::{OCTAVES, OVERLAP};
+use allan_core::Cascade;
+use measurement::MeasuredChannel;
+use std::collections::BTreeMap;
+
+/// The estimators take integers: a count is divided into so many steps, because a bias step that preprocessing subtracts is
+/// not a whole number of counts.
+pub(crate) const STEPS_PER_COUNT: f64 = 16.0;
+
+/// The estimators of one channel.
+#[derive(Clone)]
+pub(crate) struct StreamedCurves {
+    whole: GappedCascade,
+    /// In steps of a count, as those of a recording in memory.
+    parts: Vec<GappedCascade>,
+    /// First sample period of each part but the first.
+    boundaries: Vec<u64>,
+    /// Sample period of the last sample.
+    last: Option<u64>,
+    /// Samples that are refused in this channel alone, by cause.
+    pub refused: BTreeMap<&'static str, u64>,
+}
+
+/// The estimator of parts that follow each other, with a gap between them.
+pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = &'a Cascade<OCTAVES, OVERLAP>>) -> Cascade<OCTAVES, OVERLAP> {
+    let mut parts = parts.into_iter();
+    let mut joined = parts.next().cloned().unwrap_or_default();
+    parts.for_each(|later| joined.merge(later));
+    joined
+}
+
+impl StreamedCurves {
+    /// Without samples; `boundaries` are the first sample periods of each part but the first, in ascending order.
+    pub(crate) fn new(boundaries: &[u64]) -> Self {
+        Self {
+            whole: GappedCascade::default(),
+            parts: vec![GappedCascade::default(); boundaries.len() + 1],
+            boundaries: boundaries.to_vec(),
+            last: None,
+            refused: BTreeMap::new(),
+        }
+    }
+
+    /// The estimator of the whole record, in counts.
+    pub(crate) fn whole(&self) -> &Cascade<OCTAVES, OVERLAP> {
+        self.whole.cascade()
+    }
+
+    /// The first sample period of each part and its estimator, in steps of a count ([`STEPS_PER_COUNT`]).
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (u64, &Cascade<OCTAVES, OVERLAP>)> {
+        let starts = std::iter::once(0).chain(self.boundaries.iter().copied());
+        starts.zip(self.parts.iter().map(GappedCascade::cascade))
+    }
+
+    /// The estimator of the part of this number, in steps of a count.
+    pub(crate) fn part(&self, number: usize) -> GappedCascade {
+        self.parts.get(number).cloned().unwrap_or_default()
+    }
+
+    /// Takes the next samples of the channel, which were taken in the sample periods `slots`.
+    pub(crate) fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
+        for (&cause, positions) in &channel.refused {
+            *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
+        }
+        let steps: Vec<i32> = channel.counts.iter().map(|count| count.saturating_mul(STEPS_PER_COUNT as i32)).collect();
+        let mut refused = channel.refused_positions().into_iter().peekable();
+        let mut first = 0;
+        while first < slots.len() {
+            let slot = slots[first];
+            let part = self.boundaries.partition_point(|&from| from <= slot);
+            let part_from = part.checked_sub(1).map_or(0, |before| self.boundaries[before]);
+            let part_end =
+                self.boundaries.get(part).map_or(slots.len(), |&to| slots.partition_point(|&slot| slot < to));
+            // The samples from `first` on that follow each other in one part and are used; the one behind them may be refused.
+            let refused_at = refused.peek().copied().unwrap_or(usize::MAX).min(part_end);
+            let follows = |&at: &usize| slots[at] - slots[at - 1] == 1;
+            let end = (first + 1..refused_at).take_while(follows).last().map_or(first, |last| last) + 1;
+            let missing = self.last.map_or(0, |last| slot - last - 1);
+            let of_part = &mut self.parts[part];
+            if missing > 0 {
+                self.whole.miss(missing);
+                // Of a gap over a boundary, each part has the samples on its side.
+                of_part.miss(missing.min(slot - part_from));
+            }
+            if refused.next_if_eq(&first).is_some() {
+                self.whole.miss(1);
+                of_part.miss(1);
+                self.last = Some(slot);
+                first += 1;
+                continue;
+            }
+            self.whole.push(&channel.counts[first..end]);
+            of_part.push(&steps[first..end]);
+            self.last = Some(slots[end - 1]);
+            first = end;
+        }
+    }
+}

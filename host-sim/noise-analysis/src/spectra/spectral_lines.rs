@@ -1,0 +1,318 @@
+//! The lines in the spectrum of a channel, and the terms of a noise model that they are.
+//!
+//! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
+
+use crate::bounds::MeasuredValue;
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
+use crate::spectra;
+use allan_core::Model;
+use allan_core::confidence::NORMAL_975;
+use allan_core::model::FittedTerm;
+use allan_core::term::{NoiseTerm, Resonance, Shape, Sinusoid};
+use std::f64::consts::{PI, SQRT_2};
+
+/// Peaks closer than this part of their frequency are one line if either has a width.
+const MERGE_DISTANCE: f64 = 0.03;
+/// Peaks closer than so many of their widths are one line.
+const MERGE_WIDTHS: f64 = 3.0;
+/// Peaks closer than so many resolutions are one line: a sinusoid and the side lobes of its taper.
+const MERGE_RESOLUTIONS: f64 = 8.0;
+/// Distance from a line beyond which a peak is none of the side lobes of its taper, in resolutions, and by how much two peaks at
+/// equal distances from a line may differ in their distances.
+const LOBE_RESOLUTIONS: f64 = 2.5;
+const SIDEBAND_TOLERANCE: f64 = 0.5;
+/// By which part, and by how many standard deviations, equal peaks differ at most: peaks a few resolutions from a line change
+/// with the part of it that was left.
+const SIDEBAND_RATIO: f64 = 0.25;
+const SIDEBAND_SIGMAS: f64 = 3.0;
+/// A peak at a lower frequency than so many of its widths is no line but a Markov process.
+const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
+/// Lower bound of the model's other noise, as a fraction of that of its Markov processes: in the nulls of a filter rounding noise remains.
+const MIN_NOISE: f64 = 1e-6;
+/// A line wider than this part of its frequency may be an error of the form of the background.
+const BROAD: f64 = 0.1;
+/// A line whose bandwidth times the length of the record is below this is treated as a sinusoid.
+const MIN_PHASE_CHANGES: f64 = 30.0;
+/// Least bandwidth of a resonance of few phase changes in the record, in units of its frequency: that of a damping ratio of half a
+/// percent. The speed of the motor in the measured recordings wanders by a third of that.
+const NARROWEST_BAND: f64 = 0.01;
+/// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
+pub(crate) const FEW_PERIODS: f64 = 8.0;
+/// Full width at half maximum of a normal curve, in standard deviations.
+const FULL_WIDTH: f64 = 2.35;
+/// One line of a spectrum, merged from one or several peaks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MergedLine {
+    /// Mean weighted by power, Hz.
+    pub frequency: MeasuredValue,
+    /// Standard deviation of the line's signal, in the channel's unit.
+    pub deviation: MeasuredValue,
+    /// Full width at half maximum, Hz; of a line that the record does not resolve 0, or the scatter of its peaks.
+    pub width: MeasuredValue,
+    /// −2 log-likelihood ratio of the strongest peak.
+    pub statistic: f64,
+    /// Probability that a record without lines shows the strongest peak at any frequency.
+    pub p_value: f64,
+    /// Probability that the strongest peak, were it a resonance, would deviate as far from the spectrum of one.
+    pub shape_p_value: f64,
+    /// How the amplitude or the phase of the strongest peak changes to and fro.
+    pub modulation: Option<spectra::Modulation>,
+    /// Whether the strongest peak is likelier a resonance than a sinusoid.
+    is_resonance: bool,
+    duration_s: f64,
+}
+
+/// The deviation of a line of means of `m` samples over `width` s, before they were taken.
+pub(crate) fn before_averaging(line: &MergedLine, width: f64, m: u64) -> MeasuredValue {
+    let gain = gain_of_mean(line.frequency.value, width, m);
+    MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
+}
+
+/// Part of a sinusoid of `frequency` Hz that is in the means of `m` samples over `width` s: `sin(πfw)/(m·sin(πfw/m))`.
+fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
+    let (phase, m) = (PI * frequency * width, m as f64);
+    phase.sin() / (m * (phase / m).sin())
+}
+
+/// Whether `line` of a series is what the faster line `of` looks like at its sample period, s: as wide, at the alias of its frequency.
+pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
+    let turns = of.frequency.value * period_s;
+    let alias = (turns - turns.round()).abs() / period_s;
+    let reach =
+        MERGE_WIDTHS * (of.width.value + of.frequency.error + line.width.value) + MERGE_RESOLUTIONS / line.duration_s;
+    // Which is narrower is a line of its own.
+    let is_as_wide = MERGE_WIDTHS * line.width.value >= of.width.value || of.is_sinusoid();
+    is_as_wide && (line.frequency.value - alias).abs() < reach
+}
+
+/// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
+/// of white, flicker and random-walk noise.
+pub(crate) fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLine> {
+    let duration_s = series.duration_s();
+    let grid = UniformSeries::from_series(series);
+    let peaks = match known {
+        Some(model) => spectra::find_lines_over(&grid, |frequency| markov_background(model, frequency)),
+        None => spectra::find_lines(&grid),
+    };
+    merged(peaks, duration_s, duration_s, rate_error)
+}
+
+/// The lines of which `peaks` of a spectrum are parts, in a record of `duration_s`; the spectrum resolves the reciprocal of
+/// `resolved_s`.
+pub(crate) fn merged(
+    peaks: Vec<spectra::SpectralLine>,
+    resolved_s: f64,
+    duration_s: f64,
+    rate_error: f64,
+) -> Vec<MergedLine> {
+    let is_line = |peak: &spectra::SpectralLine| {
+        let is_finite = peak.frequency.error.is_finite() && peak.deviation.error.is_finite();
+        is_finite && peak.frequency.value > MIN_WIDTHS_FROM_ZERO * width(peak)
+    };
+    let mut rest: Vec<spectra::SpectralLine> = peaks.into_iter().filter(is_line).collect();
+    let mut lines = Vec::new();
+    while let Some(strongest) = rest.first().copied() {
+        let reach = (MERGE_WIDTHS * width(&strongest)).max(MERGE_RESOLUTIONS / resolved_s);
+        let is_same = |peak: &spectra::SpectralLine| {
+            let distance = (peak.frequency.value - strongest.frequency.value).abs();
+            let wanders = peak.width.is_some() || strongest.width.is_some();
+            distance < reach || (wanders && distance < MERGE_DISTANCE * strongest.frequency.value)
+        };
+        let (same, others): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_same);
+        lines.push(MergedLine { duration_s, ..MergedLine::merge(&same, resolved_s, rate_error) });
+        rest = others;
+    }
+    lines
+}
+
+/// Full width at half maximum of a peak, Hz; 0 of a sinusoid.
+fn width(peak: &spectra::SpectralLine) -> f64 {
+    peak.width.map_or(0.0, |width| width.value)
+}
+
+/// Density of a model's noise without its lines, over that without its Markov processes either.
+fn markov_background(model: &Model, frequency: f64) -> f64 {
+    let density_of = |is_included: &dyn Fn(&NoiseTerm) -> bool| {
+        let terms = model.terms().iter().copied().filter(|term| is_included(&term.kind));
+        Model::new(model.sample_period(), terms).density(frequency)
+    };
+    let markov = density_of(&|kind| matches!(kind, NoiseTerm::Markov(_)));
+    let noise =
+        density_of(&|kind| !matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)));
+    1.0 + markov / noise.max(MIN_NOISE * markov)
+}
+
+/// The change of the amplitude of the strongest of `peaks`, if the first two sinusoids beside it are at equal distances on either
+/// side, beyond the side lobes of the taper, and equally strong.
+fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<spectra::Modulation> {
+    let [strongest, one, other, ..] = peaks else { return None };
+    let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
+    let is_symmetric = (distance(one) + distance(other)).abs() < SIDEBAND_TOLERANCE / duration_s;
+    let is_beside = [one, other].iter().all(|peak| distance(peak).abs() > LOBE_RESOLUTIONS / duration_s);
+    let difference = (one.deviation.value - other.deviation.value).abs();
+    let error = one.deviation.error.hypot(other.deviation.error);
+    let mean = 0.5 * (one.deviation.value + other.deviation.value);
+    let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
+    let are_sinusoids = [strongest, one, other].iter().all(|peak| peak.width.is_none());
+    // Each sideband has half the depth of the amplitude of the line.
+    let over_line = 2.0 / strongest.deviation.value;
+    (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| spectra::Modulation {
+        frequency: 0.5 * (distance(one) - distance(other)).abs(),
+        depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
+        of_phase: false,
+    })
+}
+
+impl MergedLine {
+    /// One line with the power of all `peaks`, at their mean frequency, as wide as they and their spread.
+    fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
+        let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
+        let total: f64 = peaks.iter().map(power).sum();
+        let mean = |of: &dyn Fn(&spectra::SpectralLine) -> f64| {
+            peaks.iter().map(|peak| power(peak) * of(peak)).sum::<f64>() / total
+        };
+        let frequency = mean(&|peak| peak.frequency.value);
+        let spread = mean(&|peak| (peak.frequency.value - frequency).powi(2)).sqrt();
+        let own_width = mean(&|peak| width(peak));
+        let width_error = mean(&|peak| peak.width.map_or(0.0, |width| width.error));
+        let strongest = peaks[0];
+        Self {
+            frequency: MeasuredValue {
+                value: frequency,
+                error: strongest.frequency.error.max(spread).hypot(rate_error * frequency),
+            },
+            deviation: MeasuredValue {
+                value: total.sqrt(),
+                error: strongest.deviation.error * total.sqrt() / strongest.deviation.value,
+            },
+            width: MeasuredValue { value: own_width.hypot(FULL_WIDTH * spread), error: width_error.hypot(spread) },
+            statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
+            p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
+            shape_p_value: strongest.shape_p_value,
+            modulation: sidebands(peaks, duration_s).or(strongest.modulation),
+            is_resonance: strongest.width.is_some(),
+            duration_s,
+        }
+    }
+
+    /// Whether both have the same frequency, within the wider of them and the resolution.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let reach = self.width.value.max(other.width.value).max(MERGE_RESOLUTIONS / self.duration_s);
+        (self.frequency.value - other.frequency.value).abs() < reach
+    }
+
+    pub(crate) fn is_sinusoid(&self) -> bool {
+        matches!(self.kind(), NoiseTerm::Sinusoid(_))
+    }
+
+    /// Whether it has a few periods in the record.
+    pub(crate) fn is_slow(&self) -> bool {
+        self.frequency.value * self.duration_s < FEW_PERIODS
+    }
+
+    /// Whether it may be an error of the form of the background.
+    pub(crate) fn is_broad(&self) -> bool {
+        self.width.value > BROAD * self.frequency.value
+    }
+
+    /// Whether the record resolves its width: whether that is at least the reciprocal of the length of the record.
+    pub(crate) fn is_wider_than_resolution(&self) -> bool {
+        self.width.value * self.duration_s >= 1.0
+    }
+
+    /// Whether the spectrum shows a width: the strongest peak is a resonance, and the interval of the width is above the resolution
+    /// and not so narrow as that of a line that wanders.
+    pub(crate) fn is_band(&self) -> bool {
+        let least = self.width.value - NORMAL_975 * self.width.error;
+        let is_broad_enough = self.width.value > NARROWEST_BAND * self.frequency.value;
+        self.is_resonance && is_broad_enough && least * self.duration_s > 1.0
+    }
+
+    /// The term for the line with its size, frequency and width by the spectrum.
+    pub(crate) fn fitted_term(&self) -> FittedTerm {
+        let kind = self.kind();
+        let bounds = |of: MeasuredValue| {
+            let half = NORMAL_975 * of.error;
+            ((of.value - half).max(0.0), of.value + half)
+        };
+        // The coefficient of a sinusoid is its amplitude, that of a resonance its deviation.
+        let scale = if self.is_sinusoid() { SQRT_2 } else { 1.0 };
+        let (low, high) = bounds(self.deviation);
+        let value = scale * self.deviation.value;
+        let frequency = bounds(self.frequency);
+        let shape = match kind {
+            NoiseTerm::Resonance(_) => Shape::Resonance { frequency, bandwidth: bounds(self.width) },
+            _ => Shape::Sinusoid { frequency },
+        };
+        FittedTerm { low: scale * low, high: scale * high, shape, ..FittedTerm::exact(kind, value) }
+    }
+
+    /// The model's term for the line: a sinusoid, or a resonance if it is wider than the record resolves.
+    pub(crate) fn kind(&self) -> NoiseTerm {
+        let (frequency, bandwidth) = (self.frequency.value, self.width.value);
+        if bandwidth * self.duration_s < MIN_PHASE_CHANGES {
+            NoiseTerm::Sinusoid(Sinusoid { frequency })
+        } else {
+            NoiseTerm::Resonance(Resonance { frequency, bandwidth })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{find, gain_of_mean};
+    use crate::samples::series::Series;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    /// 400 s at 50 Hz: white noise of deviation 1 with a sinusoid of amplitude 1 at 7.3 Hz, which swells and fades by `depth` five times.
+    fn series(depth: f64) -> Series {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let slots = 0..20_000_u64;
+        let value = |slot: u64| {
+            let time_s = 0.02 * slot as f64;
+            let amplitude = 1.0 + depth * (TAU * 5.0 * time_s / 400.0).sin();
+            amplitude * (TAU * 7.3 * time_s).sin() + random.sample::<f64, _>(StandardNormal)
+        };
+        let values = slots.clone().map(value).collect();
+        Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.02, resolution: 1e-6, unit: "g" }
+    }
+
+    #[test]
+    fn a_line_that_swells_and_fades_has_sidebands() {
+        let of =
+            |depth: f64| find(&series(depth), None, 0.0).first().map(|line| (line.frequency.value, line.modulation));
+        let (frequency, modulation) = of(0.5).expect("100 times the noise at its frequency");
+        // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
+        assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");
+        let modulation = modulation.expect("two sidebands of a quarter of the amplitude");
+        assert!((modulation.frequency - 5.0 / 400.0).abs() < 0.0025, "{modulation:?}");
+        // The amplitude of each sideband is known to a fiftieth of that of the line.
+        assert!((modulation.depth.value - 0.5).abs() < 0.1, "{modulation:?}");
+        assert_eq!(of(0.0).map(|(_, modulation)| modulation), Some(None));
+    }
+
+    /// Means of samples, not of the time between them: the largest frequency in the means is that of two fifths of their rate.
+    #[test]
+    fn a_mean_has_the_part_of_a_sinusoid_that_its_samples_have() {
+        const MEANS: usize = 10_000;
+        for m in [1, 2, 4, 64] {
+            for turns_in_mean in [0.011, 0.1, 0.4] {
+                let sample = |at: usize| (TAU * turns_in_mean * at as f64 / m as f64).sin();
+                let mean = |number: usize| (m * number..m * (number + 1)).map(sample).sum::<f64>() / m as f64;
+                let square = (0..MEANS).map(|number| mean(number).powi(2)).sum::<f64>() / MEANS as f64;
+                // The mean square of whole turns is exactly ½; what is left over of the last one is below 1 in 110 turns.
+                let expected = gain_of_mean(turns_in_mean, 1.0, m as u64) / 2f64.sqrt();
+                assert!(
+                    (square.sqrt() / expected - 1.0).abs() < 0.005,
+                    "{m}, {turns_in_mean}: {} {expected}",
+                    square.sqrt()
+                );
+            }
+        }
+        assert_eq!(gain_of_mean(0.37, 0.9, 1), 1.0);
+    }
+}
