@@ -11,6 +11,7 @@
 //! fitted to the first half.
 
 use crate::OCTAVES;
+use crate::effects::Effect;
 use crate::halves::first_half::{Epochs, FirstHalf};
 use crate::halves::traced_part::ChannelTrace;
 use crate::halves::traced_record::TracedRecord;
@@ -26,7 +27,7 @@ use crate::rivals::causes;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::allan_deviations_by_spectrum;
-use measurement::{ChannelId, Measurement, RecordingDescription};
+use measurement::{ChannelId, Measurement, PerChannel, RecordingDescription};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -110,7 +111,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         TracedRecord::new(&record.first_half()).effects()
     };
     watch(Stage::Assessment);
-    let mut channels = channel_reports(&whole, &first_half, &epochs);
+    let mut channels = channel_reports(&whole, &first_half, &epochs, &effects);
     let duration_s = description.periods as f64 * description.period_s();
     let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
     let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
@@ -133,13 +134,18 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     report
 }
 
-/// The report of every channel, without its effects.
-fn channel_reports(whole: &TracedRecord, first_half: &FirstHalf, epochs: &Epochs) -> Vec<ChannelReport> {
+/// The report of every channel, without its `effects`.
+fn channel_reports(
+    whole: &TracedRecord,
+    first_half: &FirstHalf,
+    epochs: &Epochs,
+    effects: &PerChannel<Vec<Effect>>,
+) -> Vec<ChannelReport> {
     let record = whole.record;
     let assessments =
         per_channel(record.channels.ids(), |channel| Assessed::new(whole, channel, &first_half.part.channels[channel]));
     let nonstationarities = epochs.nonstationarities(whole, first_half);
-    let at_rest = whole.at_rest();
+    let at_rest = whole.at_rest(effects);
     let report = |(channel, Assessed { assessment, by_spectrum })| {
         let mut report = first_half.report(&whole.part, &whole.estimators, channel, whole.has_rules(channel));
         for point in &mut report.curve {

@@ -1,7 +1,6 @@
 //! The noise model of one channel: what is fitted to a curve, how a model is edited, and the filter that all channels share.
 
 pub(crate) mod channel_fit;
-pub(crate) mod channel_lines;
 pub mod contradiction;
 pub(crate) mod covariates;
 pub mod gauss_markov;

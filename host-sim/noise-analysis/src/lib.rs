@@ -3,7 +3,7 @@
 //! ```text
 //! Measurement ─► record: CondensedRecord ─► preprocessing (detectors) ─► estimators ─┐
 //!                                                                                    ▼
-//!          report ◄─ rivals: causes ◄─ rivals: naming ◄─ fit: channel_fit ◄─ covariates, channel_lines (spectra)
+//!       report ◄─ rivals: causes ◄─ table ◄─ proposals ◄─ fit: channel_fit ◄─ covariates, lines of the spectra
 //! ```
 //!
 //! | folder | stage |
@@ -13,7 +13,7 @@
 //! | `record` | a recording, condensed to means, preprocessed, in curves |
 //! | `effects` | every kind of effect, one file each, as numbers; the crate `reports` has the words |
 //! | `fit` | the noise model of one channel, how it is edited, and the filter that all channels share |
-//! | `rivals` | which effects explain what a channel shows, and which findings of several channels are one cause |
+//! | `rivals` | what is proposed for a channel, the [table](rivals::table) that tells what stands, and which findings are one cause |
 //! | `halves` | the fit of a part: the whole, and the first half with its errors on the second |
 //! | `nonstationarity` | whether the noise changes while the record is made, and what the models are fitted to then |
 //! | `report` | what is reported of a channel and of the sensor |
@@ -35,7 +35,7 @@ pub mod parallel;
 pub mod quick;
 pub mod record;
 pub mod report;
-mod rivals;
+pub mod rivals;
 pub mod samples;
 #[cfg(test)]
 #[path = "../tests/support/simulated_part.rs"]

@@ -16,6 +16,7 @@ use crate::report::figure_data;
 use crate::report::part_report::NOT_SOUGHT;
 use crate::report::{ChannelReport, FigureData, PartReport, Report, SCHEMA, by_cause};
 use crate::rivals::causes;
+use crate::rivals::table;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::streamed_curves::StreamedCurves;
 use measurement::{ChannelId, ChannelProfile, Measurement, PerChannel, RecordingDescription, SampleBlock};
@@ -63,9 +64,8 @@ impl CurveEstimators {
                 if !estimators.both.channels[channel].quantity.is_inertial() {
                     return Vec::new();
                 }
-                let (mut named, unexplained) = part.named_effects(profile, &estimators.both, channel, None);
-                named.extend(unexplained.map(Effect::from));
-                named
+                let (proposals, facts) = part.proposals(profile, &estimators.both, channel, None);
+                table::standing(proposals, &facts)
             };
             part.channels.ids().map(of).collect()
         };

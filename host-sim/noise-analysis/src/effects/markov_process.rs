@@ -31,6 +31,11 @@ pub enum MarkovEvidence {
     },
 }
 
+impl MarkovProcess {
+    /// Averaging time of the largest Allan deviation, in time constants (IEEE Std 952, annex C).
+    pub(crate) const PEAK: f64 = 1.89;
+}
+
 impl Kind for MarkovProcess {
     const NAME: &'static str = "markov";
 

@@ -3,19 +3,21 @@
 
 use crate::detectors::bias::BiasSensitivity;
 use crate::detectors::random_telegraph;
-use crate::effects::{Effect, TelegraphNoise, Unexplained};
+use crate::effects::TelegraphNoise;
 use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
-use crate::fit::channel_lines::fit_with_lines;
 use crate::fit::contradiction::Contradiction;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::parallel::per_channel;
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::estimators::RecordPart;
-use crate::rivals::naming::{ChannelFindings, name_effects};
+use crate::rivals::channel_lines::fit_with_lines;
+use crate::rivals::proposal::{ChannelFacts, Origin, Proposal, Signal};
+use crate::rivals::proposals::{ChannelFindings, propose};
+use crate::rivals::signals::SpectrumProposals;
 use crate::rivals::slow_drift::ChannelsInCommon;
+use crate::rivals::table::standing_in_spectrum;
 use crate::rivals::unexplained;
-use crate::rivals::unexplained_signals::UnexplainedSignals;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
@@ -66,8 +68,8 @@ pub(crate) struct ChannelTrace {
     pub rest: Option<UniformSeries>,
     /// Random telegraph noise.
     pub telegraph: Option<TelegraphNoise>,
-    /// Signals that have no name.
-    pub signals: UnexplainedSignals,
+    /// Signals that no term of the model has.
+    pub signals: Vec<Signal>,
     slowest: Option<CosineSpectrum>,
 }
 
@@ -112,15 +114,15 @@ impl TracedPart {
         }
     }
 
-    /// The effects that the model of a channel shows, and what that leaves unexplained of the curve; `common` is the drift that the
-    /// channel has in common with others.
-    pub(crate) fn named_effects(
+    /// What the model of a channel proposes, and what that leaves unexplained of the curve; `common` is the drift that the channel has in
+    /// common with others.
+    pub(crate) fn proposals(
         &self,
         profile: &SensorProfile,
         curves: &RecordPart,
         channel: ChannelId,
         common: Option<&ChannelsInCommon>,
-    ) -> (Vec<Effect>, Option<Unexplained>) {
+    ) -> (Vec<Proposal>, ChannelFacts) {
         let ChannelTrace { fit, lines, rest, telegraph, .. } = &self.channels[channel];
         let sensitivities = || fit.covariates.sensitivities();
         let findings = ChannelFindings {
@@ -136,7 +138,9 @@ impl TracedPart {
         let in_steps = |(covariate, of): (ChannelId, &Sensitivity)| (of.value * curves.resolution(covariate)).powi(2);
         let of_covariates = sensitivities().map(in_steps).sum();
         let unexplained = unexplained::by_curve(fit, profile, curves.resolution(channel), of_covariates);
-        (name_effects(profile, &findings), unexplained)
+        let (mut proposals, facts) = propose(profile, &findings);
+        proposals.extend(unexplained.map(|found| Proposal::new(found, Origin::Residual)));
+        (proposals, facts)
     }
 }
 
@@ -154,8 +158,7 @@ impl ChannelTrace {
     }
 
     fn without_samples(fit: ChannelFit) -> Self {
-        let signals = UnexplainedSignals::default();
-        Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals, slowest: None }
+        Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals: Vec::new(), slowest: None }
     }
 
     fn fit_with_samples(
@@ -171,13 +174,12 @@ impl ChannelTrace {
         let (fit, mut lines) =
             fit_with_lines(covariates, own, rest.as_ref(), profile, (samples.record.samples_per_mean, faster));
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
-        let (mut telegraph, mut signals) = (None, UnexplainedSignals::default());
+        let (mut telegraph, mut signals) = (None, Vec::new());
         if samples.seeks_signals {
             let correlation_times: Vec<f64> = fit.correlation_times().collect();
-            let is_reversible =
-                |found: &TelegraphNoise| random_telegraph::is_reversible(&rest, found.time_constant_s.value);
-            telegraph = random_telegraph::find(&rest, own.unit, &correlation_times).filter(is_reversible);
-            signals = UnexplainedSignals::find(&rest, &mut lines, &fit.bands());
+            telegraph = random_telegraph::find(&rest, own.unit, &correlation_times);
+            let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
+            (lines, signals) = found.into_lines_and_signals();
         }
         Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals }
     }

@@ -1,7 +1,6 @@
 //! What all of a recording shows: the effects in the samples of each channel, and the models of the whole.
 
 use crate::detectors::noise_grid::NoiseGrids;
-use crate::detectors::random_telegraph;
 use crate::effects::Effect;
 use crate::fit::noise_terms::filter_length_s;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
@@ -11,12 +10,12 @@ use crate::record::estimators::RecordEstimators;
 use crate::record::preprocessing::Preprocessing;
 use crate::report::Stretch;
 use crate::rivals::motion::{self, PlatformMotion};
-use crate::rivals::slow_drift::{ChannelsInCommon, common_mode, goes_as_far_as_ramp};
-use crate::rivals::unexplained;
+use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
+use crate::rivals::slow_drift::{ChannelsInCommon, common_mode, slope_of_ends};
+use crate::rivals::{signals, table, unexplained};
 use crate::samples::exclusion::Exclusion;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
-use crate::spectra::spectral_lines::MergedLine;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 
 /// A recording with what was found in all of it.
@@ -40,7 +39,7 @@ impl<'a> TracedRecord<'a> {
         let noise_grids = NoiseGrids::default();
         let preprocessing = Preprocessing::detect(record, &noise_grids);
         let estimators = RecordEstimators::estimate(record, &preprocessing);
-        let moved = per_channel(measurement.ids(), |channel| {
+        let motions = per_channel(measurement.ids(), |channel| {
             let find = || motion::find(&preprocessing.measured(measurement, channel), &measurement[channel].profile);
             record.is_traced(channel).then(find).flatten()
         });
@@ -54,8 +53,6 @@ impl<'a> TracedRecord<'a> {
         let samples = PartSamples { record, series: &series, biases, seeks_signals: true };
         let data = PartData { profile: &measurement.profile, curves: &estimators.both, samples: Some(samples) };
         let part = TracedPart::fit(&data);
-        let distance_of_levels = |channel: ChannelId| Some(part.channels[channel].telegraph.as_ref()?.amplitude.value);
-        let motions = motion::of_platform(moved, distance_of_levels);
         Self { record, noise_grids, preprocessing, estimators, series, part, motions }
     }
 
@@ -79,10 +76,12 @@ impl<'a> TracedRecord<'a> {
         is_screened || self.preprocessing.excludes(channel, Exclusion::ByFirstHalf)
     }
 
-    /// Stretches in which the platform did not move.
-    pub(crate) fn at_rest(&self) -> Vec<Stretch> {
+    /// Stretches in which the platform did not move, by the `effects` of each channel.
+    pub(crate) fn at_rest(&self, effects: &PerChannel<Vec<Effect>>) -> Vec<Stretch> {
         let duration_s = self.measurement().periods() as f64 * self.measurement().period_s();
-        motion::at_rest(self.motions.iter().flatten(), duration_s)
+        let is_motion = |effect: &Effect| matches!(effect, Effect::MotionInterval(_));
+        let moved = self.motions.iter().zip(effects).filter(|(_, effects)| effects.iter().any(is_motion));
+        motion::at_rest(moved.filter_map(|(motion, _)| motion.as_ref()), duration_s)
     }
 
     /// The effects of each channel.
@@ -96,49 +95,21 @@ impl<'a> TracedRecord<'a> {
     }
 
     fn effects_of(&self, channel: ChannelId, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
-        let Self { preprocessing, estimators, .. } = self;
-        let measurement = self.measurement();
-        let (trace, own) = (&self.part.channels[channel], &self.series[channel]);
-        let moved = self.motions[channel].iter().map(|motion| Effect::from(motion.effect));
-        let of_samples = self.record.channels[channel].effects.iter().chain(preprocessing.effects(channel));
-        let mut effects: Vec<Effect> = moved.chain(of_samples.cloned()).collect();
-        // The longest octaves of the curve see a sinusoid of a few periods as a ramp.
-        let has_ramp = preprocessing.has_ramp(channel) || trace.lines.iter().any(MergedLine::is_slow);
-        let (mut named, by_curve) = self.part.named_effects(&measurement.profile, &estimators.both, channel, common);
-        // The response that is not proportional has the sensitivity too.
-        let responds = preprocessing.responds_to_temperature(channel);
-        named.retain(|effect| !responds || !matches!(effect, Effect::TemperatureSensitivity(_)));
-        let is_named = |effect: &Effect| match effect {
-            Effect::LinearDrift(of) => !has_ramp && goes_as_far_as_ramp(own, of.slope.value),
-            _ => true,
-        };
-        effects.extend(named.into_iter().filter(is_named));
-        if let Some(unexplained) = &by_curve {
-            effects.retain(|effect| !unexplained::is_contradicted(effect, unexplained));
-        }
-        effects.extend(by_curve.map(Effect::from));
-        effects.retain(|effect| !trace.signals.has(effect, &trace.lines));
-        effects.extend(trace.signals.effects(own.unit));
+        let (measurement, trace, own) = (self.measurement(), &self.part.channels[channel], &self.series[channel]);
+        let moved = self.motions[channel].iter().map(|motion| {
+            let mut others = self.motions.with_ids().filter(|(other, _)| *other != channel);
+            let is_shared = others.any(|(_, other)| other.as_ref().is_some_and(|other| motion.is_shared_with(other)));
+            Proposal::new(motion.effect, Origin::Motion { is_shared, is_sudden: motion.is_sudden })
+        });
+        let of_samples = self.record.channels[channel].effects.iter().chain(self.preprocessing.effects(channel));
+        let of_samples = of_samples.map(|effect| Proposal::new(effect.clone(), Origin::Samples));
+        let (of_model, facts) = self.part.proposals(&measurement.profile, &self.estimators.both, channel, common);
+        let of_signals = trace.signals.iter().map(|signal| signals::proposal(signal, own.unit));
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
         let level = temperature.and_then(|of| unexplained::level_by_temperature(own, &self.series[of]));
-        if level.is_some() {
-            // The limit above which a sample is a spike is that of a constant level.
-            effects.retain(|effect| !matches!(effect, Effect::Spikes(_)));
-        }
-        effects.extend(level.map(Effect::from));
-        // Jumps to and fro from one sample to the next.
-        let telegraph = effects.iter().find_map(|effect| match effect {
-            Effect::TelegraphNoise(telegraph) => Some(*telegraph),
-            _ => None,
-        });
-        let is_visit = |effect: &Effect| match (effect, &telegraph) {
-            (Effect::Spikes(spikes), Some(telegraph)) => {
-                random_telegraph::explains_spikes(telegraph, spikes, measurement.period_s())
-            }
-            _ => false,
-        };
-        effects.retain(|effect| !is_visit(effect));
-        effects
+        let level = level.map(|level| Proposal::new(level, Origin::Level));
+        let proposals = moved.chain(of_samples).chain(of_model).chain(of_signals).chain(level).collect();
+        table::standing(proposals, &ChannelFacts { slope_of_ends: Some(slope_of_ends(own)), ..facts })
     }
 
     /// The drift that the gyroscopes have in common, and that of the accelerometers.

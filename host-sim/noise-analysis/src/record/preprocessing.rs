@@ -123,12 +123,6 @@ impl Preprocessing {
         self.channels.iter().any(|of| !of.responses(Exclusion::ByWhole).is_empty())
     }
 
-    /// Whether a channel responds to temperature behind a lag or with a curvature.
-    pub(crate) fn responds_to_temperature(&self, channel: ChannelId) -> bool {
-        let responses = self.channels[channel].responses(Exclusion::ByWhole);
-        responses.iter().any(|of| !matches!(of.effect, Effect::VibrationRectification(_)))
-    }
-
     /// A channel's series as measured, with its resolution.
     pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelId) -> Series {
         let series = Series::with_shared_slots(measurement, channel, || Arc::clone(&self.slots));

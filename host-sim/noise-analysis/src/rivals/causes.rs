@@ -6,7 +6,6 @@
 //! effects of the first half alone ──────────────────────────────────────────┴► validation
 //! ```
 
-mod cause;
 mod harmonic_series;
 mod line;
 mod periodic;
@@ -17,17 +16,13 @@ mod waveform;
 #[cfg(test)]
 mod tests;
 
+use crate::effects::Effect;
 use crate::effects::findings::{ChannelEffect, Finding, Validation};
-use crate::effects::{CommonMode, Effect};
 use crate::report::ChannelReport;
-use cause::{Cause, Shown};
+use crate::rivals::cause::{Cause, Shown};
+use crate::rivals::table::{CauseClaim, stands_as_cause};
 use measurement::SensorProfile;
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
-
-/// Frequency of a line, in units of `1/(2πT)` of a common-mode drift with the time constant T, at which the drift has a tenth of
-/// its density at low frequencies: 1/(1 + 3²).
-const WITHIN_COMMON_MODE: f64 = 3.0;
 
 /// The causes of the `effects` of all channels. Each channel is given the effects by which it reports a cause, which refer to the
 /// finding; `first_half` are the effects of the same channels from the first half alone.
@@ -63,7 +58,7 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
     let periodic = causes.len();
     for (channel, (unit, effects)) in channels.iter().enumerate() {
         for effect in effects.iter().filter(|effect| !effect.is_line()) {
-            if is_common_line(effect, channel, &causes[..periodic]) {
+            if !stands_as_cause(&CauseClaim { effect, channel, shown_by: None, periodic: &causes[..periodic] }) {
                 continue;
             }
             let is_same = |cause: &&mut Cause| {
@@ -80,21 +75,13 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
             }
         }
     }
-    // What is left in one channel of a drift that others showed as a line is that line's.
-    causes.retain(|cause| cause.shown.len() > 1 || !matches!(cause.shown[0].effect, Effect::CommonMode(_)));
+    causes.retain(|cause| {
+        let Shown { effect, channel, .. } = &cause.shown[0];
+        let shown_by = Some(cause.shown.len());
+        stands_as_cause(&CauseClaim { effect, channel: *channel, shown_by, periodic: &[] })
+    });
     causes.sort_by_key(|cause| cause.shown[0].channel);
     causes
-}
-
-/// Whether a common-mode drift of a channel is a line that the channel has in common with others, in its band.
-fn is_common_line(effect: &Effect, channel: usize, periodic: &[Cause]) -> bool {
-    let Effect::CommonMode(CommonMode { time_constant_s, .. }) = effect else { return false };
-    let is_in_band = |shown: &Shown| {
-        let frequency_hz = shown.effect.frequency_hz();
-        shown.channel == channel
-            && frequency_hz.is_some_and(|of| TAU * of.value * time_constant_s.value < WITHIN_COMMON_MODE)
-    };
-    periodic.iter().any(|cause| cause.shown.len() > 1 && cause.shown.iter().any(is_in_band))
 }
 
 /// A cause as it is reported.

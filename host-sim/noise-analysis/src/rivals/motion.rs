@@ -4,10 +4,8 @@
 //! channel whose means of a second leave their median by three times that is moved: an accelerometer of 50 mg (1 σ over
 //! parts) by a turn of 9° or more, a gyroscope of 3 deg/s by 9 deg/s.
 //!
-//! Drift of a bias may go as far, given time. A turn of the platform changes the specific force along two axes at least, and begins and
-//! ends at some time. So a motion is in two channels of one quantity in the same seconds, or it is sudden: faster than a Gaussian process
-//! with the changes of the rest of the record. A jump to and fro in one channel alone is that of random telegraph noise where that is
-//! found.
+//! Drift of a bias may go as far, given time. So each motion says whether it is sudden: faster than a Gaussian process with the changes of
+//! the rest of the record.
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::quantile;
@@ -15,7 +13,7 @@ use crate::effects::MotionInterval;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::report::Stretch;
 use crate::samples::series::Series;
-use measurement::{ChannelId, ChannelProfile, PerChannel, Quantity};
+use measurement::{ChannelProfile, Quantity};
 use std::ops::Range;
 
 /// Length of a mean, s.
@@ -36,7 +34,7 @@ pub(crate) struct PlatformMotion {
     /// Numbers of the seconds in which the channel is moved, in ascending order.
     seconds: Vec<Range<usize>>,
     /// Whether the channel changes faster than a Gaussian process would.
-    is_sudden: bool,
+    pub is_sudden: bool,
     /// As reported.
     pub effect: MotionInterval,
 }
@@ -95,32 +93,11 @@ fn is_sudden(means: &[Option<f64>]) -> bool {
     *largest > quantile(0.5 * SIGNIFICANCE / changes.len() as f64) * median / NORMAL_MEDIAN
 }
 
-/// Those of the `motions` of all channels that are of the platform. `distance_of_levels` is that of the levels of the random telegraph
-/// noise of a channel.
-pub(crate) fn of_platform(
-    motions: PerChannel<Option<PlatformMotion>>,
-    distance_of_levels: impl Fn(ChannelId) -> Option<f64>,
-) -> PerChannel<Option<PlatformMotion>> {
-    let is_of_platform = |(channel, motion): (ChannelId, &PlatformMotion)| {
-        let others = motions.with_ids().filter(|(other, _)| *other != channel).filter_map(|(_, other)| other.as_ref());
-        let is_shared = others.filter(|other| other.quantity == motion.quantity).any(|other| motion.overlaps(other));
-        let is_telegraph = || {
-            let size = motion.effect.size;
-            distance_of_levels(channel).is_some_and(|distance| size.low.abs().min(size.high.abs()) < distance)
-        };
-        is_shared || (motion.is_sudden && !is_telegraph())
-    };
-    let kept = |(channel, motion): (ChannelId, &Option<PlatformMotion>)| {
-        motion.as_ref().filter(|motion| is_of_platform((channel, motion))).cloned()
-    };
-    motions.with_ids().map(kept).collect()
-}
-
 impl PlatformMotion {
-    /// Whether both channels are moved in the same seconds.
-    fn overlaps(&self, other: &Self) -> bool {
+    /// Whether both are of one quantity, and moved in the same seconds.
+    pub(crate) fn is_shared_with(&self, other: &Self) -> bool {
         let is_in = |range: &Range<usize>| other.seconds.iter().any(|of| of.start < range.end && range.start < of.end);
-        self.seconds.iter().any(is_in)
+        self.quantity == other.quantity && self.seconds.iter().any(is_in)
     }
 }
 
@@ -145,10 +122,9 @@ pub(crate) fn at_rest<'a>(motions: impl Iterator<Item = &'a PlatformMotion>, dur
 
 #[cfg(test)]
 mod tests {
-    use super::{at_rest, find, of_platform};
+    use super::{at_rest, find};
     use crate::report::Stretch;
     use crate::samples::series::Series;
-    use measurement::PerChannel;
     use measurement::adis16405::profile;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -172,9 +148,8 @@ mod tests {
     }
 
     #[test]
-    fn a_drift_that_goes_far_in_one_channel_is_no_motion() {
-        let profile = profile(0.05);
-        let x = profile.channel("accl_x").unwrap();
+    fn a_drift_that_goes_far_is_not_sudden_and_a_turn_is() {
+        let x = profile(0.05).channel("accl_x").unwrap();
         for seed in 0..10 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             // A process of deviation 0.1 g with a time constant of 10 s over 1000 s leaves its median by 0.15 g many times.
@@ -185,16 +160,9 @@ mod tests {
                 state
             });
             let found = find(&drift, &x).expect("goes far");
-            let alone = of_platform(PerChannel::from(vec![Some(found.clone()), None]), |_| None);
-            assert_eq!(alone, PerChannel::from(vec![None, None]), "{seed}");
-            let both = PerChannel::from(vec![Some(found.clone()), Some(found)]);
-            assert_eq!(of_platform(both.clone(), |_| None), both, "{seed}");
+            assert!(!found.is_sudden && found.is_shared_with(&found), "{seed}");
         }
-        // A turn begins at once, and is one unless the channel jumps as far again and again.
-        let turn = PerChannel::from(vec![Some(find(&series(-0.7), &x).unwrap())]);
-        assert_eq!(of_platform(turn.clone(), |_| None), turn);
-        assert_eq!(of_platform(turn.clone(), |_| Some(0.3)), turn);
-        assert_eq!(of_platform(turn, |_| Some(0.7)), PerChannel::from(vec![None]));
+        assert!(find(&series(-0.7), &x).unwrap().is_sudden);
     }
 
     #[test]

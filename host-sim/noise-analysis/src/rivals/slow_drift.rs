@@ -34,16 +34,9 @@ pub(crate) fn common_mode(
     Some(ChannelsInCommon { channels, names, gain, drift })
 }
 
-/// Whether the means of the first and of the last tenth of a series are at least half as far apart as a ramp of `slope`, in its
-/// unit per s, would take them. To the longest octaves of a curve a slow oscillation looks like a ramp, which would go much
-/// farther.
-pub(crate) fn goes_as_far_as_ramp(series: &Series, slope: f64) -> bool {
-    let tenth = series.values.len() / 10;
+/// How far the means of the first and of the last tenth of a series are apart over the time between them, in its unit per s.
+pub(crate) fn slope_of_ends(series: &Series) -> f64 {
+    let (values, tenth) = (&series.values, series.values.len() / 10);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (Some(first), Some(last)) = (series.values.get(..tenth), series.values.get(series.values.len() - tenth..))
-    else {
-        return false;
-    };
-    let expected = slope * 0.9 * series.duration_s();
-    (mean(last) - mean(first)).abs() >= 0.5 * expected
+    (mean(&values[values.len() - tenth..]) - mean(&values[..tenth])).abs() / (0.9 * series.duration_s())
 }

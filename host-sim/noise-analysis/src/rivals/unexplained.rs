@@ -4,7 +4,7 @@
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, ROUNDING, quantile, upper_tail};
 use crate::effects::findings::SIGNIFICANCE;
-use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
+use crate::effects::{Observation, Unexplained, UnexplainedPlace};
 use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::samples::series::Series;
 use allan_core::{AllanPoint, Model};
@@ -18,8 +18,6 @@ const MIN_EXCESS: f64 = 0.01;
 /// Hilferty, PNAS 17, 1931), which is then exact to 10⁻³ of the tail beyond five standard deviations.
 const MANY: f64 = 1e4;
 
-/// Averaging time of the largest Allan deviation of a Markov process, in time constants (IEEE Std 952, annex C).
-const MARKOV_PEAK: f64 = 1.89;
 /// Blocks of a record whose levels are compared with the temperature, and the fewest pairs of neighbouring samples in one.
 const LEVEL_BLOCKS: usize = 64;
 const LEAST_PAIRS: u32 = 100;
@@ -78,13 +76,6 @@ pub(crate) fn by_curve(
         )),
         observation: Observation::PointOfCurve { p_value: (worst.p_value * residuals.len() as f64).min(1.0) },
     })
-}
-
-/// Whether an effect that was read off the curve is contradicted by what the model with it leaves `unexplained` there: a Markov
-/// process whose largest Allan deviation, at 1.89 time constants, is within two octaves of it.
-pub(crate) fn is_contradicted(effect: &Effect, unexplained: &Unexplained) -> bool {
-    let (Effect::MarkovProcess(markov), Some(tau_s)) = (effect, unexplained.tau_s()) else { return false };
-    (tau_s.value / (MARKOV_PEAK * markov.time_constant_s.value)).log2().abs() <= 2.0
 }
 
 /// A level of the noise that changes with the temperature: no effect that has a name.

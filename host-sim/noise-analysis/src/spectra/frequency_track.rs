@@ -46,9 +46,10 @@ pub(crate) struct FrequencyTrack {
     /// Amplitude of the line, by its power over that of the noise at the same frequencies.
     pub amplitude: BoundedEstimate,
     /// Number of segments.
-    segments: f64,
-    /// Power of a sinusoid of the same energy over the noise, at least: some is lost between the ordinates.
-    energy: f64,
+    pub segments: f64,
+    /// Power that a sinusoid of the same energy has over the noise in the spectrum of the whole record, at least: some is lost between the
+    /// ordinates.
+    pub energy: f64,
     /// Probability of such a mean anywhere by chance.
     pub p_value: f64,
 }
@@ -107,11 +108,6 @@ impl FrequencyTrack {
             energy: f64::from(line.sum) - count,
             p_value: trials * exponential_sum_tail(count, f64::from(line.sum)),
         })
-    }
-
-    /// What a sinusoid of the same energy would be over the noise in the spectrum of the whole record, at least.
-    pub(crate) fn energy(&self) -> f64 {
-        self.energy
     }
 
     /// Whether a frequency, Hz, is one that the track passes.

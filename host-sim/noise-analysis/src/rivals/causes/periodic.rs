@@ -5,7 +5,6 @@
 //! effects of every channel ─► line (by frequency) ─► harmonic_series (which belong together) ─► waveform (what it is)
 //! ```
 
-use super::cause::{Cause, Shown};
 use super::harmonic_series::{BY_CHANCE, most_certain};
 use super::line::{Frequency, Line, NORMAL_995};
 use super::waveform::{
@@ -15,6 +14,7 @@ use super::waveform::{
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
 use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
+use crate::rivals::cause::{Cause, Shown};
 use std::collections::BTreeMap;
 
 /// By which part of the record's resolution lines that are a few resolutions apart move each other's frequency.

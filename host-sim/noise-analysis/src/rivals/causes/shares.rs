@@ -10,9 +10,9 @@
 //! | values rounded to steps of Δ | white noise: Δ²/(12n) |
 //! | a knock at L times the level for a part p of the record | (L² − 1)·p times that of the channel without it |
 
-use super::cause::Shown;
 use crate::effects::{AddedVariance, AveragingTime};
 use crate::report::{ChannelReport, CurvePoint};
+use crate::rivals::cause::Shown;
 use measurement::{Quantity, SensorProfile};
 
 /// The part of the channel's Allan variance that is due to the effect, in percent, at the averaging time where it is

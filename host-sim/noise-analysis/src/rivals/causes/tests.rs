@@ -1,6 +1,5 @@
 //! Causes of effects that are given, not found.
 
-use super::cause::Cause;
 use super::{merged, validation};
 use crate::bounds::BoundedEstimate;
 use crate::effects::findings::Validation;
@@ -8,6 +7,7 @@ use crate::effects::{
     BandMismatch, Effect, LineEvidence, LineSource, Multiples, NoisyInterval, Observation, ResonantLine,
     SinusoidalLine, SpectrumEvidence, TemperatureSensitivity, Unexplained, UnexplainedPlace,
 };
+use crate::rivals::cause::Cause;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

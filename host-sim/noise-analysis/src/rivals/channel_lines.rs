@@ -2,16 +2,12 @@
 
 use crate::fit::channel_fit::ChannelFit;
 use crate::fit::covariates::CovariateFit;
+use crate::rivals::table::{LineClaim, stands_as_line};
 use crate::samples::series::Series;
-use crate::spectra::spectral_lines::{self, MergedLine, before_averaging, is_alias};
+use crate::spectra::spectral_lines::{self, MergedLine, before_averaging};
 use allan_core::Model;
 use allan_core::term::NoiseTerm;
 use measurement::SensorProfile;
-
-/// A line of the channel itself keeps more than this part of its deviation when the covariates are subtracted.
-const MIN_OWN_DEVIATION: f64 = 0.5;
-/// Power gain of a filter below which the spectrum holds leakage from other frequencies.
-const LEAKAGE_GAIN: f64 = 0.1;
 
 /// Finds the lines of `series` and traces what the baseline model lacks with them.
 ///
@@ -28,17 +24,14 @@ pub(crate) fn fit_with_lines(
     let rate_error = profile.sample_rate_error;
     let find = |series: &Series, known: Option<&Model>| {
         let mut lines = spectral_lines::find(series, known, rate_error);
-        lines.retain(|line| !faster.iter().any(|faster| is_alias(line, faster, series.period_s)));
+        lines.retain(|line| stands_as_line(&LineClaim { faster, ..LineClaim::new(line, series.period_s) }));
         lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s, samples_per_mean));
         lines
     };
     let mut lines = find(series, None);
     if let Some(rest) = rest {
         let left = find(rest, None);
-        let is_own = |line: &MergedLine, left: &MergedLine| {
-            line.is_same(left) && left.deviation.value > MIN_OWN_DEVIATION * line.deviation.value
-        };
-        lines.retain(|line| left.iter().any(|left| is_own(line, left)));
+        lines.retain(|line| stands_as_line(&LineClaim { left: Some(&left), ..LineClaim::new(line, series.period_s) }));
     }
     lines.extend(faster);
     let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
@@ -51,12 +44,15 @@ pub(crate) fn fit_with_lines(
         lines.extend(faster.iter().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
-    lines.retain(|line| line.is_sinusoid() || !is_leakage(fit.after(), line.frequency.value));
+    lines.retain(|line| {
+        let gain = filter_gain(fit.after(), line.frequency.value);
+        stands_as_line(&LineClaim { gain, ..LineClaim::new(line, series.period_s) })
+    });
     (fit, lines)
 }
 
-/// Whether a broad line at `frequency` Hz may be leakage into a null of a filter of the model.
-fn is_leakage(model: &Model, frequency: f64) -> bool {
+/// The least power gain of a filter of the model at `frequency` Hz.
+fn filter_gain(model: &Model, frequency: f64) -> f64 {
     let gain = |kind: &NoiseTerm| match kind {
         // The density of the filtered unit white noise is 1 at low frequencies.
         NoiseTerm::Filtered(filter) if filter.decimation == 1.0 => {
@@ -64,5 +60,5 @@ fn is_leakage(model: &Model, frequency: f64) -> bool {
         }
         _ => 1.0,
     };
-    model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min) < LEAKAGE_GAIN
+    model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min)
 }

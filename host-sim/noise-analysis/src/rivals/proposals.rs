@@ -1,5 +1,5 @@
-//! Names the effects that the whole record shows in a channel: which of them are reported, with their bounds and with evidence
-//! that a person can check.
+//! What the model, the spectrum and the covariates of a channel propose, with bounds and with evidence that a person can check. Which of
+//! it stands is told by the [table](crate::rivals::table).
 
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, MeasuredValue};
@@ -12,9 +12,10 @@ use crate::effects::{
     OutputFilter, Refutation, ResonantLine, SharedDrift, SinusoidalLine, SpectrumEvidence, SupplySensitivity,
     TelegraphEvidence, TelegraphNoise, TemperatureSensitivity, Unexplained, UnexplainedPlace,
 };
-use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES, FREQUENCY_BY_OCTAVES};
+use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::fit::noise_terms::{filter_length_s, is_white, line_frequency};
 use crate::fit::traced_model::Addition;
+use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
 use crate::rivals::slow_drift::ChannelsInCommon;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
@@ -26,16 +27,10 @@ use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Shape};
-use allan_core::term::{Resonance, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::PI;
 
-/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts, and a
-/// correlated process of no more than their deviation is the rounding error.
-const NEIGHBOURING_COUNTS: f64 = 1.5;
-/// In a channel that is not dithered, the rounding error is correlated over about this many lengths of the filter.
-const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 /// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
@@ -66,99 +61,119 @@ pub(crate) struct ChannelFindings<'a> {
     pub rest: Option<&'a UniformSeries>,
 }
 
-/// The effects of a channel beyond the baseline model, without those that preprocessing found.
-pub(crate) fn name_effects(profile: &SensorProfile, findings: &ChannelFindings) -> Vec<Effect> {
-    let &ChannelFindings { channel, resolution, fit, lines, common, .. } = findings;
-    let (model, unit, period_s) = (fit.after(), channel.unit, fit.after().sample_period());
-    let (plausible, implausible): (Vec<_>, Vec<_>) = findings
-        .sensitivities
-        .iter()
-        .copied()
-        .partition(|(regressor, sensitivity)| is_plausible(profile, channel, regressor.quantity, sensitivity));
-    let mut effects = sensitivity_effects(&plausible, unit);
-    effects.extend(implausible.iter().map(|(regressor, of)| shared_drift_effect(profile, channel, *regressor, of)));
-    // Without dither the rounding error is no white noise, and the curve shows the steps of the rounding.
-    let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
-    let is_dithered_at_once = fit.is_dithered(profile, resolution, 1);
-    let is_rounding =
-        |found: &&TelegraphNoise| !is_dithered_at_once && found.amplitude.value < NEIGHBOURING_COUNTS * resolution;
-    let telegraph = findings.telegraph.filter(|found| !is_rounding(found));
-    let rounding_s = if is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * filter_length_s(model) };
-    // Two levels have half their distance as their deviation.
-    let is_rounding_error = |term: &FittedTerm| 2.0 * term.low < NEIGHBOURING_COUNTS * resolution;
-    let duration_s = fit.covariates.curve.samples() as f64 * period_s;
-    let in_spectrum: Vec<Effect> = lines
-        .unwrap_or_default()
-        .iter()
-        .map(|line| line_effect(line, fit, unit))
-        .filter(|effect| is_shown(effect, duration_s))
-        .collect();
-    let unexplained = |found: &Addition, term: Option<&FittedTerm>, by: Refutation| {
-        unexplained_octave(found, &fit.covariates.curve, term, by)
+/// What is proposed of a channel beyond the baseline model, but for what preprocessing found, and what decides beside it.
+pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (Vec<Proposal>, ChannelFacts) {
+    let &ChannelFindings { channel, resolution, fit, lines, .. } = findings;
+    let (unit, period_s) = (channel.unit, fit.after().sample_period());
+    let facts = ChannelFacts {
+        resolution,
+        period_s,
+        duration_s: fit.covariates.curve.samples() as f64 * period_s,
+        is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
+        is_dithered_at_once: fit.is_dithered(profile, resolution, 1),
+        filter_length_s: filter_length_s(fit.after()),
+        slope_of_ends: None,
     };
-    for (term, found) in fit.traced.added() {
-        let curve = curve_evidence(found, period_s);
-        match term.kind {
-            NoiseTerm::Filtered(filter) => {
-                effects.push(filter_effect(term, &filter, curve, unit, profile.internal_rate_hz));
-            }
-            _ if !is_dithered => {}
-            NoiseTerm::Markov(Markov { time_constant }) if time_constant < rounding_s && is_rounding_error(term) => {}
-            NoiseTerm::Quantization if rounding_s > 0.0 => {}
-            // Reported from the spectrum, which resolves them better than the curve.
-            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if is_in_spectrum(&term.kind, &in_spectrum) => {}
-            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if rounding_s > 0.0 && is_rounding_error(term) => {}
-            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) if has_few_periods(&term.kind, duration_s) => {
-                effects.push(unexplained(found, Some(term), Refutation::FewPeriods));
-            }
-            // In the curve alone: its frequency changes, or it is no line.
-            NoiseTerm::Sinusoid(Sinusoid { frequency }) | NoiseTerm::Resonance(Resonance { frequency, .. })
-                if lines.is_some() && !is_band(term, duration_s) =>
-            {
-                // Above a line of the spectrum, one of the harmonics of that beyond those that the spectrum lists.
-                if has_line_below(&in_spectrum, frequency) {
-                    continue;
-                }
-                effects.push(unexplained(found, Some(term), Refutation::NotInSpectrum { frequency_hz: frequency }));
-            }
-            // In the curve, random telegraph noise and a common-mode drift look like these.
-            NoiseTerm::Markov(_) | NoiseTerm::RateRamp if telegraph.is_some() || common.is_some() => {}
-            NoiseTerm::Markov(markov) if is_low_pass(model, markov, resolution) => {
-                effects.push(low_pass_effect(term, markov, curve));
-            }
-            NoiseTerm::Markov(Markov { time_constant })
-                if findings.rest.is_some_and(|rest| !is_reversible(rest, time_constant)) =>
-            {
-                effects.push(unexplained(found, None, Refutation::Irreversible { time_constant_s: time_constant }));
-            }
-            NoiseTerm::Markov(_) if let Some(by_spectrum) = &fit.markov_by_spectrum => {
-                let corner_hz = 0.5 / (PI * by_spectrum.time_constant.value);
-                effects.push(markov_effect(term, MarkovEvidence::Spectrum { corner_hz, gain: by_spectrum.gain }, unit));
-            }
-            NoiseTerm::Markov(markov) => match kurtosis_ratio(fit, findings.rest, resolution, markov) {
-                // Beside a telegraph signal it is that one's.
-                Some(_) if effects.iter().any(|effect| matches!(effect, Effect::TelegraphNoise(_))) => {
-                    effects.push(markov_effect(term, MarkovEvidence::Curve(curve), unit));
-                }
-                Some(kurtosis) if kurtosis.ratio - 3.0 * kurtosis.error > LARGEST_KURTOSIS_RATIO => {
-                    effects.push(unexplained(found, None, rare_disturbances(markov, &kurtosis)));
-                }
-                Some(kurtosis) if kurtosis.is_telegraph() => {
-                    effects.push(telegraph_effect(term, &kurtosis, curve, unit));
-                }
-                Some(kurtosis) if !is_gaussian(&kurtosis) => {
-                    effects.push(unexplained(found, None, undecided_levels(markov, &kurtosis)));
-                }
-                _ => effects.push(markov_effect(term, MarkovEvidence::Curve(curve), unit)),
-            },
-            _ => effects.extend(term_effect(term, curve, unit)),
+    let mut proposals = sensitivity_proposals(profile, channel, &findings.sensitivities);
+    for (number, (term, found)) in fit.traced.added().into_iter().enumerate() {
+        let effects = term_effects(profile, findings, &facts, (term, found)).into_iter();
+        let origin = Origin::Term { number, kind: term.kind, low: term.low };
+        proposals.extend(effects.map(|effect| Proposal { effect, origin: origin.clone() }));
+    }
+    let of_levels = |found: &TelegraphNoise| {
+        let is_reversible = findings.rest.is_none_or(|rest| is_reversible(rest, found.time_constant_s.value));
+        Proposal::new(*found, Origin::Levels { is_reversible })
+    };
+    proposals.extend(findings.telegraph.map(of_levels));
+    let in_common = |common| Proposal::new(common_mode_effect(common, channel, unit), Origin::CrossSpectra);
+    proposals.extend(findings.common.map(in_common));
+    let of_line =
+        |line: &MergedLine| Proposal::new(line_effect(line, fit, unit), Origin::Line { is_slow: line.is_slow() });
+    proposals.extend(lines.unwrap_or_default().iter().map(of_line));
+    (proposals, facts)
+}
+
+/// The effects that a term of the model may be.
+fn term_effects(
+    profile: &SensorProfile,
+    findings: &ChannelFindings,
+    facts: &ChannelFacts,
+    (term, found): (&FittedTerm, &Addition),
+) -> Vec<Effect> {
+    let &ChannelFindings { channel: ChannelProfile { unit, .. }, fit, lines, .. } = findings;
+    let curve = curve_evidence(found, facts.period_s);
+    let line = |has_width: bool| LineEvidence { has_width, source: LineSource::Curve(curve) };
+    let unexplained = |by: Refutation| unexplained_octave(found, &fit.covariates.curve, term, by);
+    let mut effects = match term.kind {
+        NoiseTerm::Filtered(filter) => vec![filter_effect(term, &filter, curve, unit, profile.internal_rate_hz)],
+        NoiseTerm::Quantization => {
+            vec![AngleQuantization { coefficient: coefficient(term, unit), evidence: curve }.into()]
+        }
+        NoiseTerm::RateRamp => {
+            let evidence = LinearDriftEvidence::Curve(curve);
+            vec![LinearDrift { slope: coefficient(term, unit), evidence }.into()]
+        }
+        NoiseTerm::Resonance(_) => {
+            let (frequency_hz, bandwidth_hz) = (shape(term, 0), shape(term, 1));
+            let (deviation, evidence) = (coefficient(term, unit), line(true));
+            vec![ResonantLine { frequency_hz, bandwidth_hz, deviation, multiples: None, evidence }.into()]
+        }
+        NoiseTerm::Sinusoid(_) => {
+            let (frequency_hz, amplitude) = (shape(term, 0), coefficient(term, unit));
+            vec![SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence: line(false) }.into()]
+        }
+        NoiseTerm::Markov(markov) => return markov_effects(findings, facts, (term, markov), curve, unexplained),
+        // The terms of the baseline are no effects.
+        NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk => Vec::new(),
+    };
+    if let Some(frequency) = line_frequency(&term.kind) {
+        // The curve alone does not tell so few periods from a drift.
+        if frequency * facts.duration_s < FEW_PERIODS {
+            effects.push(unexplained(Refutation::FewPeriods));
+        }
+        // In the curve alone: its frequency changes, or it is no line.
+        if lines.is_some() && !is_band(term, facts.duration_s) {
+            effects.push(unexplained(Refutation::NotInSpectrum { frequency_hz: frequency }));
         }
     }
-    keep_first_octave(&mut effects);
-    effects.extend(telegraph.map(|found| Effect::from(*found)));
-    effects.extend(common.map(|common| common_mode_effect(common, channel, unit)));
-    effects.extend(in_spectrum);
-    effects.retain(|effect| is_shown(effect, duration_s));
+    effects
+}
+
+/// The effects that a Markov term of the model may be.
+fn markov_effects(
+    findings: &ChannelFindings,
+    facts: &ChannelFacts,
+    (term, markov): (&FittedTerm, Markov),
+    curve: CurveEvidence,
+    unexplained: impl Fn(Refutation) -> Effect,
+) -> Vec<Effect> {
+    let &ChannelFindings { channel: ChannelProfile { unit, .. }, fit, rest, .. } = findings;
+    let time_constant_s = markov.time_constant;
+    let mut effects = Vec::new();
+    if is_low_pass(fit.after(), markov, facts.resolution) {
+        effects.push(low_pass_effect(term, markov, curve));
+    }
+    if rest.is_some_and(|rest| !is_reversible(rest, time_constant_s)) {
+        effects.push(unexplained(Refutation::Irreversible { time_constant_s }));
+    }
+    let process =
+        |evidence| MarkovProcess { deviation: coefficient(term, unit), time_constant_s: shape(term, 0), evidence };
+    if let Some(by_spectrum) = &fit.markov_by_spectrum {
+        let corner_hz = 0.5 / (PI * by_spectrum.time_constant.value);
+        effects.push(process(MarkovEvidence::Spectrum { corner_hz, gain: by_spectrum.gain }).into());
+        return effects;
+    }
+    effects.push(process(MarkovEvidence::Curve(curve)).into());
+    if let Some(of) = kurtosis_ratio(fit, rest, facts.resolution, markov) {
+        let kurtosis = [of.ratio, of.error];
+        if of.ratio - 3.0 * of.error > LARGEST_KURTOSIS_RATIO {
+            effects.push(unexplained(Refutation::RareDisturbances { time_constant_s, kurtosis }));
+        } else if of.is_telegraph() {
+            effects.push(telegraph_effect(term, &of, curve, unit));
+        } else if !is_gaussian(&of) {
+            effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis }));
+        }
+    }
     effects
 }
 
@@ -186,58 +201,10 @@ fn kurtosis_ratio(
     telegraph::kurtosis_ratio(&estimator.curve(rest.sample_period()).scaled(step), model, markov)
 }
 
-/// Of several terms that stand for one thing that has no name, leaves the first, which was the clearest, and the lines.
-fn keep_first_octave(effects: &mut Vec<Effect>) {
-    let mut is_first = true;
-    effects.retain(|effect| {
-        let is_octave = matches!(effect, Effect::Unexplained(of) if of.frequency_hz().is_none());
-        !is_octave || std::mem::take(&mut is_first)
-    });
-}
-
-/// Whether the data shows an effect: the interval of its size excludes 0, and it lasts no longer than the record of
-/// `duration_s` seconds.
-fn is_shown(effect: &Effect, duration_s: f64) -> bool {
-    let time_constant_s = match effect {
-        Effect::MarkovProcess(of) => Some(of.time_constant_s),
-        Effect::TelegraphNoise(of) => Some(of.time_constant_s),
-        Effect::CommonMode(of) => Some(of.time_constant_s),
-        _ => None,
-    };
-    let excludes_0 = |of: &BoundedEstimate| of.low > 0.0 || of.high < 0.0;
-    // Of several axes some may be 0, and the size of what is unexplained is told as it is.
-    let may_be_0 = matches!(effect, Effect::AccelerationSensitivity(_) | Effect::Unexplained(_));
-    time_constant_s.is_none_or(|of| of.value < duration_s) && (may_be_0 || effect.sizes().iter().all(excludes_0))
-}
-
-/// Whether a line of the model is one of `lines`, the effects by the spectrum: its frequency by the curve, whose octaves tell it
-/// to some tenths, is that of an effect.
-fn is_in_spectrum(kind: &NoiseTerm, lines: &[Effect]) -> bool {
-    let Some(frequency) = line_frequency(kind) else { return false };
-    lines.iter().any(|line| {
-        let bandwidth = if let Effect::ResonantLine(of) = line { of.bandwidth_hz.value } else { 0.0 };
-        let reach = (FREQUENCY_BY_OCTAVES * frequency).max(0.5 * bandwidth);
-        line.frequency_hz().is_some_and(|of| (of.value - frequency).abs() < reach)
-    })
-}
-
 /// Whether a term is a resonance of whose bandwidth a record of this length bounds both sides.
 fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
     let Shape::Resonance { bandwidth: (narrowest, widest), .. } = term.shape else { return false };
     matches!(term.kind, NoiseTerm::Resonance(of) if narrowest > 1.0 / duration_s && widest < WIDEST_BAND * of.frequency)
-}
-
-/// Whether one of `lines`, the effects by the spectrum, is at a lower frequency than a line of the curve, which is known to some
-/// tenths.
-fn has_line_below(lines: &[Effect], frequency: f64) -> bool {
-    let below =
-        |line: &Effect| line.frequency_hz().is_some_and(|of| of.value < (1.0 + FREQUENCY_BY_OCTAVES) * frequency);
-    lines.iter().any(below)
-}
-
-/// Whether a line has fewer periods in the record than lines are searched for: its curve alone does not tell it from drift.
-fn has_few_periods(kind: &NoiseTerm, duration_s: f64) -> bool {
-    line_frequency(kind).is_some_and(|frequency| frequency * duration_s < FEW_PERIODS)
 }
 
 /// Whether a Markov term is white noise behind a first-order low-pass filter: its time constant is short, and the white
@@ -273,45 +240,6 @@ fn shape(term: &FittedTerm, position: usize) -> BoundedEstimate {
     BoundedEstimate::new(value, low, high)
 }
 
-/// A term that was added to the baseline model. A filter and a Markov process are told by more than the term, and the terms of the
-/// baseline are no effects.
-fn term_effect(term: &FittedTerm, curve: CurveEvidence, unit: &'static str) -> Option<Effect> {
-    let line = |has_width: bool| LineEvidence { has_width, source: LineSource::Curve(curve) };
-    match term.kind {
-        NoiseTerm::Quantization => {
-            Some(AngleQuantization { coefficient: coefficient(term, unit), evidence: curve }.into())
-        }
-        NoiseTerm::RateRamp => {
-            let evidence = LinearDriftEvidence::Curve(curve);
-            Some(LinearDrift { slope: coefficient(term, unit), evidence }.into())
-        }
-        NoiseTerm::Resonance(_) => Some(
-            ResonantLine {
-                frequency_hz: shape(term, 0),
-                bandwidth_hz: shape(term, 1),
-                deviation: coefficient(term, unit),
-                multiples: None,
-                evidence: line(true),
-            }
-            .into(),
-        ),
-        NoiseTerm::Sinusoid(_) => Some(
-            SinusoidalLine {
-                frequency_hz: shape(term, 0),
-                amplitude: coefficient(term, unit),
-                multiples: None,
-                evidence: line(false),
-            }
-            .into(),
-        ),
-        NoiseTerm::Markov(_)
-        | NoiseTerm::Filtered(_)
-        | NoiseTerm::AngleRandomWalk
-        | NoiseTerm::BiasInstability
-        | NoiseTerm::RateRandomWalk => None,
-    }
-}
-
 /// A filter that was added to the baseline model, in a sensor whose internal sample rate is `internal_rate_hz`.
 fn filter_effect(
     term: &FittedTerm,
@@ -337,12 +265,6 @@ fn normal_bounds(estimate: MeasuredValue) -> BoundedEstimate {
     BoundedEstimate::new(estimate.value, (estimate.value - half_width).max(0.0), estimate.value + half_width)
 }
 
-/// A Markov term of a channel in `unit`.
-fn markov_effect(term: &FittedTerm, evidence: MarkovEvidence, unit: &'static str) -> Effect {
-    let time_constant_s = shape(term, 0);
-    MarkovProcess { deviation: coefficient(term, unit), time_constant_s, evidence }.into()
-}
-
 /// A Markov term whose kurtosis is that of random telegraph noise.
 fn telegraph_effect(term: &FittedTerm, kurtosis: &KurtosisRatio, curve: CurveEvidence, unit: &'static str) -> Effect {
     TelegraphNoise {
@@ -354,18 +276,8 @@ fn telegraph_effect(term: &FittedTerm, kurtosis: &KurtosisRatio, curve: CurveEvi
     .into()
 }
 
-/// A Markov term with the kurtosis of rare disturbances.
-fn rare_disturbances(markov: Markov, kurtosis: &KurtosisRatio) -> Refutation {
-    Refutation::RareDisturbances { time_constant_s: markov.time_constant, kurtosis: [kurtosis.ratio, kurtosis.error] }
-}
-
-/// A Markov term whose kurtosis does not tell whether it has two levels.
-fn undecided_levels(markov: Markov, kurtosis: &KurtosisRatio) -> Refutation {
-    Refutation::UndecidedLevels { time_constant_s: markov.time_constant, kurtosis: [kurtosis.ratio, kurtosis.error] }
-}
-
-/// A term that fits an octave of the curve and is contradicted; `line` is the term where that is a line.
-fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, line: Option<&FittedTerm>, by: Refutation) -> Effect {
+/// A term that fits an octave of the curve and is contradicted.
+fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, term: &FittedTerm, by: Refutation) -> Effect {
     let point = curve.points().iter().find(|point| point.n == found.residual.n);
     // Of the measured deviation at this averaging time; that of the model is taken as exact.
     let bound = |of: fn(&AllanPoint) -> f64| point.map_or(1.0, |point| (of(point) / point.avar).sqrt());
@@ -373,7 +285,7 @@ fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, line: Option<&Fi
     let (low, high) = (percent(bound(|point| point.low)), percent(bound(|point| point.high)));
     let evidence = curve_evidence(found, curve.sample_period());
     let tau_s = BoundedEstimate::exact(evidence.tau_s);
-    let frequency_hz = line.filter(|term| line_frequency(&term.kind).is_some()).map(|term| shape(term, 0));
+    let frequency_hz = line_frequency(&term.kind).map(|_| shape(term, 0));
     Unexplained {
         place: match frequency_hz {
             Some(frequency_hz) => UnexplainedPlace::LineOfCurve { tau_s, frequency_hz },
@@ -403,25 +315,45 @@ fn bounded(sensitivity: &Sensitivity, unit: &'static str) -> ChannelEstimate {
     BoundedEstimate::new(sensitivity.value, low, high).in_unit(unit)
 }
 
-/// Sensitivities to temperature, to supply, and to the specific force on all axes as one effect.
-fn sensitivity_effects(sensitivities: &[(ChannelProfile, Sensitivity)], unit: &'static str) -> Vec<Effect> {
-    let single = |regressor: Quantity| {
-        let (_, sensitivity) = sensitivities.iter().find(|(channel, _)| channel.quantity == regressor)?;
-        Some((bounded(sensitivity, unit), sensitivity.sigmas()))
+/// The sensitivities to temperature, to supply and to the specific force along each axis, in this order, and a drift in common with each
+/// of them in their place.
+fn sensitivity_proposals(
+    profile: &SensorProfile,
+    channel: ChannelProfile,
+    sensitivities: &[(ChannelProfile, Sensitivity)],
+) -> Vec<Proposal> {
+    let origin = |(regressor, of): &(ChannelProfile, Sensitivity)| Origin::Covariate {
+        is_plausible: is_plausible(profile, channel, regressor.quantity, of),
     };
-    let forces = || sensitivities.iter().filter(|(channel, _)| channel.quantity == Quantity::SpecificForce);
-    let acceleration = forces().next().is_some().then(|| {
-        let along = |axis: &str| forces().find(|(channel, _)| channel.axis == axis).map(|(_, of)| bounded(of, unit));
-        AccelerationSensitivity {
-            sensitivity: AccelerationSensitivity::AXES.map(along),
-            sigmas: forces().map(|(_, sensitivity)| sensitivity.sigmas()).fold(0.0, f64::max),
-        }
+    let own = |covariate: &(ChannelProfile, Sensitivity)| {
+        Some(Proposal::new(sensitivity_effect(channel, covariate)?, origin(covariate)))
+    };
+    let shared = |covariate: &(ChannelProfile, Sensitivity)| {
+        Proposal::new(shared_drift_effect(profile, channel, covariate), origin(covariate))
+    };
+    let mut proposals: Vec<Proposal> = sensitivities.iter().filter_map(own).collect();
+    proposals.sort_by_key(|of| match of.effect {
+        Effect::TemperatureSensitivity(_) => 0,
+        Effect::SupplySensitivity(_) => 1,
+        _ => 2,
     });
-    let temperature = single(Quantity::Temperature)
-        .map(|(sensitivity, sigmas)| Effect::from(TemperatureSensitivity { sensitivity, sigmas }));
-    let supply = single(Quantity::SupplyVoltage)
-        .map(|(sensitivity, sigmas)| Effect::from(SupplySensitivity { sensitivity, sigmas }));
-    temperature.into_iter().chain(supply).chain(acceleration.map(Effect::from)).collect()
+    proposals.extend(sensitivities.iter().map(shared));
+    proposals
+}
+
+/// The sensitivity of `channel` to what `regressor` measures.
+fn sensitivity_effect(channel: ChannelProfile, (regressor, of): &(ChannelProfile, Sensitivity)) -> Option<Effect> {
+    let (sensitivity, sigmas) = (bounded(of, channel.unit), of.sigmas());
+    match regressor.quantity {
+        Quantity::Temperature => Some(TemperatureSensitivity { sensitivity, sigmas }.into()),
+        Quantity::SupplyVoltage => Some(SupplySensitivity { sensitivity, sigmas }.into()),
+        Quantity::SpecificForce => {
+            let along = |axis: &str| (axis == regressor.axis).then_some(sensitivity);
+            let sensitivity = AccelerationSensitivity::AXES.map(along);
+            Some(AccelerationSensitivity { sensitivity, sigmas }.into())
+        }
+        _ => None,
+    }
 }
 
 /// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value, the
@@ -444,8 +376,7 @@ fn is_plausible(
 fn shared_drift_effect(
     profile: &SensorProfile,
     channel: ChannelProfile,
-    regressor: ChannelProfile,
-    sensitivity: &Sensitivity,
+    (regressor, sensitivity): &(ChannelProfile, Sensitivity),
 ) -> Effect {
     SharedDrift {
         ratio: bounded(sensitivity, channel.unit),

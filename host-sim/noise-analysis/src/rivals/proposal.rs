@@ -1,0 +1,104 @@
+//! An explanation that is proposed for a channel, where it comes from, and what decides between proposals beside them.
+
+use crate::effects::Effect;
+use crate::spectra::decaying_disturbances::DecayingDisturbances;
+use crate::spectra::frequency_track::FrequencyTrack;
+use crate::spectra::periodic_signal::PeriodicSignal;
+use allan_core::NoiseTerm;
+
+/// An effect that a detector or a fit proposes.
+#[derive(Debug, Clone)]
+pub(crate) struct Proposal {
+    pub effect: Effect,
+    pub origin: Origin,
+}
+
+/// What proposes an effect.
+#[derive(Debug, Clone)]
+pub(crate) enum Origin {
+    /// The samples: repeated ones, knocks, spikes, steps, ramps, responses.
+    Samples,
+    /// The means of a second, which leave their median.
+    Motion {
+        /// Whether another channel of the same quantity leaves it in the same seconds.
+        is_shared: bool,
+        /// Whether they change faster than a Gaussian process would.
+        is_sudden: bool,
+    },
+    /// The regression on a covariate.
+    Covariate {
+        /// Whether the sensitivity is within what is known of the sensor.
+        is_plausible: bool,
+    },
+    /// A term that was added to the model of the curve. Several effects of one term exclude each other.
+    Term {
+        /// Number of the term.
+        number: usize,
+        kind: NoiseTerm,
+        /// Lower bound of its coefficient.
+        low: f64,
+    },
+    /// Two levels in the samples.
+    Levels {
+        /// Whether the samples change upwards as they change downwards.
+        is_reversible: bool,
+    },
+    /// The spectra of several channels.
+    CrossSpectra,
+    /// A line of the spectrum.
+    Line {
+        /// Whether it has a few periods in the record.
+        is_slow: bool,
+    },
+    /// What the model leaves of the curve.
+    Residual,
+    /// A signal that no term of the model has.
+    Signal(Signal),
+    /// The level of the noise in blocks.
+    Level,
+}
+
+/// A signal in the samples of a channel that no term of the noise model has.
+#[derive(Debug, Clone)]
+pub(crate) enum Signal {
+    /// A slow periodic one that is no sinusoid.
+    Periodic(PeriodicSignal),
+    /// A line whose frequency runs.
+    Chirp(FrequencyTrack),
+    /// Disturbances that begin at once and decay.
+    Decays(DecayingDisturbances),
+}
+
+impl Proposal {
+    pub(crate) fn new(effect: impl Into<Effect>, origin: Origin) -> Self {
+        Self { effect: effect.into(), origin }
+    }
+
+    /// Number of the term of the curve that it explains.
+    pub(crate) const fn term(&self) -> Option<usize> {
+        match self.origin {
+            Origin::Term { number, .. } => Some(number),
+            _ => None,
+        }
+    }
+}
+
+/// What is known of a channel beside what is proposed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ChannelFacts {
+    /// Smallest distance of two values, in the channel's unit.
+    pub resolution: f64,
+    /// s
+    pub period_s: f64,
+    /// s
+    pub duration_s: f64,
+    /// Whether the noise is large enough against the resolution, at short averaging times, that rounding adds white noise alone.
+    pub is_dithered: bool,
+    /// Whether it is at the shortest averaging time.
+    pub is_dithered_at_once: bool,
+    /// Length of the impulse response of the model's filter, s.
+    pub filter_length_s: f64,
+    /// Change from the first tenth of the samples to the last over the time between them, in the channel's unit per s; `None` where the
+    /// samples are not kept.
+    pub slope_of_ends: Option<f64>,
+}

@@ -1,0 +1,151 @@
+//! Signals in the samples of a channel that no term of the noise model has: a slow periodic one that is no sinusoid, a line whose
+//! frequency runs, and disturbances that begin at once and decay; and the lines of the spectrum beside them.
+
+use crate::bounds::BoundedEstimate;
+use crate::effects::{Chirp, MarkovProcess, Observation, Unexplained, UnexplainedPlace};
+use crate::rivals::proposal::{Origin, Proposal, Signal};
+use crate::samples::uniform_series::UniformSeries;
+use crate::spectra::decaying_disturbances::DecayingDisturbances;
+use crate::spectra::frequency_track::FrequencyTrack;
+use crate::spectra::periodic_signal::PeriodicSignal;
+use crate::spectra::spectral_lines::MergedLine;
+
+/// Lines of the spectrum of a channel and signals in its samples.
+#[derive(Clone)]
+pub(crate) struct SpectrumProposals {
+    pub lines: Vec<MergedLine>,
+    pub periodic: Option<PeriodicSignal>,
+    pub track: Option<FrequencyTrack>,
+    pub decays: Option<DecayingDisturbances>,
+    /// Frequencies of the resonances of the curve, Hz, with what they take off its deviance.
+    pub bands_of_curve: Vec<(f64, f64)>,
+    /// Of the spectrum.
+    pub resolution_hz: f64,
+}
+
+/// One of them.
+pub(crate) enum SpectrumClaim<'a> {
+    Line(&'a MergedLine),
+    Chirp(&'a FrequencyTrack),
+    Decays,
+}
+
+impl SpectrumProposals {
+    /// The signals in `series`, a channel's samples less its covariates, beside the `lines` of its spectrum.
+    pub(crate) fn find(series: &UniformSeries, lines: Vec<MergedLine>, bands_of_curve: Vec<(f64, f64)>) -> Self {
+        Self {
+            lines,
+            periodic: PeriodicSignal::find(series),
+            track: FrequencyTrack::find(series),
+            decays: DecayingDisturbances::find(series),
+            bands_of_curve,
+            resolution_hz: 1.0 / series.duration(),
+        }
+    }
+
+    /// Frequencies of the bands of spectrum and curve, Hz, each with its statistic.
+    pub(crate) fn bands(&self) -> impl Iterator<Item = (f64, f64)> {
+        let of_lines = self.lines.iter().filter(|line| line.width.value > 0.0);
+        of_lines.map(|line| (line.frequency.value, line.statistic)).chain(self.bands_of_curve.iter().copied())
+    }
+
+    /// The lines, and the signals in the order in which they are reported.
+    pub(crate) fn into_lines_and_signals(self) -> (Vec<MergedLine>, Vec<Signal>) {
+        let periodic = self.periodic.map(Signal::Periodic).into_iter();
+        let signals = periodic.chain(self.track.map(Signal::Chirp)).chain(self.decays.map(Signal::Decays));
+        (self.lines, signals.collect())
+    }
+}
+
+/// A signal of a channel in `unit` as it is reported.
+pub(crate) fn proposal(signal: &Signal, unit: &'static str) -> Proposal {
+    let origin = Origin::Signal(signal.clone());
+    match signal {
+        Signal::Periodic(periodic) => Proposal::new(periodic_effect(periodic), origin),
+        Signal::Chirp(track) => Proposal::new(chirp(track, unit), origin),
+        Signal::Decays(decays) => Proposal::new(decays_effect(decays), origin),
+    }
+}
+
+fn periodic_effect(periodic: &PeriodicSignal) -> Unexplained {
+    Unexplained {
+        place: UnexplainedPlace::Frequency(periodic.frequency),
+        excess_percent: Some(periodic.harmonics_percent),
+        observation: Observation::PeriodicSignal {
+            harmonics: periodic.harmonics(),
+            sum: periodic.sum,
+            p_value: periodic.p_value,
+        },
+    }
+}
+
+fn chirp(track: &FrequencyTrack, unit: &'static str) -> Chirp {
+    let FrequencyTrack { frequencies, error, duration_s, .. } = *track;
+    let bounded = |value: f64, error: f64| BoundedEstimate::new(value, value - error, value + error);
+    let [first, last] = frequencies;
+    Chirp {
+        start_hz: bounded(first, error),
+        end_hz: bounded(last, error),
+        rate_hz_per_s: bounded((last - first) / duration_s, 2.0 * error / duration_s),
+        amplitude: track.amplitude.in_unit(unit),
+        excess: track.excess,
+        p_value: track.p_value,
+    }
+}
+
+fn decays_effect(decays: &DecayingDisturbances) -> Unexplained {
+    Unexplained {
+        place: UnexplainedPlace::AveragingTime(decays.time_constant.scaled(MarkovProcess::PEAK)),
+        excess_percent: None,
+        observation: Observation::DecayingDisturbances {
+            time_constant_s: decays.time_constant.value,
+            sum: decays.sum,
+            reversed: decays.reversed,
+            p_value: decays.p_value,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SpectrumProposals, proposal};
+    use crate::effects::Effect;
+    use crate::samples::uniform_series::UniformSeries;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const SAMPLES: usize = 40_000;
+    const RATE_HZ: f64 = 100.0;
+
+    /// The effects of white noise of deviation 1 over 400 s with a signal of the time.
+    fn effects(signal: impl Fn(f64) -> f64) -> Vec<Effect> {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let value = |at: usize| signal(at as f64 / RATE_HZ) + random.sample::<f64, _>(StandardNormal);
+        let series = UniformSeries::new(1.0 / RATE_HZ, (0..SAMPLES).map(value).collect());
+        let (_, signals) = SpectrumProposals::find(&series, Vec::new(), Vec::new()).into_lines_and_signals();
+        signals.iter().map(|signal| proposal(signal, "g").effect).collect()
+    }
+
+    #[test]
+    fn a_slow_sawtooth_is_a_periodic_signal() {
+        // Harmonics of 40,000/4·(0.3/(πk))², 91/k², over the noise.
+        let found = effects(|time_s| 0.3 * (time_s / 40.0).fract());
+        let Some(periodic @ Effect::Unexplained(_)) = found.first() else { panic!("{found:?}") };
+        // The resolution is 2.5 mHz, of which the frequency is known to a tenth.
+        assert!((periodic.frequency_hz().expect("one").value - 0.025).abs() < 0.000_25, "{found:?}");
+    }
+
+    #[test]
+    fn a_frequency_that_runs_is_a_chirp() {
+        // 0.15²·40,000/4 = 225 over the noise.
+        let found = effects(|time_s| 0.15 * (TAU * (4.0 + 0.005 * time_s) * time_s).sin());
+        let [Effect::Chirp(chirp)] = &found[..] else { panic!("{found:?}") };
+        // From 4 to 8 Hz, within the ordinates of 64 segments of 6.25 s.
+        assert!((chirp.start_hz.value - 4.0).abs() < 0.2 && (chirp.end_hz.value - 8.0).abs() < 0.2, "{chirp:?}");
+        assert!((chirp.rate_hz_per_s.low..=chirp.rate_hz_per_s.high).contains(&0.01), "{chirp:?}");
+        assert!((chirp.amplitude.low..=chirp.amplitude.high).contains(&0.15), "{chirp:?}");
+        assert_eq!(effects(|_| 0.0), []);
+    }
+}
