@@ -1,7 +1,7 @@
 //! Quantization noise: steps of the angle, as of a counter or an integrator before the output.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::units::coefficient_unit;
 use allan_core::NoiseTerm;
@@ -38,9 +38,7 @@ impl Kind for AngleQuantization {
         at.of_term(&NoiseTerm::Quantization, self.coefficient.value)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }
 
 impl AngleQuantization {

@@ -1,6 +1,6 @@
 //! A chirp: a line whose frequency runs evenly from one end of the record to the other, as that of a motor whose speed changes.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
@@ -64,9 +64,7 @@ impl Kind for Chirp {
         AddedVariance::corrected(self.amplitude.value.powi(2) * mean)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Samples that never arrived: the sample indices or time stamps have room for them.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// Lost samples.
@@ -35,11 +35,5 @@ impl Kind for DroppedSamples {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

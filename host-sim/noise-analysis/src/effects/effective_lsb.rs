@@ -1,7 +1,8 @@
 //! Values that are multiples of several counts: they were rounded before they were recorded.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use crate::distributions::ROUNDING;
 
 /// A resolution of several counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,10 +38,8 @@ impl Kind for EffectiveLsb {
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
         // Rounding error is uniform within a step, and white where noise reaches over several steps.
-        AddedVariance::modelled(self.step.value.powi(2) / 12.0 / at.n as f64)
+        AddedVariance::modelled(ROUNDING * self.step.value.powi(2) / at.n as f64)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

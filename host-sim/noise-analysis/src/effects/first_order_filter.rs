@@ -1,7 +1,7 @@
 //! A low-pass filter of the first order in one channel: a Markov process in the place of the white noise.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// A filter of the first order.
@@ -34,11 +34,5 @@ impl Kind for FirstOrderFilter {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

@@ -30,6 +30,28 @@ pub(crate) trait Kind {
     fn course(&self, means: &BiasBlocks) -> Vec<(f64, Vec<f64>)>;
 }
 
+/// In a [`Kind`] of noise: [`Kind::course`].
+macro_rules! no_course {
+    () => {
+        fn course(&self, _: &$crate::effects::BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+            Vec::new()
+        }
+    };
+}
+
+/// In a [`Kind`] that adds no variance of its own: [`Kind::avar`] and [`Kind::course`].
+macro_rules! no_variance {
+    () => {
+        fn avar(&self, _: &$crate::effects::AveragingTime) -> $crate::effects::AddedVariance {
+            $crate::effects::AddedVariance::NONE
+        }
+
+        $crate::effects::kind::no_course!();
+    };
+}
+
+pub(super) use {no_course, no_variance};
+
 /// How often a part has an effect, which decides whether two channels show the same one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Occurrence {

@@ -1,6 +1,6 @@
 //! A time in which the noise is larger than before and after: a knock.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// A time of larger noise.
@@ -48,7 +48,5 @@ impl Kind for NoisyInterval {
         AddedVariance::corrected((self.level.value.powi(2) - 1.0).max(0.0) * part * at.model_avar)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

@@ -1,7 +1,7 @@
 //! Exponentially correlated noise: a first-order Gauss-Markov process.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Markov;
@@ -60,7 +60,5 @@ impl Kind for MarkovProcess {
         at.of_term(&term, self.deviation.value)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

@@ -1,6 +1,6 @@
 //! A motion of the platform, by which a channel goes farther than the biases of parts differ.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A motion.
@@ -39,11 +39,5 @@ impl Kind for MotionInterval {
         Occurrence::AtTime { from_s: self.from_s.value, to_s: self.to_s.value }
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

@@ -1,6 +1,6 @@
 //! Noise that does not reach from one count to the next.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// Noise below a count.
@@ -34,11 +34,5 @@ impl Kind for NoiseBelowCount {
         Occurrence::InChannel
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

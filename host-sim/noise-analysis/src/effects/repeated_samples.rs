@@ -1,6 +1,6 @@
 //! Samples that equal the one before in all channels: a register that is read before it is renewed.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// Samples that were read twice.
@@ -37,11 +37,5 @@ impl Kind for RepeatedSamples {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

@@ -1,7 +1,7 @@
 //! A line that is wider than the record resolves: a damped oscillation, or a frequency that wanders.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Resonance;
@@ -51,7 +51,5 @@ impl Kind for ResonantLine {
         at.of_term(&term, self.deviation.value)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

@@ -1,6 +1,6 @@
 //! A sample rate other than the nominal one: the tolerance of the part's oscillator.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// A clock that is off.
@@ -33,11 +33,5 @@ impl Kind for ClockDeviation {
         Occurrence::Once
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

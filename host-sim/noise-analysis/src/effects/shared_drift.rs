@@ -1,6 +1,6 @@
 //! Drift that a channel shares with another one, too large to be caused by what that one measures.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A drift that looks like a sensitivity.
@@ -37,11 +37,5 @@ impl Kind for SharedDrift {
         Occurrence::OnceAUnit
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

@@ -1,7 +1,7 @@
 //! A line no wider than the record resolves.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
@@ -44,7 +44,5 @@ impl Kind for SinusoidalLine {
         at.of_term(&term, self.amplitude.value)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

@@ -1,6 +1,6 @@
 //! Single samples that are farther from what their neighbours tell than chance explains.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// Samples that stand out.
@@ -46,7 +46,5 @@ impl Kind for Spikes {
         AddedVariance::corrected(rate * at.period_s * self.size.value.powi(2) / at.n as f64)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

@@ -1,7 +1,7 @@
 //! A square wave: a fundamental with its odd harmonics, whose amplitudes fall as 1/k.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A signal that is switched.
@@ -36,11 +36,5 @@ impl Kind for SquareWave {
         Occurrence::AtFrequency(self.frequency_hz)
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }

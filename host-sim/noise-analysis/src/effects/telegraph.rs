@@ -1,7 +1,7 @@
 //! Random telegraph noise: jumps to and fro between two levels at random times.
 
 use super::evidence::CurveEvidence;
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Markov;
@@ -63,7 +63,5 @@ impl Kind for TelegraphNoise {
         at.of_term(&term, 0.5 * self.amplitude.value)
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

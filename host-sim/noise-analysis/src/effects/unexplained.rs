@@ -1,7 +1,7 @@
 //! What departs from every model that the analysis knows: where, by how much, and what was seen.
 
 use super::evidence::{CurveEvidence, LineEvidence, Multiples};
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
 /// Something that no kind describes.
@@ -180,13 +180,7 @@ impl Kind for Unexplained {
         self.frequency_hz().map_or(Occurrence::InChannel, Occurrence::AtFrequency)
     }
 
-    fn avar(&self, _: &AveragingTime) -> AddedVariance {
-        AddedVariance::NONE
-    }
-
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_variance!();
 }
 
 impl Unexplained {

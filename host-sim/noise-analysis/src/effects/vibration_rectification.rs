@@ -1,6 +1,6 @@
 //! A bias in proportion to the variance of an acceleration: vibration that an even-order non-linearity rectifies.
 
-use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
@@ -44,7 +44,5 @@ impl Kind for VibrationRectification {
         AddedVariance::corrected(self.response.at(at.n))
     }
 
-    fn course(&self, _: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-        Vec::new()
-    }
+    no_course!();
 }

@@ -1,5 +1,6 @@
 //! A channel sampled at a constant period, with missing samples as `NaN`: the input of transforms and filters.
 
+use crate::distributions::ROUNDING;
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::samples::series::Series;
 use std::borrow::Cow;
@@ -57,7 +58,7 @@ impl UniformSeries {
     /// The same values, which are known to be rounded to steps of this size.
     pub(crate) fn rounded_to(self, step: f64) -> Self {
         // Rounding to steps of q has the variance q²/12, up to half the sample rate.
-        Self { rounding_density: 2.0 * self.sample_period * step.powi(2) / 12.0, ..self }
+        Self { rounding_density: 2.0 * ROUNDING * self.sample_period * step.powi(2), ..self }
     }
 
     /// One-sided density of the error of rounding the samples to counts, unit²/Hz, where it acts as white noise; 0 where the
