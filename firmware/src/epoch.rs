@@ -234,10 +234,14 @@ fn lsb(index: usize, scale: ReportScale) -> f64 {
     scale.lsb(CHANNELS[index])
 }
 
-/// Whether the subtraction would raise the Allan variance at any octave by more than twice its standard error.
+/// Whether the subtraction raises the Allan variance at any octave by more than twice the standard error of the rise.
 ///
 /// A chance correlation with a covariate that hardly varies has a large sensitivity, which would add the covariate's noise
-/// to the stream. At octaves without covariances that noise is all that the subtraction adds.
+/// to the stream `y`. With the share `s = Σ βᵢ·cᵢ` and the stream halfway, `u = y − s/2`, the rise is
+/// `σ²(y − s) − σ²(y) = −2·cov(u, s)`, and without one the estimate of `cov(u, s)` has the variance `σ²(u)·σ²(s)/edf`. A
+/// stream whose variance is small by chance, because its noise has cancelled `s`, is no evidence against a true `s`.
+/// Below the octaves with covariances the noise of the covariates is all that the subtraction adds; there it may be twice the
+/// standard error of the stream's variance.
 fn degrades(
     epoch: &FinishedEpoch,
     candidates: &Candidates,
@@ -253,9 +257,20 @@ fn degrades(
             *added += sensitivity.value * sensitivity.value * point.avar;
         }
     }
+    let of_covariates = |with: Option<usize>, covariate: usize, n: u64| match with {
+        Some(_) => (regression.covariance)(with, covariate, n),
+        None => Some(0.0),
+    };
+    let share = CovariateRegression { covariance: &of_covariates, ..*regression };
     let worse = |(raw, added): (&AllanPoint, f64)| {
-        let subtracted = regression.subtracted_at(raw, sensitivities).unwrap_or(raw.avar);
-        subtracted + added > raw.avar * (1.0 + 2.0 * libm::sqrt(2.0 / raw.edf))
+        let (Some(subtracted), Some(share)) = (
+            regression.subtracted_at(raw, sensitivities),
+            share.subtracted_at(&AllanPoint { avar: 0.0, ..*raw }, sensitivities),
+        ) else {
+            return added > raw.avar * 2.0 * libm::sqrt(2.0 / raw.edf);
+        };
+        let halfway = ((raw.avar + subtracted) / 2.0 - share / 4.0).max(0.0);
+        subtracted - raw.avar > 2.0 * 2.0 * libm::sqrt(halfway * share / raw.edf)
     };
     regression.channel.points().iter().zip(added).any(worse)
 }
