@@ -22,6 +22,8 @@ const BLOCK: u64 = 256;
 const WIDTH: u32 = 7;
 /// What the limit is wider by, in counts: two samples are rounded by half a count each, and so is the limit.
 const ROUNDING: u32 = 3;
+/// A limit above every difference of counts, which have 14 bits.
+const NO_LIMIT: i32 = 1 << 20;
 /// Samples after one beyond the limit in which none is refused.
 const CALM: u64 = 16;
 
@@ -31,7 +33,7 @@ struct ChannelGate {
     /// The last sample that was used.
     last: i32,
     /// Largest difference that noise explains, in counts.
-    limit: u32,
+    limit: i32,
     /// Sum of the squared differences of this block, counts².
     sum: u32,
     /// Mean squared difference in 1/256 counts²; `None` before the first block has ended.
@@ -50,7 +52,7 @@ pub(crate) struct GrossErrorGate<const W: u32 = WIDTH> {
 impl<const W: u32> GrossErrorGate<W> {
     /// A gate that knows nothing of the noise, and refuses nothing before the second block.
     pub(crate) const fn new() -> Self {
-        let channel = ChannelGate { last: 0, limit: u32::MAX, sum: 0, noise: None, armed_at: BLOCK };
+        let channel = ChannelGate { last: 0, limit: NO_LIMIT, sum: 0, noise: None, armed_at: BLOCK };
         Self { channels: [channel; CHANNELS.len()], samples: 0 }
     }
 
@@ -65,12 +67,14 @@ impl<const W: u32> GrossErrorGate<W> {
     pub(crate) fn find(&mut self, counts: &[i32; CHANNELS.len()], refused: ChannelSet) -> ChannelSet {
         let mut gross = ChannelSet::EMPTY;
         self.samples += 1;
+        let any_refused = !refused.is_empty();
         for (index, (channel, &count)) in self.channels.iter_mut().zip(counts).enumerate() {
-            if refused.contains(index) {
+            if any_refused && refused.contains(index) {
                 continue;
             }
             let difference = count - channel.last;
-            if difference.unsigned_abs() > channel.limit && channel.is_gross(self.samples) {
+            // Outside ±limit, in one comparison.
+            if (difference + channel.limit) as u32 > 2 * channel.limit as u32 && channel.is_gross(self.samples) {
                 gross.insert_if(index, true);
                 continue;
             }
@@ -101,7 +105,7 @@ impl ChannelGate {
         let noise = self.noise.map_or(newest, |noise| noise - noise / 4 + newest / 4);
         self.noise = Some(noise);
         // The root is in 1/16 counts.
-        self.limit = (W * noise.isqrt()).div_ceil(16) + ROUNDING;
+        self.limit = ((W * noise.isqrt()).div_ceil(16) + ROUNDING) as i32;
     }
 }
 

@@ -2,10 +2,17 @@
 #![no_std]
 #![no_main]
 
+#[allow(dead_code, unreachable_pub, reason = "a file of the firmware, of which the gate needs the channels alone")]
+#[path = "../../../firmware/src/channels.rs"]
+mod channels;
 #[allow(dead_code)] // the other images measure the stack too
 mod emulator;
 mod estimator;
 mod functions;
+mod gate;
+#[allow(dead_code, reason = "a file of the firmware, which disarms the gate, too")]
+#[path = "../../../firmware/src/gross_error_gate.rs"]
+mod gross_error_gate;
 #[path = "../../../allan-core/tests/support/late_state.rs"]
 mod late_state;
 
@@ -15,6 +22,7 @@ use cortex_m_rt::entry;
 fn main() -> ! {
     emulator::start();
     estimator::count();
+    gate::count();
     functions::count();
     emulator::success()
 }
