@@ -78,15 +78,44 @@ pub(crate) struct Outcome {
     pub(crate) diagnostics: String,
 }
 
-/// The board: whether its crystal starts, and when its DMA fails once, in s.
+/// The board: whether its crystal starts, and what fails once, at a time in s.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pico {
     pub(crate) crystal_starts: bool,
-    pub(crate) dma_error_at: f64,
+    pub(crate) fault: Option<(f64, Fault)>,
+}
+
+/// A fault of the microcontroller, by its name in `emulator.mjs`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// The DMA channel that receives a burst stops with an error.
+    Dma,
+    /// The programmed sample period, by which the firmware divides, becomes 0.
+    Divisor,
+    /// The exception of that name.
+    HardFault,
+    /// The core executes nothing any more, as after a fault within the handler of faults.
+    LockUp,
 }
 
 /// A board without a fault.
-pub(crate) const SOUND: Pico = Pico { crystal_starts: true, dma_error_at: f64::INFINITY };
+pub(crate) const SOUND: Pico = Pico { crystal_starts: true, fault: None };
+
+impl Pico {
+    /// A board with one fault, at a time in s.
+    pub(crate) fn with_fault(at_s: f64, fault: Fault) -> Self {
+        Self { fault: Some((at_s, fault)), ..SOUND }
+    }
+
+    /// The arguments of the emulator.
+    fn arguments(self) -> [String; 3] {
+        let crystal = if self.crystal_starts { "ok" } else { "dead" };
+        let (at_s, fault) = self.fault.map_or(("0".to_owned(), "none".to_owned()), |(at_s, fault)| {
+            (at_s.to_string(), format!("{fault:?}").to_lowercase())
+        });
+        [crystal.to_owned(), fault, at_s]
+    }
+}
 
 /// The path of the image.
 pub(crate) fn image() -> &'static Path {
@@ -110,8 +139,7 @@ pub(crate) fn run(
         .arg(images::workspace().join("tests/tests/pico/emulator.mjs"))
         .args([emulator, uf2, elf])
         .arg(seconds.to_string())
-        .arg(if board.crystal_starts { "ok" } else { "dead" })
-        .arg(if board.dma_error_at.is_finite() { board.dma_error_at.to_string() } else { "Infinity".to_owned() })
+        .args(board.arguments())
         .args(keys)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -168,15 +196,14 @@ pub(crate) fn run(
                     shortest_slow_read_ns = shortest_slow_read_ns.min(selected_at - before);
                 }
                 part.select();
-                frame.clear();
+                frame.clear(); // a restart may have cut the one before
             }
             b'd' => {
                 selected = false;
                 part.deselect();
-                let sent: Vec<u8> = frame.iter().map(|&(_, miso)| miso).collect();
-                if frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E)
-                    && let Ok(burst) = sent.try_into()
-                {
+                let requested = frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
+                let sent: Vec<u8> = frame.drain(..).map(|(_, miso)| miso).collect();
+                if requested && let Ok(burst) = sent.try_into() {
                     bursts.push((part.samples(), burst));
                 }
             }

@@ -1,7 +1,8 @@
 // Runs an RP2040 image in rp2040js. The sensor is simulated by the parent process, to which questions go over standard
-// output, and from which answers come over standard input. The frequency of SCK goes with every frame. Arguments: the folder of rp2040js, the image as UF2 and as
-// ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, the time in s of an error of the DMA channel
-// that receives a burst, and keys as TIME=TEXT.
+// output, and from which answers come over standard input. The frequency of SCK goes with every frame. Arguments: the folder of
+// rp2040js, the image as UF2 and as ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, a fault and its
+// time in s, and keys as TIME=TEXT. The faults: `none`, `dma` (an error of the channel that receives a burst), `divisor` (the
+// firmware divides by 0), `hardfault`, `lockup`. A restart by the watchdog or by the firmware keeps the memory.
 //
 // A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `c` has a frequency of SCK in
 // Hz in the place of the time, `s` and `d` are
@@ -14,64 +15,39 @@ import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const [folder, uf2File, elfFile, seconds, crystal, dmaError, ...keyArguments] = process.argv.slice(2);
+const [folder, uf2File, elfFile, seconds, crystal, fault, faultSeconds, ...keyArguments] = process.argv.slice(2);
 const load = (file) => import(pathToFileURL(path.join(folder, 'node_modules/rp2040js/dist/esm', file)));
 const { RP2040, GPIOPinState } = await load('index.js');
 const { SimulationClock } = await load('clock/simulation-clock.js');
 
 const PIN_SELECT = 17, PIN_DATA_READY = 20, PIN_LED = 25, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
+const FLASH = 0x10000000, WATCHDOG = 0x40058;
+const HARD_FAULT = 3; // number of the exception
 const keys = keyArguments.map((key) => [parseFloat(key) * 1e9, key.slice(key.indexOf('=') + 1)]);
+const end = seconds * 1e9;
 
-const clock = new SimulationClock();
-const mcu = new RP2040(clock);
 const diagnostics = new Map();
 const report = (from, text) => diagnostics.set(`${from}: ${text}`, true);
-mcu.logger = { debug() {}, info() {}, warn: report, error: report };
 
-const FLASH = 0x10000000;
-
-// As the boot loader does, write the payload of every block (https://github.com/microsoft/uf2) to its address.
 const uf2 = fs.readFileSync(uf2File);
-for (let block = 0; block < uf2.length; block += 512) {
-  const [magic0, magic1, , address, size] = [0, 4, 8, 12, 16].map((field) => uf2.readUInt32LE(block + field));
-  if (magic0 !== 0x0a324655 || magic1 !== 0x9e5d5157) throw new Error(`no UF2 block at ${block}`);
-  mcu.flash.set(uf2.subarray(block + 32, block + 32 + size), address - FLASH);
-}
-// Compare the loadable segments of the ELF (32 bits, little-endian), which a debug probe would write.
 const elf = fs.readFileSync(elfFile);
-for (let i = 0; i < elf.readUInt16LE(44); i++) {
-  const header = elf.readUInt32LE(28) + i * 32;
-  const [kind, offset, , address, size] = [0, 4, 8, 12, 16].map((field) => elf.readUInt32LE(header + field));
-  if (kind !== 1 || size === 0 || address < FLASH || address >= FLASH + mcu.flash.length) continue;
-  const segment = elf.subarray(offset, offset + size);
-  if (!segment.equals(mcu.flash.subarray(address - FLASH, address - FLASH + size))) {
-    throw new Error(`UF2 and ELF differ in the segment at 0x${address.toString(16)}`);
+// As the boot loader does, writes the payload of every block (https://github.com/microsoft/uf2) to its address.
+const program = (mcu) => {
+  for (let block = 0; block < uf2.length; block += 512) {
+    const [magic0, magic1, , address, size] = [0, 4, 8, 12, 16].map((field) => uf2.readUInt32LE(block + field));
+    if (magic0 !== 0x0a324655 || magic1 !== 0x9e5d5157) throw new Error(`no UF2 block at ${block}`);
+    mcu.flash.set(uf2.subarray(block + 32, block + 32 + size), address - FLASH);
   }
-}
-// The boot ROM copies the second stage to the top of memory and calls it; rp2040js has no boot ROM.
-mcu.sram.set(mcu.flash.subarray(0, 252), 0x41f00);
-Object.assign(mcu.core, { SP: 0x20041f00, LR: 0, PC: 0x20041f00 });
-// The registers with the cause of the reset, which rp2040js lacks: power-on.
-mcu.peripherals[0x40064] = {
-  readUint32: (offset) => (offset === 8 ? 1 << 8 : 0),
-  writeUint32() {},
-  writeUint32Atomic() {},
-};
-
-if (crystal === 'dead') {
-  // XOSC STATUS (offset 4) never says that the oscillator is stable.
-  mcu.peripherals[0x40024] = { readUint32: () => 0, writeUint32() {}, writeUint32Atomic() {} };
-}
-// A write to WATCHDOG LOAD (offset 4) feeds the watchdog.
-let fed = 0, longestUnfed = 0;
-const watchdog = mcu.peripherals[0x40058];
-const writeWatchdog = watchdog.writeUint32.bind(watchdog);
-watchdog.writeUint32 = (offset, value) => {
-  if (offset === 4) {
-    longestUnfed = Math.max(longestUnfed, clock.nanos - fed);
-    fed = clock.nanos;
+  // Compare the loadable segments of the ELF (32 bits, little-endian), which a debug probe would write.
+  for (let i = 0; i < elf.readUInt16LE(44); i++) {
+    const header = elf.readUInt32LE(28) + i * 32;
+    const [kind, offset, , address, size] = [0, 4, 8, 12, 16].map((field) => elf.readUInt32LE(header + field));
+    if (kind !== 1 || size === 0 || address < FLASH || address >= FLASH + mcu.flash.length) continue;
+    const segment = elf.subarray(offset, offset + size);
+    if (!segment.equals(mcu.flash.subarray(address - FLASH, address - FLASH + size))) {
+      throw new Error(`UF2 and ELF differ in the segment at 0x${address.toString(16)}`);
+    }
   }
-  writeWatchdog(offset, value);
 };
 
 const ask = (kind, value, byte, answerLength) => {
@@ -89,62 +65,125 @@ const ask = (kind, value, byte, answerLength) => {
   return answer;
 };
 
-const spi = mcu.spi[0];
-// The error is one of the bus: the channel halts and raises no interrupt (RP2040 data sheet, section 2.5.7).
-let dmaErrorAt = parseFloat(dmaError) * 1e9;
-const failReceiving = () => {
-  const channel = mcu.dma.channels[0];
-  if (clock.nanos < dmaErrorAt || !(channel.ctrl & (1 << 24)) || channel.transCount > 13) return;
-  dmaErrorAt = Infinity;
-  channel.ctrl = (channel.ctrl | (1 << 30)) & ~(1 << 24);
-  channel.transferAlarm.cancel();
-};
-spi.onTransmit = (value) => {
-  const answer = ask('b', clock.nanos, value & 0xff, 1)[0];
-  failReceiving();
-  clock.createAlarm(() => spi.completeTransmit(answer)).schedule((spi.dataBits * 1e9) / spi.clockFrequency);
-};
-mcu.gpio[PIN_SELECT].addListener((state) => {
-  if (state === GPIOPinState.Low) {
-    ask('c', spi.clockFrequency, undefined, 0);
-    ask('s', clock.nanos, undefined, 0);
-  }
-  if (state === GPIOPinState.High) ask('d', clock.nanos, undefined, 0);
-});
-let ledChanges = 0;
-const isDriven = (state) => state === GPIOPinState.Low || state === GPIOPinState.High;
-mcu.gpio[PIN_LED].addListener((state, before) => (ledChanges += isDriven(state) && isDriven(before) ? 1 : 0));
-mcu.uart[0].onByte = (byte) => ask('u', clock.nanos, byte, 0);
+// What outlasts a restart of the microcontroller: the time, the sensor's samples, the fault, the counts.
+let startedAt = 0, samples = 0, instructions = 0, ledChanges = 0, longestUnfed = 0;
+let faultAt = parseFloat(faultSeconds) * 1e9;
 
-// Data ready: a pulse at every sample. The time of the next one is asked for at least every STRIDE_NS, as settings may
-// change it.
-let samples = 0;
-const edge = clock.createAlarm(() => {
-  const answer = ask('n', clock.nanos, undefined, 16);
-  const [taken, next] = [answer.readDoubleLE(0), answer.readDoubleLE(8)];
-  if (taken > samples) {
-    samples = taken;
-    mcu.gpio[PIN_DATA_READY].setInputValue(true);
-    clock.createAlarm(() => mcu.gpio[PIN_DATA_READY].setInputValue(false)).schedule(PULSE_NS);
+// Runs the microcontroller from its boot to its restart or the end, and returns it. `retained` is the memory before it, which a
+// reset by the watchdog does not clear (Pico SDK, `__uninitialized_ram`); `reason` is the watchdog's register for the cause of its
+// reset (RP2040 data sheet, section 4.7.6).
+const run = (retained, reason) => {
+  const clock = new SimulationClock();
+  const now = () => startedAt + clock.nanos;
+  const mcu = new RP2040(clock);
+  mcu.logger = { debug() {}, info() {}, warn: report, error: report };
+  program(mcu);
+  if (retained) mcu.sram.set(retained);
+  // The boot ROM copies the second stage to the top of memory and calls it; rp2040js has no boot ROM.
+  mcu.sram.set(mcu.flash.subarray(0, 252), 0x41f00);
+  Object.assign(mcu.core, { SP: 0x20041f00, LR: 0, PC: 0x20041f00 });
+  // The registers with the cause of the reset of the chip, which rp2040js lacks: power-on.
+  mcu.peripherals[0x40064] = {
+    readUint32: (offset) => (offset === 8 ? 1 << 8 : 0),
+    writeUint32() {},
+    writeUint32Atomic() {},
+  };
+  if (crystal === 'dead') {
+    // XOSC STATUS (offset 4) never says that the oscillator is stable.
+    mcu.peripherals[0x40024] = { readUint32: () => 0, writeUint32() {}, writeUint32Atomic() {} };
   }
-  edge.schedule(Math.max(1, Math.min(next - clock.nanos, STRIDE_NS)));
-});
-edge.schedule(1);
-for (const [at, text] of keys) {
-  clock.createAlarm(() => [...text].forEach((key) => mcu.uart[0].feedByte(key.charCodeAt(0)))).schedule(at);
-}
 
-const end = seconds * 1e9;
-let instructions = 0;
-while (clock.nanos < end) {
-  if (mcu.core.waiting) {
-    clock.tick(clock.nanosToNextAlarm || STRIDE_NS);
-  } else {
-    const cycles = mcu.core.executeInstruction();
-    instructions++;
-    clock.tick((cycles * 1e9) / mcu.clkSys);
+  const watchdog = mcu.peripherals[WATCHDOG];
+  watchdog.reason = reason;
+  let restarts = false, lockedUp = false;
+  watchdog.onWatchdogTrigger = () => {
+    watchdog.alarm.enable = false; // at 0 it would fire again and again at the same time
+    restarts = true;
+  };
+  // A write to LOAD (offset 4) feeds the watchdog.
+  let fed = 0;
+  const writeWatchdog = watchdog.writeUint32.bind(watchdog);
+  watchdog.writeUint32 = (offset, value) => {
+    if (offset === 4) {
+      longestUnfed = Math.max(longestUnfed, clock.nanos - fed);
+      fed = clock.nanos;
+    }
+    writeWatchdog(offset, value);
+  };
+
+  const spi = mcu.spi[0];
+  // An error of the bus: the channel halts and raises no interrupt (RP2040 data sheet, section 2.5.7).
+  const failReceiving = () => {
+    const channel = mcu.dma.channels[0];
+    if (fault !== 'dma' || now() < faultAt || !(channel.ctrl & (1 << 24)) || channel.transCount > 13) return;
+    faultAt = Infinity;
+    channel.ctrl = (channel.ctrl | (1 << 30)) & ~(1 << 24);
+    channel.transferAlarm.cancel();
+  };
+  spi.onTransmit = (value) => {
+    const answer = ask('b', now(), value & 0xff, 1)[0];
+    failReceiving();
+    clock.createAlarm(() => spi.completeTransmit(answer)).schedule((spi.dataBits * 1e9) / spi.clockFrequency);
+  };
+  mcu.gpio[PIN_SELECT].addListener((state) => {
+    if (state === GPIOPinState.Low) {
+      ask('c', spi.clockFrequency, undefined, 0);
+      ask('s', now(), undefined, 0);
+    }
+    if (state === GPIOPinState.High) ask('d', now(), undefined, 0);
+  });
+  const isDriven = (state) => state === GPIOPinState.Low || state === GPIOPinState.High;
+  mcu.gpio[PIN_LED].addListener((state, before) => (ledChanges += isDriven(state) && isDriven(before) ? 1 : 0));
+  mcu.uart[0].onByte = (byte) => ask('u', now(), byte, 0);
+
+  // Data ready: a pulse at every sample. The time of the next one is asked for at least every STRIDE_NS, as settings may
+  // change it.
+  const edge = clock.createAlarm(() => {
+    const answer = ask('n', now(), undefined, 16);
+    const [taken, next] = [answer.readDoubleLE(0), answer.readDoubleLE(8)];
+    if (taken > samples) {
+      samples = taken;
+      mcu.gpio[PIN_DATA_READY].setInputValue(true);
+      clock.createAlarm(() => mcu.gpio[PIN_DATA_READY].setInputValue(false)).schedule(PULSE_NS);
+    }
+    edge.schedule(Math.max(1, Math.min(next - now(), STRIDE_NS)));
+  });
+  edge.schedule(1);
+  for (const [at, text] of keys) {
+    const feed = () => [...text].forEach((key) => mcu.uart[0].feedByte(key.charCodeAt(0)));
+    if (at >= now()) clock.createAlarm(feed).schedule(at - now());
   }
-}
+
+  // Faults of the processor, which happen between two instructions.
+  const fail = {
+    // Every aligned word pair that is the programmed period in 1/256 us becomes 0, by which the firmware then divides.
+    divisor() {
+      const memory = new BigUint64Array(mcu.sram.buffer);
+      memory.forEach((value, index) => (memory[index] = value === 1_250_000n ? 0n : value));
+    },
+    hardfault: () => mcu.core.exceptionEntry(HARD_FAULT),
+    // As after a fault within the handler of faults: no instruction is executed any more.
+    lockup: () => (lockedUp = true),
+  }[fault];
+  while (now() < end && !restarts) {
+    if (fail && now() >= faultAt) {
+      faultAt = Infinity;
+      fail();
+    }
+    if (mcu.core.waiting || lockedUp) {
+      clock.tick(clock.nanosToNextAlarm || STRIDE_NS);
+    } else {
+      const cycles = mcu.core.executeInstruction();
+      instructions++;
+      clock.tick((cycles * 1e9) / mcu.clkSys);
+    }
+  }
+  startedAt = now();
+  return mcu;
+};
+
+let mcu = run(undefined, 0);
+while (startedAt < end) mcu = run(mcu.sram, mcu.peripherals[WATCHDOG].reason);
 for (const diagnostic of diagnostics.keys()) console.error(diagnostic);
 for (const address of [0x4003c000, 0x40014108, 0x40058000]) ask('r', mcu.readUint32(address), undefined, 0);
 ask('l', ledChanges, undefined, 0);
