@@ -1,6 +1,7 @@
 //! `analyze` and `replay`: the report of a recording in a file, and the summary of several.
 
 use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
+use crate::inspect::{self, read_or_ask};
 use crate::output::{self, note};
 use crate::output_files::{OutputFiles, is_standard_stream};
 use crate::progress::{self, Progress};
@@ -41,18 +42,25 @@ const GENERIC: &str = "generic";
 
 /// Analyses the recordings of the arguments and writes the report, or the summary of several.
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
-    let AnalyzeArguments { recording, more, against, quick, reports, output } = arguments;
+    let AnalyzeArguments { recording, more, each_sensor, against, quick, reports, output } = arguments;
     let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
     let sensor = recording.input.sensor.as_deref().map(Path::new);
     let outputs = OutputFiles::beside(files.iter().copied().chain(against.as_deref()).chain(sensor));
+    let mut recordings: Vec<RecordingArguments> = Vec::new();
+    for &file in &files {
+        let of_file = of_file(recording, file);
+        recordings.extend(if *each_sensor { inspect::each_sensor(&of_file)? } else { vec![of_file] });
+    }
     if let Some(folder) = reports {
-        let analyze = |file: &Path| report(&of_file(recording, file), *quick, &ReadMonitor::default(), &mut |_| {});
-        return many::write_reports(&files, folder, output.quiet, &outputs, analyze);
+        let analyze = |recording: &RecordingArguments| {
+            read_or_ask(recording, |recording| report(recording, *quick, &ReadMonitor::default(), &mut |_| {}))
+        };
+        return many::write_reports(&recordings, folder, output.quiet, &outputs, analyze);
     }
     output::check(output, &outputs)?;
-    if more.is_empty() && against.is_none() {
+    if let ([recording], None) = (recordings.as_slice(), against) {
         let source = output::source_name(&recording.input.file);
-        let report = watched_report(recording, *quick)?;
+        let report = read_or_ask(recording, |recording| watched_report(recording, *quick))?;
         return output::write_report(&report, Some(&source), output, &outputs);
     }
     if *quick {
@@ -68,11 +76,15 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     if !refused.is_empty() {
         bail!("several recordings have a summary and no report: leave out {}", refused.join(", "));
     }
-    let read_other = |file: &Path| read_measurement(&of_file(recording, file));
-    let still: Vec<Measurement> = files.into_iter().map(read_other).collect::<Result<_>>()?;
+    let read = |recording: &RecordingArguments| read_or_ask(recording, read_measurement);
+    let still: Vec<Measurement> = recordings.iter().map(read).collect::<Result<_>>()?;
+    if *each_sensor {
+        let names: Vec<String> = recordings.iter().map(sensor_name).collect();
+        note(format_args!("recordings: {}", Printable(&names.join(", "))));
+    }
     let agreement = (still.len() > 1).then(|| several::compare(&still)).transpose()?;
     let inflation = match against {
-        Some(file) => Some(several::inflation(&still, &read_other(file)?)?),
+        Some(file) => Some(several::inflation(&still, &read(&of_file(recording, file))?)?),
         None => None,
     };
     if let Some(file) = &output.json {
@@ -86,6 +98,12 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         agreement.as_ref().map_or(Ok(()), |agreement| reports::several::write_agreement(agreement, out))?;
         inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
     })
+}
+
+/// What tells a sensor from the others of its file: its topic, or its columns.
+fn sensor_name(recording: &RecordingArguments) -> String {
+    let InputArguments { topic, columns, .. } = &recording.input;
+    topic.clone().unwrap_or_else(|| columns.join(" "))
 }
 
 /// The same arguments for another file.
@@ -152,7 +170,14 @@ fn note_all(notes: &[String]) {
 /// Opens a recording of any format to read it in blocks.
 fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<SampleStream> {
     let name = || recording.input.file.display().to_string();
-    let opened = match open(&recording.input, monitor)? {
+    let RecordingArguments { input, rate } = recording;
+    let opened = match open(input, monitor)? {
+        opened if input.stretch().is_some() => match read_opened(opened, recording, monitor)? {
+            Recorded::Counts(part) => return SampleStream::recorded(part, *rate, kept).with_context(name),
+            Recorded::AnySensor(part) => {
+                return SampleStream::sensor_recording(*part, *rate, monitor).with_context(name);
+            }
+        },
         Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate, kept),
         Opened::AnySensor(input, options) => SampleStream::any_sensor(input, options, recording.rate, kept),
         Opened::Replayed(replayed) => {
@@ -213,7 +238,7 @@ enum Opened {
 
 /// Opens a file of any format. What the user should know of an SPI log is noted.
 fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
-    let InputArguments { file, range, sensor, columns, units, topic } = arguments;
+    let InputArguments { file, range, sensor, columns, units, topic, .. } = arguments;
     let sensor = sensor.as_deref().map(sensor_profile).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
     let input = InputFile::open_monitored(file, monitor)?;
@@ -233,20 +258,33 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     }
 }
 
-/// Reads a file of any format. What the user should know of an SPI log is noted.
-pub(crate) fn read(arguments: &InputArguments) -> Result<Recorded> {
+/// Reads a file of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
+pub(crate) fn read(arguments: &RecordingArguments) -> Result<Recorded> {
     read_content(arguments, &ReadMonitor::default())
 }
 
-fn read_content(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Recorded> {
-    match open(arguments, monitor)? {
+fn read_content(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
+    read_opened(open(&arguments.input, monitor)?, arguments, monitor)
+}
+
+fn read_opened(opened: Opened, arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
+    let RecordingArguments { input: InputArguments { range, file, .. }, rate } = arguments;
+    let recorded = match opened {
         Opened::Counts(input) => {
-            let recording = count_table::read_monitored(input.path(), arguments.range.into(), monitor);
-            Ok(Recorded::Counts(recording.map_err(|error| input.rename(error))?))
+            let recording = count_table::read_monitored(input.path(), (*range).into(), monitor);
+            Recorded::Counts(recording.map_err(|error| input.rename(error))?)
         }
-        Opened::AnySensor(input, options) => Ok(Recorded::AnySensor(Box::new(input.read(&options)?))),
-        Opened::Replayed(recording) => Ok(Recorded::Counts(recording)),
-    }
+        Opened::AnySensor(input, options) => Recorded::AnySensor(Box::new(input.read(&options)?)),
+        Opened::Replayed(recording) => Recorded::Counts(recording),
+    };
+    let Some(stretch) = arguments.input.stretch() else { return Ok(recorded) };
+    let part = match recorded {
+        Recorded::Counts(recording) => stretch.of_recording(recording, *rate).map(Recorded::Counts),
+        Recorded::AnySensor(recording) => {
+            recording.within(stretch, *rate).map(|part| Recorded::AnySensor(Box::new(part)))
+        }
+    };
+    part.with_context(|| file.display().to_string())
 }
 
 /// The samples of a recording of any format on their time base. What the user should know is noted.
@@ -260,7 +298,7 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
 fn read_with(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<(Measurement, Vec<String>)> {
     let RecordingArguments { input, rate } = arguments;
     let name = || input.file.display().to_string();
-    match read_content(input, monitor)? {
+    match read_content(arguments, monitor)? {
         Recorded::Counts(recording) => on_time_base(&recording, *rate).with_context(name),
         Recorded::AnySensor(recording) => {
             let (base, mut notes) = recording.time_base(*rate).with_context(name)?;

@@ -4,9 +4,13 @@ use adis16405_driver::GyroRange;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use recordings::serial;
+use recordings::time_base::Stretch;
 use reports::export::{AxisChoice, ExportFormat};
 use simulation::Simulation;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// Heading of the options that say how a recording is read.
+const READING: &str = "Reading";
 
 /// Noise analysis of the ADIS16405 inertial sensor, with a virtual sensor, recordings and replay.
 ///
@@ -31,6 +35,9 @@ pub(crate) enum Command {
     /// Analyse a recording: a table of counts or in any units, an array, a bag, a flight log, an SPI log; or compare the noise
     /// of several.
     Analyze(AnalyzeArguments),
+    /// Show what is in a file without analysing it: topics, columns, units, rate, gaps, where it is at rest, and the command that
+    /// analyses it.
+    Inspect(InspectArguments),
     /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
     Replay(ReplayArguments),
     /// Explain recordings in sentences: what was found, what changes in the course of the record, and what the models foretell.
@@ -87,6 +94,9 @@ pub(crate) struct AnalyzeArguments {
     /// More recordings of the same sensor: one summary, and whether they show the same noise; with --reports of any sensors.
     #[arg(value_name = "FILE")]
     pub(crate) more: Vec<PathBuf>,
+    /// Analyse every sensor of a file that has several, each as a recording of its own.
+    #[arg(long, help_heading = READING, conflicts_with = "topic")]
+    pub(crate) each_sensor: bool,
     /// A recording with motors running: its noise over that of the others, by channel and octave.
     #[arg(long, value_name = "RUNNING", conflicts_with = "reports")]
     pub(crate) against: Option<PathBuf>,
@@ -100,6 +110,17 @@ pub(crate) struct AnalyzeArguments {
     /// Where the report goes besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
+}
+
+/// Files to inspect.
+#[derive(Debug, Args)]
+pub(crate) struct InspectArguments {
+    /// The files, of any format.
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Topic, message or array of a file with several [default: all with an inertial sensor].
+    #[arg(long)]
+    pub(crate) topic: Option<String>,
 }
 
 /// A recording to replay, and where the report goes.
@@ -260,7 +281,7 @@ pub(crate) struct RecordingArguments {
     #[command(flatten)]
     pub(crate) input: InputArguments,
     /// Sample rate in Hz; overrides what the time stamps say.
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, help_heading = READING, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
 }
 
@@ -270,22 +291,60 @@ pub(crate) struct InputArguments {
     /// The recording, of a format that its content tells; - for standard input.
     pub(crate) file: PathBuf,
     /// Gyro range of an ADIS16405 in which the recording was taken, deg/s.
-    #[arg(long, value_enum, default_value = "300")]
+    #[arg(long, help_heading = READING, value_enum, default_value = "300")]
     pub(crate) range: GyroRangeArgument,
     /// The sensor: adis16405, generic, adis16470, bmi088, mpu6050, or a profile file [default: adis16405 for register counts
     /// and SPI logs, else generic].
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help_heading = READING, value_name = "NAME|FILE")]
     pub(crate) sensor: Option<String>,
     /// Columns of the channels, as in gyro_x=wx,gyro_y=wy,time=t; a number for a column without a name, from 0; gyro.0 for
     /// column 0 of the array gyro [default: by their names].
-    #[arg(long, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
+    #[arg(long, help_heading = READING, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
     /// Units of the columns, one for each quantity, as in rad/s,m/s^2,us [default: by the names of the columns].
-    #[arg(long, value_name = "UNIT", value_delimiter = ',')]
+    #[arg(long, help_heading = READING, value_name = "UNIT", value_delimiter = ',')]
     pub(crate) units: Vec<String>,
     /// Topic, message or array of a file with several.
-    #[arg(long)]
+    #[arg(long, help_heading = READING)]
     pub(crate) topic: Option<String>,
+    /// Take the guess of a column or a unit that the file does not say, if nothing else is plausible.
+    #[arg(long, help_heading = READING)]
+    pub(crate) yes: bool,
+    /// Leave out what comes before this time, s from the first sample.
+    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
+    pub(crate) from: Option<f64>,
+    /// Leave out what comes at this time or later, s from the first sample.
+    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
+    pub(crate) to: Option<f64>,
+}
+
+impl InputArguments {
+    /// A file of which nothing is said.
+    pub(crate) fn new(file: &Path) -> Self {
+        Self {
+            file: file.to_owned(),
+            range: GyroRangeArgument::Dps300,
+            sensor: None,
+            columns: Vec::new(),
+            units: Vec::new(),
+            topic: None,
+            yes: false,
+            from: None,
+            to: None,
+        }
+    }
+
+    /// The part of the recording that is read; `None` for all of it.
+    pub(crate) fn stretch(&self) -> Option<Stretch> {
+        let is_part = self.from.is_some() || self.to.is_some();
+        is_part.then(|| Stretch { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
+    }
+}
+
+/// A finite time of at least 0 s.
+fn time_in_recording(text: &str) -> Result<f64, String> {
+    let time = text.parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
+    time.ok_or_else(|| "not a time of at least 0 s".to_owned())
 }
 
 /// What to show live.
@@ -318,8 +377,7 @@ impl MonitorArguments {
     /// The recording, as the other commands take it.
     pub(crate) fn recording(&self) -> RecordingArguments {
         let Self { source, rate, range, .. } = self;
-        let (columns, units) = (Vec::new(), Vec::new());
-        let input = InputArguments { file: source.clone(), range: *range, sensor: None, columns, units, topic: None };
+        let input = InputArguments { range: *range, ..InputArguments::new(source) };
         RecordingArguments { input, rate: *rate }
     }
 }
@@ -398,6 +456,7 @@ impl SimulationArguments {
 
 /// Where the report goes.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct OutputArguments {
     /// Print every table of every channel instead of one screen.
     #[arg(long, conflicts_with = "quiet")]

@@ -1,7 +1,8 @@
 //! `convert`: a recording in another format.
 
 use crate::analyze::{Recorded, read};
-use crate::cli::{ConvertArguments, RecordingFormat};
+use crate::cli::{ConvertArguments, RecordingArguments, RecordingFormat};
+use crate::inspect::read_or_ask;
 use crate::output::note;
 use crate::output_files::OutputFiles;
 use crate::recording_file;
@@ -16,7 +17,8 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
     let files = OutputFiles::beside([input.file.as_path()].into_iter().chain(sensor));
     files.check(out)?;
     let format = recording_file::format_of(out, *to);
-    match read(input)? {
+    let recording = RecordingArguments { input: input.clone(), rate: None };
+    match read_or_ask(&recording, read)? {
         Recorded::Counts(recording) => recording_file::write(&recording, out, format, &files),
         Recorded::AnySensor(recording) => {
             recording.notes().iter().for_each(|sentence| note(format_args!("{sentence}")));

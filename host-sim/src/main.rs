@@ -6,6 +6,7 @@ mod compare;
 mod convert;
 mod explain;
 mod export;
+mod inspect;
 mod interrupt;
 mod live;
 mod many;
@@ -21,6 +22,7 @@ use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command, MonitorArguments, ReplayArguments};
 use host_sim::{monitor, uf2};
+use inspect::Question;
 use live::{DeviceSource, GrowingRecording};
 use mimalloc::MiMalloc;
 use output_files::OutputFiles;
@@ -71,6 +73,9 @@ fn main() -> ExitCode {
         Err(error) => {
             // Where standard error is closed too, the exit code alone shows the error.
             let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
+            if let Some(question) = error.downcast_ref::<Question>() {
+                let _ = io::stderr().write_all(question.text.as_bytes());
+            }
             ExitCode::FAILURE
         }
     }
@@ -85,6 +90,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             output::write_report(&record::simulate(&simulate.simulation(3600.0))?, None, &output, &files)
         }
         Some(Command::Analyze(arguments)) => analyze::run(&arguments),
+        Some(Command::Inspect(arguments)) => inspect::run(&arguments),
         Some(Command::Replay(arguments)) => {
             let ReplayArguments { file, output, .. } = &arguments;
             let files = OutputFiles::beside([file.as_path()]);

@@ -1,5 +1,6 @@
 //! `analyze --reports`: one report a recording, as many recordings at a time as there are cores.
 
+use crate::cli::RecordingArguments;
 use crate::output::{self, note, progress_bar};
 use crate::output_files::OutputFiles;
 use anyhow::{Context, Result, bail};
@@ -15,40 +16,40 @@ use std::path::{Path, PathBuf};
 /// Endings that the name of a report does not keep.
 const ENDINGS: [&str; 2] = [".gz", ".csv"];
 
-/// Writes the report of each of `files` into `folder`. A file that cannot be analysed does not keep the others from it.
+/// Writes the report of each of `recordings` into `folder`. One that cannot be analysed does not keep the others from it.
 ///
 /// # Errors
-/// Two files would have one report, the folder cannot be written, or a file could not be analysed.
+/// Two would have one report, the folder cannot be written, or one could not be analysed.
 pub(crate) fn write_reports(
-    files: &[&Path],
+    recordings: &[RecordingArguments],
     folder: &Path,
     is_quiet: bool,
     outputs: &OutputFiles,
-    analyze: impl Fn(&Path) -> Result<Report> + Sync,
+    analyze: impl Fn(&RecordingArguments) -> Result<Report> + Sync,
 ) -> Result<()> {
-    let reports = names(files, folder)?;
+    let reports = names(recordings, folder)?;
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for report in &reports {
         outputs.check(report)?;
     }
-    let bar = progress_bar(files.len() as u64, "{wide_bar} {pos}/{len} {eta}");
-    let work: Vec<(&Path, &PathBuf)> = files.iter().copied().zip(&reports).collect();
-    let written = in_parallel(&work, |(file, report)| {
-        let written = on_one_thread(|| output::write_json(&ReportJson::from(&analyze(file)?), report, outputs));
+    let bar = progress_bar(recordings.len() as u64, "{wide_bar} {pos}/{len} {eta}");
+    let work: Vec<(&RecordingArguments, &PathBuf)> = recordings.iter().zip(&reports).collect();
+    let written = in_parallel(&work, |(recording, report)| {
+        let written = on_one_thread(|| output::write_json(&ReportJson::from(&analyze(recording)?), report, outputs));
         bar.inc(1);
-        written.map_err(|error| named(file, &error))
+        written.map_err(|error| named(&recording.input.file, &error))
     });
     bar.finish_and_clear();
     let failures: Vec<String> = written.into_iter().filter_map(Result::err).collect();
     failures.iter().for_each(|failure| note(format_args!("no report: {failure}")));
-    let written = files.len() - failures.len();
+    let written = recordings.len() - failures.len();
     if !is_quiet {
         output::print(|out| {
-            writeln!(out, "{written} of {} reports in {}", files.len(), Printable(&folder.display().to_string()))
+            writeln!(out, "{written} of {} reports in {}", recordings.len(), Printable(&folder.display().to_string()))
         })?;
     }
     if !failures.is_empty() {
-        bail!("{} of {} recordings have no report", failures.len(), files.len());
+        bail!("{} of {} recordings have no report", failures.len(), recordings.len());
     }
     Ok(())
 }
@@ -59,17 +60,31 @@ fn named(file: &Path, error: &anyhow::Error) -> String {
     if text.starts_with(&name) { text } else { format!("{name}: {text}") }
 }
 
-/// The report of each file.
-fn names(files: &[&Path], folder: &Path) -> Result<Vec<PathBuf>> {
+/// The report of each recording: the name of its file, and that of its sensor where one is named.
+fn names(recordings: &[RecordingArguments], folder: &Path) -> Result<Vec<PathBuf>> {
     let mut known: BTreeMap<PathBuf, &Path> = BTreeMap::new();
-    let mut reports = Vec::with_capacity(files.len());
-    for &file in files {
+    let mut reports = Vec::with_capacity(recordings.len());
+    for recording in recordings {
+        let input = &recording.input;
+        let file = input.file.as_path();
         let name = output::source_name(file);
         let stem = ENDINGS.iter().fold(name.as_str(), |name, ending| match name.strip_suffix(ending) {
             Some("") | None => name,
             Some(stem) => stem,
         });
-        let report = folder.join(format!("{stem}.json"));
+        let of_file = recordings.iter().filter(|other| other.input.file == *file);
+        // Of several sensors of a file each has its own name, or its number.
+        let sensor = match (of_file.clone().count(), &input.topic) {
+            (1, _) => String::new(),
+            (_, Some(topic)) => {
+                let plain = topic.replace(|letter: char| !letter.is_ascii_alphanumeric(), "-");
+                format!("-{}", plain.trim_matches('-'))
+            }
+            (_, None) => {
+                format!("-{}", of_file.clone().position(|other| std::ptr::eq(other, recording)).unwrap_or(0))
+            }
+        };
+        let report = folder.join(format!("{stem}{sensor}.json"));
         if let Some(other) = known.insert(report.clone(), file) {
             let [one, other, report] = [other, file, &report].map(|path| path.display().to_string());
             bail!("{} and {} would both have the report {}", Printable(&one), Printable(&other), Printable(&report));

@@ -16,6 +16,7 @@ pub(crate) mod numpy;
 mod ros_bag;
 mod ros_definition;
 mod ros_message;
+mod row_kinds;
 mod sqlite_bag;
 pub(crate) mod text_table;
 mod topics;

@@ -9,6 +9,7 @@ mod columns;
 mod counts;
 mod formats;
 mod input;
+pub mod inspection;
 mod streams;
 mod tables;
 pub mod time_base;

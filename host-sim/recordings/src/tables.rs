@@ -6,3 +6,4 @@ pub(crate) mod quantizer;
 pub(crate) mod sensor_measurement;
 pub(crate) mod sensor_table;
 mod sensor_table_writer;
+pub(crate) mod whole_table;

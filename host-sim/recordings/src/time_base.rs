@@ -12,6 +12,7 @@ mod stamp_alignment;
 pub(crate) mod stamp_quality;
 mod stamp_tick;
 pub(crate) mod stream_clock;
+mod stretch;
 pub(crate) mod time_base_error;
 
 use crate::counts::recording::{RecordedSample, Recording};
@@ -27,6 +28,7 @@ pub use crate::time_base::indexed_clock::ClockStep;
 pub use crate::time_base::lateness_track::LostStretch;
 pub use crate::time_base::stamp_alignment::RateEstimate;
 pub use crate::time_base::stamp_quality::StampQuality;
+pub use crate::time_base::stretch::Stretch;
 pub use crate::time_base::time_base_error::TimeBaseError;
 
 /// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.

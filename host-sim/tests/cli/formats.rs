@@ -209,6 +209,25 @@ fn several_sensors_of_a_file_have_a_name_each() {
         for name in expected {
             assert!(topics.iter().any(|topic| topic.sensors.iter().any(|sensor| sensor == name)), "{file}: {name}");
         }
+        if expected.is_empty() {
+            continue;
+        }
+        // They are offered by their names, and analysed in one call as several recordings are, or with a report each.
+        let path = samples.join(file);
+        let path = path.to_str().expect("UTF-8");
+        let shown = String::from_utf8_lossy(&host_sim(&["inspect", path]).stdout).into_owned();
+        for name in expected {
+            assert!(shown.contains(&format!("analyze {path} --topic {name}")), "{file}: {shown}");
+        }
+        assert!(shown.contains("--each-sensor"), "{file}: {shown}");
+        let folder = tempdir().expect("a folder");
+        let several: Value =
+            serde_json::from_slice(&json_of(&folder, &["analyze", path, "--each-sensor"])).expect("JSON");
+        assert_eq!(several["agreement"]["samples"].as_array().map(Vec::len), Some(expected.len()), "{file}");
+        let reports = folder.path().join("reports");
+        let output = host_sim(&["analyze", path, "--each-sensor", "--reports", reports.to_str().expect("UTF-8")]);
+        assert!(output.status.success(), "{file}: {}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(std::fs::read_dir(&reports).expect("a folder").count(), expected.len(), "{file}");
     }
     let topics = InputFile::open(&samples.join("attributes.h5")).expect("HDF5").contents().expect("HDF5");
     let acc = topics.iter().find(|topic| topic.name == "run 1/imu/acc").expect("a dataset");

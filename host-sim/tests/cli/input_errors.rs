@@ -11,9 +11,11 @@ fn error_line(output: &Output) -> String {
     let stderr = String::from_utf8(output.stderr.clone()).expect("UTF-8");
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(!stderr.contains("panicked"), "{stderr}");
-    assert_eq!(stderr.lines().count(), 1, "one line: {stderr}");
+    // What is in the file comes after the error, where a column, a unit or a rate is missing.
+    let is_asked = stderr.contains("first values");
+    assert!(is_asked || stderr.lines().count() == 1, "one line: {stderr}");
     assert!(output.stdout.is_empty(), "a report is printed: {}", String::from_utf8_lossy(&output.stdout));
-    let line = stderr.trim_end().to_owned();
+    let line = stderr.lines().next().unwrap_or_default().to_owned();
     assert!(line.starts_with("error: "), "{line}");
     line
 }
@@ -43,7 +45,7 @@ fn files_that_are_no_tables_are_refused() {
     refuses(&write(&dir, "empty.csv", b""), &[], &["empty"]);
     refuses(&write(&dir, "blank.csv", b"\n\n"), &[], &["empty"]);
     refuses(&write(&dir, "header.csv", b"gyro_x_counts\n"), &[], &["no data"]);
-    refuses(&write(&dir, "latin.csv", b"t,gyro_x [\xB0/s]\n0,1\n"), &[], &["line 1", "UTF-8"]);
+    refuses(&write(&dir, "bytes.csv", b"t,gyro_x \x01\xB0\n0,1\n"), &[], &["line 1", "UTF-8"]);
     refuses(&write(&dir, "wide.csv", &[0xFF, 0xFE, b'1', 0x00]), &[], &["UTF-16", "iconv"]);
     refuses(&write(&dir, "binary.csv", &[0xF1, 0x02, 0x00]), &[], &["F1 02 00", "no known format"]);
     refuses(&write(&dir, "long.csv", &vec![b'1'; 100_000]), &[], &["line 1", "65536"]);

@@ -1,4 +1,4 @@
-//! The command `host-sim`: input errors, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
+//! The command `host-sim`: input errors, what is in a file, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
 //! exports, conversions, the live screen, quick reports, reports of many files, and a device on a serial port.
 
 mod analyze_and_replay;
@@ -7,6 +7,7 @@ mod damaged_input;
 mod exports;
 mod formats;
 mod input_errors;
+mod inspection;
 mod live_screen;
 mod many_and_interrupted;
 mod measured_recordings;
@@ -20,4 +21,5 @@ mod serial_device;
 mod serial_faults;
 mod several_recordings;
 mod simulated_sensor;
+mod stretches;
 mod text_formats;

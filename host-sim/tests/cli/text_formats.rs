@@ -171,3 +171,110 @@ fn errors_are_short_and_hide_nothing() {
     let output = host_sim(&["compare", file.to_str().expect("UTF-8"), "--data-sheet"]);
     assert!(!output.status.success() && output.stderr.len() < 4000, "{} bytes", output.stderr.len());
 }
+
+/// Tables as programs of other countries and systems write them: each has 6000 samples at 100 Hz of a white noise of 0.02 rad/s, N =
+/// 0.02·(180/π)/√100 = 0.1146 deg/√s; what is in it is read without options.
+#[test]
+fn tables_of_any_country_and_program_are_read_without_options() {
+    let dir = tempdir().expect("a folder");
+    let time = |row: u32| format!("{:.2}", f64::from(row) / 100.0);
+    let comma = |value: f64| format!("{value:.6}").replace('.', ",");
+    type Row<'a> = Box<dyn Fn(u32, f64) -> String + 'a>;
+    let cases: [(&str, &str, Row); 8] = [
+        (
+            "decimal commas, BOM and CR LF",
+            "\u{feff}t [s];gyro_x [rad/s]\r\n",
+            Box::new(|row, value| format!("{};{}\r\n", time(row).replace('.', ","), comma(value))),
+        ),
+        (
+            "a row of units",
+            "time;Gyro X;Gyro Y\ns;rad/s;rad/s\n",
+            Box::new(|row, value| format!("{};{value:.6};0\n", time(row))),
+        ),
+        (
+            "degrees in Latin-1",
+            "t [s],gx [\u{b0}/s]\n",
+            Box::new(|row, value| format!("{},{:.5}\n", time(row), value.to_degrees())),
+        ),
+        (
+            "quotation marks",
+            "\"Time (s)\",\"Gyroscope x (rad/s)\"\n",
+            Box::new(|row, value| format!("\"{}\",\"{value:.6E}\"\n", time(row))),
+        ),
+        (
+            "milliseconds by the name",
+            "millis\tgyro_x_rad_s\n",
+            Box::new(|row, value| format!("{}\t{value:.6}\n", 10 * row + 1234)),
+        ),
+        (
+            "a serial monitor",
+            "time,gx [rad/s]\n",
+            Box::new(|row, value| {
+                format!("12:{:02}:{:02}.{:03} -> {value:.6}\n", row / 6000, row / 100 % 60, row % 100 * 10)
+            }),
+        ),
+        (
+            "a rate in a comment",
+            "// Update Rate: 100.0Hz\nGyr_X [rad/s]\n",
+            Box::new(|_, value| format!("{value:.6}\n")),
+        ),
+        (
+            "a magnetometer without a unit",
+            "time_s,gyro_x_rad_s,mag_x\n",
+            Box::new(|row, value| format!("{},{value:.6},0.3\n", time(row))),
+        ),
+    ];
+    for (name, heading, row) in cases {
+        let mut rng = ChaCha8Rng::seed_from_u64(21);
+        let text = heading.to_owned() + &(0..ROWS).map(|at| row(at, noise(&mut rng))).collect::<String>();
+        let bytes = if name.ends_with("Latin-1") { text.chars().map(|c| c as u8).collect() } else { text.into_bytes() };
+        let file = write(&dir, "recording.txt", &bytes);
+        let report: Value =
+            serde_json::from_slice(&json_of(&dir, &["analyze", file.to_str().expect("UTF-8")])).expect("JSON");
+        assert_eq!((&report["samples"], &report["dropped"]["gap"]), (&Value::from(ROWS), &Value::from(0)), "{name}");
+        let rate = report["sample_rate_hz"].as_f64().expect("a rate");
+        assert!((rate / 100.0 - 1.0).abs() < 1e-4, "{name}: {rate}");
+        let adev = report["channels"][0]["curve"][0]["adev"].as_f64().expect("a number");
+        // σ(τ₀) = 0.02 rad/s; the relative error of 6000 differences is √(3/(4·6000)), 1.1 %.
+        assert!((adev / 0.02f64.to_degrees() - 1.0).abs() < 5.0 * 0.011, "{name}: {adev}");
+    }
+}
+
+/// Rows of several sensors in turn, with a label each, of different widths.
+#[test]
+fn rows_of_several_kinds_are_several_sensors() {
+    let dir = tempdir().expect("a folder");
+    let mut rng = ChaCha8Rng::seed_from_u64(22);
+    let mut text = String::new();
+    for row in 0..ROWS {
+        let [x, y, z] = [0, 1, 2].map(|_| noise(&mut rng));
+        text += &format!("left,{},{x:.6},{y:.6},{z:.6}\nright,{},{y:.6},{x:.6},{z:.6}\n", 10 * row, 10 * row + 3);
+        if row % 50 == 0 {
+            text += &format!("state,{},idle,0\n", 10 * row);
+        }
+    }
+    let error = refusal(text.as_bytes(), &[]);
+    assert!(error.contains("choose one with --topic: left, right"), "{error}");
+    assert!(error.contains("--topic left") && error.contains("--topic right"), "{error}");
+    let columns = ["--columns", "time=1,gyro_x=2,gyro_y=3,gyro_z=4", "--units", "ms,rad/s"];
+    let report = analysed(&dir, &text, &[&["--topic", "right"], &columns[..]].concat());
+    assert_eq!((&report["samples"], &report["dropped"]["gap"]), (&Value::from(ROWS), &Value::from(0)));
+    assert!(refusal(text.as_bytes(), &["--topic", "up"]).contains("it has left, right"));
+    let file = write(&dir, "kinds.txt", text.as_bytes());
+    let both = [&["analyze", file.to_str().expect("UTF-8"), "--each-sensor"], &columns[..]].concat();
+    let several: Value = serde_json::from_slice(&json_of(&dir, &both)).expect("JSON");
+    assert_eq!(several["agreement"]["samples"], Value::from(vec![ROWS, ROWS]));
+}
+
+/// Of columns with one name each is known by its number: none is taken in silence.
+#[test]
+fn columns_of_one_name_are_known_by_their_numbers() {
+    let dir = tempdir().expect("a folder");
+    let mut rng = ChaCha8Rng::seed_from_u64(23);
+    let rows: String = (0..1000).map(|row| format!("{row},{:.6},{:.6}\n", noise(&mut rng), noise(&mut rng))).collect();
+    let text = format!("time_s,x,x\n{rows}");
+    let error = refusal(text.as_bytes(), &["--columns", "gyro_x=x", "--units", "rad/s"]);
+    assert!(error.contains("no column x; the file has time, 1, 2"), "{error}");
+    let report = analysed(&dir, &text, &["--columns", "gyro_x=2", "--units", "rad/s"]);
+    assert_eq!(report["samples"], 1000);
+}

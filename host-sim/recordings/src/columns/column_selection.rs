@@ -2,7 +2,7 @@
 //! names of the columns.
 
 use crate::columns::unit::{COUNT, SECOND, Unit};
-use measurement::{ChannelProfile, SensorProfile};
+use measurement::{ChannelProfile, Quantity, SensorProfile};
 
 /// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +15,17 @@ pub(crate) enum Role {
     Channel(ChannelProfile),
 }
 
+impl Role {
+    /// As `--columns` takes it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Index => "sample",
+            Self::Channel(profile) => profile.name,
+        }
+    }
+}
+
 /// A column that a file has.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AvailableColumn {
@@ -22,6 +33,16 @@ pub(crate) struct AvailableColumn {
     pub(crate) name: String,
     /// Its unit, where the file says it.
     pub(crate) unit: Option<Unit>,
+}
+
+/// All `available` columns as they are, to be looked at: as channels without a name, in the unit of the file.
+pub(crate) fn as_they_are(available: &[AvailableColumn]) -> Vec<ChosenColumn> {
+    let role = Role::Channel(ChannelProfile::generic("", Quantity::AuxiliaryVoltage));
+    let column = |(position, column): (usize, &AvailableColumn)| {
+        let (label, unit) = (column.name.clone(), column.unit);
+        ChosenColumn { position, role, label, unit, factor: 1.0 }
+    };
+    available.iter().enumerate().map(column).collect()
 }
 
 /// A column that is read.
@@ -142,6 +163,18 @@ impl ColumnSelection {
         self.assignments.is_empty() && self.units.is_empty()
     }
 
+    /// The channels, `time` and `sample` that the user assigns, each with the position of its column in `available`.
+    pub(crate) fn assignments(&self, available: &[AvailableColumn]) -> Vec<(&'static str, usize)> {
+        let sensor = SensorProfile::generic();
+        let assigned = self.assigned(available, &sensor).unwrap_or_default();
+        assigned.into_iter().map(|(role, position)| (role.name(), position)).collect()
+    }
+
+    /// The unit that the user states for the quantity with this base.
+    pub(crate) fn stated_unit(&self, base: &str) -> Option<Unit> {
+        self.units.iter().copied().find(|unit| unit.base == base)
+    }
+
     /// Whether the user assigns columns.
     pub(crate) fn has_columns(&self) -> bool {
         !self.assignments.is_empty()
@@ -180,6 +213,10 @@ impl ColumnSelection {
         if !chosen.iter().any(|(role, _)| matches!(role, Role::Channel(_))) {
             return Err(SelectionError::NoChannel(names(available)));
         }
+        if self.assignments.is_empty() {
+            let left_out = self.unitless_companions(&chosen, available);
+            chosen.retain(|(_, position)| !left_out.contains(position));
+        }
         chosen.sort_by_key(|(role, _)| match role {
             Role::Time => 0,
             Role::Index => 1,
@@ -188,6 +225,34 @@ impl ColumnSelection {
             }
         });
         chosen.into_iter().map(|(role, position)| self.with_unit(role, position, &available[position])).collect()
+    }
+
+    /// The columns of other quantities than rate and force, by their positions, that have no unit, beside those of an inertial sensor: a
+    /// magnetometer or a thermometer is no reason to ask for one.
+    fn unitless_companions(&self, chosen: &[(Role, usize)], available: &[AvailableColumn]) -> Vec<usize> {
+        let quantity = |role: &Role| match role {
+            Role::Channel(profile) => Some(profile.quantity),
+            _ => None,
+        };
+        if !chosen.iter().any(|(role, _)| quantity(role).is_some_and(Quantity::is_inertial)) {
+            return Vec::new();
+        }
+        let is_unitless = |(role, position): &(Role, usize)| {
+            quantity(role).is_some_and(|quantity| {
+                let own = available[*position].unit.filter(|unit| unit.measures(quantity) || unit.base == COUNT);
+                let stated = self.stated_unit(quantity.unit()).or_else(|| self.stated_unit(COUNT));
+                !quantity.is_inertial() && own.or(stated).is_none()
+            })
+        };
+        chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
+    }
+
+    /// Which columns are left out of those that their names tell, in a sentence; `None` where none is.
+    pub(crate) fn left_out(&self, available: &[AvailableColumn], sensor: &SensorProfile) -> Option<String> {
+        let named = by_name(available, sensor).ok().filter(|_| self.assignments.is_empty())?;
+        let left_out = self.unitless_companions(&named, available);
+        let names: Vec<&str> = left_out.iter().map(|&at| available[at].name.as_str()).collect();
+        (!names.is_empty()).then(|| format!("{} left out: no unit; --units gives one", names.join(", ")))
     }
 
     fn assigned(
@@ -219,7 +284,7 @@ impl ColumnSelection {
     }
 
     fn with_unit(&self, role: Role, position: usize, column: &AvailableColumn) -> Result<ChosenColumn, SelectionError> {
-        let stated = |base: &str| self.units.iter().copied().find(|unit| unit.base == base);
+        let stated = |base: &str| self.stated_unit(base);
         let (unit, factor) = match role {
             Role::Index => (None, 1.0),
             Role::Time => (stated(SECOND).or(column.unit.filter(|unit| unit.base == SECOND)), 1.0),
@@ -256,6 +321,9 @@ impl AvailableColumn {
                 return Self { name: name.trim().to_owned(), unit: Some(unit) };
             }
         }
+        if let Some(unit) = Unit::parse(heading).filter(|unit| unit.base == SECOND && heading.len() > 1) {
+            return Self { name: heading.to_owned(), unit: Some(unit) };
+        }
         // The longest ending that is a unit: `deg_s`, not `s`.
         let ends = heading.char_indices().filter(|(_, letter)| *letter == '_').map(|(at, _)| at);
         let named = ends.filter(|at| *at > 0).find_map(|at| {
@@ -264,6 +332,21 @@ impl AvailableColumn {
         named
             .filter(|column| role_of(&column.name).is_some())
             .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
+    }
+
+    /// What stands before the usual name of a channel, and the channel, `time` or `sample` that it names.
+    pub(crate) fn prefix_and_channel(&self) -> Option<(&str, &'static str)> {
+        let channel = match role_of(&self.name)? {
+            NamedRole::Time => return Some(("", "time")),
+            NamedRole::Index => return Some(("", "sample")),
+            NamedRole::Channel(name) => name,
+        };
+        // The shortest ending that is a name by itself has the longest beginning before it.
+        let starts = self.name.char_indices().map(|(at, _)| at).rev();
+        let short = starts.filter(|at| *at > 0 && !self.name[..*at].ends_with(|letter: char| letter.is_alphanumeric()));
+        let is_name =
+            |at: &usize| matches!(role_of(&self.name[*at..]), Some(NamedRole::Channel(own)) if own == channel);
+        Some((&self.name[..short.clone().find(is_name).unwrap_or(0)], channel))
     }
 
     /// Whether its name is that of a time.
@@ -289,12 +372,7 @@ fn names(available: &[AvailableColumn]) -> String {
 /// two columns look like one channel.
 pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'static str, usize)>> {
     let named = by_name(available, &SensorProfile::generic()).ok()?;
-    let name = |(role, position)| match role {
-        Role::Time => ("time", position),
-        Role::Index => ("sample", position),
-        Role::Channel(profile) => (profile.name, position),
-    };
-    Some(named.into_iter().map(name).collect())
+    Some(named.into_iter().map(|(role, position)| (role.name(), position)).collect())
 }
 
 /// The columns whose names say what they are.
@@ -317,12 +395,8 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
                 }
                 continue;
             }
-            let channel = match role {
-                Role::Channel(profile) => profile.name,
-                _ => "sample",
-            };
             let (one, other) = (available[*other].name.clone(), column.name.clone());
-            return Err(SelectionError::Ambiguous { channel: channel.to_owned(), one, other });
+            return Err(SelectionError::Ambiguous { channel: role.name().to_owned(), one, other });
         }
         named.push((role, position));
     }
@@ -337,10 +411,20 @@ enum NamedRole {
 }
 
 /// The usual names, in small letters with `_` for other signs and without the axis.
-const GYROSCOPE: [&str; 12] = [
+const GYROSCOPE: [&str; 22] = [
     "gyro",
+    "gy",
     "gyr",
+    "gyros",
     "gyroscope",
+    "gyro_rate",
+    "gyrorate",
+    "rot_rate",
+    "rotation_rate",
+    "rotationrate",
+    "angularvelocity",
+    "ang_vel",
+    "angvel",
     "w",
     "wb",
     "g",
@@ -351,12 +435,17 @@ const GYROSCOPE: [&str; 12] = [
     "w_rs_s",
     "gyro_rad",
 ];
-const ACCELEROMETER: [&str; 12] = [
+const ACCELEROMETER: [&str; 17] = [
     "accl",
+    "ac",
     "fb",
     "acc",
     "accel",
+    "accels",
     "accelerometer",
+    "linearacceleration",
+    "lin_acc",
+    "linacc",
     "a",
     "acceleration",
     "linear_acceleration",
@@ -383,10 +472,17 @@ fn role_of(name: &str) -> Option<NamedRole> {
         name.to_lowercase().chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
     let plain = plain.trim_matches('_');
     match plain {
-        "time" | "t" | "timestamp" | "stamp" | "timestamp_sample" | "timeus" => return Some(NamedRole::Time),
+        "time" | "times" | "t" | "timestamp" | "timestamps" | "time_stamp" | "stamp" | "timestamp_sample"
+        | "timeus" | "elapsed" | "elapsed_time" => {
+            return Some(NamedRole::Time);
+        }
+        // A column that is called by its unit.
+        _ if plain.len() > 1 && Unit::parse(plain).is_some_and(|unit| unit.base == SECOND) => {
+            return Some(NamedRole::Time);
+        }
         _ if plain.ends_with("header_stamp") => return Some(NamedRole::Time),
         "sample" => return Some(NamedRole::Index),
-        "temp" | "temperature" => return Some(NamedRole::Channel("temp")),
+        "temp" | "tmp" | "temperature" => return Some(NamedRole::Channel("temp")),
         "supply" | "vdd" => return Some(NamedRole::Channel("supply")),
         "aux_adc" => return Some(NamedRole::Channel("aux_adc")),
         _ => {}

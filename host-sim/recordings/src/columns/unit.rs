@@ -45,16 +45,28 @@ const UNITS: &[(&[&str], &str, f64)] = &[
     (&["V", "v", "volt"], "V", 1.0),
     (&["mV", "mv"], "V", 1e-3),
     (&["s", "sec", "secs", "seconds"], SECOND, 1.0),
-    (&["ms", "msec", "milliseconds"], SECOND, 1e-3),
-    (&["us", "usec", "microseconds"], SECOND, 1e-6),
-    (&["ns", "nsec", "nanoseconds"], SECOND, 1e-9),
+    (&["ms", "msec", "millis", "milliseconds"], SECOND, 1e-3),
+    (&["us", "usec", "micros", "microseconds"], SECOND, 1e-6),
+    (&["ns", "nsec", "nanos", "nanoseconds"], SECOND, 1e-9),
     (&["counts", "count", "lsb", "raw"], COUNT, 1.0),
 ];
 
 impl Unit {
-    /// The unit that `text` names, such as `rad/s`, `m s^-2`, `°/s` or `mg`; `None` for other texts.
+    /// The unit that `text` names, such as `rad/s`, `m s^-2`, `°/s` or `mg`, or a multiple or a part of one, such as `0.07*deg/s` or
+    /// `deg/s/131`; `None` for other texts.
     #[must_use]
     pub(crate) fn parse(text: &str) -> Option<Self> {
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_normal() && *number > 0.0);
+        Self::named(text).or_else(|| {
+            let multiple = text.split_once('*').and_then(|(factor, unit)| Some((unit, number(factor)?)));
+            let part = || text.rsplit_once('/').and_then(|(unit, divisor)| Some((unit, number(divisor)?.recip())));
+            let (unit, factor) = multiple.or_else(part)?;
+            let unit = Self::named(unit)?;
+            Some(Self { factor: factor * unit.factor, ..unit })
+        })
+    }
+
+    fn named(text: &str) -> Option<Self> {
         let spelling = normalized(text);
         UNITS.iter().find_map(|(spellings, base, factor)| {
             let known = spellings.iter().any(|known| *known == text.trim() || *known == spelling);
@@ -105,6 +117,9 @@ mod tests {
             (&["°C", "degC", "C"], "degC", 1.0),
             (&["us", "µs"], "s", 1e-6),
             (&["counts", "LSB"], "count", 1.0),
+            (&["deg/s/131", "deg/s / 131"], "deg/s", 1.0 / 131.0),
+            (&["0.07*deg/s", "70*mdps", "0.07 * dps"], "deg/s", 0.07),
+            (&["g/16384"], "g", 6.103_515_6e-5),
         ] {
             for text in texts {
                 let unit = Unit::parse(text).unwrap_or_else(|| panic!("{text}"));
@@ -112,7 +127,7 @@ mod tests {
                 assert!((unit.factor / factor - 1.0).abs() < 1e-6, "{text}: {}", unit.factor);
             }
         }
-        for text in ["", "x", "m/s", "furlong", "s^2"] {
+        for text in ["", "x", "m/s", "furlong", "s^2", "deg/s/0", "-1*g", "g/", "nan*g", "2", "1/2"] {
             assert_eq!(Unit::parse(text), None, "{text}");
         }
     }

@@ -2,8 +2,9 @@
 //!
 //! The crate `ardupilot-binlog` 0.2 is not used because a format message that states a length below 3 bytes makes it panic.
 
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
-use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::{Budget, Metered};
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::sensor_table::Number;

@@ -1,16 +1,45 @@
 //! Arrays of numbers with names, as NumPy, MATLAB and HDF5 keep them: which of them are columns of one table.
 
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, known_by_name};
 use crate::columns::unit::Unit;
-use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::any_sensor::ReadOptions;
 use crate::tables::sensor_table::Number;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Names of vectors whose unit is a matter of course, as in NaveGo and in textbooks on strapdown navigation.
 const UNITS_BY_NAME: [(&str, &str); 2] = [("wb", "rad/s"), ("fb", "m/s^2")];
+
+/// Names of a sample rate, Hz, in small letters: of attributes, or of arrays of one number beside the others.
+const RATES: [&str; 13] = [
+    "sampling_rate",
+    "sample_rate",
+    "samplingrate",
+    "samplerate",
+    "sampling_frequency",
+    "sample_frequency",
+    "samplefrequency",
+    "samplingfrequency",
+    "fs",
+    "freq",
+    "rate_hz",
+    "fs_hz",
+    "sample_rate_hz",
+];
+/// Names of a sample period, s.
+const PERIODS: [&str; 5] = ["dt", "ts", "sample_time", "sample_period", "sampling_period"];
+
+/// The sample rate, Hz, that a number with this name states.
+pub(crate) fn stated_rate(name: &str, number: f64) -> Option<f64> {
+    let name = name.to_lowercase();
+    let rate = if PERIODS.contains(&name.as_str()) { number.recip() } else { number };
+    let is_known = RATES.contains(&name.as_str()) || PERIODS.contains(&name.as_str());
+    (is_known && rate.is_finite() && rate > 0.0).then_some(rate)
+}
 
 /// An array of a file: a vector, or a matrix whose longer side is the time.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -96,7 +125,8 @@ pub(crate) struct ArraySource<'a, R> {
 
 impl<'a, R: ArrayReader> ArraySource<'a, R> {
     /// The first topic has all arrays; each group and each array is one of its own.
-    pub(crate) fn new(file: &'a Path, reader: R, arrays: Vec<NamedArray>, budget: Budget) -> Self {
+    pub(crate) fn new(file: &'a Path, mut reader: R, mut arrays: Vec<NamedArray>, budget: Budget) -> Self {
+        set_stated_rates(&mut reader, &mut arrays);
         let places: Vec<(usize, usize)> = arrays
             .iter()
             .enumerate()
@@ -186,6 +216,24 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
     }
 }
 
+/// Sets the rate of the arrays beside and below an array of one number that states one.
+fn set_stated_rates(reader: &mut impl ArrayReader, arrays: &mut [NamedArray]) {
+    for at in 0..arrays.len() {
+        let NamedArray { group, name, rows: 1, columns, .. } = &arrays[at] else { continue };
+        // The value 1 stands for any.
+        if columns.len() != 1 || stated_rate(name, 1.0).is_none() {
+            continue;
+        }
+        let Ok(read) = reader.read(at, &[0], &mut |_| Ok(())) else { continue };
+        let number = read.first().and_then(|values| values.first()).map_or(f64::NAN, |number| number.value());
+        let Some(rate) = stated_rate(name, number) else { continue };
+        let (group, path) = (group.clone(), arrays[at].path());
+        for array in arrays.iter_mut().filter(|array| array.rows > 1 && array.group.starts_with(&group)) {
+            array.rate.get_or_insert((rate, path.clone()));
+        }
+    }
+}
+
 impl<R: ArrayReader> Source for ArraySource<'_, R> {
     fn format(&self) -> &'static str {
         R::FORMAT
@@ -197,6 +245,34 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
 
     fn whole(&self) -> Option<usize> {
         Some(0)
+    }
+
+    /// Arrays of one length: all of them where their names are those of one sensor, else those of a group and the groups in it.
+    fn tables(&self, topic: usize) -> Vec<Vec<usize>> {
+        let mut by_rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (at, member) in self.members[topic].iter().enumerate() {
+            by_rows.entry(self.arrays[self.places[*member].0].rows).or_default().push(at);
+        }
+        let columns = &self.topics[topic].columns;
+        let mut tables = Vec::new();
+        // Arrays of one number come last.
+        for all in by_rows.into_values().rev() {
+            let available: Vec<AvailableColumn> = all.iter().map(|&at| columns[at].clone()).collect();
+            if known_by_name(&available).is_some_and(|known| !known.is_empty()) {
+                tables.push(all);
+                continue;
+            }
+            let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
+            for at in all {
+                let own = self.arrays[self.places[self.members[topic][at]].0].group.as_str();
+                match groups.iter_mut().find(|(group, _)| own.starts_with(*group)) {
+                    Some((_, table)) => table.push(at),
+                    None => groups.push((own, vec![at])),
+                }
+            }
+            tables.extend(groups.into_iter().map(|(_, columns)| columns));
+        }
+        tables
     }
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
@@ -216,7 +292,7 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
             if array.rows != self.arrays[first].rows {
                 let [one, other] = [&self.arrays[first], array]
                     .map(|array| format!("array {:?} has {} rows", array.path(), array.rows));
-                return Err(fail(Reason::Array(format!("{one}, {other}"))));
+                return Err(fail(Reason::UnequalRows(format!("{one}, {other}"))));
             }
             let columns: Vec<usize> = own.iter().map(|&at| places[at].1).collect();
             let read = self.reader.read(number, &columns, &mut |values| meter.add_values(values)).map_err(fail)?;

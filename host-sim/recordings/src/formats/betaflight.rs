@@ -1,8 +1,9 @@
 //! Blackbox logs of Betaflight and INAV (`.bbl`, `.bfl`): gyroscope and accelerometer with the scales of their header, and every other
 //! field of the main frames. A file has a log for each flight.
 
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
-use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::sensor_table::Number;
 

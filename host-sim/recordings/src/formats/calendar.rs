@@ -44,7 +44,7 @@ pub(crate) fn date(text: &str) -> Option<i64> {
 }
 
 /// Nanoseconds from midnight to a time of day, in UTC where it says its offset: 10:00, 10:00:13, 10:00:13.25, 10:00:13Z,
-/// 10:00:13+02:00, 10:00:13 PM.
+/// 10:00:13+02:00, 10:00:13 PM, 10:00:13:250 (ms).
 pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     let text = text.trim();
     let upper = text.to_uppercase();
@@ -66,7 +66,7 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     let (hour, minute) = (two_digits(parts.next()?, 24)?, two_digits(parts.next()?, 60)?);
     let (second, fraction) = match parts.next() {
         Some(text) => {
-            let (second, fraction) = text.split_once('.').unwrap_or((text, "0"));
+            let (second, fraction) = text.split_once(['.', ',']).unwrap_or((text, parts.next().unwrap_or("0")));
             let is_fraction = (1..=18).contains(&fraction.len()) && fraction.bytes().all(|b| b.is_ascii_digit());
             let digits = fraction.get(..9).unwrap_or(fraction);
             let scale = 10i64.pow(9 - digits.len() as u32);

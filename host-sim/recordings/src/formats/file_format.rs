@@ -1,5 +1,6 @@
 //! Which format a file has, by its content; and the reading of any of them.
 
+use crate::columns::column_selection::ColumnSelection;
 use crate::counts::count_table;
 use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
@@ -20,7 +21,9 @@ use crate::input::delimited_text::Lines;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::inspection::InspectedTable;
 use crate::tables::any_sensor::{ReadOptions, SensorRecording};
+use measurement::{SensorProfile, adis16405};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -66,6 +69,26 @@ pub enum FileFormat {
 }
 
 impl FileFormat {
+    /// What it is called in a sentence.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CountTable => "register counts of an ADIS16405",
+            Self::FrameLog | Self::SpiExport => "a log of the SPI bus of an ADIS16405",
+            Self::TextTable => "text",
+            Self::Npy => "an array of NumPy",
+            Self::Npz => "arrays of NumPy",
+            Self::Mat => "MATLAB, level 5",
+            Self::RosBag => "a bag of ROS 1",
+            Self::Mcap => "MCAP",
+            Self::Sqlite => "a bag of ROS 2 in SQLite",
+            Self::Ulog => "a log of PX4",
+            Self::ArduPilot => "a DataFlash log of ArduPilot",
+            Self::Hdf5 => "HDF5",
+            Self::Blackbox => "a blackbox log",
+        }
+    }
+
     /// Whether the file is text: a table or a log that may be replayed.
     pub fn is_text(self) -> bool {
         matches!(self, Self::CountTable | Self::FrameLog | Self::SpiExport | Self::TextTable)
@@ -197,6 +220,38 @@ impl InputFile {
             }
         };
         table.map(|table| SensorRecording::new(table, &options.sensor)).map_err(|error| self.rename(error))
+    }
+
+    /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
+    /// user says of the columns.
+    ///
+    /// # Errors
+    /// The file is damaged, has no rows of numbers, or is a log of the SPI bus, which has no columns.
+    pub fn inspect(&self, topic: Option<&str>, selection: &ColumnSelection) -> Result<Vec<InspectedTable>, InputError> {
+        let path = self.path();
+        let whole = match self.format {
+            FileFormat::CountTable | FileFormat::TextTable => {
+                let read = |topic: Option<&str>| text_table::read_whole(path, topic, &self.monitor);
+                match read(topic) {
+                    // Rows of several kinds.
+                    Err(InputError { reason: Reason::SeveralTopics(names), .. }) => {
+                        names.split(", ").map(|name| read(Some(name))).collect()
+                    }
+                    table => table.map(|table| vec![table]),
+                }
+            }
+            FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(path, Reason::FrameLog)),
+            _ => {
+                let budget = self.budget.again();
+                self.source(budget).and_then(|mut source| topics::read_whole(path, source.as_mut(), topic, budget))
+            }
+        };
+        let sensor = match self.format {
+            FileFormat::CountTable => adis16405::profile(adis16405::GYRO_LSB_300),
+            _ => SensorProfile::generic(),
+        };
+        let tables = whole.map_err(|error| self.rename(error))?;
+        Ok(tables.into_iter().map(|table| InspectedTable::new(table, &sensor, selection)).collect())
     }
 
     /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,

@@ -5,7 +5,7 @@
 
 use crate::columns::unit::Unit;
 use crate::counts::recording::MAX_SAMPLES;
-use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
+use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::{InputError, Reason};
@@ -27,18 +27,6 @@ const MAX_OBJECTS: usize = 1 << 14;
 /// Rows that are read at once, where the chunks of the file are smaller.
 const ROWS_AT_ONCE: u64 = 4096;
 
-/// Names of attributes that state a sample rate, Hz, in small letters.
-const RATES: [&str; 9] = [
-    "sampling_rate",
-    "sample_rate",
-    "samplingrate",
-    "samplerate",
-    "sampling_frequency",
-    "sample_frequency",
-    "fs",
-    "rate_hz",
-    "sample_rate_hz",
-];
 /// Names of attributes that state a unit, in small letters.
 const UNITS: [&str; 2] = ["unit", "units"];
 /// The attribute by which MATLAB says what an array was, and what of it are no numbers.
@@ -160,7 +148,7 @@ impl Stated {
         let mut stated = self.clone();
         for (name, value) in attributes {
             let plain = name.to_lowercase();
-            if let Some(hz) = number(value).filter(|hz| RATES.contains(&plain.as_str()) && *hz > 0.0) {
+            if let Some(hz) = number(value).and_then(|number| stated_rate(name, number)) {
                 let of = if path.is_empty() { "the file" } else { path.trim_end_matches('/') };
                 stated.rate = Some((hz, format!("attribute {name} of {of}")));
             }

@@ -276,6 +276,7 @@ impl ArrayLayout {
         let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
         let header = NpyHeader::from_reader(checked_header(input)?.as_slice()).map_err(damaged)?;
         let (outer, inner, first_is_time) = match *header.shape() {
+            [] => (1, 1, true),
             [rows] => (rows, 1, true),
             [rows, columns] => (rows.max(columns), rows.min(columns), rows >= columns),
             ref shape => return Err(unusable(format!("has {} dimensions; a recording has 1 or 2", shape.len()))),

@@ -1,8 +1,9 @@
 //! Messages of ROS as rows: which of their columns are an inertial sensor's, and when they were taken.
 
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::message_layout::{Encoding, MessageColumn, MessageLayout};
-use crate::formats::topics::{ACCELEROMETER, GYROSCOPE, Topic, TopicSensor};
+use crate::formats::topics::{Topic, TopicSensor};
 use crate::tables::sensor_table::Number;
 
 /// Names of the fields of an inertial sensor (`sensor_msgs/Imu`), in whatever message, with their channels and units (REP 103).

@@ -1,14 +1,17 @@
 //! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading, and sentences as of NMEA 0183.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, SelectionError, as_they_are};
+use crate::columns::unit::Unit;
 use crate::formats::calendar::{self, CalendarClock, CalendarColumns};
 use crate::formats::nmea::{self, Sentence};
+use crate::formats::row_kinds::RowKinds;
 use crate::input::delimited_text::{self, Lines};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
 use crate::tables::any_sensor::ReadOptions;
 use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
-use std::collections::VecDeque;
+use crate::tables::whole_table::{WholeTable, most_rows};
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
 /// Separators of columns, the first that occurs; blanks where none does.
@@ -20,8 +23,11 @@ const MISSING: [&str; 6] = ["", "nan", "na", "n/a", "null", "none"];
 /// Lines before the first row of numbers that may be comments or a heading.
 const MAX_PREAMBLE: usize = 64;
 
-/// Lines at the start of a file of sentences that tell which of them is read.
-const SENTENCES: usize = 64;
+/// Rows or sentences at the start of a file that tell their kinds.
+const FIRST_LINES: usize = 64;
+
+/// What the serial monitor of the Arduino IDE writes between the time of a line and the line.
+const ARROW: &str = " -> ";
 
 /// Reads a table; `monitor` counts the bytes and may stop the reading.
 pub(crate) fn read(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<SensorTable, InputError> {
@@ -30,13 +36,49 @@ pub(crate) fn read(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) ->
     while table.add_row(&mut builder)? {}
     let mut read = builder.finish().map_err(|reason| InputError::file(file, reason))?;
     read.notes.extend(table.notes());
+    // Time stamps say more than a stated rate.
+    read.rate_hz = table.rate_hz().filter(|_| read.times_s.is_none());
     Ok(read)
 }
+
+/// Reads all columns of a table; fields that are no numbers are missing.
+pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor) -> Result<WholeTable, InputError> {
+    let mut table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
+    table.is_lenient = true;
+    let mut builder = TableBuilder::new(table.chosen().to_vec());
+    let most = most_rows(table.chosen().len());
+    let mut whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
+    loop {
+        whole.is_cut = builder.rows() >= most;
+        match table.add_row(&mut builder) {
+            Ok(true) if !whole.is_cut => {}
+            Ok(_) => break,
+            Err(error) if builder.rows() == 0 => return Err(error),
+            Err(error) => {
+                whole.notes.push(format!("{error}; the {} rows before that are shown", builder.rows()));
+                break;
+            }
+        }
+    }
+    whole.notes.extend(table.notes());
+    whole.rate_hz = table.rate_hz();
+    Ok(whole.with_rows(builder))
+}
+
+/// Chooses the columns to read of those that there are.
+type Choose<'a> = dyn Fn(&[AvailableColumn]) -> Result<Vec<ChosenColumn>, SelectionError> + 'a;
 
 /// How the fields of a row are told from each other.
 enum Layout {
     /// By a separator; blanks where there is none.
-    Columns { separator: Option<char>, calendar: Option<CalendarClock> },
+    Columns {
+        separator: Option<char>,
+        calendar: Option<CalendarClock>,
+        /// Where the name of the kind of row is, and that which is read, of rows of several kinds.
+        kind: Option<(usize, String)>,
+        /// Rows of the other kinds.
+        others: u64,
+    },
     /// Those of one kind of sentence.
     Sentences { name: String, damaged: u64, others: u64 },
 }
@@ -45,8 +87,15 @@ enum Layout {
 pub(crate) struct TextTable {
     file: PathBuf,
     lines: Lines,
+    available: Vec<AvailableColumn>,
     chosen: Vec<ChosenColumn>,
     layout: Layout,
+    /// The rate that a line before the rows states, Hz.
+    rate_hz: Option<f64>,
+    /// What the user should know of the columns.
+    note: Option<String>,
+    /// Whether a field that is no number is a missing one.
+    is_lenient: bool,
     /// Fields of a row.
     width: usize,
     /// The first rows, which were read to tell the columns.
@@ -57,6 +106,12 @@ pub(crate) struct TextTable {
 impl TextTable {
     /// Opens a table and chooses its columns.
     pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let choose = |available: &[AvailableColumn]| options.choose(available);
+        let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
+        Ok(Self { note: options.selection.left_out(&table.available, &options.sensor), ..table })
+    }
+
+    fn open_with(file: &Path, topic: Option<&str>, monitor: &ReadMonitor, choose: &Choose) -> Result<Self, InputError> {
         let mut lines = Lines::open_monitored(file, monitor)?;
         let mut preamble: Vec<(u64, String)> = Vec::new();
         let first = loop {
@@ -66,7 +121,7 @@ impl TextTable {
             };
             if Sentence::parse(text).is_some() {
                 let first = (line, text.to_owned());
-                return Self::open_sentences(file, options, lines, first);
+                return Self::open_sentences(file, topic, choose, lines, first);
             }
             if is_row(text) {
                 break (line, text.to_owned());
@@ -76,24 +131,45 @@ impl TextTable {
                 return Err(InputError::line(file, line, Reason::NoNumbers));
             }
         };
-        if let Some(topic) = &options.topic {
-            let names = Box::new((topic.clone(), "no topics: it is a table".to_owned()));
-            return Err(InputError::file(file, Reason::UnknownTopic(names)));
+        let separator = separator_of(&first.1);
+        let mut first = VecDeque::from([first]);
+        while first.len() < FIRST_LINES {
+            let Some((line, text)) = lines.next()? else { break };
+            first.push_back((line, text.to_owned()));
         }
-        let separator = SEPARATORS.into_iter().find(|separator| first.1.contains(*separator));
-        let row: Vec<&str> = split(&first.1, separator).collect();
+        let rows: Vec<Vec<&str>> = first.iter().map(|(_, text)| split(text, separator).collect()).collect();
+        let kinds = RowKinds::find(&rows);
+        let kind = match (&kinds, topic) {
+            (None, None) => None,
+            (None, Some(topic)) => {
+                let names = Box::new((topic.to_owned(), "no topics: it is a table".to_owned()));
+                return Err(InputError::file(file, Reason::UnknownTopic(names)));
+            }
+            (Some(kinds), topic) => Some(kinds.choose(topic).map_err(|reason| InputError::file(file, reason))?),
+        };
+        let is_kind = |row: &&Vec<&str>| kind.as_ref().is_none_or(|(at, name)| row.get(*at) == Some(&name.as_str()));
+        let row = rows.iter().find(is_kind).cloned().unwrap_or_default();
         let (width, calendar) = (row.len(), CalendarColumns::find(&row));
         // The heading may have one name for a date and a time of day.
         let is_heading = |fields: usize| fields == width || is_short(fields, width, calendar);
         let fields = |text: &str| split(text, separator).count();
-        let heading = preamble.iter().rev().find(|(_, text)| is_heading(fields(text)));
-        if heading.is_none()
+        let mut headings = preamble.iter().rev().filter(|(_, text)| is_heading(fields(text)));
+        let mut heading = headings.next();
+        // A row of units below the names.
+        let units = heading.and_then(|(_, text)| units_of(split(text, separator)));
+        if let Some(names) = headings.next().filter(|_| units.is_some()) {
+            heading = Some(names);
+        }
+        if kind.is_some() && heading.is_none_or(|(_, text)| fields(text) != width) {
+            // Rows of several kinds have no common heading.
+            heading = None;
+        } else if heading.is_none()
             && let Some((line, text)) = preamble.iter().rev().find(|(_, text)| !text.starts_with(['#', '%', '/']))
         {
             return Err(InputError::line(file, *line, Reason::FieldCount { found: width, expected: fields(text) }));
         }
         let mut available: Vec<AvailableColumn> = match heading {
-            Some((_, text)) => split(text, separator).map(AvailableColumn::from_heading).collect(),
+            Some((_, text)) => named_columns(split(text, separator), units.as_deref()),
             None => (0..width).map(|number| AvailableColumn { name: number.to_string(), unit: None }).collect(),
         };
         if let Some(calendar) = calendar {
@@ -104,24 +180,37 @@ impl TextTable {
             let name = if available[at].is_time() { available[at].name.clone() } else { "time".to_owned() };
             available[at] = AvailableColumn::known(&name, "ns");
         }
-        let chosen = options.choose(&available).map_err(|error| match heading {
+        let chosen = choose(&available).map_err(|error| match heading {
             Some((line, _)) => InputError::line(file, *line, Reason::Selection(Box::new(error))),
             None => InputError::file(file, Reason::Selection(Box::new(error))),
         })?;
         let row = Vec::with_capacity(chosen.len());
-        let layout = Layout::Columns { separator, calendar: calendar.map(CalendarClock::new) };
-        Ok(Self { file: file.to_owned(), lines, chosen, layout, width, first: VecDeque::from([first]), row })
+        let layout = Layout::Columns { separator, calendar: calendar.map(CalendarClock::new), kind, others: 0 };
+        Ok(Self {
+            file: file.to_owned(),
+            lines,
+            available,
+            chosen,
+            layout,
+            rate_hz: preamble.iter().find_map(|(_, text)| stated_rate(text)),
+            note: None,
+            is_lenient: false,
+            width,
+            first,
+            row,
+        })
     }
 
     /// Opens a file of sentences: of one kind, that which the options name, else the most frequent one with numbers among the first.
     fn open_sentences(
         file: &Path,
-        options: &ReadOptions,
+        topic: Option<&str>,
+        choose: &Choose,
         mut lines: Lines,
         first: (u64, String),
     ) -> Result<Self, InputError> {
         let mut first = VecDeque::from([first]);
-        while first.len() < SENTENCES {
+        while first.len() < FIRST_LINES {
             let Some((line, text)) = lines.next()? else { break };
             first.push_back((line, text.to_owned()));
         }
@@ -134,7 +223,7 @@ impl TextTable {
             }
         }
         let names = || kinds.iter().map(|(name, ..)| name.as_str()).collect::<Vec<_>>().join(", ");
-        let unknown = |topic: &String| Reason::UnknownTopic(Box::new((topic.clone(), names())));
+        let unknown = |topic: &str| Reason::UnknownTopic(Box::new((topic.to_owned(), names())));
         let is_numeric = |name: &str| {
             let of_kind = first.iter().filter_map(|(_, text)| Sentence::parse(text)).find(|of| of.name == name);
             of_kind.is_some_and(|of| {
@@ -143,7 +232,7 @@ impl TextTable {
                 2 * numbers >= of.fields.len()
             })
         };
-        let kind = match &options.topic {
+        let kind = match topic {
             Some(topic) => {
                 let named = kinds.iter().find(|(name, ..)| name == topic);
                 named.ok_or_else(|| InputError::file(file, unknown(topic)))?
@@ -155,11 +244,23 @@ impl TextTable {
         };
         let (name, width) = (kind.0.clone(), kind.1);
         let available = nmea::columns(&name, width);
-        let chosen = options.choose(&available);
+        let chosen = choose(&available);
         let chosen = chosen.map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
         let row = Vec::with_capacity(chosen.len());
         let layout = Layout::Sentences { name, damaged: 0, others: 0 };
-        Ok(Self { file: file.to_owned(), lines, chosen, layout, width, first, row })
+        Ok(Self {
+            file: file.to_owned(),
+            lines,
+            available,
+            chosen,
+            layout,
+            rate_hz: None,
+            note: None,
+            is_lenient: false,
+            width,
+            first,
+            row,
+        })
     }
 
     /// The columns that are read.
@@ -169,17 +270,32 @@ impl TextTable {
 
     /// What the user should know of the rows that were read, one sentence each.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let Layout::Sentences { name, damaged, others } = &self.layout else { return Vec::new() };
+        let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
+        let mut notes: Vec<String> = self.note.iter().cloned().chain(of_rate).collect();
+        let (name, damaged, others) = match &self.layout {
+            Layout::Columns { others: 0, .. } => return notes,
+            Layout::Columns { others, .. } => {
+                notes.push(format!("{others} rows of other kinds are left out; --topic reads another"));
+                return notes;
+            }
+            Layout::Sentences { name, damaged, others } => (name, damaged, others),
+        };
         let sentences = [
             (*damaged, format!("{damaged} sentences whose checksum is wrong; their values are missing")),
             (*others, format!("{others} lines that are no sentence {name} are left out; --topic reads another")),
         ];
-        sentences.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text).collect()
+        notes.extend(sentences.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text));
+        notes
+    }
+
+    /// The rate that the file states before its rows, Hz.
+    pub(crate) fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
     }
 
     /// Adds the next row to `builder`; false at the end.
     pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
-        let Self { file, lines, chosen, layout, width, first, row } = self;
+        let Self { file, lines, chosen, layout, is_lenient, width, first, row, .. } = self;
         loop {
             let first = first.pop_front();
             let (line, text) = match &first {
@@ -190,7 +306,13 @@ impl TextTable {
                 },
             };
             let of_layout = match layout {
-                Layout::Columns { separator, calendar } => {
+                Layout::Columns { separator, kind: Some((at, name)), others, .. }
+                    if split(text, *separator).nth(*at) != Some(name) =>
+                {
+                    *others += 1;
+                    Ok(false)
+                }
+                Layout::Columns { separator, calendar, .. } => {
                     numbers(split(text, *separator), chosen, *width, calendar.as_mut(), row).map(|()| true)
                 }
                 Layout::Sentences { name, damaged, others } => match Sentence::parse(text) {
@@ -210,6 +332,11 @@ impl TextTable {
                     }
                 },
             };
+            let of_layout = of_layout.or_else(|fault| match fault {
+                // The row has the missing ones as NaN.
+                (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
+                fault => Err(fault),
+            });
             let added = of_layout.and_then(|is_row| {
                 let of_column = |(at, reason)| (Some(at), reason);
                 if is_row { builder.push(row).map(|()| true).map_err(of_column) } else { Ok(false) }
@@ -277,11 +404,56 @@ fn numbers<'a>(
     }
 }
 
+/// The sample rate that a line before the rows states, as in `// Update Rate: 100.0Hz`, Hz.
+fn stated_rate(line: &str) -> Option<f64> {
+    const NAMES: [&str; 4] = ["rate", "frequency", "freq", "fs"];
+    let plain = line.to_lowercase();
+    let (before, _) = plain.split_once("hz")?;
+    let number = before.trim_end();
+    let start = number.rfind(|letter: char| !letter.is_ascii_digit() && letter != '.').map_or(0, |at| at + 1);
+    let is_named = number[..start].split(|letter: char| !letter.is_alphanumeric()).any(|word| NAMES.contains(&word));
+    number[start..].parse().ok().filter(|hz: &f64| is_named && *hz > 0.0)
+}
+
+/// The sign between the fields of a row, without the time that a serial monitor writes before it.
+fn separator_of(text: &str) -> Option<char> {
+    let fields = text.split_once(ARROW).map_or(text, |(_, rest)| rest);
+    SEPARATORS.into_iter().find(|separator| fields.contains(*separator))
+}
+
 fn split(text: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> + '_> {
+    if let Some((time, rest)) = text.split_once(ARROW) {
+        return Box::new(std::iter::once(time.trim()).chain(split(rest, separator)));
+    }
     match separator {
         Some(separator) => Box::new(text.split(separator).map(delimited_text::field)),
         None => Box::new(text.split_ascii_whitespace().map(delimited_text::field)),
     }
+}
+
+/// The units of a row below the names, where it is one.
+fn units_of<'a>(fields: impl Iterator<Item = &'a str>) -> Option<Vec<Option<Unit>>> {
+    let fields: Vec<&str> = fields.collect();
+    let unit = |field: &&str| Unit::parse(field.trim_matches(['[', ']', '(', ')']));
+    let units: Vec<Option<Unit>> = fields.iter().map(unit).collect();
+    let known = units.iter().flatten().count();
+    (2 * known > fields.len()).then_some(units)
+}
+
+/// The columns of a heading. Of several with the same name each is known by its number, from 0.
+fn named_columns<'a>(names: impl Iterator<Item = &'a str>, units: Option<&[Option<Unit>]>) -> Vec<AvailableColumn> {
+    let mut columns: Vec<AvailableColumn> = names.map(AvailableColumn::from_heading).collect();
+    for (column, unit) in columns.iter_mut().zip(units.unwrap_or_default()) {
+        column.unit = column.unit.or(*unit);
+    }
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for column in &columns {
+        *counts.entry(column.name.clone()).or_insert(0) += 1;
+    }
+    for (number, column) in columns.iter_mut().enumerate().filter(|(_, column)| counts[&column.name] > 1) {
+        column.name = number.to_string();
+    }
+    columns
 }
 
 /// A number, with a decimal comma too; NaN for a missing one; `None` for other texts.
@@ -297,7 +469,7 @@ fn number(field: &str) -> Option<Number> {
 /// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The
 /// others may be texts, such as the name of a frame.
 fn is_row(text: &str) -> bool {
-    let separator = SEPARATORS.into_iter().find(|separator| text.contains(*separator));
+    let separator = separator_of(text);
     let (mut numbers, mut missing, mut fields, mut named) = (0, 0, 0, 0);
     for field in split(text, separator) {
         fields += 1;

@@ -3,17 +3,15 @@
 //! A format implements [`Source`]: it lists its topics with all their columns, marks those that it knows to be of an inertial sensor, and
 //! gives the rows of a topic one after the other. Which topic and which columns are read is decided here, for every format alike.
 
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection};
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, as_they_are};
 use crate::columns::unit::Unit;
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::any_sensor::ReadOptions;
 use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
+use crate::tables::whole_table::{WholeSensor, WholeTable, most_rows};
+use measurement::SensorProfile;
 use std::path::Path;
-
-/// Channels of a gyroscope and of an accelerometer, in the order of their axes.
-pub(crate) const GYROSCOPE: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-pub(crate) const ACCELEROMETER: [&str; 3] = ["accl_x", "accl_y", "accl_z"];
 
 /// A source of rows in a file.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -112,6 +110,11 @@ pub(crate) trait Source {
     /// The topic that has the columns of all others.
     fn whole(&self) -> Option<usize> {
         None
+    }
+
+    /// The columns of a topic whose rows belong together, by their positions.
+    fn tables(&self, topic: usize) -> Vec<Vec<usize>> {
+        vec![(0..self.topics()[topic].columns.len()).collect()]
     }
 
     /// Gives every row of the topic at `topic`, with the `columns` at these positions.
@@ -266,6 +269,9 @@ pub(crate) fn read(
     let mut notes: Vec<String> = Vec::new();
     let states_units = |selection: &ColumnSelection| selection.has_units();
     notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
+    if sensor.is_none() {
+        notes.extend(options.selection.left_out(&topic.columns, &options.sensor));
+    }
     let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
     if options.topic.is_none() && source.preferred() == Some(name.as_str()) {
         let all = sensors(source.topics());
@@ -297,4 +303,94 @@ pub(crate) fn read(
             Ok(table)
         }
     }
+}
+
+/// Topics without a known sensor that are read to be looked at.
+const MOST_TOPICS: usize = 8;
+
+/// All columns of the topic that is named; else of those with a known sensor; else of the first ones.
+pub(crate) fn read_whole(
+    file: &Path,
+    source: &mut dyn Source,
+    topic: Option<&str>,
+    budget: Budget,
+) -> Result<Vec<WholeTable>, InputError> {
+    let known = sensors(source.topics());
+    let topics: Vec<usize> = match (topic, source.whole()) {
+        (Some(wanted), _) => {
+            let selection = ColumnSelection::default();
+            let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: Some(wanted.to_owned()) };
+            vec![choose(source, &options).map_err(|reason| InputError::file(file, reason))?.topic]
+        }
+        (None, Some(whole)) => vec![whole],
+        (None, None) if known.is_empty() => {
+            let has_columns = |at: &usize| !source.topics()[*at].columns.is_empty();
+            (0..source.topics().len()).filter(has_columns).take(MOST_TOPICS).collect()
+        }
+        (None, None) => {
+            let mut topics: Vec<usize> = known.iter().map(|(_, choice)| choice.topic).collect();
+            topics.dedup();
+            topics
+        }
+    };
+    let mut tables = Vec::new();
+    for at in topics {
+        for columns in source.tables(at) {
+            tables.push(read_columns(file, source, at, &columns, budget)?);
+        }
+    }
+    // A name of one of several sensors of a topic.
+    for table in &mut tables {
+        if table.sensors.iter().any(|sensor| Some(sensor.name.as_str()) == topic) {
+            table.sensors.retain(|sensor| Some(sensor.name.as_str()) == topic);
+        }
+    }
+    Ok(tables)
+}
+
+/// These columns of a topic, as they are.
+fn read_columns(
+    file: &Path,
+    source: &mut dyn Source,
+    topic: usize,
+    columns: &[usize],
+    budget: Budget,
+) -> Result<WholeTable, InputError> {
+    let Topic { name, kind, columns: all, .. } = &source.topics()[topic];
+    let chosen: Vec<AvailableColumn> = columns.iter().map(|&at| all[at].clone()).collect();
+    let is_of_arrays = source.whole().is_some();
+    let mut whole = WholeTable { name: name.clone(), kind: kind.clone(), is_of_arrays, ..WholeTable::default() };
+    // The same column may be in several topics, under one name.
+    let position = |name: &str| chosen.iter().position(|column| column.name == name);
+    for of in source.topics().iter().filter(|of| source.whole().is_some() || of.name == *name) {
+        for sensor in &of.sensors {
+            let column = |&(channel, at, unit): &(&'static str, usize, Option<Unit>)| {
+                Some((channel, position(&of.columns[at].name)?, unit))
+            };
+            if let Some(columns) = sensor.columns.iter().map(column).collect() {
+                whole.sensors.push(WholeSensor { name: sensor_name(of, sensor), columns });
+            }
+        }
+    }
+    let most = most_rows(columns.len());
+    let mut builder = TableBuilder::new(as_they_are(&chosen)).within(budget);
+    let mut is_cut = false;
+    let ending = source.read(topic, columns, &mut |row| {
+        is_cut = builder.rows() >= most;
+        let pushed = if is_cut { Err((0, Reason::TooManySamples)) } else { builder.push(row) };
+        pushed.map_err(|(_, reason)| InputError::file(file, reason))
+    });
+    whole.is_cut = is_cut;
+    match ending {
+        Err(_) if is_cut => {}
+        ending => {
+            let Ending { damage, notes, rate_hz } = ending?;
+            whole.rate_hz = rate_hz;
+            whole
+                .notes
+                .extend(damage.map(|reason| format!("{reason}; the {} rows before that are shown", builder.rows())));
+            whole.notes.extend(notes);
+        }
+    }
+    Ok(whole.with_rows(builder))
 }

@@ -3,9 +3,10 @@
 //! The crate `px4-ulog` is not used: it follows formats within formats to any depth, in time that grows with the square of it until the
 //! stack ends.
 
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
-use crate::formats::topics::{ACCELEROMETER, EachRow, Ending, GYROSCOPE, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::sensor_table::Number;

@@ -24,6 +24,9 @@ pub(crate) struct Lines {
     input: BufReader<Box<dyn Read + Send>>,
     line: u64,
     bytes: Vec<u8>,
+    /// The line, where it is no UTF-8.
+    latin: String,
+    is_latin: bool,
     /// Whether the line in `bytes` is read once more.
     again: bool,
     monitor: ReadMonitor,
@@ -71,16 +74,19 @@ impl Lines {
             input,
             line: 0,
             bytes: Vec::new(),
+            latin: String::new(),
+            is_latin: false,
             again: false,
             monitor: monitor.clone(),
             is_stopped: false,
         })
     }
 
-    /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file.
+    /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file. A line that
+    /// is no UTF-8 is Latin-1, as programs for Windows write a degree sign.
     ///
     /// # Errors
-    /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or not UTF-8.
+    /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or has control characters.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {
             self.is_stopped |= self.monitor.take_stop();
@@ -107,10 +113,19 @@ impl Lines {
                 break;
             }
         }
-        match text(&self.bytes) {
-            Ok(text) => Ok(Some((self.line, text))),
-            Err(_) => Err(InputError::line(&self.file, self.line, Reason::NotText)),
+        self.is_latin = false;
+        if let Ok(text) = text(&self.bytes) {
+            return Ok(Some((self.line, text)));
         }
+        // Characters that no text has tell other bytes from letters.
+        let latin = self.bytes.trim_ascii().iter().map(|byte| char::from(*byte));
+        if latin.clone().any(|letter| letter.is_control() && letter != '\t') {
+            return Err(InputError::line(&self.file, self.line, Reason::NotText));
+        }
+        self.latin.clear();
+        self.latin.extend(latin);
+        self.is_latin = true;
+        Ok(Some((self.line, &self.latin)))
     }
 
     /// Whether the reading was stopped before the end of the file.
@@ -126,7 +141,7 @@ impl Lines {
     pub(crate) fn header(&mut self) -> Result<Option<&str>, InputError> {
         let found = self.next()?.is_some();
         self.again = found;
-        Ok(found.then(|| text(&self.bytes)).and_then(Result::ok))
+        Ok(found.then_some(if self.is_latin { self.latin.as_str() } else { text(&self.bytes).unwrap_or_default() }))
     }
 }
 

@@ -94,8 +94,8 @@ pub enum Reason {
         /// The first bytes.
         begins: String,
     },
-    /// Bytes that are not UTF-8.
-    #[error("not UTF-8 text")]
+    /// Bytes that are neither UTF-8 nor Latin-1.
+    #[error("not text in UTF-8 or Latin-1")]
     NotText,
     /// More than 65536 bytes without a line end.
     #[error("the line is longer than 65536 bytes")]
@@ -245,6 +245,9 @@ pub enum Reason {
     /// A ROS 1 bag of a recording that was interrupted.
     #[error("the bag has no index, as after an interrupted recording; make one with `rosbag reindex`")]
     NoIndex,
+    /// Arrays that cannot be columns of one table: what each has.
+    #[error("{0}; columns of one table have as many rows")]
+    UnequalRows(String),
     /// An array that is no column or matrix of numbers.
     #[error("{0}")]
     Array(String),

@@ -131,6 +131,20 @@ impl SampleStream {
         }
     }
 
+    /// The rows of any sensor, which become one measurement in memory; `stated_hz` overrides the rate that their time stamps show.
+    ///
+    /// # Errors
+    /// They have no time base.
+    pub fn sensor_recording(
+        recording: SensorRecording,
+        stated_hz: Option<f64>,
+        monitor: &ReadMonitor,
+    ) -> Result<Self, TimeBaseError> {
+        let (base, mut notes) = recording.time_base(stated_hz)?;
+        notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
+        Ok(Self { notes, ..Self::held(base.measurement, monitor) })
+    }
+
     /// What a simulation or a log of the bus recorded; `stated_hz` overrides the rate that its time stamps show.
     ///
     /// # Errors
@@ -207,9 +221,7 @@ impl SampleStream {
         let monitor = &input.monitor().clone();
         let is_streamed = matches!(input.format(), FileFormat::CountTable | FileFormat::TextTable | FileFormat::Npy);
         if !is_streamed {
-            let (base, mut notes) = input.read(&options)?.time_base(stated_hz)?;
-            notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
-            return Ok(Self { notes, ..Self::held(base.measurement, monitor) });
+            return Ok(Self::sensor_recording(input.read(&options)?, stated_hz, monitor)?);
         }
         let head = |most: u64| {
             let head = value_stream::head(input.path(), input.format(), &options, monitor, most);
@@ -217,6 +229,7 @@ impl SampleStream {
         };
         let slots_of = |table: &SensorTable| {
             let rows = table.columns.first().map_or(0, |column| column.values.len());
+            let stated_hz = stated_hz.or(table.rate_hz);
             SampleSlots::new(rows, table.times_s.as_deref(), table.indices.as_deref(), stated_hz)
         };
         let ValueHead { mut table, time_unit_s, mut is_all } = head(kept.rows)?;
@@ -229,12 +242,10 @@ impl SampleStream {
             ValueHead { table, is_all, .. } = head(u64::MAX)?;
         }
         if is_all {
-            let recording = SensorRecording::new(table, &options.sensor);
-            let (base, mut notes) = recording.time_base(stated_hz)?;
-            notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
-            return Ok(Self { notes, ..Self::held(base.measurement, monitor) });
+            return Ok(Self::sensor_recording(SensorRecording::new(table, &options.sensor), stated_hz, monitor)?);
         }
         let slots = slots_of(&table)?;
+        let stated_hz = stated_hz.or(table.rate_hz);
         let description = RecordingDescription {
             profile: options.sensor.clone(),
             sample_rate_hz: slots.sample_rate_hz,

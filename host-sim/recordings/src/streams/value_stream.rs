@@ -45,6 +45,14 @@ impl RowReader {
         }
     }
 
+    /// The rate that the file states beside its rows, Hz.
+    fn rate_hz(&self) -> Option<f64> {
+        match self {
+            Self::Text(rows) => rows.rate_hz(),
+            Self::Npy(_) => None,
+        }
+    }
+
     fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
         match self {
             Self::Text(rows) => rows.add_row(builder),
@@ -87,6 +95,8 @@ pub(crate) fn head(
     let (time_unit_s, _) = builder.time_unit().map_err(fail)?;
     let mut table = builder.finish().map_err(fail)?;
     table.notes.extend(rows.notes());
+    // Time stamps say more than a stated rate.
+    table.rate_hz = rows.rate_hz().filter(|_| table.times_s.is_none());
     Ok(ValueHead { table, time_unit_s, is_all })
 }
 

@@ -19,7 +19,7 @@ const MAX_BEYOND: f64 = 1e-3;
 /// the estimator's sums of fourth powers have room for noise of some thousand counts.
 const FINEST_STEP: f64 = 1e-3;
 /// The median of the absolute values of a normal distribution, in standard deviations.
-const MEDIAN_OF_NORMAL: f64 = 0.674_5;
+pub(crate) const MEDIAN_OF_NORMAL: f64 = 0.674_5;
 
 /// How the numbers of a column become counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,7 +130,7 @@ fn refined(mut step: f64, distances: &[f64]) -> Option<f64> {
 
 /// Standard deviation of the noise by the median difference of neighbours, which slow changes and single outliers do not move;
 /// by all differences where most are 0.
-fn difference_noise(values: &[f64]) -> f64 {
+pub(crate) fn difference_noise(values: &[f64]) -> f64 {
     let stride = values.len().div_ceil(1 << 17).max(1);
     let pairs =
         values.windows(2).step_by(stride).map(|pair| pair[1] - pair[0]).filter(|difference| difference.is_finite());

@@ -91,19 +91,9 @@ fn leave_out_repeated(table: &mut SensorTable, stated_hz: Option<f64>) -> u64 {
     let kept: Vec<bool> = (0..times.len()).map(|row| !is_repeat(row)).collect();
     let repeated = kept.iter().filter(|kept| !**kept).count() as u64;
     if repeated > 0 {
-        for column in &mut table.columns {
-            retain(&mut column.values, &kept);
-        }
-        table.times_s.iter_mut().for_each(|times| retain(times, &kept));
-        table.indices.iter_mut().for_each(|indices| retain(indices, &kept));
+        table.retain(&kept);
     }
     repeated
-}
-
-/// The elements whose flag is set.
-fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
-    let mut kept = kept.iter();
-    values.retain(|_| kept.next().copied().unwrap_or(true));
 }
 
 /// Why a value of a channel is no measurement, if so: 1 in it is `factor` in the channel's unit, in which it is `limit` at most.

@@ -71,6 +71,19 @@ pub(crate) struct SensorTable {
     pub(crate) rate_hz: Option<f64>,
 }
 
+impl SensorTable {
+    /// Leaves out the rows whose flag is not set.
+    pub(crate) fn retain(&mut self, kept: &[bool]) {
+        fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
+            let mut kept = kept.iter();
+            values.retain(|_| kept.next().copied().unwrap_or(true));
+        }
+        self.columns.iter_mut().for_each(|column| retain(&mut column.values, kept));
+        self.times_s.iter_mut().for_each(|times| retain(times, kept));
+        self.indices.iter_mut().for_each(|indices| retain(indices, kept));
+    }
+}
+
 /// Builds a [`SensorTable`] row by row.
 #[derive(Debug)]
 pub(crate) struct TableBuilder {
@@ -232,6 +245,11 @@ impl TableBuilder {
         }
     }
 
+    /// The columns with the numbers of all channels, in the units of the file.
+    pub(crate) fn into_values(self) -> (Vec<ChosenColumn>, Vec<Vec<f64>>) {
+        (self.chosen, self.values)
+    }
+
     /// The table of all rows.
     ///
     /// # Errors
@@ -265,7 +283,7 @@ impl TableBuilder {
 
 /// The unit of times that do not say it: of a clock that counts from 1970 (2001 to 2096) the one that gives this date, else
 /// seconds if they give a plausible sample rate. `None` where neither is so.
-fn usual_unit(times: &[f64], origin: f64) -> Option<Unit> {
+pub(crate) fn usual_unit(times: &[f64], origin: f64) -> Option<Unit> {
     let units = || ["s", "ms", "us", "ns"].into_iter().filter_map(Unit::parse);
     let by_date = units().find(|unit| (1e9..4e9).contains(&(origin * unit.factor)));
     let rows = times.len().saturating_sub(1).max(1) as f64;

@@ -43,6 +43,16 @@ pub enum TimeBaseError {
         /// Sample periods from the first to the last.
         periods: u64,
     },
+    /// A stretch without a sample.
+    #[error("no sample from {from_s} to {to_s} s (--from, --to): the recording has {recording_s:.3} s")]
+    EmptyStretch {
+        /// Its beginning, s from the first sample.
+        from_s: f64,
+        /// Its end, s from the first sample.
+        to_s: f64,
+        /// From the first sample to the last, s.
+        recording_s: f64,
+    },
     /// Too few samples for one octave of the Allan deviation.
     #[error("record too short: {used} usable samples, one octave needs {MIN_SAMPLES}{}", list(.dropped))]
     TooShort {

@@ -1,0 +1,6 @@
+//! The channels of an inertial sensor, in the order of their axes.
+
+/// Those of a gyroscope.
+pub(crate) const GYROSCOPE: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+/// Those of an accelerometer.
+pub(crate) const ACCELEROMETER: [&str; 3] = ["accl_x", "accl_y", "accl_z"];

@@ -1,0 +1,132 @@
+//! What is in a file without an analysis: columns, rates, gaps, what its columns are taken for, and the options with which it is analysed.
+
+mod column_facts;
+mod sensor_guess;
+mod steady_part;
+mod unit_guess;
+
+use crate::columns::column_selection::ColumnSelection;
+use crate::columns::unit::{SECOND, Unit};
+use crate::inspection::column_facts::ColumnFacts;
+use crate::inspection::sensor_guess::SensorGuess;
+use crate::tables::whole_table::WholeTable;
+use crate::time_base::sample_slots::SampleSlots;
+use crate::time_base::{RateEstimate, StampQuality};
+use measurement::SensorProfile;
+
+pub use crate::inspection::sensor_guess::{ColumnGuess, Proposal};
+pub use crate::inspection::steady_part::SteadyPart;
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InspectedColumn {
+    /// Its name, or its number.
+    pub name: String,
+    /// Its unit, where the file says it.
+    pub unit: Option<&'static str>,
+    /// The first values.
+    pub first: Vec<f64>,
+    /// Mean of the finite values; NaN where there is none.
+    pub mean: f64,
+    /// Standard deviation of the noise, by the differences of neighbours.
+    pub noise: f64,
+    /// Step that all values are multiples of, where there is one.
+    pub step: Option<f64>,
+    /// What it is taken for.
+    pub guess: Option<ColumnGuess>,
+}
+
+/// The rows of a file, or of a topic in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InspectedTable {
+    /// Topic, message or group of arrays, where a file has several; else empty.
+    pub topic: String,
+    /// Its type in the file; empty where there is none.
+    pub kind: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// Whether the file has more rows, which were not looked at.
+    pub is_cut: bool,
+    /// The columns, in their order.
+    pub columns: Vec<InspectedColumn>,
+    /// The rate by the time stamps, if there are any.
+    pub rate: Option<RateEstimate>,
+    /// The rate that the file states beside its rows, Hz.
+    pub stated_rate_hz: Option<f64>,
+    /// From the first time stamp to the last, s.
+    pub duration_s: Option<f64>,
+    /// Samples that are missing by the time stamps or the index, and the gaps in which they are.
+    pub missing: u64,
+    /// See [`missing`](Self::missing).
+    pub gaps: usize,
+    /// The longest part in which the sensor was steady; `None` where no column is taken for one of an inertial sensor.
+    pub steady: Option<SteadyPart>,
+    /// How each sensor in it is analysed.
+    pub proposals: Vec<Proposal>,
+    /// What the user should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl InspectedTable {
+    /// Looks at the rows; `sensor` says how large counts are, `selection` what the user says of the columns.
+    pub(crate) fn new(table: WholeTable, sensor: &SensorProfile, selection: &ColumnSelection) -> Self {
+        let facts: Vec<ColumnFacts> = table.columns.iter().map(ColumnFacts::new).collect();
+        let sensors = SensorGuess::all(&table, &facts, sensor, selection);
+        let place = |channel: &str| sensors.iter().find_map(|sensor| sensor.position(channel));
+        let times = place("time").and_then(|at| facts[at].times_s());
+        let indices = place("sample").and_then(|at| facts[at].indices());
+        let mut inspected = Self {
+            topic: table.name.clone(),
+            kind: table.kind.clone(),
+            rows: table.rows(),
+            is_cut: table.is_cut,
+            columns: Vec::new(),
+            rate: None,
+            stated_rate_hz: table.rate_hz,
+            duration_s: times.as_ref().map(|times| times.duration_s()),
+            missing: 0,
+            gaps: 0,
+            steady: SteadyPart::find(&facts, &sensors),
+            proposals: Vec::new(),
+            notes: table.notes.clone(),
+        };
+        if let Some(back) = times.as_ref().map(|times| times.backwards).filter(|back| *back > 0) {
+            inspected.notes.push(format!("{back} rows whose time goes back"));
+        }
+        let times_s = times.as_ref().map(|times| times.seconds.as_slice());
+        // An index counts where it goes with the times that are left.
+        let indices = indices.filter(|indices| times_s.is_none_or(|times| times.len() == indices.len()));
+        let rows = times_s.map_or(inspected.rows, <[f64]>::len);
+        // Without times the length of a period does not matter here.
+        let stated_hz = table.rate_hz.or(Some(1.0).filter(|_| times_s.is_none()));
+        if let Ok(slots) = SampleSlots::new(rows, times_s, indices.as_deref(), stated_hz) {
+            inspected.rate = slots.stamps.as_ref().and_then(|stamps| stamps.rate);
+            inspected.missing = slots.never_arrived;
+            inspected.gaps = slots.slots.windows(2).filter(|pair| pair[1] - pair[0] > 1).count();
+            inspected.notes.extend(slots.stamps.iter().flat_map(StampQuality::notes));
+        }
+        let has_rate = inspected.rate.is_some() || table.rate_hz.is_some();
+        inspected.proposals = sensors.iter().map(|sensor| sensor.proposal(&table, &facts, has_rate)).collect();
+        let guess = |at: usize| sensors.iter().find_map(|sensor| sensor.guess(at));
+        inspected.columns = facts.iter().enumerate().map(|(at, facts)| facts.inspected(guess(at))).collect();
+        inspected
+    }
+
+    /// Whether a column has times.
+    #[must_use]
+    pub fn has_times(&self) -> bool {
+        self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == "time"))
+    }
+
+    /// Whether times or running numbers tell which samples are missing.
+    #[must_use]
+    pub fn has_places(&self) -> bool {
+        let is_place = |guess: &ColumnGuess| matches!(guess.channel, "time" | "sample");
+        self.columns.iter().any(|column| column.guess.as_ref().is_some_and(is_place))
+    }
+}
+
+/// Whether a unit is one of times.
+fn is_time(unit: &Unit) -> bool {
+    unit.base == SECOND
+}

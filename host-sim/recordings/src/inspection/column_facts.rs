@@ -1,0 +1,113 @@
+//! What the numbers of a column show.
+
+use crate::columns::column_selection::AvailableColumn;
+use crate::inspection::{ColumnGuess, InspectedColumn, is_time, unit_guess};
+use crate::tables::quantizer::{Quantizer, difference_noise};
+use crate::tables::whole_table::WholeColumn;
+
+/// First values of a column that are shown.
+const SHOWN: usize = 3;
+/// Part of the rows that may be before the row above in a column of times.
+const MOST_BACKWARDS: f64 = 0.01;
+/// How many times as fast a clock may be in one half of a recording as in the other: gaps are in one of them.
+const MOST_UNEVEN: f64 = 8.0;
+
+/// A column and what its numbers show.
+pub(crate) struct ColumnFacts<'a> {
+    pub(crate) column: &'a AvailableColumn,
+    pub(crate) values: &'a [f64],
+    /// Of the finite values.
+    pub(crate) mean: f64,
+    /// Standard deviation of the noise, by the differences of neighbours.
+    pub(crate) noise: f64,
+    pub(crate) step: Option<f64>,
+}
+
+/// Times of rows that do not go back.
+pub(crate) struct RowTimes {
+    /// From the first.
+    pub(crate) seconds: Vec<f64>,
+    /// Rows that are left out because their time is before that of a row above.
+    pub(crate) backwards: usize,
+}
+
+impl RowTimes {
+    pub(crate) fn duration_s(&self) -> f64 {
+        self.seconds.last().copied().unwrap_or(0.0)
+    }
+}
+
+impl<'a> ColumnFacts<'a> {
+    pub(crate) fn new(of: &'a WholeColumn) -> Self {
+        let WholeColumn { column, values } = of;
+        let finite = || values.iter().copied().filter(|value| value.is_finite());
+        let quantizer = Quantizer::new(values);
+        Self {
+            column,
+            values,
+            mean: finite().sum::<f64>() / finite().count() as f64,
+            noise: difference_noise(values),
+            step: quantizer.cost.is_none().then_some(quantizer.lsb),
+        }
+    }
+
+    pub(crate) fn inspected(&self, guess: Option<ColumnGuess>) -> InspectedColumn {
+        InspectedColumn {
+            name: self.column.name.clone(),
+            unit: self.column.unit.map(|unit| unit.name),
+            first: self.values.iter().copied().take(SHOWN).collect(),
+            mean: self.mean,
+            noise: self.noise,
+            step: self.step,
+            guess,
+        }
+    }
+
+    /// Whether all values are whole numbers, and not all the same.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.noise > 0.0 && self.values.iter().all(|value| value.is_nan() || value.fract() == 0.0)
+    }
+
+    /// Whether the values are a running number: each is larger than the one before by one.
+    pub(crate) fn is_counter(&self) -> bool {
+        let is_next = |pair: &[f64]| pair[1] - pair[0] == 1.0;
+        self.values.len() > 2 && self.values.windows(2).all(is_next)
+    }
+
+    /// Whether the values may be times: they grow evenly, and hardly one is smaller than the one before.
+    pub(crate) fn is_clock(&self) -> bool {
+        let rows = self.values.len();
+        let back = self.values.windows(2).filter(|pair| !(pair[1] >= pair[0])).count();
+        if rows < 8 || back as f64 > MOST_BACKWARDS * rows as f64 {
+            return false;
+        }
+        let [first, middle, last] = [0, rows / 2, rows - 1].map(|at| self.values[at]);
+        let (one, other) = (middle - first, last - middle);
+        one > 0.0 && other > 0.0 && one.max(other) < MOST_UNEVEN * one.min(other)
+    }
+
+    /// The times of the rows that have one; `None` where their unit cannot be told or there are fewer than two.
+    pub(crate) fn times_s(&self) -> Option<RowTimes> {
+        let own = self.column.unit.filter(is_time).map(|unit| unit.factor);
+        let factor = own.or_else(|| unit_guess::time_unit(self.values).map(|(unit, _)| unit.factor))?;
+        let origin = self.values.iter().copied().find(|value| value.is_finite())?;
+        let mut times = RowTimes { seconds: Vec::with_capacity(self.values.len()), backwards: 0 };
+        for value in self.values.iter().filter(|value| value.is_finite()) {
+            let time = (value - origin) * factor;
+            if times.seconds.last().is_some_and(|last| time < *last) {
+                times.backwards += 1;
+            } else {
+                times.seconds.push(time);
+            }
+        }
+        (times.seconds.len() > 1).then_some(times)
+    }
+
+    /// The running numbers of the rows; `None` where one is none, or does not follow the one above.
+    pub(crate) fn indices(&self) -> Option<Vec<u64>> {
+        let is_index = |value: &f64| value.fract() == 0.0 && (0.0..9e15).contains(value);
+        let is_increasing = self.values.windows(2).all(|pair| pair[0] < pair[1]);
+        let all = is_increasing && self.values.iter().all(is_index);
+        all.then(|| self.values.iter().map(|value| *value as u64).collect())
+    }
+}

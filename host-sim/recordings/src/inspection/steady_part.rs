@@ -1,0 +1,93 @@
+//! Where a sensor was steady: the longest run of blocks of rows whose noise is that of the quietest ones.
+
+use crate::inspection::column_facts::ColumnFacts;
+use crate::inspection::sensor_guess::SensorGuess;
+use crate::tables::quantizer::MEDIAN_OF_NORMAL;
+use std::ops::Range;
+
+/// Rows of a block.
+const BLOCK: usize = 128;
+/// How many times the standard deviation of the quietest eighth of the blocks a steady block has at most. That of 128 samples scatters by 10 %.
+const MOST_NOISE: f64 = 3.0;
+/// How far deviation and mean of a block may differ from those of a sensor at rest, deg/s and g: noise and vibration of a table are below,
+/// a hand is above.
+const REST_DEG_S: f64 = 2.0;
+const REST_G: f64 = 0.05;
+
+/// The longest part of a recording in which the sensor was steady.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SteadyPart {
+    /// Rows from 0, the end excluded.
+    pub rows: Range<usize>,
+    /// Whether the units tell that the sensor was at rest; without units its values are steady, and nothing else is known.
+    pub is_rest: bool,
+}
+
+impl SteadyPart {
+    /// `None` where no column is one of an inertial sensor.
+    pub(crate) fn find(columns: &[ColumnFacts], sensors: &[SensorGuess]) -> Option<Self> {
+        let inertial: Vec<(usize, Option<f64>)> = sensors.iter().flat_map(SensorGuess::inertial).collect();
+        let rows = columns[inertial.first()?.0].values.len();
+        let blocks = rows.div_ceil(BLOCK);
+        let mut is_steady = vec![true; blocks];
+        for &(at, factor) in &inertial {
+            let ColumnFacts { values, step, .. } = &columns[at];
+            let limit = factor.map(|factor| {
+                let limit = if sensors.iter().any(|sensor| sensor.is_force(at)) { REST_G } else { REST_DEG_S };
+                limit / factor
+            });
+            let moments: Vec<(f64, f64)> = values.chunks(BLOCK).map(moments).collect();
+            let sorted = |part: fn(&(f64, f64)) -> f64| {
+                let mut all: Vec<f64> = moments.iter().map(part).filter(|value| value.is_finite()).collect();
+                all.sort_by(f64::total_cmp);
+                all
+            };
+            let (means, deviations) = (sorted(|of| of.0), sorted(|of| of.1));
+            let usual = means.get(means.len() / 2).copied().unwrap_or(0.0);
+            let quiet = deviations.get(deviations.len() / 8).copied().unwrap_or(0.0).max(step.unwrap_or(0.0));
+            for (steady, (mean, deviation)) in is_steady.iter_mut().zip(&moments) {
+                let is_quiet = *deviation <= MOST_NOISE * quiet;
+                let is_rest = limit.is_none_or(|limit| (mean - usual).abs() < limit && *deviation < limit);
+                // A block without a value says nothing.
+                *steady &= mean.is_nan() || is_quiet && is_rest;
+            }
+        }
+        // A movement may begin or end in the blocks beside those that it moves.
+        let mut longest = longest_run(&is_steady);
+        if longest.start > 0 && longest.len() > 2 {
+            longest.start += 1;
+        }
+        if longest.end < blocks && longest.len() > 2 {
+            longest.end -= 1;
+        }
+        let rows = longest.start * BLOCK..(longest.end * BLOCK).min(rows);
+        Some(Self { rows, is_rest: inertial.iter().all(|(_, factor)| factor.is_some()) })
+    }
+}
+
+/// The longest run of true.
+fn longest_run(flags: &[bool]) -> Range<usize> {
+    let mut longest = 0..0;
+    let mut first = 0;
+    for at in 0..=flags.len() {
+        if at == flags.len() || !flags[at] {
+            if at - first > longest.len() {
+                longest = first..at;
+            }
+            first = at + 1;
+        }
+    }
+    longest
+}
+
+/// Median and standard deviation of the finite values by the median of their distances from it, which single outliers do not move.
+fn moments(values: &[f64]) -> (f64, f64) {
+    let median = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    let mut finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let middle = median(&mut finite);
+    let mut distances: Vec<f64> = finite.iter().map(|value| (value - middle).abs()).collect();
+    (middle, median(&mut distances) / MEDIAN_OF_NORMAL)
+}

@@ -1,0 +1,376 @@
+//! `inspect`: what is in a file, without an analysis; and the command that would analyse a file which does not say all that is needed.
+
+use crate::analyze;
+use crate::cli::{InputArguments, InspectArguments, RecordingArguments};
+use crate::output::{self, note};
+use crate::output_files::is_standard_stream;
+use anyhow::{Result, anyhow};
+use measurement::Measurement;
+use recordings::file_format::{FileFormat, InputFile, TopicDescription};
+use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
+use recordings::sample_stream::StreamError;
+use recordings::time_base::TimeBaseError;
+use recordings::{ColumnSelection, InputError, Printable, Reason};
+use std::fmt::{self, Display, Write as _};
+use std::io::Write;
+use std::path::Path;
+
+/// Columns of a table, and topics that are not read, that are shown at most.
+const MOST_COLUMNS: usize = 64;
+const MOST_TOPICS: usize = 32;
+/// Columns of a table beyond which those that never change are not shown one by one.
+const WIDE: usize = 16;
+
+/// Prints what is in the files of the arguments.
+pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
+    let InspectArguments { files, topic } = arguments;
+    for (number, file) in files.iter().enumerate() {
+        let input = InputFile::open(file)?;
+        let text = match input.format() {
+            FileFormat::FrameLog | FileFormat::SpiExport => describe_bus_log(file)?,
+            _ => {
+                let input_arguments = InputArguments { topic: topic.clone(), ..InputArguments::new(file) };
+                Contents::read(&input, RecordingArguments { input: input_arguments, rate: None })?.to_string()
+            }
+        };
+        output::print(|out| {
+            if number > 0 {
+                writeln!(out)?;
+            }
+            writeln!(out, "{}: {}", Printable(&file.display().to_string()), input.format().name())?;
+            out.write_all(text.as_bytes())
+        })?;
+    }
+    Ok(())
+}
+
+/// A log of the bus has no columns to choose: it is read as `analyze` reads it.
+fn describe_bus_log(file: &Path) -> Result<String> {
+    let input = InputArguments::new(file);
+    let measurement = analyze::read_measurement(&RecordingArguments { input, rate: None })?;
+    let Measurement { sample_rate_hz, channels, .. } = &measurement;
+    let names: Vec<&str> = channels.iter().map(|channel| channel.profile.name).collect();
+    let (samples, periods) = (measurement.len() as u64, measurement.periods());
+    Ok(format!(
+        "{samples} samples at {sample_rate_hz:.4} Hz in {:.1} s; {} missing in {} gaps\n{}\n",
+        periods as f64 / sample_rate_hz,
+        periods - samples,
+        measurement.gaps(),
+        names.join(", ")
+    ))
+}
+
+/// The arguments for each sensor that the file of `recording` has, with what the file does not say guessed where `--yes` takes it.
+///
+/// # Errors
+/// The file is damaged, or has one sensor, or something is missing that is not guessed.
+pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<RecordingArguments>> {
+    let opened = InputFile::open(&recording.input.file)?;
+    let contents = Contents::read(&opened, recording.clone())?;
+    let is_offered = |proposal: &&Proposal| {
+        contents.several.is_empty() || proposal.topic.as_ref().is_some_and(|topic| contents.several.contains(topic))
+    };
+    let proposals: Vec<&Proposal> = contents.proposals().filter(is_offered).collect();
+    let taken = |proposal: &&Proposal| recording.input.yes && proposal.is_safe() || proposal.is_complete();
+    if proposals.is_empty() || !proposals.iter().all(taken) {
+        let error = anyhow!(
+            "{}: what each sensor is, the file does not say",
+            Printable(&recording.input.file.display().to_string())
+        );
+        return Err(Question { error, text: contents.to_string() }.into());
+    }
+    Ok(proposals.into_iter().map(|proposal| contents.arguments(proposal)).collect())
+}
+
+/// What is in a file.
+struct Contents {
+    /// What the user says.
+    given: RecordingArguments,
+    tables: Vec<InspectedTable>,
+    /// Topics that were not read.
+    others: Vec<TopicDescription>,
+    /// Sensors of one kind.
+    several: Vec<String>,
+}
+
+impl Contents {
+    fn read(input: &InputFile, given: RecordingArguments) -> Result<Self> {
+        let InputArguments { columns, units, topic, .. } = &given.input;
+        let mut tables = input.inspect(topic.as_deref(), &ColumnSelection::parse(columns, units)?)?;
+        for proposal in tables.iter_mut().flat_map(|table| &mut table.proposals) {
+            // What the user says stands.
+            proposal.lacks_rate &= given.rate.is_none();
+            proposal.topic = topic.clone().or(proposal.topic.take());
+            proposal.units.splice(0..0, units.iter().cloned());
+            if !columns.is_empty() {
+                proposal.columns.clone_from(columns);
+            }
+        }
+        let is_read = |name: &str| tables.iter().any(|table| table.topic == name);
+        // Arrays are shown with all others.
+        let others = if is_read("") { Vec::new() } else { input.contents()? };
+        let others = others.into_iter().filter(|of| !is_read(&of.name)).collect();
+        let several = if topic.is_some() { Vec::new() } else { input.sensors()? };
+        Ok(Self { given, tables, others, several })
+    }
+
+    fn proposals(&self) -> impl Iterator<Item = &Proposal> {
+        self.tables.iter().flat_map(|table| &table.proposals)
+    }
+
+    /// The arguments with what is proposed.
+    fn arguments(&self, proposal: &Proposal) -> RecordingArguments {
+        let mut arguments = self.given.clone();
+        arguments.input.topic.clone_from(&proposal.topic);
+        arguments.input.columns.clone_from(&proposal.columns);
+        arguments.input.units.clone_from(&proposal.units);
+        arguments
+    }
+
+    fn command(&self, proposal: &Proposal) -> String {
+        let Proposal { topic, columns, units, lacks_rate, .. } = proposal;
+        let InputArguments { file, sensor, from, to, .. } = &self.given.input;
+        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
+        let number = |number: &Option<f64>| number.map(|number| number.to_string());
+        let rate = number(&self.given.rate).or_else(|| lacks_rate.then(|| "HZ".to_owned()));
+        // An only sensor that the format knows is found without its name.
+        let is_only = self.proposals().count() == 1 && self.several.is_empty() && proposal.is_found;
+        let topic = topic.clone().filter(|_| !is_only || self.given.input.topic.is_some());
+        let options = [
+            ("--topic", topic),
+            ("--columns", list(columns)),
+            ("--units", list(units)),
+            ("--rate", rate),
+            ("--sensor", sensor.clone()),
+            ("--from", number(from)),
+            ("--to", number(to)),
+        ];
+        let options = options.into_iter().filter_map(|(name, value)| Some(format!(" {name} {}", quoted(&value?))));
+        format!("host-sim analyze {}{}", quoted(&file.display().to_string()), options.collect::<String>())
+    }
+}
+
+impl Display for Contents {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (number, table) in self.tables.iter().enumerate() {
+            if number > 0 {
+                writeln!(f)?;
+            }
+            write_table(table, f)?;
+        }
+        if !self.others.is_empty() {
+            writeln!(f, "\nother topics:")?;
+        }
+        for TopicDescription { name, kind, rows, columns, .. } in self.others.iter().take(MOST_TOPICS) {
+            let rows = rows.map_or_else(String::new, |rows| format!(", {rows} rows"));
+            let lacking = if columns.is_empty() { ", without a definition or numbers" } else { "" };
+            writeln!(f, "  {} {}{rows}{lacking}", Printable(name), Printable(kind))?;
+        }
+        if self.others.len() > MOST_TOPICS {
+            writeln!(f, "  … and {} more", self.others.len() - MOST_TOPICS)?;
+        }
+        if self.tables.is_empty() {
+            let how = "where the packages of these types are installed, `ros2 bag convert` to MCAP writes their definitions along";
+            return writeln!(f, "\nno topic can be read without its definition; {how}");
+        }
+        if self.proposals().next().is_none() {
+            writeln!(f, "\nno column is known to be one of an inertial sensor; say which, as in")?;
+            let example = Proposal {
+                columns: vec!["gyro_x=COLUMN".to_owned()],
+                units: vec!["rad/s".to_owned()],
+                ..Proposal::default()
+            };
+            return writeln!(f, "  {}", self.command(&example));
+        }
+        writeln!(f, "\nto analyse it:")?;
+        for proposal in self.proposals() {
+            writeln!(f, "  {}", self.command(proposal))?;
+            for doubt in &proposal.doubts {
+                writeln!(f, "    in doubt: {doubt}")?;
+            }
+        }
+        if self.proposals().count() > 1 {
+            let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --yes" };
+            let file = quoted(&self.given.input.file.display().to_string());
+            writeln!(f, "all of them, as several recordings:\n  host-sim analyze {file} --each-sensor{rest}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes rows, rate and gaps of a table, and a line for each column.
+fn write_table(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let InspectedTable { topic, kind, rows, is_cut, columns, rate, stated_rate_hz, duration_s, missing, gaps, .. } =
+        table;
+    let title: Vec<&str> = [topic.as_str(), kind].into_iter().filter(|text| !text.is_empty()).collect();
+    if !title.is_empty() {
+        writeln!(f, "{}", Printable(&title.join(" ")))?;
+    }
+    write!(f, "{}{rows} rows", if *is_cut { "the first " } else { "" })?;
+    if let Some(rate) = rate {
+        write!(f, " at {:.4} Hz ({:.4} to {:.4})", rate.hz, rate.low_hz, rate.high_hz)?;
+    }
+    if let Some(hz) = stated_rate_hz {
+        write!(f, ", {hz} Hz by the file")?;
+    }
+    match duration_s {
+        Some(duration) => write!(f, " in {duration:.2} s")?,
+        None if table.has_times() => write!(f, "; times of an unknown unit")?,
+        None => write!(f, "; no time stamps")?,
+    }
+    match missing {
+        _ if !table.has_places() => writeln!(f),
+        0 => writeln!(f, "; no sample missing"),
+        missing => writeln!(f, "; {missing} samples missing in {gaps} gaps"),
+    }?;
+    write_steady(table, f)?;
+    let mut lines = vec![["column", "unit", "first values", "mean", "noise", "step", "taken for"].map(str::to_owned)];
+    let mut reason = "";
+    // Of a wide table, such as of messages with covariances, columns that never change are named alone.
+    let is_constant = |column: &&InspectedColumn| {
+        columns.len() > WIDE && column.noise == 0.0 && column.guess.is_none() && !column.mean.is_nan()
+    };
+    let constant: Vec<&str> = columns.iter().filter(is_constant).map(|column| column.name.as_str()).collect();
+    let shown = || columns.iter().filter(|column| !is_constant(column));
+    for column in shown().take(MOST_COLUMNS) {
+        // Columns beside each other often have one reason.
+        let own = column.guess.as_ref().map_or("", |guess| guess.reason.as_str());
+        lines.push(line(column, if own == reason { "" } else { own }));
+        reason = own;
+    }
+    let width = |at: usize| lines.iter().map(|line| line[at].chars().count()).max().unwrap_or(0);
+    let widths: [usize; 7] = std::array::from_fn(width);
+    for line in &lines {
+        let mut text = String::from(" ");
+        for (field, width) in line.iter().zip(widths) {
+            write!(text, " {field:width$} ")?;
+        }
+        writeln!(f, "{}", text.trim_end())?;
+    }
+    if shown().count() > MOST_COLUMNS {
+        writeln!(f, "  … and {} columns more", shown().count() - MOST_COLUMNS)?;
+    }
+    if let [first, .., last] = constant.as_slice() {
+        writeln!(f, "  {} columns never change, {} to {}", constant.len(), Printable(first), Printable(last))?;
+    }
+    table.notes.iter().try_for_each(|note| writeln!(f, "note: {}", Printable(note)))
+}
+
+fn write_steady(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let Some(steady) = &table.steady else { return Ok(()) };
+    let what = if steady.is_rest { "at rest" } else { "steady (without units, that is all that is known)" };
+    let rate_hz = table.rate.map(|rate| rate.hz).or(table.stated_rate_hz);
+    match (steady.rows.len(), rate_hz) {
+        (0, _) => writeln!(f, "never {what}"),
+        (length, _) if length == table.rows => writeln!(f, "{what} all the time"),
+        (_, Some(rate)) => {
+            let [from, to] = [steady.rows.start, steady.rows.end].map(|row| row as f64 / rate);
+            writeln!(f, "longest part {what}: --from {from:.1} --to {to:.1}, in s")
+        }
+        (_, None) => writeln!(f, "longest part {what}: rows {} to {}", steady.rows.start + 1, steady.rows.end),
+    }
+}
+
+fn line(column: &InspectedColumn, reason: &str) -> [String; 7] {
+    let InspectedColumn { name, unit, first, mean, noise, step, guess } = column;
+    let first: Vec<String> = first.iter().map(|value| short(*value)).collect();
+    let guess = guess.as_ref().map_or_else(String::new, |ColumnGuess { channel, unit, .. }| {
+        let unit = unit.map_or_else(String::new, |unit| format!(" in {unit}"));
+        let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
+        format!("{channel}{unit}{reason}")
+    });
+    let is_number = !mean.is_nan();
+    [
+        Printable(name).to_string(),
+        unit.unwrap_or("").to_owned(),
+        if is_number { first.join(" ") } else { "no numbers".to_owned() },
+        if is_number { short(*mean) } else { String::new() },
+        if is_number { short(*noise) } else { String::new() },
+        step.map_or_else(String::new, short),
+        guess,
+    ]
+}
+
+/// A number in six digits.
+fn short(value: f64) -> String {
+    let magnitude = value.abs();
+    if value.fract() == 0.0 && magnitude < 1e20 {
+        format!("{value:.0}")
+    } else if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
+        let decimals = (5.0 - magnitude.max(1e-3).log10().floor()).clamp(0.0, 8.0) as usize;
+        let text = format!("{value:.decimals$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.5e}")
+    }
+}
+
+/// A text as one word of a shell, without what a terminal obeys.
+fn quoted(text: &str) -> String {
+    let text = Printable(text).to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./,=:+@%".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+/// An error that what is in the file may answer, with the columns and the command.
+#[derive(Debug)]
+pub(crate) struct Question {
+    error: anyhow::Error,
+    /// The table and the command, in lines.
+    pub(crate) text: String,
+}
+
+impl Display for Question {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:#}", self.error)
+    }
+}
+
+impl std::error::Error for Question {}
+
+/// What `read` makes of a recording. Where the file does not say all that is needed, the error shows its columns and the command with the
+/// best guess; with `--yes` the guess is taken, and told, if it is safe.
+pub(crate) fn read_or_ask<R>(
+    recording: &RecordingArguments,
+    read: impl Fn(&RecordingArguments) -> Result<R>,
+) -> Result<R> {
+    let error = match read(recording) {
+        Ok(read) => return Ok(read),
+        Err(error) => error,
+    };
+    let InputArguments { file, yes, .. } = &recording.input;
+    if !is_answered_by_columns(&error) || is_standard_stream(file) {
+        return Err(error);
+    }
+    let opened = InputFile::open(file).map_err(anyhow::Error::from);
+    let Ok(contents) = opened.and_then(|opened| Contents::read(&opened, recording.clone())) else { return Err(error) };
+    let proposals: Vec<&Proposal> = contents.proposals().collect();
+    let hint = match proposals.as_slice() {
+        [proposal] if *yes && proposal.is_safe() => {
+            note(format_args!("guessed: {}", contents.command(proposal)));
+            return read(&contents.arguments(proposal));
+        }
+        [proposal] if proposal.is_safe() => "--yes takes this guess\n",
+        _ if *yes => "--yes takes no guess in doubt, no rate, and none of several\n",
+        _ => "",
+    };
+    let text = format!("{contents}{hint}");
+    Err(Question { error, text }.into())
+}
+
+/// Whether a column, a unit, a topic or a rate is missing.
+fn is_answered_by_columns(error: &anyhow::Error) -> bool {
+    let by_reason = |error: &InputError| {
+        use Reason::{NoSensor, NoTimeUnit, Selection, SeveralTopics, UnequalRows};
+        matches!(error.reason, Selection(_) | NoTimeUnit(_) | NoSensor { .. } | SeveralTopics(_) | UnequalRows(_))
+    };
+    let by_time = |error: &TimeBaseError| matches!(error, TimeBaseError::NoRate);
+    error.chain().any(|cause| {
+        let of_stream = cause.downcast_ref::<StreamError>();
+        of_stream.is_some_and(|error| match error {
+            StreamError::Input(error) => by_reason(error),
+            StreamError::TimeBase(error) => by_time(error),
+        }) || cause.downcast_ref::<InputError>().is_some_and(by_reason)
+            || cause.downcast_ref::<TimeBaseError>().is_some_and(by_time)
+    })
+}
