@@ -77,7 +77,7 @@ impl<'a> ColumnFacts<'a> {
     /// Whether the values may be times: they grow evenly, and hardly one is smaller than the one before.
     pub(crate) fn is_clock(&self) -> bool {
         let rows = self.values.len();
-        let back = self.values.windows(2).filter(|pair| !(pair[1] >= pair[0])).count();
+        let back = self.values.windows(2).filter(|pair| pair[1] < pair[0] || pair[1].is_nan()).count();
         if rows < 8 || back as f64 > MOST_BACKWARDS * rows as f64 {
             return false;
         }

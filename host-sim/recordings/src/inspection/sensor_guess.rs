@@ -115,7 +115,7 @@ impl SensorGuess {
         Self { name: name.to_owned(), evidence, columns, force: None, rate: None, time: None }
     }
 
-    /// What the user says, and the time, which he seldom names.
+    /// What the user says, and the time, which is seldom named.
     fn by_user(facts: &[ColumnFacts], selection: &ColumnSelection) -> Option<Self> {
         let available: Vec<AvailableColumn> = facts.iter().map(|of| of.column.clone()).collect();
         let mut assigned = selection.assignments(&available);
