@@ -170,9 +170,9 @@ fn note_all(notes: &[String]) {
 /// Opens a recording of any format to read it in blocks.
 fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<SampleStream> {
     let name = || recording.input.file.display().to_string();
-    let RecordingArguments { input, rate } = recording;
-    let opened = match open(input, monitor)? {
-        opened if input.stretch().is_some() => match read_opened(opened, recording, monitor)? {
+    let RecordingArguments { rate, .. } = recording;
+    let opened = match open(&recording.input, monitor)? {
+        opened if recording.stretch().is_some() => match read_opened(opened, recording, monitor)? {
             Recorded::Counts(part) => return SampleStream::recorded(part, *rate, kept).with_context(name),
             Recorded::AnySensor(part) => {
                 return SampleStream::sensor_recording(*part, *rate, monitor).with_context(name);
@@ -268,7 +268,7 @@ fn read_content(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result
 }
 
 fn read_opened(opened: Opened, arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
-    let RecordingArguments { input: InputArguments { range, file, .. }, rate } = arguments;
+    let RecordingArguments { input: InputArguments { range, file, .. }, rate, .. } = arguments;
     let recorded = match opened {
         Opened::Counts(input) => {
             let recording = count_table::read_monitored(input.path(), (*range).into(), monitor);
@@ -277,7 +277,7 @@ fn read_opened(opened: Opened, arguments: &RecordingArguments, monitor: &ReadMon
         Opened::AnySensor(input, options) => Recorded::AnySensor(Box::new(input.read(&options)?)),
         Opened::Replayed(recording) => Recorded::Counts(recording),
     };
-    let Some(stretch) = arguments.input.stretch() else { return Ok(recorded) };
+    let Some(stretch) = arguments.stretch() else { return Ok(recorded) };
     let part = match recorded {
         Recorded::Counts(recording) => stretch.of_recording(recording, *rate).map(Recorded::Counts),
         Recorded::AnySensor(recording) => {
@@ -296,7 +296,7 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
 
 /// The samples of a recording of any format on their time base, and what the user should know.
 fn read_with(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<(Measurement, Vec<String>)> {
-    let RecordingArguments { input, rate } = arguments;
+    let RecordingArguments { input, rate, .. } = arguments;
     let name = || input.file.display().to_string();
     match read_content(arguments, monitor)? {
         Recorded::Counts(recording) => on_time_base(&recording, *rate).with_context(name),

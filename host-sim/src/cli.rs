@@ -283,6 +283,25 @@ pub(crate) struct RecordingArguments {
     /// Sample rate in Hz; overrides what the time stamps say.
     #[arg(long, help_heading = READING, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
+    /// Leave out what comes before this time, s from the first sample.
+    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
+    pub(crate) from: Option<f64>,
+    /// Leave out what comes at this time or later, s from the first sample.
+    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
+    pub(crate) to: Option<f64>,
+}
+
+impl RecordingArguments {
+    /// Of which nothing but the input is said.
+    pub(crate) fn new(input: InputArguments) -> Self {
+        Self { input, rate: None, from: None, to: None }
+    }
+
+    /// The part of the recording that is read; `None` for all of it.
+    pub(crate) fn stretch(&self) -> Option<Stretch> {
+        let is_part = self.from.is_some() || self.to.is_some();
+        is_part.then(|| Stretch { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
+    }
 }
 
 /// A recording.
@@ -310,12 +329,6 @@ pub(crate) struct InputArguments {
     /// Take the guess of a column or a unit that the file does not say, if nothing else is plausible.
     #[arg(long, help_heading = READING)]
     pub(crate) yes: bool,
-    /// Leave out what comes before this time, s from the first sample.
-    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
-    pub(crate) from: Option<f64>,
-    /// Leave out what comes at this time or later, s from the first sample.
-    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
-    pub(crate) to: Option<f64>,
 }
 
 impl InputArguments {
@@ -329,15 +342,7 @@ impl InputArguments {
             units: Vec::new(),
             topic: None,
             yes: false,
-            from: None,
-            to: None,
         }
-    }
-
-    /// The part of the recording that is read; `None` for all of it.
-    pub(crate) fn stretch(&self) -> Option<Stretch> {
-        let is_part = self.from.is_some() || self.to.is_some();
-        is_part.then(|| Stretch { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
     }
 }
 
@@ -378,7 +383,7 @@ impl MonitorArguments {
     pub(crate) fn recording(&self) -> RecordingArguments {
         let Self { source, rate, range, .. } = self;
         let input = InputArguments { range: *range, ..InputArguments::new(source) };
-        RecordingArguments { input, rate: *rate }
+        RecordingArguments { rate: *rate, ..RecordingArguments::new(input) }
     }
 }
 

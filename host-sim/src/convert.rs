@@ -17,7 +17,7 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
     let files = OutputFiles::beside([input.file.as_path()].into_iter().chain(sensor));
     files.check(out)?;
     let format = recording_file::format_of(out, *to);
-    let recording = RecordingArguments { input: input.clone(), rate: None };
+    let recording = RecordingArguments::new(input.clone());
     match read_or_ask(&recording, read)? {
         Recorded::Counts(recording) => recording_file::write(&recording, out, format, &files),
         Recorded::AnySensor(recording) => {

@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
             FileFormat::FrameLog | FileFormat::SpiExport => describe_bus_log(file)?,
             _ => {
                 let input_arguments = InputArguments { topic: topic.clone(), ..InputArguments::new(file) };
-                Contents::read(&input, RecordingArguments { input: input_arguments, rate: None })?.to_string()
+                Contents::read(&input, RecordingArguments::new(input_arguments))?.to_string()
             }
         };
         output::print(|out| {
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
 /// A log of the bus has no columns to choose: it is read as `analyze` reads it.
 fn describe_bus_log(file: &Path) -> Result<String> {
     let input = InputArguments::new(file);
-    let measurement = analyze::read_measurement(&RecordingArguments { input, rate: None })?;
+    let measurement = analyze::read_measurement(&RecordingArguments::new(input))?;
     let Measurement { sample_rate_hz, channels, .. } = &measurement;
     let names: Vec<&str> = channels.iter().map(|channel| channel.profile.name).collect();
     let (samples, periods) = (measurement.len() as u64, measurement.periods());
@@ -129,7 +129,7 @@ impl Contents {
 
     fn command(&self, proposal: &Proposal) -> String {
         let Proposal { topic, columns, units, lacks_rate, .. } = proposal;
-        let InputArguments { file, sensor, from, to, .. } = &self.given.input;
+        let RecordingArguments { input: InputArguments { file, sensor, .. }, from, to, .. } = &self.given;
         let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
         let number = |number: &Option<f64>| number.map(|number| number.to_string());
         let rate = number(&self.given.rate).or_else(|| lacks_rate.then(|| "HZ".to_owned()));

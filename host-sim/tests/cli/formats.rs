@@ -222,10 +222,11 @@ fn several_sensors_of_a_file_have_a_name_each() {
         assert!(shown.contains("--each-sensor"), "{file}: {shown}");
         let folder = tempdir().expect("a folder");
         let several: Value =
-            serde_json::from_slice(&json_of(&folder, &["analyze", path, "--each-sensor"])).expect("JSON");
+            serde_json::from_slice(&json_of(&folder, &["analyze", path, "--each-sensor", "--yes"])).expect("JSON");
         assert_eq!(several["agreement"]["samples"].as_array().map(Vec::len), Some(expected.len()), "{file}");
         let reports = folder.path().join("reports");
-        let output = host_sim(&["analyze", path, "--each-sensor", "--reports", reports.to_str().expect("UTF-8")]);
+        let output =
+            host_sim(&["analyze", path, "--each-sensor", "--yes", "--reports", reports.to_str().expect("UTF-8")]);
         assert!(output.status.success(), "{file}: {}", String::from_utf8_lossy(&output.stderr));
         assert_eq!(std::fs::read_dir(&reports).expect("a folder").count(), expected.len(), "{file}");
     }

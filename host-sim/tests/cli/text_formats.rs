@@ -208,9 +208,9 @@ fn tables_of_any_country_and_program_are_read_without_options() {
         ),
         (
             "a serial monitor",
-            "time,gx [rad/s]\n",
+            "12:00:00.000 -> gx [rad/s],gy [rad/s]\n",
             Box::new(|row, value| {
-                format!("12:{:02}:{:02}.{:03} -> {value:.6}\n", row / 6000, row / 100 % 60, row % 100 * 10)
+                format!("12:{:02}:{:02}.{:03} -> {value:.6},0\n", row / 6000, row / 100 % 60, row % 100 * 10)
             }),
         ),
         (
