@@ -66,7 +66,13 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     let (hour, minute) = (two_digits(parts.next()?, 24)?, two_digits(parts.next()?, 60)?);
     let (second, fraction) = match parts.next() {
         Some(text) => {
-            let (second, fraction) = text.split_once(['.', ',']).unwrap_or((text, parts.next().unwrap_or("0")));
+            let (second, fraction) = match (text.split_once(['.', ',']), parts.next()) {
+                (Some(split), None) => split,
+                (None, None) => (text, "0"),
+                // Two digits would be frames.
+                (None, Some(milliseconds)) if milliseconds.len() == 3 => (text, milliseconds),
+                _ => return None,
+            };
             let is_fraction = (1..=18).contains(&fraction.len()) && fraction.bytes().all(|b| b.is_ascii_digit());
             let digits = fraction.get(..9).unwrap_or(fraction);
             let scale = 10i64.pow(9 - digits.len() as u32);
@@ -173,6 +179,9 @@ mod tests {
             assert_eq!(date_time(text), Some(NS + fraction), "{text}");
         }
         assert_eq!(time_of_day("10:00:13 PM"), Some((22 * 3600 + 13) * 1_000_000_000));
+        for text in ["10:00:13.250", "10:00:13,25", "10:00:13:250"] {
+            assert_eq!(time_of_day(text), Some(36_013_250_000_000), "{text}");
+        }
         assert_eq!(time_of_day("12:30 am"), Some(30 * 60 * 1_000_000_000));
         assert_eq!((date("2000-02-29"), date("1970-01-01"), date("1969-12-31")), (Some(11_016), Some(0), Some(-1)));
         assert_eq!(date("1900-03-01").map(|day| day - date("1900-02-28").unwrap_or(0)), Some(1));
