@@ -172,7 +172,7 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
     let name = || recording.input.file.display().to_string();
     let RecordingArguments { rate, .. } = recording;
     let opened = match open(&recording.input, monitor)? {
-        opened if recording.stretch().is_some() => match read_opened(opened, recording, monitor)? {
+        opened if recording.time_range().is_some() => match read_opened(opened, recording, monitor)? {
             Recorded::Counts(part) => return SampleStream::recorded(part, *rate, kept).with_context(name),
             Recorded::AnySensor(part) => {
                 return SampleStream::sensor_recording(*part, *rate, monitor).with_context(name);
@@ -277,11 +277,11 @@ fn read_opened(opened: Opened, arguments: &RecordingArguments, monitor: &ReadMon
         Opened::AnySensor(input, options) => Recorded::AnySensor(Box::new(input.read(&options)?)),
         Opened::Replayed(recording) => Recorded::Counts(recording),
     };
-    let Some(stretch) = arguments.stretch() else { return Ok(recorded) };
+    let Some(range) = arguments.time_range() else { return Ok(recorded) };
     let part = match recorded {
-        Recorded::Counts(recording) => stretch.of_recording(recording, *rate).map(Recorded::Counts),
+        Recorded::Counts(recording) => range.of_recording(recording, *rate).map(Recorded::Counts),
         Recorded::AnySensor(recording) => {
-            recording.within(stretch, *rate).map(|part| Recorded::AnySensor(Box::new(part)))
+            recording.within(range, *rate).map(|part| Recorded::AnySensor(Box::new(part)))
         }
     };
     part.with_context(|| file.display().to_string())

@@ -4,7 +4,7 @@ use adis16405_driver::GyroRange;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use recordings::serial;
-use recordings::time_base::Stretch;
+use recordings::time_base::TimeRange;
 use reports::export::{AxisChoice, ExportFormat};
 use simulation::Simulation;
 use std::path::{Path, PathBuf};
@@ -298,9 +298,9 @@ impl RecordingArguments {
     }
 
     /// The part of the recording that is read; `None` for all of it.
-    pub(crate) fn stretch(&self) -> Option<Stretch> {
+    pub(crate) fn time_range(&self) -> Option<TimeRange> {
         let is_part = self.from.is_some() || self.to.is_some();
-        is_part.then(|| Stretch { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
+        is_part.then(|| TimeRange { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
     }
 }
 

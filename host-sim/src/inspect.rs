@@ -1,6 +1,5 @@
 //! `inspect`: what is in a file, without an analysis; and the command that would analyse a file which does not say all that is needed.
 
-use crate::analyze;
 use crate::cli::{InputArguments, InspectArguments, RecordingArguments};
 use crate::output::{self, note};
 use crate::output_files::is_standard_stream;
@@ -21,13 +20,16 @@ const MOST_TOPICS: usize = 32;
 /// Columns of a table beyond which those that never change are not shown one by one.
 const WIDE: usize = 16;
 
-/// Prints what is in the files of the arguments.
-pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
+/// Reads a recording as `analyze` does.
+type ReadMeasurement = fn(&RecordingArguments) -> Result<Measurement>;
+
+/// Prints what is in the files of the arguments; `read` reads a log of the bus.
+pub(crate) fn run(arguments: &InspectArguments, read: ReadMeasurement) -> Result<()> {
     let InspectArguments { files, topic } = arguments;
     for (number, file) in files.iter().enumerate() {
         let input = InputFile::open(file)?;
         let text = match input.format() {
-            FileFormat::FrameLog | FileFormat::SpiExport => describe_bus_log(file)?,
+            FileFormat::FrameLog | FileFormat::SpiExport => describe_bus_log(file, read)?,
             _ => {
                 let input_arguments = InputArguments { topic: topic.clone(), ..InputArguments::new(file) };
                 Contents::read(&input, RecordingArguments::new(input_arguments))?.to_string()
@@ -45,9 +47,9 @@ pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
 }
 
 /// A log of the bus has no columns to choose: it is read as `analyze` reads it.
-fn describe_bus_log(file: &Path) -> Result<String> {
+fn describe_bus_log(file: &Path, read: ReadMeasurement) -> Result<String> {
     let input = InputArguments::new(file);
-    let measurement = analyze::read_measurement(&RecordingArguments::new(input))?;
+    let measurement = read(&RecordingArguments::new(input))?;
     let Measurement { sample_rate_hz, channels, .. } = &measurement;
     let names: Vec<&str> = channels.iter().map(|channel| channel.profile.name).collect();
     let (samples, periods) = (measurement.len() as u64, measurement.periods());

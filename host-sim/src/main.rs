@@ -90,7 +90,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             output::write_report(&record::simulate(&simulate.simulation(3600.0))?, None, &output, &files)
         }
         Some(Command::Analyze(arguments)) => analyze::run(&arguments),
-        Some(Command::Inspect(arguments)) => inspect::run(&arguments),
+        Some(Command::Inspect(arguments)) => inspect::run(&arguments, analyze::read_measurement),
         Some(Command::Replay(arguments)) => {
             let ReplayArguments { file, output, .. } = &arguments;
             let files = OutputFiles::beside([file.as_path()]);

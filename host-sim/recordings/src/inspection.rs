@@ -3,10 +3,10 @@
 mod column_facts;
 mod sensor_guess;
 mod steady_part;
+mod time_unit;
 mod unit_guess;
 
 use crate::columns::column_selection::ColumnSelection;
-use crate::columns::unit::{SECOND, Unit};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::tables::whole_table::WholeTable;
@@ -34,6 +34,23 @@ pub struct InspectedColumn {
     pub step: Option<f64>,
     /// What it is taken for.
     pub guess: Option<ColumnGuess>,
+}
+
+/// First values of a column that are shown.
+const SHOWN: usize = 3;
+
+impl InspectedColumn {
+    fn new(facts: &ColumnFacts, guess: Option<ColumnGuess>) -> Self {
+        Self {
+            name: facts.column.name.clone(),
+            unit: facts.column.unit.map(|unit| unit.name),
+            first: facts.values.iter().copied().take(SHOWN).collect(),
+            mean: facts.mean,
+            noise: facts.noise,
+            step: facts.step,
+            guess,
+        }
+    }
 }
 
 /// The rows of a file, or of a topic in it.
@@ -108,7 +125,8 @@ impl InspectedTable {
         let has_rate = inspected.rate.is_some() || table.rate_hz.is_some();
         inspected.proposals = sensors.iter().map(|sensor| sensor.proposal(&table, &facts, has_rate)).collect();
         let guess = |at: usize| sensors.iter().find_map(|sensor| sensor.guess(at));
-        inspected.columns = facts.iter().enumerate().map(|(at, facts)| facts.inspected(guess(at))).collect();
+        inspected.columns =
+            facts.iter().enumerate().map(|(at, facts)| InspectedColumn::new(facts, guess(at))).collect();
         inspected
     }
 
@@ -124,9 +142,4 @@ impl InspectedTable {
         let is_place = |guess: &ColumnGuess| matches!(guess.channel, "time" | "sample");
         self.columns.iter().any(|column| column.guess.as_ref().is_some_and(is_place))
     }
-}
-
-/// Whether a unit is one of times.
-fn is_time(unit: &Unit) -> bool {
-    unit.base == SECOND
 }

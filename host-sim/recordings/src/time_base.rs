@@ -12,8 +12,8 @@ mod stamp_alignment;
 pub(crate) mod stamp_quality;
 mod stamp_tick;
 pub(crate) mod stream_clock;
-mod stretch;
 pub(crate) mod time_base_error;
+mod time_range;
 
 use crate::counts::recording::{RecordedSample, Recording};
 use crate::time_base::lateness_track::COARSE;
@@ -28,8 +28,8 @@ pub use crate::time_base::indexed_clock::ClockStep;
 pub use crate::time_base::lateness_track::LostStretch;
 pub use crate::time_base::stamp_alignment::RateEstimate;
 pub use crate::time_base::stamp_quality::StampQuality;
-pub use crate::time_base::stretch::Stretch;
 pub use crate::time_base::time_base_error::TimeBaseError;
+pub use crate::time_base::time_range::TimeRange;
 
 /// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
 const SEARCHED_WIDTHS: f64 = 4.0;

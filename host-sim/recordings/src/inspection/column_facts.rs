@@ -1,12 +1,11 @@
 //! What the numbers of a column show.
 
 use crate::columns::column_selection::AvailableColumn;
-use crate::inspection::{ColumnGuess, InspectedColumn, is_time, unit_guess};
+use crate::columns::unit::Unit;
+use crate::inspection::time_unit::time_unit;
 use crate::tables::quantizer::{Quantizer, difference_noise};
 use crate::tables::whole_table::WholeColumn;
 
-/// First values of a column that are shown.
-const SHOWN: usize = 3;
 /// Part of the rows that may be before the row above in a column of times.
 const MOST_BACKWARDS: f64 = 0.01;
 /// How many times as fast a clock may be in one half of a recording as in the other: gaps are in one of them.
@@ -51,18 +50,6 @@ impl<'a> ColumnFacts<'a> {
         }
     }
 
-    pub(crate) fn inspected(&self, guess: Option<ColumnGuess>) -> InspectedColumn {
-        InspectedColumn {
-            name: self.column.name.clone(),
-            unit: self.column.unit.map(|unit| unit.name),
-            first: self.values.iter().copied().take(SHOWN).collect(),
-            mean: self.mean,
-            noise: self.noise,
-            step: self.step,
-            guess,
-        }
-    }
-
     /// Whether all values are whole numbers, and not all the same.
     pub(crate) fn is_whole(&self) -> bool {
         self.noise > 0.0 && self.values.iter().all(|value| value.is_nan() || value.fract() == 0.0)
@@ -88,8 +75,8 @@ impl<'a> ColumnFacts<'a> {
 
     /// The times of the rows that have one; `None` where their unit cannot be told or there are fewer than two.
     pub(crate) fn times_s(&self) -> Option<RowTimes> {
-        let own = self.column.unit.filter(is_time).map(|unit| unit.factor);
-        let factor = own.or_else(|| unit_guess::time_unit(self.values).map(|(unit, _)| unit.factor))?;
+        let own = self.column.unit.filter(Unit::is_time).map(|unit| unit.factor);
+        let factor = own.or_else(|| time_unit(self.values).map(|(unit, _)| unit.factor))?;
         let origin = self.values.iter().copied().find(|value| value.is_finite())?;
         let mut times = RowTimes { seconds: Vec::with_capacity(self.values.len()), backwards: 0 };
         for value in self.values.iter().filter(|value| value.is_finite()) {

@@ -4,7 +4,7 @@ use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, ColumnSelection, known_by_name};
 use crate::columns::unit::{COUNT, SECOND, Unit};
 use crate::inspection::column_facts::ColumnFacts;
-use crate::inspection::is_time;
+use crate::inspection::time_unit::time_unit;
 use crate::inspection::unit_guess::{self, UnitGuess};
 use crate::tables::sensor_table::usual_unit;
 use crate::tables::whole_table::{WholeSensor, WholeTable};
@@ -257,8 +257,8 @@ impl SensorGuess {
             let values = facts[at].values;
             let origin = values.first().copied().unwrap_or(0.0);
             let since: Vec<f64> = values.iter().map(|value| value - origin).collect();
-            let is_missing = !unit.is_some_and(|unit| is_time(&unit)) && usual_unit(&since, origin).is_none();
-            unit_guess::time_unit(values).filter(|_| is_missing)
+            let is_missing = !unit.is_some_and(|unit| unit.is_time()) && usual_unit(&since, origin).is_none();
+            time_unit(values).filter(|_| is_missing)
         });
         Self { force: force_guess, rate: rate_guess, time: time_guess, ..self }
     }

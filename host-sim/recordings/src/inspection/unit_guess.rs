@@ -1,8 +1,6 @@
-//! Units that a file does not say, by the numbers: gravity, the sensitivities of common gyroscopes, and plausible sample rates.
+//! Units that a file does not say, by the numbers: gravity and the sensitivities of common gyroscopes.
 
-use crate::columns::unit::Unit;
 use crate::inspection::column_facts::ColumnFacts;
-use crate::tables::sensor_table::usual_unit;
 use std::f64::consts::PI;
 
 /// Largest relative difference of the mean specific force from gravity: the bias and the scale error of a cheap sensor.
@@ -31,9 +29,6 @@ const NO_RAD_S_ABOVE: f64 = 0.05;
 /// Noise of a rate, in the unit of the file, below which it is more likely in rad/s: 0.6 deg/s. Cheap gyroscopes, 0.003 to 0.05
 /// deg/s/sqrt(Hz) at 25 to 400 Hz, have 0.015 to 1 deg/s, and 0.00026 to 0.017 rad/s.
 const LIKELY_RAD_S_BELOW: f64 = 0.01;
-
-/// Sample rates, Hz, that a clock without a unit is taken for, the likeliest first.
-const LIKELY_HZ: [std::ops::RangeInclusive<f64>; 2] = [10.0..=10_000.0, 0.2..=40_000.0];
 
 /// A unit that is guessed.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,22 +98,4 @@ pub(crate) fn rate_unit(axes: &[&ColumnFacts], force: Option<&str>) -> UnitGuess
             is_safe: false,
         },
     }
-}
-
-/// The unit of times that do not say it, and why.
-pub(crate) fn time_unit(times: &[f64]) -> Option<(Unit, String)> {
-    let finite: Vec<f64> = times.iter().copied().filter(|time| time.is_finite()).collect();
-    let (origin, last) = (*finite.first()?, *finite.last()?);
-    let since: Vec<f64> = finite.iter().map(|time| time - origin).collect();
-    if let Some(unit) = usual_unit(&since, origin) {
-        return Some((unit, String::new()));
-    }
-    let interval = (last - origin) / (finite.len().max(2) - 1) as f64;
-    let units = ["ms", "us", "ns"].into_iter().filter_map(Unit::parse);
-    let unit_of = |rates: &std::ops::RangeInclusive<f64>| {
-        units.clone().find(|unit| rates.contains(&(interval * unit.factor).recip()))
-    };
-    let unit = LIKELY_HZ.iter().find_map(unit_of)?;
-    let hz = (interval * unit.factor).recip();
-    Some((unit, format!("a step of {interval:.4} in {} is {hz:.2} Hz", unit.name)))
 }

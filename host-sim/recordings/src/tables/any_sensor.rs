@@ -4,7 +4,7 @@ use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSele
 use crate::tables::sensor_measurement;
 use crate::tables::sensor_table::SensorTable;
 use crate::tables::sensor_table_writer;
-use crate::time_base::{EstimatedTimeBase, Stretch, TimeBaseError};
+use crate::time_base::{EstimatedTimeBase, TimeBaseError, TimeRange};
 use measurement::SensorProfile;
 use std::io;
 use std::path::Path;
@@ -50,15 +50,15 @@ impl SensorRecording {
         sensor_measurement::time_base(self.table, &self.sensor, stated_hz)
     }
 
-    /// The rows in a stretch, by their time stamps; without, by their number and the rate that is stated.
+    /// The rows in a range, by their time stamps; without, by their number and the rate that is stated.
     ///
     /// # Errors
-    /// There is neither a time nor a rate, or no row in the stretch.
-    pub fn within(self, stretch: Stretch, stated_hz: Option<f64>) -> Result<Self, TimeBaseError> {
+    /// There is neither a time nor a rate, or no row in the range.
+    pub fn within(self, range: TimeRange, stated_hz: Option<f64>) -> Result<Self, TimeBaseError> {
         let Self { mut table, sensor } = self;
         let rows = table.columns.first().map_or(0, |column| column.values.len());
         let stated_hz = stated_hz.or(table.rate_hz);
-        let kept = stretch.kept(rows, table.times_s.as_deref(), table.indices.as_deref(), stated_hz)?;
+        let kept = range.kept(rows, table.times_s.as_deref(), table.indices.as_deref(), stated_hz)?;
         table.retain(&kept);
         // How often the time went back is not known of a part.
         table.dropped.clear();

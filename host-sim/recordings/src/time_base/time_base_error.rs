@@ -43,9 +43,9 @@ pub enum TimeBaseError {
         /// Sample periods from the first to the last.
         periods: u64,
     },
-    /// A stretch without a sample.
+    /// A range without a sample.
     #[error("no sample from {from_s} to {to_s} s (--from, --to): the recording has {recording_s:.3} s")]
-    EmptyStretch {
+    EmptyTimeRange {
         /// Its beginning, s from the first sample.
         from_s: f64,
         /// Its end, s from the first sample.

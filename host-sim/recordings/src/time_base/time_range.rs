@@ -5,18 +5,18 @@ use crate::time_base::TimeBaseError;
 
 /// A part of a recording, s from its first sample: what comes at `from_s` or later and before `to_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
+pub struct TimeRange {
     /// Its beginning.
     pub from_s: f64,
     /// Its end, which may be infinite.
     pub to_s: f64,
 }
 
-impl Stretch {
-    /// The samples of `recording` in this stretch, by their time stamps; without, by their number and the stated rate.
+impl TimeRange {
+    /// The samples of `recording` in this range, by their time stamps; without, by their number and the stated rate.
     ///
     /// # Errors
-    /// There is neither a time nor a rate, or no sample in the stretch.
+    /// There is neither a time nor a rate, or no sample in the range.
     pub fn of_recording(self, mut recording: Recording, stated_hz: Option<f64>) -> Result<Recording, TimeBaseError> {
         let samples = &recording.samples;
         let times: Option<Vec<f64>> = samples.iter().map(|sample| sample.time_stamp.time_s).collect();
@@ -27,7 +27,7 @@ impl Stretch {
         Ok(recording)
     }
 
-    /// Which of some rows are in the stretch, as [`of_recording`](Self::of_recording).
+    /// Which of some rows are in the range, as [`of_recording`](Self::of_recording).
     pub(crate) fn kept(
         self,
         rows: usize,
@@ -56,6 +56,6 @@ impl Stretch {
         if kept.contains(&true) {
             return Ok(kept);
         }
-        Err(TimeBaseError::EmptyStretch { from_s, to_s, recording_s: elapsed_s.last().copied().unwrap_or(0.0) })
+        Err(TimeBaseError::EmptyTimeRange { from_s, to_s, recording_s: elapsed_s.last().copied().unwrap_or(0.0) })
     }
 }
