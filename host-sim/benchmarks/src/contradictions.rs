@@ -14,7 +14,7 @@ use virtual_sensor::SensorScenario;
 const SENTENCES: [(&str, &str); 3] = [
     ("against the model", "… at τ = …: measured … against the model"),
     ("the spectrum gives N", "…: the spectrum gives N … than the fit"),
-    ("too sure of itself", "a filter with these models would be too sure of itself in …"),
+    ("smaller error than it has", "a Kalman filter with the models of … would claim a smaller error than it has"),
 ];
 
 /// Which records to examine.

@@ -115,7 +115,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     let duration_s = description.periods as f64 * description.period_s();
     let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
     let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
-    let part = part_report::report(record.first_samples(), description.samples, &whole.part.filter);
+    let part = part_report::report(record.first_samples(), &whole.part.filter);
     // The samples are transformed once more for the figures: what is not needed then is released.
     drop((whole, first_half, epochs));
     let mut report = Report {

@@ -13,8 +13,7 @@ use crate::parallel::{self, per_channel};
 use crate::record::estimators::{RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
 use crate::report::figure_data;
-use crate::report::part_report::NOT_SOUGHT;
-use crate::report::{ChannelReport, FigureData, PartReport, Report, SCHEMA, by_cause};
+use crate::report::{ChannelReport, FigureData, PartNote, PartReport, Report, SCHEMA, by_cause};
 use crate::rivals::causes;
 use crate::rivals::table;
 use crate::samples::gapped_cascade::GappedCascade;
@@ -96,7 +95,7 @@ impl CurveEstimators {
             flagged: by_cause(&description.flagged),
             part: PartReport {
                 name: profile.name.to_owned(),
-                note: Some(NOT_SOUGHT.to_owned()),
+                notes: vec![PartNote::NotSought],
                 ..PartReport::default()
             },
             findings,

@@ -9,7 +9,7 @@ pub mod figure_data;
 pub(crate) mod part_report;
 pub mod several;
 
-pub use crate::bounds::Parameter;
+pub use crate::bounds::{BoundedEstimate, Parameter};
 pub use crate::effects::Effect;
 pub use crate::effects::findings::{ChannelEffect, Finding, Validation};
 pub use crate::fit::contradiction::Contradiction;
@@ -57,7 +57,7 @@ pub(crate) fn by_cause(counts: &BTreeMap<&'static str, u64>) -> BTreeMap<String,
 
 /// What a sensor has once for all its channels: the clock of its converter and the low-pass filter before its output.
 ///
-/// What the record does not identify is absent, and `note` says why.
+/// What the record does not identify is absent, and `notes` say why.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PartReport {
     /// Name of the sensor's profile.
@@ -71,7 +71,63 @@ pub struct PartReport {
     /// Samples of the sensor's own clock from one recorded sample to the next.
     pub decimation: Option<Parameter>,
     /// What the record does not identify, and why.
-    pub note: Option<String>,
+    #[serde(skip)]
+    pub notes: Vec<PartNote>,
+}
+
+/// Why a record does not identify the clock or the filter of a part, or not fully.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PartNote {
+    /// A quick report does not look for them.
+    NotSought,
+    /// The noise of every inertial channel is smaller than a step of its counts, whose rounding hides the filter.
+    CountsTooCoarse,
+    /// Neighbouring samples are not correlated: there is no filter, or one shorter than the sample period.
+    NotCorrelated {
+        /// The sample period, s.
+        period_s: f64,
+    },
+    /// Fewer than half of the channels are correlated as behind a filter.
+    Minority(Vec<&'static str>),
+    /// Every value of the filter is recorded, so that the clock is the sample rate; without time stamps that is stated, not measured.
+    StatedClock {
+        /// The stated sample rate, Hz.
+        sample_rate_hz: f64,
+    },
+    /// There are no time stamps to measure the clock by.
+    NoTimeStamps {
+        /// The part's nominal clock, Hz.
+        nominal_hz: f64,
+        /// The sample rate at that clock, with 95 % bounds, Hz.
+        sample_rate_hz: BoundedEstimate,
+        /// The sample rate that is stated, Hz.
+        stated_hz: f64,
+    },
+    /// The curves give the length of the filter; the taps follow from the nominal clock.
+    LengthAlone {
+        /// Length of the filter in samples of the record.
+        length: f64,
+        /// The taps whose clock is nearest to the nominal one.
+        taps: u16,
+        /// Taps that have the same length, at another clock.
+        other_taps: Vec<u16>,
+        /// The part's nominal clock, Hz.
+        nominal_hz: f64,
+    },
+    /// A channel's own decimation is farther from the common one than chance explains.
+    Contradicted {
+        /// Name of the channel.
+        channel: &'static str,
+        /// Its decimation alone.
+        decimation: f64,
+    },
+    /// Some channels whose noise is larger than a count do not show the filter.
+    NotInAll {
+        /// Channels that show it.
+        showing: usize,
+        /// Channels that could.
+        able: usize,
+    },
 }
 
 /// A stretch of the record, in seconds from its first sample.

@@ -6,7 +6,7 @@ mod simulated_part;
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use noise_analysis::analysis::analyze;
 use noise_analysis::effects::Effect;
-use noise_analysis::report::{ChannelReport, Parameter, Report, TermReport};
+use noise_analysis::report::{ChannelReport, Parameter, PartNote, Report, TermReport};
 use simulated_part::{RecordedChannel, read};
 use std::collections::BTreeMap;
 
@@ -79,7 +79,7 @@ fn all_channels_have_the_filter_and_the_clock_of_the_part() {
 fn one_channel_has_one_n() {
     let report = analyze(&recorded(8, 100.0, false, 3));
     assert_eq!(report.part.clock, None);
-    assert!(report.part.note.as_ref().is_some_and(|note| note.contains("without time stamps")), "{:?}", report.part);
+    assert!(matches!(report.part.notes[..], [PartNote::NoTimeStamps { .. }, ..]), "{:?}", report.part);
     for (channel, (name, deviation)) in noisy(&report).zip(DEVIATIONS) {
         assert_eq!(channel.name, name);
         let n = |terms: &[TermReport]| -> f64 {
@@ -112,7 +112,7 @@ fn white_noise_identifies_no_filter_and_a_constant_channel_no_coefficients() {
     let report = analyze(&recorded(1, CLOCK_HZ, true, 4));
     let part = &report.part;
     assert_eq!((part.clock.as_ref(), part.filter.as_ref(), part.taps.as_ref()), (None, None, None));
-    assert!(part.note.as_ref().is_some_and(|note| note.contains("not correlated")), "{part:?}");
+    assert!(matches!(part.notes[..], [PartNote::NotCorrelated { .. }]), "{part:?}");
     assert!(noisy(&report).all(|channel| filter_terms(channel).next().is_none()));
     let constant = report.channels.iter().find(|channel| channel.name == "gyro_z").expect("recorded");
     assert_eq!((constant.assessment.coefficients.len(), constant.assessment.record.len()), (0, 0));

@@ -34,8 +34,8 @@ pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
     for finding in named.iter().chain(&unexplained) {
         writeln!(out, "{}", item(&found(finding)))?;
     }
-    if let Some(note) = &report.part.note {
-        writeln!(out, "{}", item(&sentence(note)))?;
+    for note in summary::part_notes(report) {
+        writeln!(out, "{}", item(&note))?;
     }
     let followed = || report.channels.iter().filter_map(|channel| Some((channel, channel.nonstationarity.as_ref()?)));
     for (channel, _) in followed() {

@@ -318,9 +318,9 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::NoisyInterval(of) => (
             format!(
-                "The part was knocked from {} to {}: the noise is {} times that beside it.",
+                "The part was knocked at {} for {}: the noise is {} times that beside it.",
                 span(of.from_s.value),
-                span(of.to_s.value),
+                span(of.to_s.value - of.from_s.value),
                 significant(of.level.value, 2)
             ),
             Advice::done("These samples are left out", "; keep hands and machines off the bench while recording."),

@@ -67,7 +67,7 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
     writeln!(out)?;
-    for sentence in summary::record_sentences(report).into_iter().chain(summary::part_note(report)) {
+    for sentence in summary::record_sentences(report).into_iter().chain(summary::part_notes(report)) {
         paragraph(out, &sentence)?;
     }
     let (found, _) = summary::findings(report);

@@ -2,6 +2,7 @@
 //! evidence; the rest is as in [`Report`].
 
 use crate::evidence::{EvidenceText, NumberStyle};
+use crate::part_note;
 use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{
     ChannelEffect, ChannelReport, CommonModeRegression, CurvePoint, FigureData, Finding, MissingSamples,
@@ -21,11 +22,19 @@ pub struct ReportJson<'a> {
     samples: u64,
     dropped: &'a BTreeMap<String, u64>,
     flagged: &'a BTreeMap<String, u64>,
-    part: &'a PartReport,
+    part: PartJson<'a>,
     findings: Vec<FindingJson<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     common_mode: Option<&'a CommonModeRegression>,
     channels: Vec<ChannelJson<'a>>,
+}
+
+/// A [`PartReport`], with its notes in one text.
+#[derive(Debug, Serialize)]
+struct PartJson<'a> {
+    #[serde(flatten)]
+    part: &'a PartReport,
+    note: Option<String>,
 }
 
 /// A [`Finding`].
@@ -83,11 +92,18 @@ impl<'a> From<&'a Report> for ReportJson<'a> {
             samples: *samples,
             dropped,
             flagged,
-            part,
+            part: PartJson::from(part),
             findings: findings.iter().map(FindingJson::from).collect(),
             common_mode: common_mode.as_ref(),
             channels: channels.iter().map(ChannelJson::from).collect(),
         }
+    }
+}
+
+impl<'a> From<&'a PartReport> for PartJson<'a> {
+    fn from(part: &'a PartReport) -> Self {
+        let sentences: Vec<String> = part.notes.iter().map(part_note::sentence).collect();
+        Self { part, note: (!sentences.is_empty()).then(|| sentences.join(" ")) }
     }
 }
 

@@ -14,6 +14,7 @@ pub mod full_tables;
 pub mod json;
 pub mod live;
 pub mod page;
+mod part_note;
 pub mod raster;
 pub mod rounding;
 pub mod saved_report;

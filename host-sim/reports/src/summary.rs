@@ -3,7 +3,8 @@
 
 use crate::coefficients;
 use crate::finding_text::{FindingText, channel_list, describe, signed_percent, unexplained_place};
-use crate::formatting::{capital, count, words};
+use crate::formatting::{count, words};
+use crate::part_note;
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span, unit};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::Effect;
@@ -79,7 +80,7 @@ impl ChannelCoefficients {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
             coefficients: LETTERS.map(|(kind, _)| coefficient(channel, kind)),
-            deviance: [&channel.before, &channel.after].map(|model| unseen(model).deviance_per_point),
+            deviance: unseen_errors(channel),
         }
     }
 }
@@ -178,6 +179,11 @@ fn unseen(model: &noise_analysis::report::ModelReport) -> &ModelErrorReport {
     model.unseen_excluding.as_ref().unwrap_or(&model.unseen)
 }
 
+/// Deviance a point of the models `before` and `after` on the unseen half, as the table has them.
+pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
+    [&channel.before, &channel.after].map(|model| unseen(model).deviance_per_point)
+}
+
 /// Deviance a point before and after; nothing where no model has met unseen data yet.
 fn error_change(deviance: [Option<f64>; 2]) -> String {
     if deviance == [None, None] {
@@ -196,7 +202,7 @@ fn is_high(channel: &ChannelReport) -> bool {
 }
 
 /// Gyros and accelerometers.
-fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> {
+pub(crate) fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     report.channels.iter().filter(|channel| ["gyro_", "accl_"].iter().any(|prefix| channel.name.starts_with(prefix)))
 }
 
@@ -249,18 +255,15 @@ pub fn record_sentences(report: &Report) -> Vec<String> {
 
 /// What the record does not tell of the part's clock and filter, and why.
 #[must_use]
-pub fn part_note(report: &Report) -> Option<String> {
-    report.part.note.as_ref().map(|note| format!("{}.", capital(note.trim_end_matches('.'))))
+pub fn part_notes(report: &Report) -> Vec<String> {
+    report.part.notes.iter().map(part_note::sentence).collect()
 }
 
-/// The record in sentences, with the first clause of the note on the part.
+/// The record in sentences, with those of the part's notes that a short report has.
 #[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     let mut sentences = record_sentences(report);
-    sentences.extend(part_note(report).map(|note| match note.split_once([':', ';']) {
-        Some((clause, _)) => format!("{clause}: see --full."),
-        None => note,
-    }));
+    sentences.extend(part_note::in_short(&report.part.notes));
     sentences
 }
 
@@ -350,10 +353,10 @@ fn losses(report: &Report) -> String {
     if refused.is_empty() { format!("{lost}.") } else { format!("{lost}, refused: {}.", refused.join(", ")) }
 }
 
-/// For which coefficients the record is long enough, and how much longer it should be for the others. `None` without an
-/// inertial channel that says it.
-fn length_advice(report: &Report) -> Option<String> {
-    let (mut enough, mut others): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
+/// Which coefficients the record gives to ±20 %, how much longer it should be for the others, and which do not show. Nothing without
+/// an inertial channel that says it.
+fn length_advice(report: &Report) -> Vec<String> {
+    let (mut known, mut longer, mut nowhere, mut somewhere) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (kind, letter) in LETTERS {
         let said: Vec<(&str, Option<f64>)> = inertial(report)
             .filter_map(|channel| {
@@ -361,31 +364,61 @@ fn length_advice(report: &Report) -> Option<String> {
                 Some((channel.name.as_str(), record.more_hours))
             })
             .collect();
-        if said.is_empty() {
-            continue;
-        }
         let hidden: Vec<String> =
             said.iter().filter(|(_, hours)| hours.is_none()).map(|(name, _)| (*name).to_owned()).collect();
         let most = said.iter().filter_map(|(_, hours)| *hours).fold(0.0, f64::max);
-        if hidden.len() == said.len() {
-            others.push(format!("{letter} does not show"));
+        if said.is_empty() {
+            continue;
+        } else if hidden.len() == said.len() {
+            nowhere.push(letter.to_owned());
+            continue;
         } else if most > 0.0 {
-            let not =
-                if hidden.is_empty() { String::new() } else { format!(" (not shown in {})", channel_list(&hidden)) };
-            others.push(format!("{letter} wants {} more{not}", hours(most)));
+            longer.push((letter, hours(most)));
         } else if hidden.is_empty() {
-            enough.push(letter);
-        } else {
-            others.push(format!("{letter} is not shown in {}", channel_list(&hidden)));
+            known.push(letter.to_owned());
+        }
+        if !hidden.is_empty() {
+            somewhere.push(format!("{letter} does not show in {}", channel_list(&hidden)));
         }
     }
-    let enough = match enough.as_slice() {
-        [] => None,
-        [one] => Some(format!("long enough for {one}")),
-        [first @ .., last] => Some(format!("long enough for {} and {last}", first.join(", "))),
+    // Of the three, N is known first.
+    let too_short = known.is_empty() && longer.first().is_some_and(|(letter, _)| *letter == LETTERS[0].1);
+    let longer: Vec<String> = match longer.as_slice() {
+        [] => Vec::new(),
+        [(letter, first), rest @ ..] => {
+            let first = format!("{letter} takes {first} more");
+            std::iter::once(first).chain(rest.iter().map(|(letter, hours)| format!("{letter} {hours} more"))).collect()
+        }
     };
-    let parts: Vec<String> = enough.into_iter().chain(others).collect();
-    (!parts.is_empty()).then(|| format!("For ±20 %: {}.", parts.join("; ")))
+    let are = |letters: &[String], one: &str, several: &str| {
+        if letters.len() == 1 { one.to_owned() } else { several.to_owned() }
+    };
+    [
+        (!known.is_empty()).then(|| format!("{} {} known to ±20 %.", enumerated(&known), are(&known, "is", "are"))),
+        too_short.then(|| "Too short for ±20 % of any coefficient.".to_owned()),
+        (!longer.is_empty()).then(|| format!("For ±20 %, {}.", enumerated(&longer))),
+        (!nowhere.is_empty()).then(|| {
+            format!(
+                "{} {} not show: the record bounds {} from above.",
+                enumerated(&nowhere),
+                are(&nowhere, "does", "do"),
+                are(&nowhere, "it", "them")
+            )
+        }),
+        (!somewhere.is_empty()).then(|| format!("{}.", enumerated(&somewhere))),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn enumerated(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 /// Which models of the first half are those of its later quarter; `None` where none is.
@@ -558,7 +591,10 @@ pub fn contradictions(report: &Report) -> Vec<String> {
         .map(|channel| channel.name.clone())
         .collect();
     if !unsure.is_empty() {
-        told.push(format!("a filter with these models would be too sure of itself in {}", channel_list(&unsure)));
+        told.push(format!(
+            "a Kalman filter with the models of {} would claim a smaller error than it has",
+            channel_list(&unsure)
+        ));
     }
     told
 }

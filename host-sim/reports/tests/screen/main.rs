@@ -12,7 +12,8 @@ use noise_analysis::effects::{
     CurveEvidence, Effect, LineEvidence, LineSource, Observation, OutputFilter, SinusoidalLine, Unexplained,
     UnexplainedPlace,
 };
-use noise_analysis::report::{Finding, Parameter, Report, Stretch, Validation};
+use noise_analysis::report::assessment::RecordLength;
+use noise_analysis::report::{Finding, Parameter, PartNote, Report, Stretch, Validation};
 use phrases::{documentation, phrases};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
@@ -224,11 +225,90 @@ fn departures_at_one_place_are_told_together() {
     assert!(told.ends_with("; gyro z: +2.1 % at averaging times around 1.2 ms"), "{told}");
 }
 
+/// What a record may not tell of the part's clock and filter.
+fn every_note() -> Vec<PartNote> {
+    let sample_rate_hz = BoundedEstimate { value: 90.8, low: 90.7, high: 90.9 };
+    vec![
+        PartNote::NotSought,
+        PartNote::CountsTooCoarse,
+        PartNote::NotCorrelated { period_s: 0.01 },
+        PartNote::Minority(vec!["accl_x"]),
+        PartNote::Minority(Vec::new()),
+        PartNote::StatedClock { sample_rate_hz: 819.2 },
+        PartNote::NoTimeStamps { nominal_hz: 819.2, sample_rate_hz, stated_hz: 100.0 },
+        PartNote::LengthAlone { length: 1.774, taps: 8, other_taps: vec![4, 16], nominal_hz: 819.2 },
+        PartNote::Contradicted { channel: "gyro_z", decimation: 8.873 },
+        PartNote::NotInAll { showing: 5, able: 6 },
+    ]
+}
+
+/// Each is one or two plain sentences on the page, without the names of the JSON.
+#[test]
+fn what_the_record_does_not_tell_of_the_part_is_told_in_sentences() {
+    let mut noted = report();
+    noted.part.notes = every_note();
+    let told = reports::summary::part_notes(&noted);
+    let last = [
+        "Without time stamps the part's clock is not measured. At its nominal 819.2 Hz the sample rate would be 90.80 ± 0.10 Hz; 100 Hz \
+         was stated.",
+        "The curves give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
+         4 or 16 taps at another clock have the same length.",
+        "Gyro z alone would have its filter read every 8.873 values, farther from the common figure than chance explains: the bounds of \
+         that are wider for it.",
+        "The filter shows in 5 of the 6 channels whose noise is larger than a count.",
+    ];
+    assert_eq!(told[told.len() - 4..], last);
+    assert_eq!(
+        told[3],
+        "Accel x alone is correlated as behind a low-pass filter. Most channels are not, so that it is none of the part."
+    );
+    assert!(told.iter().all(|text| text.ends_with('.') && !text.contains('_') && !text.contains("  ")), "{told:#?}");
+}
+
+/// The cases of recorded files: enough for all, for some, for none, and coefficients that do not show.
+#[test]
+fn the_length_of_a_record_is_told_by_what_it_is_good_for() {
+    let told = |hours: [[Option<f64>; 3]; 2]| {
+        let mut report = report();
+        report.channels.retain(|channel| ["gyro_x", "gyro_y"].contains(&channel.name.as_str()));
+        for (channel, hours) in report.channels.iter_mut().zip(hours) {
+            let kinds = ["angle_random_walk", "bias_instability", "rate_random_walk"];
+            let record = |(kind, more_hours): (&str, Option<f64>)| RecordLength {
+                kind: kind.to_owned(),
+                half_s: None,
+                more_hours,
+            };
+            channel.assessment.record = kinds.into_iter().zip(hours).map(record).collect();
+        }
+        reports::summary::record_sentences(&report).join(" ")
+    };
+    let enough = Some(0.0);
+    for (hours, sentences) in [
+        ([[enough; 3]; 2], "N, B and K are known to ±20 %."),
+        (
+            [[enough, Some(0.4), Some(12.0)], [enough, enough, Some(3.0)]],
+            "N is known to ±20 %. For ±20 %, B takes 24 min more and K 12 h more.",
+        ),
+        (
+            [[enough, None, None], [enough, None, Some(2.0)]],
+            "N is known to ±20 %. For ±20 %, K takes 2.0 h more. B does not show: the record bounds it from above. K does not show in \
+             gyro x.",
+        ),
+        (
+            [[Some(0.1); 3]; 2],
+            "Too short for ±20 % of any coefficient. For ±20 %, N takes 6 min more, B 6 min more and K 6 min more.",
+        ),
+        ([[enough, None, None]; 2], "N is known to ±20 %. B and K do not show: the record bounds them from above."),
+    ] {
+        assert!(told(hours).contains(sentences), "{sentences}: {}", told(hours));
+    }
+}
+
 #[test]
 fn the_documentation_explains_every_sentence_about_the_record() {
     let page = documentation();
     let mut moved = report();
-    moved.part.note = Some("without time stamps the clock is not measured; why".to_owned());
+    moved.part.notes = every_note();
     moved.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
     moved.dropped.clear();
     let mut changed = report();
@@ -258,7 +338,7 @@ fn every_finding_of_a_full_screen_has_a_line() {
     for number in 0..9 {
         crowded.findings.push(finding(line(20.0 + f64::from(number)), &["accl_x", "accl_y"], 3.0));
     }
-    crowded.part.note = Some("a note: that goes on and on ".repeat(40));
+    crowded.part.notes = every_note();
     let screen = plain(&crowded, 80);
     assert!(screen.len() <= MOST_LINES);
     for number in 1..=11 {
