@@ -6,6 +6,7 @@ mod channel;
 mod evidence;
 mod plot;
 
+use crate::summary;
 use axis::{Axis, has_logarithm};
 use channel::{allan_deviation_plot, bias_plot, measured, spectrum_plot};
 pub(crate) use evidence::evidence;
@@ -81,7 +82,7 @@ fn standalone(plot: &Plot) -> Picture {
 /// Every figure of a report, in the order of the page.
 #[must_use]
 pub fn pictures(report: &Report) -> Vec<Picture> {
-    let overview = overview(report).into_iter();
+    let overview = story(report).into_iter().chain(overview(report));
     let channels = report.channels.iter().flat_map(|channel| channel_plots(report, channel));
     let findings = (0..report.findings.len()).filter_map(|index| evidence(report, index));
     overview.chain(channels).chain(findings).map(|plot| standalone(&plot)).collect()
@@ -99,6 +100,18 @@ pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plo
 #[must_use]
 pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
     standalone(&allan_deviation_plot(report, channel)).svg
+}
+
+/// The channel whose error on the unseen half its effects lower most, by their ratio: measured, the model before, the model after.
+/// `None` where no error is lowered.
+pub(crate) fn story(report: &Report) -> Option<Plot> {
+    let lowered = |channel: &'_ ChannelReport| {
+        let [before, after] = summary::unseen_errors(channel);
+        before.zip(after).filter(|(before, after)| before > after).map(|(before, after)| [before, after])
+    };
+    let gains = summary::inertial(report).filter_map(|channel| Some((channel, lowered(channel)?)));
+    let (channel, errors) = gains.max_by(|(_, a), (_, b)| (a[0] / a[1]).total_cmp(&(b[0] / b[1])))?;
+    Some(channel::story_plot(channel, errors))
 }
 
 /// The gyros' curves, or the accelerometers' where there is no gyro, beside the data sheet's. `None` without either.

@@ -116,16 +116,18 @@ fn contents(report: &Report) -> Markup {
     }
 }
 
-/// The record in sentences, and the coefficients.
+/// What the analysis gained, the record in sentences, and the coefficients.
 fn verdict(report: &Report) -> Markup {
     html! {
         section.verdict aria-label="Verdict" {
+            @if let Some(plot) = figure::story(report) { (drawing(&plot)) }
             @for sentence in summary::record_sentences(report) { p { (unparted(&sentence)) } }
             @let conditions = summary::conditions(report);
             @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
             (tables::coefficients_of_all(report))
-            @if let Some(note) = summary::part_note(report) {
-                details { summary { "Clock and filter of the part" } p.faint { (note) } }
+            @let notes = summary::part_notes(report);
+            @if !notes.is_empty() {
+                details { summary { "Clock and filter of the part" } p.faint { (notes.join(" ")) } }
             }
         }
     }

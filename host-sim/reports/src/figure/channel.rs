@@ -2,12 +2,13 @@
 
 use super::axis::{Axis, has_logarithm};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
-use crate::formatting::words;
-use crate::rounding::{quantity, quantity_digits, span, unit};
+use crate::formatting::{capital, words};
+use crate::rounding::{quantity, quantity_digits, significant, span, unit};
 use allan_core::NoiseTerm;
 use allan_core::model::cube_root_deviation;
 use noise_analysis::report::figure_data::noise_term;
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
+use std::f64::consts::{LN_2, PI};
 
 /// Standard deviations that the panel of the residual shows at least and at most.
 const RESIDUAL: std::ops::RangeInclusive<f64> = 4.0..=30.0;
@@ -34,6 +35,7 @@ pub(super) fn deviation_plot(channel: &ChannelReport, rate_hz: f64, stages: u8) 
     // The terms may lead out of the panel, but for the flat line of B.
     let shown = lines.iter().filter(|line| line.look != Look::Term || line.mark == "B").flat_map(heights);
     let up = Axis::logarithmic(&format!("Allan deviation σ(τ), {}", unit(&channel.unit)), shown, curve);
+    lines.extend(slopes(channel));
     let lower = residual_panel(channel, has_terms, across.clone(), residual);
     let description = describe(channel);
     Plot {
@@ -42,6 +44,56 @@ pub(super) fn deviation_plot(channel: &ChannelReport, rate_hz: f64, stages: u8) 
         description,
         panels: vec![Panel::new(across, up, lines), lower],
     }
+}
+
+/// What was measured, the baseline model and the model with its effects, both fitted to the first half, and the error of each on the
+/// second.
+pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
+    let lines = vec![
+        model_line(channel, &channel.before, "model before: N, B, K", Look::Before),
+        model_line(channel, &channel.after, "model after: with its effects", Look::Model),
+        measured(channel, Look::Measured, "measured, 95 % bounds"),
+    ];
+    let [frame] = frames([330.0]);
+    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let label = format!("Allan deviation σ(τ), {}", unit(&channel.unit));
+    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
+    Plot {
+        id: "story".to_owned(),
+        title: format!("{}: what was measured, and the model before and after", capital(&words(&channel.name))),
+        description: format!(
+            "Both models are fitted to the first half. Their error on the second half, which they have not seen: {} before, {} after the \
+             effects were added. A true model has about 1.",
+            significant(before, 2),
+            significant(after, 2)
+        ),
+        panels: vec![Panel::new(across, up, lines)],
+    }
+}
+
+/// The slopes that the slope method reads off: −½ at 1 s, flat at the minimum, +½ at 3 s, each over a factor of four to both sides.
+fn slopes(channel: &ChannelReport) -> Vec<Line> {
+    let read_off = &channel.read_off;
+    let line = |name: &str, tau: f64, deviation: &dyn Fn(f64) -> f64| {
+        let points = [0.25, 1.0, 4.0].map(|factor| (factor * tau, deviation(factor * tau))).to_vec();
+        Line {
+            mark: if tau == 1.0 {
+                "−½"
+            } else if tau == 3.0 {
+                "+½"
+            } else {
+                "0"
+            },
+            ..Line::new(name, Look::Reference, points).unlisted()
+        }
+    };
+    let n = read_off.angle_random_walk.as_ref().map(|n| line("slope −½", 1.0, &|tau| n.value / tau.sqrt()));
+    let b = read_off
+        .bias_instability
+        .as_ref()
+        .map(|b| line("slope 0", (b.from_s * b.to_s).sqrt(), &|_| b.value * (2.0 * LN_2 / PI).sqrt()));
+    let k = read_off.rate_random_walk.as_ref().map(|k| line("slope +½", 3.0, &|tau| k.value * (tau / 3.0).sqrt()));
+    [n, b, k].into_iter().flatten().filter(|line| line.points.iter().all(|&(_, of)| has_logarithm(of))).collect()
 }
 
 fn describe(channel: &ChannelReport) -> String {

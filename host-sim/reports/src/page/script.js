@@ -1,11 +1,21 @@
 "use strict";
 // Values under the pointer and by keyboard, and tables as CSV. Without this script the page shows everything but these.
 (() => {
-  const format = (value) => {
-    if (value === null) return "–";
-    const size = Math.abs(value);
-    if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(3).replace("-", "−");
-    return String(Number(value.toPrecision(4))).replace("-", "−");
+  // A value with the unit that ends the label of its axis, such as "23.14 µg"; a prefix stands for an exponent.
+  const prefixes = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+  const scale = (values, unit) => {
+    const size = Math.max(...values.map((value) => Math.abs(value ?? 0)));
+    const takes = !["", "σ", "1", "min", "h", "d"].includes(unit) && size < 0.1 && size > 0;
+    return takes ? prefixes.find(([factor]) => size >= factor) ?? prefixes.at(-1) : prefixes[0];
+  };
+  const number = (value, factor) => value === null ? "–"
+    : (value / factor).toLocaleString("en-US", { maximumSignificantDigits: 4 }).replace("-", "−");
+  const nameOf = (axis) => axis.label.slice(0, axis.label.lastIndexOf(", "));
+  const unitOf = (axis) => axis.label.slice(axis.label.lastIndexOf(", ") + 2);
+  const format = (axis, value, bounds) => {
+    const [factor, prefix] = scale([value], unitOf(axis));
+    const between = bounds ? ` (${bounds.map((bound) => number(bound, factor)).join(" … ")})` : "";
+    return `${number(value, factor)}${between} ${prefix}${unitOf(axis)}`.trimEnd();
   };
   const at = (axis, value) => {
     const part = axis.log ? Math.log(value / axis.from) / Math.log(axis.to / axis.from)
@@ -41,10 +51,10 @@
           if (nearest < 0 || Math.abs(at(of.x, value) - x) < Math.abs(at(of.x, line.x[nearest]) - x)) nearest = position;
         });
         if (nearest < 0 || Math.abs(at(of.x, line.x[nearest]) - x) > 3 || line.y[nearest] === null) continue;
-        const bounds = line.low ? ` (${format(line.low[nearest])} … ${format(line.high[nearest])})` : "";
-        texts.push(`${line.name} ${format(line.y[nearest])}${bounds}`);
+        const bounds = line.low ? [line.low[nearest], line.high[nearest]] : null;
+        texts.push(`${line.name} ${format(of.y, line.y[nearest], bounds)}`);
       }
-      output.textContent = `${of.x.label} ${format(xs[index])} · ${of.y.label}: ${texts.join(" · ")}`;
+      output.textContent = `${nameOf(of.x)} ${format(of.x, xs[index])}: ${texts.join(" · ")}`;
     };
     const hide = () => {
       cursor.setAttribute("visibility", "hidden");

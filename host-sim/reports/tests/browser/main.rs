@@ -11,7 +11,7 @@ use noise_analysis::effects::{
     TelegraphEvidence, TelegraphNoise,
 };
 use noise_analysis::report::{BiasOverTime, DataSheetReport, SpectrumReport};
-use noise_analysis::report::{Finding, Report, Validation};
+use noise_analysis::report::{ChannelReport, Finding, Report, Validation};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -146,8 +146,8 @@ fn what_is_drawn_is_what_was_measured() {
     let report = report();
     let facts = facts(program, &report, false, &[1300]);
     let figures = list(&facts[0], "figures");
-    // The overview, three figures a channel, four of the evidence.
-    assert_eq!(figures.len(), 1 + 3 * 6 + 4);
+    // The story, the overview, three figures a channel, four of the evidence.
+    assert_eq!(figures.len(), 2 + 3 * 6 + 4);
     let figure = |id: &str| figures.iter().find(|figure| figure["id"] == id).expect("the figure");
     let line = |id: &str, name: &str| {
         let figure = figure(id);
@@ -170,6 +170,18 @@ fn what_is_drawn_is_what_was_measured() {
             }
         }
     };
+    // The page begins with the channel whose error is lowered most.
+    assert_eq!(figures[0]["id"], "story");
+    let gain = |channel: &ChannelReport| {
+        let [before, after] =
+            [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point.expect("an error"));
+        before / after
+    };
+    let told = report.channels.iter().max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("a channel");
+    let taus = told.curve.iter().map(|point| point.tau_s);
+    for (name, model) in [("model before: N, B, K", &told.before), ("model after: with its effects", &told.after)] {
+        check("story", name, &taus.clone().zip(model.adev.iter().copied()).collect::<Vec<_>>());
+    }
     for channel in &report.channels {
         let name = &channel.name;
         let measured: Vec<(f64, f64)> = channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect();
@@ -246,8 +258,8 @@ fn the_page_fits_and_can_be_read_in_both_colour_schemes() {
             let cut: Vec<&str> = list(&facts, "cut").iter().filter_map(Value::as_str).collect();
             // On a telephone a figure is scrolled, since its text would be too small to read otherwise; the first screen's table
             // is not.
-            let is_allowed =
-                |of: &&&str| width.as_u64().is_some_and(|width| width <= 400) && !of.starts_with("verdict");
+            let is_figure = |of: &str| of.ends_with("drawing") || !of.starts_with("verdict");
+            let is_allowed = |of: &&&str| width.as_u64().is_some_and(|width| width <= 400) && is_figure(of);
             assert!(cut.iter().all(|of| is_allowed(&of)), "{cut:?} at {width} pixels");
             let worst = &facts["contrasts"][0];
             assert!(worst[0].as_f64().expect("a contrast") >= 4.5, "{} at {width}, dark {is_dark}", facts["contrasts"]);
@@ -266,10 +278,19 @@ fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
         assert_eq!(figure["focused"], true, "{}", of("id"));
         assert!(of("label").chars().count() > 40, "{}: {}", of("id"), of("label"));
         // The first value of the first panel, with the name of its axis.
-        let axis = figure["panels"][0]["x"]["label"].as_str().expect("a label");
+        let label = figure["panels"][0]["x"]["label"].as_str().expect("a label");
+        let (axis, unit) = label.rsplit_once(", ").expect("a unit");
         assert!(of("read").starts_with(axis) && of("read") != of("before"), "{}: {}", of("id"), of("read"));
         assert!(of("pointed").starts_with(axis) && of("pointed") != of("read"), "{}: {}", of("id"), of("pointed"));
         assert_eq!(of("after"), of("before"), "{}", of("id"));
+        for read in [of("read"), of("pointed")] {
+            let place = read.split(':').next().unwrap_or_default();
+            assert!(place.ends_with(unit), "{}: {read} without {unit}", of("id"));
+            let words = read.split([' ', '(']).map(|word| word.trim_end_matches(')'));
+            // Ten to a power as scripts write it, such as 2.3e-5 or 2.3e−5.
+            let is_exponent = |word: &str| word.starts_with(|c: char| c.is_ascii_digit()) && word.contains('e');
+            assert!(!words.into_iter().any(is_exponent), "{}: {read}", of("id"));
+        }
     }
     let csv = facts[0]["csv"].as_str().expect("the table");
     assert!(csv.starts_with("channel,angle random walk N,"), "{csv}");

@@ -290,8 +290,8 @@ fn the_page_shows_every_channel_and_coefficient() {
     }
     // A line does not end between a number and its per cent sign.
     assert!(page.contains("bias instability to ±20\u{a0}%: record"));
-    // The overview and one Allan deviation a channel: the fixture has no spectrum and no bias over time.
-    assert_eq!(page.matches("<svg").count(), 7);
+    // The story, the overview and one Allan deviation a channel: the fixture has no spectrum and no bias over time.
+    assert_eq!(page.matches("<svg").count(), 8);
 }
 
 #[test]
