@@ -90,14 +90,14 @@ impl FilteredNoisePlan {
 
 impl FilteredChannel {
     fn new(seed: u64, channel: &'static str, report: &ChannelReport, taps: usize, truth: [f64; 3]) -> Self {
-        let term = |kind: &str| report.refitted.terms.iter().find(|term| term.kind == kind);
+        let term = |kind: &str| report.refitted.terms.iter().find(|term| term.kind() == kind);
         let filter = term("filter_bandwidth");
-        let parameter = |name: &str| filter.and_then(|term| term.parameters.get(name)).map(|of| of.value);
+        let parameter = |name: &str| filter.map(|term| term.parameters()[name].value);
         // Behind a filter N is its coefficient.
         let white = filter.or(term("angle_random_walk"));
         let terms = [white, term("bias_instability"), term("rate_random_walk")];
         let coefficient = |at: usize| {
-            let &Parameter { value, low, high, .. } = terms[at]?.parameters.get("value")?;
+            let Parameter { value, low, high, .. } = terms[at]?.coefficient();
             Some(FilteredCoefficient { truth: truth[at], value, low, high })
         };
         let is_filter = |kind: &str| taps > 1 && kind == "filter_bandwidth";

@@ -16,9 +16,10 @@ pub use crate::fit::contradiction::Contradiction;
 pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
 use crate::report::assessment::Assessment;
 use crate::units::coefficient_unit;
-use allan_core::model::cube_root_deviation;
+use allan_core::model::{FittedTerm, cube_root_deviation};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// Version of the JSON schema; the field names are fixed within a version.
@@ -274,13 +275,13 @@ pub struct ModelReport {
     pub unseen_excluding: Option<ModelErrorReport>,
 }
 
-/// One term of a noise model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// One term of a noise model of a channel.
+#[derive(Debug, Clone, PartialEq)]
 pub struct TermReport {
-    /// Such as `angle_random_walk`.
-    pub kind: String,
-    /// By name; N, B, K and Q call theirs `value`.
-    pub parameters: BTreeMap<String, Parameter>,
+    /// With the 95 % bounds of its coefficient and of its shape.
+    pub term: FittedTerm,
+    /// Unit of the channel.
+    pub unit: String,
 }
 
 /// Error of a model over the octaves with `n ≤ M/8` of a part of `M` samples, and its largest deviation over all octaves;
@@ -381,8 +382,44 @@ impl SlopeMethodReport {
 impl TermReport {
     /// A term of a model of a channel in `unit`.
     #[must_use]
-    pub fn new(term: &allan_core::model::FittedTerm, unit: &str) -> Self {
-        Self { kind: term.kind.name().to_owned(), parameters: term_parameters(term, unit) }
+    pub fn new(term: &FittedTerm, unit: &str) -> Self {
+        Self { term: *term, unit: unit.to_owned() }
+    }
+
+    /// Name of the kind, such as `angle_random_walk`.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        self.term.kind.name()
+    }
+
+    /// The coefficient.
+    #[must_use]
+    pub fn coefficient(&self) -> Parameter {
+        let FittedTerm { kind, value, low, high, .. } = &self.term;
+        Parameter::new(*value, *low, *high, coefficient_unit(kind, &self.unit))
+    }
+
+    /// The parameters of its shape, and its coefficient, by name; N, B, K and Q call theirs `value`.
+    #[must_use]
+    pub fn parameters(&self) -> BTreeMap<&'static str, Parameter> {
+        let shape = |(name, value, (low, high)): (&'static str, f64, (f64, f64))| {
+            let unit = match name {
+                "frequency" | "bandwidth" => "Hz",
+                "time_constant" => "s",
+                _ => "",
+            };
+            (name, Parameter::new(value, low, high, unit))
+        };
+        self.term.shape_parameters().map(shape).chain([(self.term.kind.coefficient(), self.coefficient())]).collect()
+    }
+}
+
+impl Serialize for TermReport {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut written = serializer.serialize_struct("TermReport", 2)?;
+        written.serialize_field("kind", self.kind())?;
+        written.serialize_field("parameters", &self.parameters())?;
+        written.end()
     }
 }
 
@@ -391,21 +428,6 @@ impl TermReport {
 #[must_use]
 pub fn term_reports(model: &Model, unit: &str) -> Vec<TermReport> {
     model.terms().iter().filter(|term| term.high > 0.0).map(|term| TermReport::new(term, unit)).collect()
-}
-
-/// The parameters of a term by name, of a channel in `unit`: those of its shape, and its coefficient.
-#[must_use]
-pub fn term_parameters(term: &allan_core::model::FittedTerm, unit: &str) -> BTreeMap<String, Parameter> {
-    let coefficient = Parameter::new(term.value, term.low, term.high, coefficient_unit(&term.kind, unit));
-    let shape = |(name, value, (low, high)): (&str, f64, (f64, f64))| {
-        let unit = match name {
-            "frequency" | "bandwidth" => "Hz",
-            "time_constant" => "s",
-            _ => "",
-        };
-        (name.to_owned(), Parameter::new(value, low, high, unit))
-    };
-    term.shape_parameters().map(shape).chain([(term.kind.coefficient().to_owned(), coefficient)]).collect()
 }
 
 impl ModelErrorReport {

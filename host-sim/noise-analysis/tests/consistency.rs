@@ -35,19 +35,19 @@ fn contradict(a: &Parameter, b: &Parameter) -> bool {
     (a.value - b.value).abs() > CONTRADICTION * scatter + 1e-9 * a.value.abs()
 }
 
-fn value<'a>(model: &'a ModelReport, kind: &str) -> Option<&'a Parameter> {
-    model.terms.iter().find(|term| term.kind == kind)?.parameters.get("value")
+fn value(model: &ModelReport, kind: &str) -> Option<Parameter> {
+    model.terms.iter().find(|term| term.kind() == kind).map(TermReport::coefficient)
 }
 
 /// N of a model, behind its filter or not.
-fn angle_random_walk(model: &ModelReport) -> Option<&Parameter> {
+fn angle_random_walk(model: &ModelReport) -> Option<Parameter> {
     value(model, "filter_bandwidth").or_else(|| value(model, "angle_random_walk"))
 }
 
 /// Allan variance of a term at the averaging time `tau_s` by its formula in IEEE Std 952, for the terms of [`POWERS`].
 fn variance(term: &TermReport, tau_s: f64) -> f64 {
-    let of = |name: &str| term.parameters.get(name).map_or(0.0, |parameter| parameter.value.powi(2));
-    match term.kind.as_str() {
+    let of = |name: &str| term.parameters().get(name).map_or(0.0, |parameter| parameter.value.powi(2));
+    match term.kind() {
         "angle_random_walk" => of("value") / tau_s,
         "bias_instability" => of("value") * 2.0 * LN_2 / PI,
         "rate_random_walk" => of("value") * tau_s / 3.0,
@@ -82,12 +82,12 @@ fn white_noise(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         of.kind == "angle_random_walk" && !of.discrete && of.value.unit == fitted.unit
     };
     if let Some(of) = practice.coefficients.iter().find(same_unit)
-        && contradict(fitted, &of.value)
+        && contradict(&fitted, &of.value)
     {
         add(format!("N of the coefficients {:?}, of the model {fitted:?}", of.value));
     }
     if let (Some(of), None) = (&practice.angle_random_walk_by_spectrum, &practice.angle_random_walk_by_spectrum_note)
-        && contradict(fitted, of)
+        && contradict(&fitted, of)
     {
         add(format!("N by the spectrum {of:?}, of the model {fitted:?}"));
     }
@@ -99,7 +99,7 @@ fn curve_of_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let has_covariates =
         channel.effects.iter().any(|of| ["temperature", "supply", "acceleration"].contains(&of.effect.name()));
     for (name, model) in [("before", &channel.before), ("final", &channel.refitted)] {
-        if (name == "final" && has_covariates) || model.terms.iter().any(|term| !POWERS.contains(&term.kind.as_str())) {
+        if (name == "final" && has_covariates) || model.terms.iter().any(|term| !POWERS.contains(&term.kind())) {
             continue;
         }
         for (point, adev) in channel.curve.iter().zip(&model.adev).filter(|(point, _)| point.n >= 16) {
@@ -138,7 +138,7 @@ fn is_one_line(a: Option<f64>, b: Option<f64>) -> bool {
 }
 
 fn frequency_of(term: &TermReport) -> Option<f64> {
-    term.parameters.get("frequency").map(|frequency| frequency.value)
+    term.parameters().get("frequency").map(|frequency| frequency.value)
 }
 
 fn frequency(effect: &Effect) -> Option<f64> {
@@ -156,13 +156,13 @@ fn effects_and_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         };
         let is_same =
             |name: &str, of: Option<f64>| name == effect.name() && is_one_line(of, frequency(effect)) && is_nearest(of);
-        let terms = channel.refitted.terms.iter().filter(|term| is_same(&term.kind, frequency_of(term)));
+        let terms = channel.refitted.terms.iter().filter(|term| is_same(term.kind(), frequency_of(term)));
         let [term] = terms.collect::<Vec<_>>()[..] else { continue };
         if effects().filter(|other| is_same(other.name(), frequency(other))).count() > 1 {
             continue;
         }
         for (name, parameter) in effect.parameters() {
-            if let Some(of) = term.parameters.get(name)
+            if let Some(of) = term.parameters().get(name)
                 && contradict(&parameter, of)
             {
                 add(format!("effect {} {name} {parameter:?}, its term {of:?}", effect.name()));
@@ -201,9 +201,9 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     }
     // What the whole record no longer shows: its size may be 0.
     let may_be_nothing = |term: &TermReport| {
-        ["amplitude", "deviation"].iter().any(|of| term.parameters.get(*of).is_some_and(|of| of.low <= 0.0))
+        ["amplitude", "deviation"].iter().any(|of| term.parameters().get(*of).is_some_and(|of| of.low <= 0.0))
     };
-    let added = |term: &&TermReport| !baseline.contains(&term.kind.as_str()) && !may_be_nothing(term);
+    let added = |term: &&TermReport| !baseline.contains(&term.kind()) && !may_be_nothing(term);
     for term in channel.refitted.terms.iter().filter(added) {
         let of_term = frequency_of(term);
         let is_of = |kind: &str| effects().any(|effect| effect.name() == kind);
@@ -214,7 +214,7 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
             let tau_s = unexplained.tau_s().zip(of_term);
             tau_s.is_some_and(|(tau_s, frequency)| (tau_s.value * frequency / 0.371).ln().abs() < 3f64.ln())
         };
-        let is_told = match term.kind.as_str() {
+        let is_told = match term.kind() {
             "sinusoid" | "resonance" => effects().any(|effect| {
                 // Octaves tell a frequency to some tenths. A wave that is no sinusoid has lines at multiples of its frequency.
                 frequency(effect).zip(of_term).is_some_and(|(of, frequency)| {
@@ -234,7 +234,7 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         };
         if !is_told {
             let effects: Vec<&str> = effects().map(Effect::name).collect();
-            add(format!("the model has {} {:?}, and no effect of {effects:?} is it", term.kind, term.parameters));
+            add(format!("the model has {} {:?}, and no effect of {effects:?} is it", term.kind(), term.parameters()));
         }
     }
 }
@@ -254,8 +254,8 @@ fn lines_in_model(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         if !["sinusoid", "resonance"].contains(&effect.name()) || model.terms.len() == MAX_TERMS {
             continue;
         }
-        let is_it = |term: &TermReport| is_one_line(frequency_of(term), Some(frequency)) && term.kind != "markov";
-        let has_it = model.terms.iter().filter(|term| term.parameters.contains_key("frequency")).any(is_it);
+        let is_it = |term: &TermReport| is_one_line(frequency_of(term), Some(frequency)) && term.kind() != "markov";
+        let has_it = model.terms.iter().filter(|term| term.parameters().contains_key("frequency")).any(is_it);
         let share = |point: &CurvePoint| {
             let x = PI * frequency * point.tau_s;
             (amplitude * x.sin().powi(2) / x).powi(2)
@@ -272,10 +272,7 @@ fn lines_in_model(channel: &ChannelReport, add: &mut impl FnMut(String)) {
 fn spectrum_of_the_picture(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let Some(spectrum) = &channel.figure_data.spectrum else { return };
     let terms = &channel.refitted.terms;
-    if terms
-        .iter()
-        .any(|term| !["angle_random_walk", "bias_instability", "rate_random_walk"].contains(&term.kind.as_str()))
-    {
+    if terms.iter().any(|term| !["angle_random_walk", "bias_instability", "rate_random_walk"].contains(&term.kind())) {
         return;
     }
     let of = |kind: &str| value(&channel.refitted, kind).map_or(0.0, |of| of.value);
@@ -292,10 +289,10 @@ fn spectrum_of_the_picture(channel: &ChannelReport, add: &mut impl FnMut(String)
 
 /// The filter of a channel's model and that of the part.
 fn filter_of_the_part(report: &Report, channel: &ChannelReport, add: &mut impl FnMut(String)) {
-    let Some(term) = channel.refitted.terms.iter().find(|term| term.kind == "filter_bandwidth") else { return };
+    let Some(term) = channel.refitted.terms.iter().find(|term| term.kind() == "filter_bandwidth") else { return };
     let pairs = [("taps", &report.part.taps), ("decimation", &report.part.decimation)];
     for (name, of_part) in pairs {
-        if let (Some(of_channel), Some(of_part)) = (term.parameters.get(name), of_part)
+        if let (Some(of_channel), Some(of_part)) = (term.parameters().get(name), of_part)
             && contradict(of_channel, of_part)
         {
             add(format!("filter {name} {of_channel:?}, of the part {of_part:?}"));

@@ -21,8 +21,8 @@ fn channel<'a>(report: &'a Report, name: &str) -> &'a ChannelReport {
     report.channels.iter().find(|channel| channel.name == name).expect("a recorded channel")
 }
 
-fn coefficient<'a>(model: &'a ModelReport, kind: &str) -> &'a Parameter {
-    &model.terms.iter().find(|term| term.kind == kind).expect("a term of the baseline").parameters["value"]
+fn coefficient(model: &ModelReport, kind: &str) -> Parameter {
+    model.terms.iter().find(|term| term.kind() == kind).expect("a term of the baseline").coefficient()
 }
 
 /// Adds noise of `deviation` counts to some samples of a channel.
@@ -70,8 +70,8 @@ fn a_knock_is_named_and_does_not_change_the_coefficients() {
         assert_eq!(of.missing.replaced, refused + of.missing.refused.get("spikes").copied().unwrap_or(0));
         let without = channel(&before, &of.name);
         for kind in ["angle_random_walk", "bias_instability", "rate_random_walk"] {
-            let Some(old) = without.after.terms.iter().find(|term| term.kind == kind) else { continue };
-            let (old, new) = (&old.parameters["value"], coefficient(&of.after, kind));
+            let Some(old) = without.after.terms.iter().find(|term| term.kind() == kind) else { continue };
+            let (old, new) = (old.coefficient(), coefficient(&of.after, kind));
             assert!((old.low..=old.high).contains(&new.value), "{} {kind}: {old:?} {new:?}", of.name);
         }
         // The baseline is that of the record as it came: the knock is in it.

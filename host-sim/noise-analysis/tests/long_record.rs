@@ -102,9 +102,9 @@ fn a_condensed_recording_has_the_curves_and_the_findings_of_its_samples() {
         assert_eq!(curve(of_whole), curve(of_long), "{name}");
         assert_eq!(of_whole.missing.lost, of_long.missing.lost);
         // The models are fitted to the same curves up to 16 samples, and to those of means behind them.
-        let n = |of: &ChannelReport| of.refitted.terms.iter().find(|term| term.kind == "angle_random_walk").cloned();
+        let n = |of: &ChannelReport| of.refitted.terms.iter().find(|term| term.kind() == "angle_random_walk").cloned();
         let (Some(a), Some(b)) = (n(of_whole), n(of_long)) else { panic!("{name} has no white noise") };
-        let (a, b) = (&a.parameters["value"], &b.parameters["value"]);
+        let (a, b) = (a.coefficient(), b.coefficient());
         assert!((a.value - b.value).abs() < 0.25 * (a.high - a.low), "{name}: {a:?} {b:?}");
         if name != "temp" {
             assert!((b.low..=b.high).contains(&N), "{name}: {b:?}");

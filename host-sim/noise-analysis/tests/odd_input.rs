@@ -60,8 +60,8 @@ fn kinds(report: &Report) -> Vec<&str> {
     only(report).effects.iter().map(|shown| shown.effect.name()).collect()
 }
 
-fn coefficient<'a>(model: &'a ModelReport, kind: &str) -> &'a Parameter {
-    &model.terms.iter().find(|term| term.kind == kind).expect("a term of the baseline").parameters["value"]
+fn coefficient(model: &ModelReport, kind: &str) -> Parameter {
+    model.terms.iter().find(|term| term.kind() == kind).expect("a term of the baseline").coefficient()
 }
 
 /// Every interval of a report holds its value, and none that was estimated is without width.
@@ -69,8 +69,7 @@ fn assert_bounds_hold(report: &Report, what: &str) {
     let channel = only(report);
     let models = [&channel.before, &channel.after, &channel.refitted];
     let terms = models.into_iter().flat_map(|model| &model.terms);
-    let of_terms = terms
-        .flat_map(|term| term.parameters.iter().map(move |(name, of)| (term.kind.as_str(), name.as_str(), of.clone())));
+    let of_terms = terms.flat_map(|term| term.parameters().into_iter().map(move |(name, of)| (term.kind(), name, of)));
     let of_effects = channel.effects.iter().flat_map(|shown| {
         let parameters = shown.effect.parameters().into_iter();
         parameters.map(|(name, of)| (shown.effect.name(), name, of))

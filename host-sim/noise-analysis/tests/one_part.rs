@@ -41,12 +41,12 @@ fn recorded(taps: usize, rate_hz: f64, is_stamped: bool, seed: u64) -> Measureme
 
 /// Decimation and taps of the filter, by the model and by the effect.
 fn filter_terms(channel: &ChannelReport) -> impl Iterator<Item = [Parameter; 2]> {
-    let of_terms = channel.refitted.terms.iter().filter(|term| term.kind == "filter_bandwidth");
+    let of_terms = channel.refitted.terms.iter().filter(|term| term.kind() == "filter_bandwidth");
     let of_effects = channel.effects.iter().filter_map(|shown| match &shown.effect {
         Effect::OutputFilter(of) => Some([of.decimation.parameter(""), of.taps.parameter("")]),
         _ => None,
     });
-    of_terms.map(|term| ["decimation", "taps"].map(|name| term.parameters[name].clone())).chain(of_effects)
+    of_terms.map(|term| ["decimation", "taps"].map(|name| term.parameters()[name].clone())).chain(of_effects)
 }
 
 fn noisy(report: &Report) -> impl Iterator<Item = &ChannelReport> {
@@ -83,9 +83,8 @@ fn one_channel_has_one_n() {
     for (channel, (name, deviation)) in noisy(&report).zip(DEVIATIONS) {
         assert_eq!(channel.name, name);
         let n = |terms: &[TermReport]| -> f64 {
-            let white =
-                terms.iter().filter(|term| ["filter_bandwidth", "angle_random_walk"].contains(&term.kind.as_str()));
-            white.map(|term| term.parameters["value"].value.powi(2)).sum::<f64>().sqrt()
+            let white = terms.iter().filter(|term| ["filter_bandwidth", "angle_random_walk"].contains(&term.kind()));
+            white.map(|term| term.term.value.powi(2)).sum::<f64>().sqrt()
         };
         let white =
             |of: &&noise_analysis::report::assessment::Coefficient| of.kind == "angle_random_walk" && !of.discrete;

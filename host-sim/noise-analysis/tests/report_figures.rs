@@ -67,7 +67,7 @@ fn n_by_the_spectrum_is_n_by_the_fit_or_is_not_given() {
         };
         given += 1;
         assert!(spectrum.low > 0.0 && spectrum.high < 1.2 * spectrum.low, "{}: {spectrum:?}", of.name);
-        let fit = &of.after.terms[0].parameters["value"];
+        let fit = of.after.terms[0].term;
         let reach = (spectrum.high - spectrum.low).hypot(fit.high - fit.low) / 2.0;
         // 95 % of the differences are within the two intervals: of a dozen channels all are within 1.5 times that.
         assert!((spectrum.value - fit.value).abs() < 1.5 * reach, "{}: {spectrum:?}, {fit:?}", of.name);

@@ -57,9 +57,9 @@ fn different_noise_is_told_and_the_joint_model_is_that_of_all() {
     let same = &compare(&[one.clone(), other]).expect("comparable").channels[0];
     assert!(same.agree, "{same:?}");
     // N = 20 counts of 0.05 deg/s over √100 Hz, with the rounding's twelfth: from 32,768 samples to 0.5 %.
-    let white = same.joint.iter().find(|term| term.kind == "angle_random_walk").expect("white noise");
+    let white = same.joint.iter().find(|term| term.kind() == "angle_random_walk").expect("white noise");
     let expected = 0.05 * (20.0_f64.powi(2) + 1.0 / 12.0).sqrt() / RATE_HZ.sqrt();
-    let found = &white.parameters["value"];
+    let found = white.term;
     assert!((found.value / expected - 1.0).abs() < 0.025 && found.low < expected && expected < found.high, "{found:?}");
     // The same samples in another range, whose counts are half as large: nothing differs.
     let mut finer = one.clone();

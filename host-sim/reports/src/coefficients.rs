@@ -3,18 +3,18 @@
 
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::assessment::sum_of_white_noise;
-use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue};
+use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue, TermReport};
 
 /// The coefficient `kind` of a model with these terms: of each its kind, its `value` with bounds, and the unit. N is that of all white
 /// noise, behind the part's filter (`filter_bandwidth`) and after it.
 pub(crate) fn coefficient<'a>(
     kind: &str,
-    terms: impl Iterator<Item = (&'a str, BoundedEstimate, &'a str)>,
-) -> Option<(BoundedEstimate, &'a str)> {
+    terms: impl Iterator<Item = (&'a str, BoundedEstimate, String)>,
+) -> Option<(BoundedEstimate, String)> {
     let is_of = |of: &str| of == kind || (kind == SLOPES[0].0 && of == "filter_bandwidth");
-    let (estimates, units): (Vec<BoundedEstimate>, Vec<&str>) =
+    let (estimates, units): (Vec<BoundedEstimate>, Vec<String>) =
         terms.filter(|(of, ..)| is_of(of)).map(|(_, estimate, unit)| (estimate, unit)).unzip();
-    Some((sum_of_white_noise(&estimates), units.first()?))
+    Some((sum_of_white_noise(&estimates), units.into_iter().next()?))
 }
 
 /// Kind, letter and slope of the coefficients that the slope method gives (IEEE Std 952, annex C).
@@ -25,20 +25,20 @@ pub const SLOPES: [(&str, &str, &str); 3] = [
 ];
 
 /// A coefficient by both methods.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientRow<'a> {
     /// Name in the JSON schema.
-    pub kind: &'a str,
+    pub kind: &'static str,
     /// Letter in formulas; empty for a term that is not of the baseline model.
     pub symbol: &'static str,
     /// The slope, and where the coefficient is read; empty for a term that has no slope.
     pub slope: &'static str,
     /// Unit of both values; empty where there is neither.
-    pub unit: &'a str,
+    pub unit: String,
     /// By the slope method; absent where the slope does not occur.
     pub slope_value: Option<&'a SlopeMethodValue>,
     /// By the fit of the baseline model to the first half; absent where the model lacks the term.
-    pub fit: Option<&'a Parameter>,
+    pub fit: Option<Parameter>,
 }
 
 /// N, B and K in this order, then the other terms of the baseline model of `channel`.
@@ -47,23 +47,21 @@ pub fn rows(channel: &ChannelReport) -> Vec<CoefficientRow<'_>> {
     let values =
         [read_off.angle_random_walk.as_ref(), read_off.bias_instability.as_ref(), read_off.rate_random_walk.as_ref()];
     let classical = SLOPES.iter().zip(values).map(|(&(kind, symbol, slope), slope_value)| {
-        let fit =
-            channel.before.terms.iter().find(|term| term.kind == kind).and_then(|term| term.parameters.get("value"));
-        let unit = slope_value.map(|value| value.unit.as_str()).or(fit.map(|parameter| parameter.unit.as_str()));
-        CoefficientRow { kind, symbol, slope, unit: unit.unwrap_or(""), slope_value, fit }
+        let fit = channel.before.terms.iter().find(|term| term.kind() == kind).map(TermReport::coefficient);
+        let unit = slope_value.map(|value| &value.unit).or(fit.as_ref().map(|parameter| &parameter.unit));
+        let unit = unit.cloned().unwrap_or_default();
+        CoefficientRow { kind, symbol, slope, unit, slope_value, fit }
     });
-    let others =
-        channel.before.terms.iter().filter(|term| SLOPES.iter().all(|(kind, ..)| term.kind != *kind)).flat_map(
-            |term| {
-                term.parameters.values().map(|parameter| CoefficientRow {
-                    kind: &term.kind,
-                    symbol: "",
-                    slope: "",
-                    unit: &parameter.unit,
-                    slope_value: None,
-                    fit: Some(parameter),
-                })
-            },
-        );
+    let others = channel.before.terms.iter().filter(|term| SLOPES.iter().all(|(kind, ..)| term.kind() != *kind));
+    let others = others.flat_map(|term| {
+        term.parameters().into_values().map(move |parameter| CoefficientRow {
+            kind: term.kind(),
+            symbol: "",
+            slope: "",
+            unit: parameter.unit.clone(),
+            slope_value: None,
+            fit: Some(parameter),
+        })
+    });
     classical.chain(others).collect()
 }

@@ -112,7 +112,7 @@ pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
 
 /// The terms, and the errors on the second half.
 fn model(channel: &ChannelReport) -> String {
-    let terms: Vec<String> = channel.after.terms.iter().map(|term| words(&term.kind)).collect();
+    let terms: Vec<String> = channel.after.terms.iter().map(|term| words(term.kind())).collect();
     let excluding = channel.after.unseen_excluding.as_ref().map_or_else(String::new, |error| {
         format!(" ({} without the samples that the rules of the first half exclude)", deviance(error))
     });

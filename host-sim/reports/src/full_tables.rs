@@ -146,14 +146,15 @@ fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String
 fn coefficient_table(channel: &ChannelReport) -> TextTable {
     let header = ["coefficient", "unit", "by slope", "slope found, s", "fit, 95 % interval"];
     let row = |row: CoefficientRow<'_>| {
-        let shown = row.slope_value.map(|value| value.value).into_iter().chain(row.fit.map(parameter_magnitude));
-        let scale = Scale::new(shown, row.unit);
+        let shown =
+            row.slope_value.map(|value| value.value).into_iter().chain(row.fit.as_ref().map(parameter_magnitude));
+        let scale = Scale::new(shown, &row.unit);
         let (by_slope, found) = match (row.slope_value, row.slope) {
             (Some(value), _) => (scale.number(value.value, 3), interval(value.from_s, value.to_s)),
             (None, "") => (NONE.to_owned(), NONE.to_owned()),
             (None, _) => (NONE.to_owned(), "no such slope".to_owned()),
         };
-        let fit = row.fit.map_or_else(|| NONE.to_owned(), |fit| scale.estimate(fit));
+        let fit = row.fit.as_ref().map_or_else(|| NONE.to_owned(), |fit| scale.estimate(fit));
         vec![words(row.kind), scale.unit, by_slope, found, fit]
     };
     table(&header, 2, coefficients::rows(channel).into_iter().map(row))
@@ -161,10 +162,10 @@ fn coefficient_table(channel: &ChannelReport) -> TextTable {
 
 fn term_table(terms: &[TermReport]) -> TextTable {
     let rows = terms.iter().flat_map(|term| {
-        term.parameters.iter().map(|(name, parameter)| {
-            let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
-            let fit = scale.estimate(parameter);
-            vec![words(&term.kind), parameter_name(name), scale.unit, fit]
+        term.parameters().into_iter().map(move |(name, parameter)| {
+            let scale = Scale::new([parameter_magnitude(&parameter)], &parameter.unit);
+            let fit = scale.estimate(&parameter);
+            vec![words(term.kind()), parameter_name(name), scale.unit, fit]
         })
     });
     let header = ["with the effects", "parameter", "unit", "fit, 95 % interval"];

@@ -158,10 +158,9 @@ impl SavedChannel {
         let terms = self.refitted.terms.iter().filter_map(|term| {
             let SavedParameter { value, low, high, unit } = term.parameters.get("value")?;
             let estimate = BoundedEstimate { value: *value, low: *low, high: *high };
-            Some((term.kind.as_str(), estimate, unit.as_str()))
+            Some((term.kind.as_str(), estimate, unit.clone()))
         });
         let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
-        let unit = unit.to_owned();
         Some(SavedParameter { value, low, high, unit })
     }
 }
@@ -177,15 +176,13 @@ impl From<&Report> for SavedReport {
 
 impl From<&ChannelReport> for SavedChannel {
     fn from(channel: &ChannelReport) -> Self {
-        let parameter = |Parameter { value, low, high, unit }: &Parameter| SavedParameter {
-            value: *value,
-            low: *low,
-            high: *high,
-            unit: unit.clone(),
+        let parameter = |(name, of): (&str, Parameter)| {
+            let Parameter { value, low, high, unit } = of;
+            (name.to_owned(), SavedParameter { value, low, high, unit })
         };
-        let term = |TermReport { kind, parameters }: &TermReport| SavedTerm {
-            kind: kind.clone(),
-            parameters: parameters.iter().map(|(name, of)| (name.clone(), parameter(of))).collect(),
+        let term = |term: &TermReport| SavedTerm {
+            kind: term.kind().to_owned(),
+            parameters: term.parameters().into_iter().map(parameter).collect(),
         };
         let point = |point: &noise_analysis::report::CurvePoint| SavedPoint {
             n: point.n,

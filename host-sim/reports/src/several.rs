@@ -28,8 +28,8 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
         });
         let worst = ratios.min_by(|(_, a), (_, b)| a.p_value.total_cmp(&b.p_value));
         let joint = channel.joint.iter().flat_map(|term| {
-            term.parameters.iter().map(|(name, of)| {
-                let name = if name == "value" { term.kind.as_str() } else { name.as_str() }.replace('_', " ");
+            term.parameters().into_iter().map(move |(name, of)| {
+                let name = if name == "value" { term.kind() } else { name }.replace('_', " ");
                 format!("{name} {} [{}, {}] {}", number(of.value), number(of.low), number(of.high), of.unit)
             })
         });

@@ -166,9 +166,9 @@ pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
 /// A coefficient of the model to use. N is that of all white noise, behind the part's filter and after it.
 #[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
-    let terms = channel.refitted.terms.iter().filter_map(|term| {
-        let &Parameter { value, low, high, ref unit } = term.parameters.get("value")?;
-        Some((term.kind.as_str(), BoundedEstimate { value, low, high }, unit.as_str()))
+    let terms = channel.refitted.terms.iter().map(|term| {
+        let Parameter { value, low, high, unit } = term.coefficient();
+        (term.kind(), BoundedEstimate { value, low, high }, unit)
     });
     let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
     Some(Parameter::new(value, low, high, unit))

@@ -57,9 +57,9 @@ fn deviance(error: &ModelErrorReport) -> f64 {
 
 /// Taps and decimation of the filter in the model of the first half.
 fn filter(of: &ChannelReport) -> [f64; 2] {
-    let filter = of.after.terms.iter().find(|term| term.kind == "filter_bandwidth");
+    let filter = of.after.terms.iter().find(|term| term.kind() == "filter_bandwidth");
     let filter = filter.unwrap_or_else(|| panic!("no filter in {}", of.name));
-    ["taps", "decimation"].map(|name| filter.parameters[name].value)
+    ["taps", "decimation"].map(|name| filter.parameters()[name].value)
 }
 
 /// Expected values of one of the static recordings. Arrays have gyros and accelerometers in the order of [`INERTIAL`].

@@ -7,8 +7,6 @@ use crate::report::{BiasOverTime, ChannelReport, DataSheetReport, FigureData, Re
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
-use allan_core::NoiseTerm;
-use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
 use measurement::{ChannelId, DataSheetNoise, Measurement, Quantity};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -36,7 +34,6 @@ const DIGITS: usize = 6;
 /// `first` samples show the higher frequencies.
 pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<&Measurement>) {
     let period_s = report.sample_rate_hz.recip();
-    let stages = if report.part.filter.as_deref() == Some("moving_average") { 1 } else { 2 };
     let recorded: Vec<(ChannelId, &ChannelReport)> = measurement.ids().zip(&report.channels).collect();
     let mut data = in_parallel(&recorded, |&(id, channel)| {
         let profile = &measurement[id].profile;
@@ -44,7 +41,7 @@ pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<
         FigureData {
             data_sheet: data_sheet(&profile.data_sheet),
             spectrum: {
-                let model = |frequency: f64| model_density(&channel.refitted.terms, stages, frequency, period_s);
+                let model = |frequency: f64| model_density(&channel.refitted.terms, frequency, period_s);
                 let own = spectrum(&UniformSeries::from_series(&series), model);
                 let faster = first.and_then(|first| {
                     let series = Series::from_measurement(first, first.named(profile.name)?);
@@ -77,32 +74,12 @@ pub(crate) fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
     })
 }
 
-/// The term of a reported model with the value of its coefficient; `stages` is the number of averages of the part's filter. `None`
-/// for a kind that has no Allan variance of its own.
-#[must_use]
-pub fn noise_term(term: &TermReport, stages: u8) -> Option<(NoiseTerm, f64)> {
-    let of = |name: &str| term.parameters.get(name).map(|parameter| parameter.value);
-    let kind = match term.kind.as_str() {
-        "quantization" => NoiseTerm::Quantization,
-        "angle_random_walk" => NoiseTerm::AngleRandomWalk,
-        "bias_instability" => NoiseTerm::BiasInstability,
-        "rate_random_walk" => NoiseTerm::RateRandomWalk,
-        "rate_ramp" => NoiseTerm::RateRamp,
-        "filter_bandwidth" => {
-            NoiseTerm::Filtered(MovingAverageFilter { stages, taps: of("taps")? as u16, decimation: of("decimation")? })
-        }
-        "markov" => NoiseTerm::Markov(Markov { time_constant: of("time_constant")? }),
-        "resonance" => NoiseTerm::Resonance(Resonance { frequency: of("frequency")?, bandwidth: of("bandwidth")? }),
-        "sinusoid" => NoiseTerm::Sinusoid(Sinusoid { frequency: of("frequency")? }),
-        _ => return None,
-    };
-    Some((kind, of(kind.coefficient())?))
-}
-
 /// Root of the one-sided density of a model, unit/√Hz.
-fn model_density(terms: &[TermReport], stages: u8, frequency: f64, period_s: f64) -> f64 {
-    let of = |(kind, value): (NoiseTerm, f64)| 2.0 * value * value * kind.process().density(frequency, period_s);
-    terms.iter().filter_map(|term| noise_term(term, stages)).map(of).sum::<f64>().sqrt()
+fn model_density(terms: &[TermReport], frequency: f64, period_s: f64) -> f64 {
+    let density = |TermReport { term, .. }: &TermReport| {
+        2.0 * term.value * term.value * term.kind.process().density(frequency, period_s)
+    };
+    terms.iter().map(density).sum::<f64>().sqrt()
 }
 
 /// The spectrum of `series` in bands of equal width on a logarithmic axis.

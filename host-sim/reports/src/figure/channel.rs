@@ -6,7 +6,6 @@ use crate::formatting::{capital, words};
 use crate::rounding::{quantity, quantity_digits, significant, span, unit};
 use allan_core::NoiseTerm;
 use allan_core::model::cube_root_deviation;
-use noise_analysis::report::figure_data::noise_term;
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
 use std::f64::consts::{LN_2, PI};
 
@@ -17,14 +16,9 @@ const PER_OCTAVE: u32 = 2;
 
 /// The Allan deviation with its bounds, the models and each term; beneath, what the models leave.
 pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> Plot {
-    let stages = if report.part.filter.as_deref() == Some("moving_average") { 1 } else { 2 };
-    deviation_plot(channel, report.sample_rate_hz, stages)
-}
-
-pub(super) fn deviation_plot(channel: &ChannelReport, rate_hz: f64, stages: u8) -> Plot {
     let data = measured(channel, Look::Measured, "measured, 95 % bounds");
     let has_terms = channel.refitted.adev != channel.before.adev;
-    let mut lines: Vec<Line> = terms(channel, &channel.refitted, stages, rate_hz);
+    let mut lines: Vec<Line> = terms(channel, &channel.refitted, report.sample_rate_hz);
     if has_terms {
         lines.push(model_line(channel, &channel.before, "before: N, B, K of the first half", Look::Before));
     }
@@ -122,7 +116,7 @@ fn model_line(channel: &ChannelReport, model: &ModelReport, name: &str, look: Lo
 }
 
 /// Each term of a model on its own, the first of them in the legend.
-fn terms(channel: &ChannelReport, model: &ModelReport, stages: u8, rate_hz: f64) -> Vec<Line> {
+fn terms(channel: &ChannelReport, model: &ModelReport, rate_hz: f64) -> Vec<Line> {
     let Some(last) = channel.curve.last().map(|point| point.n) else { return Vec::new() };
     let factors: Vec<u64> = (0..=last.max(1).ilog2() * PER_OCTAVE)
         .map(|step| 2f64.powf(f64::from(step) / f64::from(PER_OCTAVE)).round() as u64)
@@ -140,7 +134,7 @@ fn terms(channel: &ChannelReport, model: &ModelReport, stages: u8, rate_hz: f64)
         };
         Line { mark, in_legend: false, ..Line::new(words(kind.name()), Look::Term, points) }
     };
-    let known = model.terms.iter().filter_map(|term| noise_term(term, stages)).filter(|(_, value)| *value > 0.0);
+    let known = model.terms.iter().map(|of| (of.term.kind, of.term.value)).filter(|(_, value)| *value > 0.0);
     known.map(line).filter(|line| !line.points.is_empty()).collect()
 }
 

@@ -2,7 +2,7 @@
 //! histogram, or what the baseline model leaves of the curve.
 
 use super::axis::Axis;
-use super::channel::{deviation_plot, spectrum_plot, time_unit};
+use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
 use crate::finding_text::channel_list;
 use crate::formatting::words;
@@ -218,5 +218,5 @@ fn histogram(channel: &ChannelReport) -> Option<Plot> {
 
 /// The curve with the baseline model and the model, and what they leave.
 fn residual(report: &Report, channel: &ChannelReport) -> Plot {
-    deviation_plot(channel, report.sample_rate_hz, 2)
+    allan_deviation_plot(report, channel)
 }

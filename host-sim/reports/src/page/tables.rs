@@ -72,10 +72,10 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
 pub(super) fn terms(model: &ModelReport) -> Markup {
     let rows = html! {
         @for term in &model.terms {
-            @for (name, parameter) in &term.parameters {
+            @for (name, parameter) in &term.parameters() {
                 @let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
                 tr {
-                    th scope="row" { (words(&term.kind)) span.under { (parameter_name(name)) } }
+                    th scope="row" { (words(term.kind())) span.under { (parameter_name(name)) } }
                     td { (scale.unit) }
                     td.number { (scale.estimate(parameter)) }
                 }

@@ -1,5 +1,8 @@
 //! A report made by hand: the curve of known N, B and K, without an estimator or a fit.
 
+use allan_core::NoiseTerm;
+use allan_core::model::FittedTerm;
+use allan_core::term::Sinusoid;
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{CurveEvidence, LineEvidence, LineSource, SinusoidalLine};
 use noise_analysis::report::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
@@ -72,13 +75,9 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
     let scale = if unit == "g" { 1e-3 } else { 1.0 };
     let curve: Vec<CurvePoint> = (0..18).map(|octave| point(octave, scale)).collect();
     let baseline = ModelReport {
-        terms: [
-            ("angle_random_walk", N, "/sqrt(s)"),
-            ("bias_instability", B, ""),
-            ("rate_random_walk", K, "/s/sqrt(s)"),
-        ]
-        .map(|(kind, value, per)| term(kind, "value", value * scale, &rate_unit(unit, per)))
-        .into(),
+        terms: [(NoiseTerm::AngleRandomWalk, N), (NoiseTerm::BiasInstability, B), (NoiseTerm::RateRandomWalk, K)]
+            .map(|(kind, value)| term(kind, value * scale, unit))
+            .into(),
         adev: curve.iter().map(|point| scale * model(point.tau_s)).collect(),
         fitted: error(1.042, 2.317),
         unseen: error(1.385, 3.946),
@@ -173,9 +172,8 @@ fn rate_unit(unit: &str, per: &str) -> String {
     }
 }
 
-pub(crate) fn term(kind: &str, name: &str, value: f64, unit: &str) -> TermReport {
-    let parameter = Parameter { value, low: value * 0.94, high: value * 1.07, unit: unit.to_owned() };
-    TermReport { kind: kind.to_owned(), parameters: BTreeMap::from([(name.to_owned(), parameter)]) }
+pub(crate) fn term(kind: NoiseTerm, value: f64, unit: &str) -> TermReport {
+    TermReport::new(&FittedTerm { low: value * 0.94, high: value * 1.07, ..FittedTerm::exact(kind, value) }, unit)
 }
 
 /// The point of one octave: about `1.5·N/n` degrees of freedom, and a bounded wobble inside the interval.
@@ -215,8 +213,7 @@ fn trace_sinusoid(channel: &mut ChannelReport) {
         point.low *= factor;
         point.high *= factor;
     }
-    let mut sinusoid = term("sinusoid", "frequency_hz", FREQUENCY_HZ, "Hz");
-    sinusoid.parameters.extend(term("sinusoid", "amplitude", AMPLITUDE, "deg/s").parameters);
+    let sinusoid = term(NoiseTerm::Sinusoid(Sinusoid { frequency: FREQUENCY_HZ }), AMPLITUDE, "deg/s");
     let curve = CurveEvidence { excess: 0.41, tau_s: 0.64, sigmas: 33.0, gain_sigmas: 14.6 };
     let line = SinusoidalLine {
         frequency_hz: BoundedEstimate::exact(FREQUENCY_HZ),

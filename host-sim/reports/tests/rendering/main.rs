@@ -5,7 +5,7 @@ mod fixture;
 mod phrases;
 
 use fixture::{channel, empty, report};
-use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
+use noise_analysis::report::{ChannelReport, ModelErrorReport, Report, TermReport};
 use reports::{figure, full_tables, page};
 use roxmltree::{Document, Node};
 
@@ -210,13 +210,10 @@ fn no_number_with_a_unit_has_an_exponent() {
     }
     for model in [&mut gyro.before, &mut gyro.after, &mut gyro.refitted] {
         model.adev.iter_mut().for_each(|adev| *adev *= 1e-5);
-        for parameter in model.terms.iter_mut().flat_map(|term| term.parameters.values_mut()) {
-            *parameter = Parameter::new(
-                1e-5 * parameter.value,
-                1e-5 * parameter.low,
-                1e-5 * parameter.high,
-                parameter.unit.as_str(),
-            );
+        for TermReport { term, .. } in &mut model.terms {
+            for of in [&mut term.value, &mut term.low, &mut term.high] {
+                *of *= 1e-5;
+            }
         }
     }
     small.sample_rate_hz = 2e6;

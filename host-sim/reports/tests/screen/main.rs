@@ -13,15 +13,11 @@ use noise_analysis::effects::{
     UnexplainedPlace,
 };
 use noise_analysis::report::assessment::RecordLength;
-use noise_analysis::report::{Finding, Parameter, PartNote, Report, Stretch, Validation};
+use noise_analysis::report::{Finding, PartNote, Report, Stretch, Validation};
 use phrases::{documentation, phrases};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
 use std::path::Path;
-
-fn parameter(value: f64, half_width: f64, unit: &str) -> Parameter {
-    Parameter::new(value, value - half_width, value + half_width, unit)
-}
 
 fn estimate(value: f64, half_width: f64) -> BoundedEstimate {
     BoundedEstimate::new(value, value - half_width, value + half_width)
@@ -137,8 +133,8 @@ fn the_screen_keeps_to_its_lines_and_columns() {
 fn the_screen_has_one_value_of_a_coefficient() {
     // `final` counts, not `before`, `after` or the slopes.
     let mut report = report();
-    let term = &mut report.channels[0].refitted.terms[0];
-    *term.parameters.get_mut("value").expect("N") = parameter(0.05, 0.0005, "deg/sqrt(s)");
+    let term = &mut report.channels[0].refitted.terms[0].term;
+    (term.value, term.low, term.high) = (0.05, 0.0495, 0.0505);
     let screen = plain(&report, 80).join("\n");
     // 0.05 deg/√s are 3 deg/√h.
     assert!(screen.contains("3.00 ± 0.03"), "{screen}");
@@ -160,9 +156,9 @@ fn what_is_not_known_is_not_claimed() {
 /// A magnetometer with this N, in gauss/√Hz, and deviance on the unseen half.
 fn magnetometer(name: &str, [n, low, high]: [f64; 3], deviance: f64) -> noise_analysis::report::ChannelReport {
     let mut channel = fixture::channel(name, "gauss");
-    channel.refitted.terms.retain(|term| term.kind == "angle_random_walk");
-    let value = Parameter::new(n, low, high, "gauss/sqrt(Hz)");
-    channel.refitted.terms[0].parameters.insert("value".to_owned(), value);
+    channel.refitted.terms.retain(|term| term.kind() == "angle_random_walk");
+    let term = &mut channel.refitted.terms[0].term;
+    (term.value, term.low, term.high) = (n, low, high);
     channel.after.unseen.deviance_per_point = Some(deviance);
     channel
 }
