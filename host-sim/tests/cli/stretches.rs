@@ -27,7 +27,7 @@ fn a_part_is_what_a_file_of_it_would_be() {
         ("sample,gyro_x_counts", of_index, &["--rate", "100"][..], 9998, 2),
         ("time_s,gyro_x_counts", of_time, &[], 9998, 2),
         ("time_s,gyro_x [dps]", of_time, &[], 9998, 2),
-        ("gyro_x [dps]", of_row, &["--rate", "100"], 10_000, 0),
+        ("gyro_x_deg_s", of_row, &["--rate", "100"], 10_000, 0),
     ] {
         let is_inside = |(position, (row, _)): &(usize, (u32, i32))| match lost {
             0 => (5000..15_000).contains(position),

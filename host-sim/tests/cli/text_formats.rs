@@ -213,11 +213,7 @@ fn tables_of_any_country_and_program_are_read_without_options() {
                 format!("12:{:02}:{:02}.{:03} -> {value:.6},0\n", row / 6000, row / 100 % 60, row % 100 * 10)
             }),
         ),
-        (
-            "a rate in a comment",
-            "// Update Rate: 100.0Hz\nGyr_X [rad/s]\n",
-            Box::new(|_, value| format!("{value:.6}\n")),
-        ),
+        ("a rate in a comment", "// Update Rate: 100.0Hz\nGyr_X_rad_s\n", Box::new(|_, value| format!("{value:.6}\n"))),
         (
             "a magnetometer without a unit",
             "time_s,gyro_x_rad_s,mag_x\n",
