@@ -163,8 +163,6 @@ pub(crate) enum Event {
     SensorReset,
     /// The sensor is put to sleep, without end.
     SensorSleep,
-    /// Something else writes this frame to the sensor.
-    WriteRegister(u16),
     /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
     /// The data-ready line changes its level every 4 us for this time, in ns.
@@ -233,11 +231,6 @@ impl Plant {
             Event::SensorReset => {
                 sensor.part.select();
                 sensor.part.transfer(0xBE80); // GLOB_CMD bit 7
-                sensor.part.deselect();
-            }
-            Event::WriteRegister(frame) => {
-                sensor.part.select();
-                sensor.part.transfer(frame);
                 sensor.part.deselect();
             }
             Event::SensorSleep => {
