@@ -92,8 +92,8 @@ pub(crate) enum Fault {
     Dma,
     /// The programmed sample period, by which the firmware divides, becomes 0.
     Divisor,
-    /// The exception of that name.
-    HardFault,
+    /// The exception HardFault.
+    Exception,
     /// The core executes nothing any more, as after a fault within the handler of faults.
     LockUp,
 }

@@ -2,7 +2,7 @@
 // output, and from which answers come over standard input. The frequency of SCK goes with every frame. Arguments: the folder of
 // rp2040js, the image as UF2 and as ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, a fault and its
 // time in s, and keys as TIME=TEXT. The faults: `none`, `dma` (an error of the channel that receives a burst), `divisor` (the
-// firmware divides by 0), `hardfault`, `lockup`. A restart by the watchdog or by the firmware keeps the memory.
+// firmware divides by 0), `exception`, `lockup`. A restart by the watchdog or by the firmware keeps the memory.
 //
 // A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `c` has a frequency of SCK in
 // Hz in the place of the time, `s` and `d` are
@@ -161,7 +161,7 @@ const run = (retained, reason) => {
       const memory = new BigUint64Array(mcu.sram.buffer);
       memory.forEach((value, index) => (memory[index] = value === 1_250_000n ? 0n : value));
     },
-    hardfault: () => mcu.core.exceptionEntry(HARD_FAULT),
+    exception: () => mcu.core.exceptionEntry(HARD_FAULT),
     // As after a fault within the handler of faults: no instruction is executed any more.
     lockup: () => (lockedUp = true),
   }[fault];

@@ -127,7 +127,7 @@ fn a_restart_keeps_the_statistics_and_tells_its_cause() {
     let cases = [
         (None, "start 2: Software, 8 channels restored", ""),
         (Some((0.25, Fault::Divisor)), "start 2: Software, ", "panic at acquisition.rs:"),
-        (Some((2.5, Fault::HardFault)), "start 2: Software, 8 channels restored", "hard fault at 0x100"),
+        (Some((2.5, Fault::Exception)), "start 2: Software, 8 channels restored", "hard fault at 0x100"),
         (Some((2.5, Fault::LockUp)), "start 2: Watchdog, 8 channels restored", ""),
     ];
     for (fault, start, record) in cases {
