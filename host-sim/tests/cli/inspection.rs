@@ -188,13 +188,16 @@ fn other_peoples_files_are_described() {
         ("vn100_nitin.bag", &["imu_driver/Vectornav", "13217 rows at 39.9999", "at rest all the time"][..]),
         ("vn100_emulator_0.db3", &["/imu imu_msg/msg/IMUmsg", "without a definition"]),
         ("mpu9250_imu1_raw.mat", &["imu1_raw.wb.0", "41671 rows at 43.0", "at rest"]),
-        ("mpu6050_accelerometer.mat", &["accelBuffer.3", "65067 rows at 99.3", "--units g"]),
-        ("px4_sample.ulg", &["sensor_combined", "17070 rows at 25", "in 8 gaps", "other topics:", "vehicle_attitude"]),
+        ("mpu6050_accelerometer.mat", &["accelBuffer.3", "65067 rows at 99.2976", "--units g"]),
+        (
+            "px4_sample.ulg",
+            &["sensor_combined", "17070 rows at 248.55", "in 8 gaps", "other topics:", "vehicle_attitude"],
+        ),
         ("betaflight_btfl_001.bbl", &["gyroADC[0]", "samples missing"]),
         ("phone_gyro4.txt", &["38577 rows at", "gyro_x=2,gyro_y=3,gyro_z=4"]),
         ("imutk_xsens_gyro.mat", &["51175 rows at 100.", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "deg/s/131"]),
         ("lsm6dso_static.txt", &["973 rows; no time stamps", "--rate HZ", "at rest all the time"]),
-        ("stampfly_fft_20260114T115628.csv", &["12000 rows at 39", "--units rad/s,m/s^2"]),
+        ("stampfly_fft_20260114T115628.csv", &["12000 rows at 399.98", "--units 'rad/s,m/s^2'"]),
     ] {
         let Some(path) = recording(test, &format!("others/{file}")) else { return };
         let shown = inspected(&path);
