@@ -95,6 +95,6 @@ fn a_wrong_file_and_a_wrong_section_are_found() {
     let text = "# A page, of *mine*\n[here](#a-page-of-mine) [gone](#gone) [no](no.md)\n```\n[code](code.md)\n```\n";
     std::fs::write(&page, text).expect("written");
     let wrong = broken(&page, &mut HashMap::new());
-    let told: Vec<&str> = wrong.iter().filter_map(|text| text.split(".md:").nth(1)).collect();
+    let told: Vec<&str> = wrong.iter().filter_map(|text| Some(text.split_once("page.md:")?.1)).collect();
     assert_eq!(told, ["2: #gone: no such section", "2: no.md: no such file"]);
 }

@@ -123,7 +123,7 @@ mod tests {
         };
         assert_eq!(row("against the model"), ["2", "%", "50.0", "1/2"]);
         assert_eq!(row("gives N"), ["1", "%", "50.0", "1/2"]);
-        assert_eq!(row("too sure"), ["0", "%", "0.0", "0/2"]);
+        assert_eq!(row("smaller error"), ["0", "%", "0.0", "0/2"]);
         assert!(text.contains("not in the table: a new sentence"), "{text}");
     }
 
