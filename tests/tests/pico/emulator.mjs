@@ -166,7 +166,8 @@ const run = (retained, reason) => {
     lockup: () => (lockedUp = true),
   }[fault];
   while (now() < end && !restarts) {
-    if (fail && now() >= faultAt) {
+    // A core that sleeps executes nothing that could fail.
+    if (fail && now() >= faultAt && !mcu.core.waiting) {
       faultAt = Infinity;
       fail();
     }
