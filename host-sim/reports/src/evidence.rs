@@ -1,5 +1,6 @@
 //! What an effect was told by, in words: what was measured, against which threshold, and the usual causes.
 
+use crate::formatting::enumerated;
 use crate::rounding::quantity_digits;
 use noise_analysis::effects::{
     BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, Multiples,
@@ -500,10 +501,10 @@ fn filter_meaning(of: &OutputFilter) -> String {
 /// Such as `harmonics 1, 3 and 5 with 2 sidebands`.
 fn harmonics(of: &Multiples) -> String {
     let numbers: Vec<String> = of.harmonics.iter().map(u32::to_string).collect();
-    let harmonics = match numbers.as_slice() {
-        [] => String::new(),
-        [one] => format!("harmonic {one}"),
-        [others @ .., last] => format!("harmonics {} and {last}", others.join(", ")),
+    let harmonics = match numbers.len() {
+        0 => String::new(),
+        1 => format!("harmonic {}", numbers[0]),
+        _ => format!("harmonics {}", enumerated(&numbers)),
     };
     match of.sidebands {
         0 => harmonics,

@@ -2,7 +2,7 @@
 //! first half leaves on the second.
 
 use crate::finding_text::{FindingText, channel_list};
-use crate::formatting::{count, duration, words, wrap};
+use crate::formatting::{capital, count, duration, words, wrap};
 use crate::rounding::{NONE, quantity_digits, significant, span};
 use crate::summary;
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
@@ -66,10 +66,8 @@ fn item(text: &str) -> String {
 
 /// `text` with a capital and a full stop.
 fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
     let stop = if text.ends_with('.') { "" } else { "." };
-    format!("{first}{}{stop}", letters.as_str())
+    format!("{}{stop}", capital(text))
 }
 
 fn found(FindingText { channels, physics, advice, weight, .. }: &FindingText) -> String {

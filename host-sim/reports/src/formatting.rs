@@ -83,6 +83,15 @@ pub fn capital(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn enumerated(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 /// A name of the JSON schema as words: `angle_random_walk` becomes `angle random walk`.
 pub fn words(name: &str) -> String {
     name.replace('_', " ")

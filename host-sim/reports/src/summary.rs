@@ -3,7 +3,7 @@
 
 use crate::coefficients;
 use crate::finding_text::{FindingText, channel_list, describe, signed_percent, unexplained_place};
-use crate::formatting::{count, words};
+use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span, unit};
 use noise_analysis::bounds::BoundedEstimate;
@@ -189,10 +189,13 @@ fn error_change(deviance: [Option<f64>; 2]) -> String {
     if deviance == [None, None] {
         return "–".to_owned();
     }
-    let [before, after] = deviance.map(|of| {
-        of.map_or_else(|| "–".to_owned(), |of| if of < 9.95 { format!("{of:.1}") } else { count(of.round() as u64) })
-    });
+    let [before, after] = deviance.map(|of| of.map_or_else(|| "–".to_owned(), deviance_per_point));
     format!("{before} → {after}")
+}
+
+/// A deviance a point with the digits that every place of the report gives it.
+pub(crate) fn deviance_per_point(of: f64) -> String {
+    if of < 9.95 { format!("{of:.1}") } else { count(of.round() as u64) }
 }
 
 /// Whether the model with its effects fails on the unseen half.
@@ -410,15 +413,6 @@ fn length_advice(report: &Report) -> Vec<String> {
     .into_iter()
     .flatten()
     .collect()
-}
-
-/// `a`, `a and b`, `a, b and c`.
-fn enumerated(parts: &[String]) -> String {
-    match parts {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 /// Which models of the first half are those of its later quarter; `None` where none is.

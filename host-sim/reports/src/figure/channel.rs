@@ -3,7 +3,8 @@
 use super::axis::{Axis, has_logarithm};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
 use crate::formatting::{capital, words};
-use crate::rounding::{quantity, quantity_digits, significant, span, unit};
+use crate::rounding::{quantity, quantity_digits, span, unit};
+use crate::summary::deviance_per_point;
 use allan_core::NoiseTerm;
 use allan_core::model::cube_root_deviation;
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
@@ -44,8 +45,8 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
 /// second.
 pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let lines = vec![
-        model_line(channel, &channel.before, "model before: N, B, K", Look::Before),
-        model_line(channel, &channel.after, "model after: with its effects", Look::Model),
+        model_line(channel, &channel.before, "before: N, B, K", Look::Before),
+        model_line(channel, &channel.after, "after: with effects", Look::Model),
         measured(channel, Look::Measured, "measured, 95 % bounds"),
     ];
     let [frame] = frames([330.0]);
@@ -58,8 +59,8 @@ pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> 
         description: format!(
             "Both models are fitted to the first half. Their error on the second half, which they have not seen: {} before, {} after the \
              effects were added. A true model has about 1.",
-            significant(before, 2),
-            significant(after, 2)
+            deviance_per_point(before),
+            deviance_per_point(after)
         ),
         panels: vec![Panel::new(across, up, lines)],
     }

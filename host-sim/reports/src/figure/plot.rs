@@ -171,8 +171,8 @@ impl Plot {
             }
             names.push(&line.name);
             entries.push((left, line));
-            // Letters of 13 px are up to 7.4 px wide.
-            left += 40.0 + 7.4 * line.name.chars().count() as f64;
+            // Letters of 16 px, as the first figures of the page have them, are up to 9.1 px wide.
+            left += 40.0 + 9.1 * line.name.chars().count() as f64;
         }
         html! {
             g class="legend" {

@@ -179,7 +179,7 @@ fn what_is_drawn_is_what_was_measured() {
     };
     let told = report.channels.iter().max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("a channel");
     let taus = told.curve.iter().map(|point| point.tau_s);
-    for (name, model) in [("model before: N, B, K", &told.before), ("model after: with its effects", &told.after)] {
+    for (name, model) in [("before: N, B, K", &told.before), ("after: with effects", &told.after)] {
         check("story", name, &taus.clone().zip(model.adev.iter().copied()).collect::<Vec<_>>());
     }
     for channel in &report.channels {
