@@ -1,15 +1,11 @@
-//! Gives the program the hash of what it is built from, and hands the linker the board's memory map.
+//! Gives the program the hash of what it is built from, and hands the linker the memory map of the board that a feature names.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// Feature of each board, as cargo spells it here, and its memory map.
-const BOARDS: [(&str, &str); 3] = [
-    ("CARGO_FEATURE_BOARD_H405", "memory/f405.x"),
-    ("CARGO_FEATURE_BOARD_FEATHER", "memory/f405.x"),
-    ("CARGO_FEATURE_BOARD_PICO", "memory/rp2040.x"),
-];
+/// What the name of a board's feature begins with, as cargo spells it here. The rest is the name of its memory map.
+const BOARD: &str = "CARGO_FEATURE_BOARD_";
 
 /// Folders and files that a program is built from, seen from this package: what it retains over a restart is not for a program of
 /// other sources.
@@ -27,11 +23,12 @@ const SOURCES: [&str; 8] = [
 fn main() {
     println!("cargo:rustc-env=FIRMWARE_BUILD={}", build_hash());
     let bare_metal = env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none");
-    let board = BOARDS.iter().find(|(feature, _)| env::var_os(feature).is_some());
-    let Some((_, map)) = board.filter(|_| bare_metal) else { return };
+    let board = env::vars().find_map(|(name, _)| Some(name.strip_prefix(BOARD)?.to_lowercase()));
+    let Some(board) = board.filter(|_| bare_metal) else { return };
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    fs::copy(map, out.join("memory.x")).expect("the memory map is copied");
+    fs::copy(format!("memory/{board}.x"), out.join("memory.x")).expect("the memory map is copied");
     println!("cargo:rustc-link-search={}", out.display());
+    println!("cargo:rustc-link-search={}/memory", env::var("CARGO_MANIFEST_DIR").expect("cargo sets it"));
     // Functions that are the same to the byte are linked once.
     for argument in ["--nmagic", "--icf=all", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo:rustc-link-arg-bins={argument}");

@@ -1,6 +1,7 @@
 //! The application's main loop: commands, checkpoints, epochs and learning, reports.
 
-use crate::board::{Board, BoardContext, BrownOutLevel, Chip};
+use crate::bench_console;
+use crate::board::{Board, BoardContext, BrownOutLevel, BusTiming, Chip, HostPort};
 use crate::command::{CommandError, CommandParser, DeviceCommand};
 use crate::console::{Answer, Console, VERSION_LINE};
 use crate::counters::CounterLog;
@@ -13,8 +14,10 @@ use crate::report_frames::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
 use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
+use crate::settings_store::{MAX_RECORD, StoreError};
 use crate::statistics::CHANNELS;
 use crate::status_flags::StatusFlags;
+use crate::stored_state::{self, StoredSettings};
 use crate::task_monitor::TaskMonitor;
 use adis16405_driver::{Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
@@ -39,7 +42,8 @@ const CHECKPOINT_US: u64 = 100_000;
 pub struct App {
     state: DeviceState,
     retained: RetainedRam,
-    parser: CommandParser,
+    /// One for each port: a line is not made of what two of them receive.
+    parsers: [CommandParser; HostPort::COUNT],
     console: Console,
     report: ReportProgress,
     next_report_us: u64,
@@ -76,7 +80,13 @@ impl App {
             .settings()
             .and_then(|settings| Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?)));
         let first = restored.is_none();
-        let (mut settings, config) = restored.unwrap_or((FIRST_SETTINGS, FIRST_CONFIG));
+        let mut learner = Learner::new(finished);
+        let stored = read_stored(board, &mut learner);
+        let kept = || {
+            let settings = stored?.apply_to(FIRST_SETTINGS);
+            Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?))
+        };
+        let (mut settings, config) = restored.or_else(kept).unwrap_or((FIRST_SETTINGS, FIRST_CONFIG));
         settings.starts = settings.starts.saturating_add(1);
         boot.starts = settings.starts;
         board.estimators(|estimators| estimators.restart(config));
@@ -88,8 +98,16 @@ impl App {
         }
         retained.write_settings(settings, first);
         // A restart while the last finished epoch was being learned from: its report starts again.
-        let interrupted =
-            !first && retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch;
+        let interrupted = !first
+            && learner.finished.as_deref_mut().is_some_and(|finished| {
+                retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch
+            });
+        match stored {
+            Some(stored) if stored.have_sensor_of(settings) => {
+                board.estimators(|estimators| estimators.set_raw_stream(first && stored.raw_stream));
+            }
+            _ => learner.reset(),
+        }
         let mut report = ReportProgress::default();
         if interrupted {
             report.start_epoch_end();
@@ -106,7 +124,7 @@ impl App {
                 config,
                 product_id: 0,
                 sensor: SensorState::Probing { at_us: probe_us, step: None },
-                learner: Learner::new(finished),
+                learner,
                 epoch_start_us: now_us as i64 - settings.epoch_age_us as i64,
                 bad_commands: 0,
                 recovery: SensorRecovery::default(),
@@ -114,7 +132,7 @@ impl App {
                 report_scale: ReportScale::new(config, None),
             },
             retained,
-            parser: CommandParser::default(),
+            parsers: Default::default(),
             console: Console::new(),
             report,
             next_report_us: now_us + interval_us(settings),
@@ -139,8 +157,8 @@ impl App {
             return; // nothing that would feed the watchdog
         }
         board.feed_watchdog();
-        while let Some(byte) = board.receive() {
-            match self.parser.push(byte) {
+        while let Some((port, byte)) = board.receive() {
+            match self.parsers[port as usize].push(byte) {
                 Some(Ok(command)) => self.execute(command, board),
                 Some(Err(error)) => self.reject(error, board),
                 None => {}
@@ -244,14 +262,56 @@ impl App {
                 self.print(board, format_args!("keep the sensor still; autonull within 10 s nulls its bias"));
             }
             DeviceCommand::AutoNull => self.auto_null(board, now_us),
+            DeviceCommand::DumpRegisters => self.console.answer(board, Answer::Registers),
+            DeviceCommand::ReadRegister(register) => {
+                let line = bench_console::read_register(register, &self.state, board);
+                self.print(board, format_args!("{line}"));
+            }
+            DeviceCommand::WriteRegister(register, value) => {
+                let line = bench_console::write_register(register, value, &self.state, board);
+                self.print(board, format_args!("{line}"));
+            }
+            DeviceCommand::Measure => self.console.answer(board, Answer::Measurement),
+            DeviceCommand::Deflections => self.console.answer(board, Answer::Deflections),
+            DeviceCommand::CarefulBus(careful) => {
+                board.set_sampling(false);
+                let set = board.set_bus_timing(if careful { BusTiming::CAREFUL } else { BusTiming::SAFE });
+                self.state.request_probe(now_us);
+                match (set, careful) {
+                    (true, true) => self.print(board, format_args!("careful timing of the bus, until a restart")),
+                    (true, false) => self.print(board, format_args!("usual timing of the bus")),
+                    (false, _) => self.print(board, format_args!("this board has one timing of its bus")),
+                }
+            }
+            DeviceCommand::Persist => {
+                let written = self.persist(board);
+                self.tell_written(written, "settings and models are kept without power", board);
+            }
+            DeviceCommand::Forget => {
+                let erased = self.write_record(&[], board);
+                self.tell_written(erased, "nothing is kept without power", board);
+            }
             DeviceCommand::Restart => self.restart(board),
+            DeviceCommand::BootLoader => {
+                self.checkpoint_all(board);
+                if !board.start_boot_loader() {
+                    self.print(
+                        board,
+                        format_args!("no boot loader that a command starts: use the board's button or pin"),
+                    );
+                }
+            }
         }
     }
 
     fn restart(&mut self, board: &mut impl Board) {
+        self.checkpoint_all(board);
+        board.restart();
+    }
+
+    fn checkpoint_all(&mut self, board: &mut impl Board) {
         (0..CHANNELS.len()).for_each(|index| self.checkpoint_channel(board, index));
         self.checkpoint_age(board.now_us());
-        board.restart();
     }
 
     fn reject(&mut self, error: CommandError, board: &mut impl Board) {
@@ -303,6 +363,42 @@ impl App {
                 self.print(board, format_args!("bias nulled, statistics reset"));
             }
             Err(error) => self.print(board, format_args!("bias not nulled: {error}")),
+        }
+    }
+
+    // What is kept without power
+
+    /// Keeps the settings and the models. Returns the time in µs for which nothing was sampled.
+    #[inline(never)]
+    fn persist(&mut self, board: &mut impl Board) -> Result<u64, StoreError> {
+        let raw_stream = board.estimators(|estimators| estimators.has_raw_stream());
+        let mut record = [0; MAX_RECORD];
+        let settings = StoredSettings::new(self.state.settings, raw_stream);
+        let record =
+            stored_state::encode(&settings, &self.state.learner.models, &mut record).ok_or(StoreError::TooLong)?;
+        self.write_record(record, board)
+    }
+
+    /// Writes a record while nothing is sampled; the samples that this costs are a gap.
+    fn write_record(&mut self, record: &[u8], board: &mut impl Board) -> Result<u64, StoreError> {
+        if !board.keeps_record() {
+            return Err(StoreError::NoMemory);
+        }
+        let began_us = board.now_us();
+        board.set_sampling(false);
+        let written = board.write_record(record);
+        let now_us = board.now_us();
+        if self.state.is_sampled() {
+            board.estimators(|estimators| estimators.mark_resumed(now_us));
+            board.set_sampling(true);
+        }
+        written.map(|()| now_us - began_us)
+    }
+
+    fn tell_written(&mut self, written: Result<u64, StoreError>, done: &str, board: &mut impl Board) {
+        match written {
+            Ok(us) => self.print(board, format_args!("{done}; not sampled for {} ms", us.div_ceil(1000))),
+            Err(error) => self.print(board, format_args!("not written: {error}")),
         }
     }
 
@@ -391,6 +487,13 @@ impl App {
         let Some(part) = self.report.part() else {
             if ends_epoch {
                 self.retained.clear_epoch(); // it has been learned from
+                match self.persist(board) {
+                    Ok(us) => {
+                        log(board, format_args!("models kept without power, not sampled for {} ms", us.div_ceil(1000)))
+                    }
+                    Err(StoreError::NoMemory) => {}
+                    Err(error) => log(board, format_args!("models not kept without power: {error}")),
+                }
             }
             return;
         };
@@ -432,6 +535,15 @@ impl App {
         }
         self.report.ends_epoch()
     }
+}
+
+/// Settings that were kept without power, if there are any, and the models, in `learner`.
+#[inline(never)]
+fn read_stored(board: &mut impl Board, learner: &mut Learner) -> Option<StoredSettings> {
+    let mut record = [0; MAX_RECORD];
+    let length = board.read_record(&mut record)?;
+    let (settings, models) = stored_state::decode_settings(record.get(..length)?)?;
+    stored_state::decode_models(models, &mut learner.models).then_some(settings)
 }
 
 fn send_learned(board: &mut impl Board, fit: &EpochFit, index: usize, epoch: u32) {

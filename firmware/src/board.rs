@@ -3,6 +3,7 @@
 
 use crate::acquisition::{Sampler, SamplingActivity};
 use crate::sample_intake::Estimators;
+use crate::settings_store::StoreError;
 use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
@@ -11,6 +12,8 @@ use rtic_core::Mutex;
 
 /// Time before the first frame after a burst in µs: the sensor's longest stall time, that of its low-power mode.
 const STALL_US: u32 = 75;
+/// Time in µs for which the sensor's RST line is low, as with the driver of Linux; the data sheet has no least time.
+const RESET_US: u32 = 100;
 /// Time in µs after which a burst is abandoned: the longest one, at 164 kHz with gaps of 16 µs, takes 1.5 ms.
 const BURST_US: u32 = 5_000;
 
@@ -52,9 +55,22 @@ impl BusTiming {
         low_power: SelectTiming { high_ns: 100_000, read_ns: 150_000 },
         word_gap_ns: 9_000,
     };
+}
 
-    /// The times that the image was built with: [`CAREFUL`](Self::CAREFUL) with feature `careful-bus`.
-    pub const CONFIGURED: Self = if cfg!(feature = "careful-bus") { Self::CAREFUL } else { Self::SAFE };
+/// Times of frames on the sensor's bus as the board has made them, in µs, to within one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameTimes {
+    /// Time for which chip select was low in the last frame.
+    pub low_us: u32,
+    /// Shortest time for which it was high between two frames.
+    pub shortest_high_us: u32,
+    /// Shortest time from one falling edge of chip select to the next.
+    pub shortest_period_us: u32,
+}
+
+impl FrameTimes {
+    /// Before the first frame.
+    pub const NONE: Self = Self { low_us: 0, shortest_high_us: u32::MAX, shortest_period_us: u32::MAX };
 }
 
 /// The sensor's bus, whose serial clock can be changed between two frames.
@@ -63,6 +79,10 @@ pub trait SensorBus: SpiDevice<u8> {
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
     /// Drops what was received, and disables and enables the peripheral.
     fn reset(&mut self);
+    /// Keeps other times from the next frame on.
+    fn set_timing(&mut self, timing: BusTiming);
+    /// The times of the frames since they were taken last.
+    fn take_frame_times(&mut self) -> FrameTimes;
 }
 
 /// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
@@ -90,6 +110,19 @@ pub trait Board {
     fn sampling_activity(&mut self) -> SamplingActivity;
     /// Resets the microcontroller's side of the sensor's bus. To be used only while sampling is disabled.
     fn reset_bus(&mut self);
+    /// Keeps other times on the sensor's bus. Returns false if the board cannot. To be used only while sampling is disabled.
+    fn set_bus_timing(&mut self, _timing: BusTiming) -> bool {
+        false
+    }
+    /// Times of the frames on the sensor's bus since they were asked for last; `None` if the board does not know them.
+    fn frame_times(&mut self) -> Option<FrameTimes> {
+        None
+    }
+    /// Width of the next pulse of data ready in µs; `None` if none ends within `limit_us`, or the board does not see the level. To
+    /// be used only while sampling is disabled.
+    fn data_ready_width_us(&mut self, _limit_us: u32) -> Option<u32> {
+        None
+    }
     /// Pulses the sensor's RST line. Returns false if the board does not connect it.
     fn reset_sensor(&mut self) -> bool {
         false
@@ -98,8 +131,8 @@ pub trait Board {
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
     /// Gives access to the transmit queue, and has what is queued transmitted.
     fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R;
-    /// The next received byte.
-    fn receive(&mut self) -> Option<u8>;
+    /// The next received byte, and the port that has received it.
+    fn receive(&mut self) -> Option<(HostPort, u8)>;
     /// Load figures of the board.
     fn meters(&mut self) -> BoardMeters;
     /// Feeds the watchdog.
@@ -109,6 +142,55 @@ pub trait Board {
     /// Programs the level of the supply below which the microcontroller is reset into memory that keeps it.
     fn program_brown_out(&mut self) -> BrownOutLevel {
         BrownOutLevel::Fixed
+    }
+    /// Whether the board has memory that keeps a record without power.
+    fn keeps_record(&mut self) -> bool {
+        false
+    }
+    /// Copies the record in memory that keeps it without power to `record`, and returns its length; `None` if there is none.
+    fn read_record(&mut self, _record: &mut [u8]) -> Option<usize> {
+        None
+    }
+    /// Replaces that record, or erases it if `record` is empty. Interrupts may be disabled for the time that the memory takes: to be used
+    /// only while sampling is disabled.
+    ///
+    /// # Errors
+    /// The board has no such memory, or it does not take the record. The one before is kept.
+    fn write_record(&mut self, _record: &[u8]) -> Result<(), StoreError> {
+        Err(StoreError::NoMemory)
+    }
+    /// Starts the boot loader that takes an image over USB. Returns false if the board has none that a program can start.
+    fn start_boot_loader(&mut self) -> bool {
+        false
+    }
+}
+
+/// A serial port to the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HostPort {
+    /// On pins of the board.
+    Uart,
+    /// On its USB connector.
+    Usb,
+}
+
+impl HostPort {
+    /// Number of ports.
+    pub const COUNT: usize = 2;
+}
+
+/// The queues of received bytes.
+pub struct ReceivedBytes<'q> {
+    /// From the UART.
+    pub uart: spsc::Consumer<'q, u8>,
+    /// From the USB port of a board that has one.
+    pub usb: Option<spsc::Consumer<'q, u8>>,
+}
+
+impl ReceivedBytes<'_> {
+    fn next(&mut self) -> Option<(HostPort, u8)> {
+        let usb = || self.usb.as_mut().and_then(|queue| queue.dequeue()).map(|byte| (HostPort::Usb, byte));
+        self.uart.dequeue().map(|byte| (HostPort::Uart, byte)).or_else(usb)
     }
 }
 
@@ -181,14 +263,26 @@ pub trait Chip {
     fn restart(&mut self);
     /// Load figures, without the time asleep.
     fn meters(&mut self) -> BoardMeters;
+    /// Sets the sensor's RST line active, which is low, or inactive. Returns false if it is not connected.
+    fn set_reset_line(&mut self, active: bool) -> bool;
     /// Programs the brown-out level.
     fn program_brown_out(&mut self) -> BrownOutLevel;
+    /// As [`Board::keeps_record`].
+    fn keeps_record(&mut self) -> bool;
+    /// As [`Board::read_record`].
+    fn read_record(&mut self, record: &mut [u8]) -> Option<usize>;
+    /// As [`Board::write_record`].
+    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError>;
+    /// Starts the boot loader. Returns false if there is none.
+    fn start_boot_loader(&mut self) -> bool;
 }
 
 /// The data-ready line, whose edges raise an interrupt.
 pub trait DataReadyLine {
     /// Ignores edges, or takes them again; those that came meanwhile are forgotten.
     fn set_masked(&mut self, masked: bool);
+    /// The level of the line.
+    fn is_active(&mut self) -> bool;
 }
 
 /// What the main loop shares with the interrupts. Each lock disables only the interrupts that share the resource.
@@ -211,7 +305,7 @@ pub struct Locks<T, B, S, D, E, Q> {
 pub struct BoardContext<'r, C, T, B, S, D, E, Q> {
     chip: C,
     locks: Locks<T, B, S, D, E, Q>,
-    received: &'r mut spsc::Consumer<'static, u8>,
+    received: &'r mut ReceivedBytes<'static>,
     asleep_us: u64,
     watchdog: WatchdogFeeder,
 }
@@ -257,8 +351,8 @@ impl WatchdogExtension {
 }
 
 impl<'r, C: Chip, T, B, S, D, E, Q> BoardContext<'r, C, T, B, S, D, E, Q> {
-    /// `received` is the queue of bytes from the serial port.
-    pub fn new(chip: C, locks: Locks<T, B, S, D, E, Q>, received: &'r mut spsc::Consumer<'static, u8>) -> Self {
+    /// `received` has the bytes from the serial ports.
+    pub fn new(chip: C, locks: Locks<T, B, S, D, E, Q>, received: &'r mut ReceivedBytes<'static>) -> Self {
         Self { chip, locks, received, asleep_us: 0, watchdog: WatchdogFeeder { fed_at: 0 } }
     }
 
@@ -310,6 +404,41 @@ where
         self.locks.bus.lock(SensorBus::reset);
     }
 
+    fn reset_sensor(&mut self) -> bool {
+        let is_connected = self.chip.set_reset_line(true);
+        if is_connected {
+            FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(RESET_US);
+            self.chip.set_reset_line(false);
+        }
+        is_connected
+    }
+
+    fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
+        self.locks.bus.lock(|bus| bus.set_timing(timing));
+        true
+    }
+
+    fn frame_times(&mut self) -> Option<FrameTimes> {
+        Some(self.locks.bus.lock(SensorBus::take_frame_times))
+    }
+
+    fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
+        let start = self.chip.microseconds();
+        let mut edge = |active: bool| loop {
+            let now = self.chip.microseconds();
+            if self.locks.data_ready.lock(DataReadyLine::is_active) == active {
+                return Some(now);
+            }
+            if now.wrapping_sub(start) > limit_us {
+                return None;
+            }
+            self.watchdog.feed(&mut self.chip);
+        };
+        edge(false)?;
+        let risen = edge(true)?;
+        Some(edge(false)?.wrapping_sub(risen))
+    }
+
     fn set_sampling(&mut self, enabled: bool) {
         self.locks.sampler.lock(|sampler| sampler.set_enabled(enabled));
         if enabled {
@@ -339,8 +468,8 @@ where
         result
     }
 
-    fn receive(&mut self) -> Option<u8> {
-        self.received.dequeue()
+    fn receive(&mut self) -> Option<(HostPort, u8)> {
+        self.received.next()
     }
 
     fn meters(&mut self) -> BoardMeters {
@@ -357,6 +486,22 @@ where
 
     fn program_brown_out(&mut self) -> BrownOutLevel {
         self.chip.program_brown_out()
+    }
+
+    fn keeps_record(&mut self) -> bool {
+        self.chip.keeps_record()
+    }
+
+    fn read_record(&mut self, record: &mut [u8]) -> Option<usize> {
+        self.chip.read_record(record)
+    }
+
+    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError> {
+        self.chip.write_record(record)
+    }
+
+    fn start_boot_loader(&mut self) -> bool {
+        self.chip.start_boot_loader()
     }
 }
 
@@ -430,8 +575,23 @@ mod tests {
         fn transmit(&mut self) {}
         fn abandon_burst(&mut self) {}
         fn restart(&mut self) {}
+        fn set_reset_line(&mut self, _: bool) -> bool {
+            false
+        }
         fn program_brown_out(&mut self) -> BrownOutLevel {
             BrownOutLevel::Fixed
+        }
+        fn keeps_record(&mut self) -> bool {
+            false
+        }
+        fn read_record(&mut self, _: &mut [u8]) -> Option<usize> {
+            None
+        }
+        fn write_record(&mut self, _: &[u8]) -> Result<(), StoreError> {
+            Err(StoreError::NoMemory)
+        }
+        fn start_boot_loader(&mut self) -> bool {
+            false
         }
         fn meters(&mut self) -> BoardMeters {
             BoardMeters::default()

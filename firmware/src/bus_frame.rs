@@ -1,7 +1,7 @@
 //! Frames on the sensor's bus as every microcontroller sends them: chip select with its times, and the operations between
 //! its edges.
 
-use crate::board::BusTiming;
+use crate::board::{BusTiming, FrameTimes};
 use crate::sensor::LOW_POWER_LIMIT_HZ;
 use core::convert::Infallible;
 use embedded_hal::digital::OutputPin;
@@ -67,12 +67,13 @@ pub(crate) struct ChipSelect<S> {
     /// The counter when the pin has fallen, and when it has risen.
     fallen_at: u32,
     risen_at: u32,
+    times: FrameTimes,
 }
 
 impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
     /// `pin` must be high.
     pub(crate) fn new(pin: S, timing: BusTiming) -> Self {
-        Self { pin, timing, low_power: true, fallen_at: 0, risen_at: 0 }
+        Self { pin, timing, low_power: true, fallen_at: 0, risen_at: 0, times: FrameTimes::NONE }
     }
 
     /// To be called when the limit of the serial clock has changed.
@@ -90,12 +91,23 @@ impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
         };
         wait_ns::<M>(rest_ns(self.risen_at, times.high_ns).max(rest_ns(self.fallen_at, times.read_ns)));
         let Ok(()) = self.pin.set_low();
-        self.fallen_at = M::counter();
+        let now = M::counter();
+        let times = &mut self.times;
+        times.shortest_high_us = times.shortest_high_us.min(now.wrapping_sub(self.risen_at));
+        times.shortest_period_us = times.shortest_period_us.min(now.wrapping_sub(self.fallen_at));
+        self.fallen_at = now;
     }
 
     pub(crate) fn deselect<M: MicrosecondCounter>(&mut self) {
         let Ok(()) = self.pin.set_high();
         self.risen_at = M::counter();
+        self.times.low_us = self.risen_at.wrapping_sub(self.fallen_at);
+    }
+
+    /// The times of the frames since they were taken last.
+    pub(crate) fn take_times(&mut self) -> FrameTimes {
+        let low_us = self.times.low_us;
+        core::mem::replace(&mut self.times, FrameTimes { low_us, ..FrameTimes::NONE })
     }
 }
 

@@ -1,30 +1,43 @@
 //! Commands of the serial port: keys that act at once, and lines that end with Enter.
 
-use adis16405_driver::GyroRange;
+use crate::bench_console::{hexadecimal, register};
+use adis16405_driver::{GyroRange, Register};
 use heapless::Vec;
 
-/// The lines that `?` prints.
-pub const HELP: [&str; 21] = [
+/// The lines that `?` prints, each in 80 columns.
+pub const HELP: [&str; 33] = [
     "at the press of a key:",
     "?          this list",
-    "r          report in frames, for a program",
     "t          report as a table",
-    "s          status",
+    "s          status: sensor, rate, epoch, start",
     "k          counters of what was lost and why",
     "v          version",
-    "and, with Enter:",
+    "r          report in frames, for a program",
+    "settings, with Enter:",
     "f RATE     sample rate in Hz, such as f 819.2",
     "g RANGE    gyro range in deg/s: 75, 150 or 300",
     "n TAPS     filter, log2 of the taps of each stage: 0 to 6",
     "e SECONDS  length of an epoch, 0 for one without end",
     "i SECONDS  time between reports, 0 for none",
-    "w 1, w 0   start and stop the stream of raw bursts",
+    "w 1, w 0   start and stop the raw stream of bursts",
     "p ID       take a part with this PROD_ID for an ADIS16405, 0 for none",
-    "check      self-test of the sensor",
-    "arm        allow autonull for 10 s",
-    "autonull   store the gyro output as the bias; keep the sensor still",
+    "persist    keep settings and learned models without power",
+    "forget     erase what is kept",
     "clear      reset the statistics",
+    "the sensor, which must be still, with Enter:",
+    "check      self-test: passed or failed",
+    "deflect    self-test with the deflection of each axis",
+    "arm        allow autonull for 10 s",
+    "autonull   store the gyro output as the bias",
+    "the bench, with Enter:",
+    "dump       all registers of the sensor by name, in hexadecimal",
+    "peek REG   read one: peek smpl_prd, or by its address peek 36",
+    "poke R V   write one: poke smpl_prd 0007; check undoes it",
+    "measure    SCK, stall and read rate, period and width of data ready",
+    "careful 1  longer times on the bus, if the sensor answers wrongly; careful 0",
+    "help       this list",
     "boot       restart; the statistics are kept",
+    "bootsel    start the boot loader, which takes a UF2 file over USB",
     "brownout   program a reset below 2.7 V into the microcontroller",
 ];
 
@@ -67,8 +80,26 @@ pub enum DeviceCommand {
     ArmAutoNull,
     /// Store the present gyro output as the bias in the sensor.
     AutoNull,
+    /// Print all registers of the sensor.
+    DumpRegisters,
+    /// Read a register of the sensor.
+    ReadRegister(Register),
+    /// Write a register of the sensor.
+    WriteRegister(Register, u16),
+    /// Print the times of the bus and of data ready.
+    Measure,
+    /// Run the self-test with its deflections.
+    Deflections,
+    /// Keep longer times on the sensor's bus, or the usual ones.
+    CarefulBus(bool),
+    /// Keep settings and models in flash memory.
+    Persist,
+    /// Erase what is kept there.
+    Forget,
     /// Restart the microcontroller.
     Restart,
+    /// Start the boot loader that takes an image over USB.
+    BootLoader,
 }
 
 /// Why input is no command.
@@ -81,7 +112,7 @@ pub enum CommandError {
 }
 
 /// Longest line in bytes.
-const MAX_LINE: usize = 16;
+const MAX_LINE: usize = 32;
 
 /// Parses commands from received bytes.
 ///
@@ -104,14 +135,14 @@ impl CommandParser {
                 self.line.clear();
                 Some(command)
             }
-            b' ' => None,
             0x08 | 0x7F => {
                 self.line.pop();
                 None
             }
             _ if self.line.is_empty() && key(byte).is_some() => key(byte).map(Ok),
             _ if self.invalid => None,
-            b'a'..=b'z' | b'0'..=b'9' | b'.' if !self.line.is_empty() || LINE_STARTS.contains(&byte) => {
+            b' ' if self.line.is_empty() => None,
+            b'a'..=b'z' | b'0'..=b'9' | b'.' | b'_' | b' ' if !self.line.is_empty() || LINE_STARTS.contains(&byte) => {
                 self.line.push(byte).err().map(|byte| self.reject(byte))
             }
             _ => Some(self.reject(byte)),
@@ -140,15 +171,29 @@ fn key(byte: u8) -> Option<DeviceCommand> {
 }
 
 /// Letters that a line may begin with.
-const LINE_STARTS: &[u8] = b"fgneiwcabp";
+const LINE_STARTS: &[u8] = b"fgneiwcabpdhm";
 
 fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
-    match line {
+    let words = core::str::from_utf8(line).ok()?.split_ascii_whitespace();
+    if let Some(command) = register_command(words) {
+        return Some(command);
+    }
+    let line: Vec<u8, MAX_LINE> = line.iter().copied().filter(|&byte| byte != b' ').collect();
+    match line.as_slice() {
+        b"help" => return Some(DeviceCommand::Help),
+        b"dump" => return Some(DeviceCommand::DumpRegisters),
+        b"measure" => return Some(DeviceCommand::Measure),
+        b"deflect" => return Some(DeviceCommand::Deflections),
+        b"careful1" => return Some(DeviceCommand::CarefulBus(true)),
+        b"careful0" => return Some(DeviceCommand::CarefulBus(false)),
         b"check" => return Some(DeviceCommand::SelfTest),
         b"arm" => return Some(DeviceCommand::ArmAutoNull),
         b"autonull" => return Some(DeviceCommand::AutoNull),
         b"clear" => return Some(DeviceCommand::ResetStatistics),
+        b"persist" => return Some(DeviceCommand::Persist),
+        b"forget" => return Some(DeviceCommand::Forget),
         b"boot" => return Some(DeviceCommand::Restart),
+        b"bootsel" => return Some(DeviceCommand::BootLoader),
         b"brownout" => return Some(DeviceCommand::BrownOut),
         _ => {}
     }
@@ -170,6 +215,17 @@ fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
         (b'w', 1) => Some(DeviceCommand::RawStream(true)),
         _ => None,
     }
+}
+
+/// `peek REGISTER` or `poke REGISTER VALUE`.
+fn register_command<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<DeviceCommand> {
+    let (verb, register) = (words.next()?, register(words.next()?)?);
+    let command = match verb {
+        "peek" => DeviceCommand::ReadRegister(register),
+        "poke" => DeviceCommand::WriteRegister(register, hexadecimal(words.next()?)?),
+        _ => return None,
+    };
+    words.next().is_none().then_some(command)
 }
 
 /// Parses a decimal number as thousandths, truncated after the third decimal; the largest is 4 294 967.295.
@@ -229,7 +285,7 @@ mod tests {
     #[test]
     fn commands_that_change_something_are_whole_lines() {
         assert_eq!(
-            parse("clear\rcheck\narm\rautonull\rboot\rbrownout\rp 3\r"),
+            parse("clear\rcheck\narm\rautonull\rboot\rbrownout\rbootsel\rp 3\r"),
             [
                 Ok(DeviceCommand::ResetStatistics),
                 Ok(DeviceCommand::SelfTest),
@@ -237,7 +293,30 @@ mod tests {
                 Ok(DeviceCommand::AutoNull),
                 Ok(DeviceCommand::Restart),
                 Ok(DeviceCommand::BrownOut),
+                Ok(DeviceCommand::BootLoader),
                 Ok(DeviceCommand::ProductId(3)),
+            ]
+        );
+        assert_eq!(
+            parse("dump\rmeasure\rdeflect\rcareful 1\rcareful 0\rpersist\rforget\rhelp\r"),
+            [
+                Ok(DeviceCommand::DumpRegisters),
+                Ok(DeviceCommand::Measure),
+                Ok(DeviceCommand::Deflections),
+                Ok(DeviceCommand::CarefulBus(true)),
+                Ok(DeviceCommand::CarefulBus(false)),
+                Ok(DeviceCommand::Persist),
+                Ok(DeviceCommand::Forget),
+                Ok(DeviceCommand::Help),
+            ]
+        );
+        assert_eq!(
+            parse("peek smpl_prd\rpeek 36\rpoke sens_avg 0x0402\rpoke 3e 80 \r"),
+            [
+                Ok(DeviceCommand::ReadRegister(Register::SmplPrd)),
+                Ok(DeviceCommand::ReadRegister(Register::SmplPrd)),
+                Ok(DeviceCommand::WriteRegister(Register::SensAvg, 0x0402)),
+                Ok(DeviceCommand::WriteRegister(Register::GlobCmd, 0x0080)),
             ]
         );
         // After an unknown key the line is ignored, except the key `t`, which acts at once.
@@ -254,7 +333,7 @@ mod tests {
             [Err(CommandError::UnknownKey(b'x')), Ok(DeviceCommand::Report), Ok(DeviceCommand::Report)]
         );
         assert_eq!(parse("f1\u{8}\u{8}r"), [Ok(DeviceCommand::Report)], "backspace deletes a letter");
-        let long = "f00000000000000000\r";
+        let long = "f000000000000000000000000000000000\r";
         for wrong in [
             "f\r",
             "f.\r",
@@ -269,6 +348,11 @@ mod tests {
             "e4294968\r",
             "p65536\r",
             "cl3ar\r",
+            "peek\r",
+            "peek smpl\r",
+            "poke 36\r",
+            "poke 36 10000\r",
+            "poke 36 1 2\r",
             long,
         ] {
             let letter = wrong.as_bytes()[0];

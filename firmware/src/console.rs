@@ -1,5 +1,6 @@
 //! Text for a person at a terminal: single lines, and answers of several lines that are made and sent one line at a time.
 
+use crate::bench_console::{deflection_line, dump_line, measurement_line};
 use crate::bench_log::bench_log;
 use crate::board::Board;
 use crate::command::HELP;
@@ -27,6 +28,12 @@ pub(crate) enum Answer {
     Table,
     Counters,
     Status,
+    /// All registers of the sensor.
+    Registers,
+    /// The times of the bus and of data ready.
+    Measurement,
+    /// The self-test with its deflections.
+    Deflections,
 }
 
 /// Text lines and answers that wait to be sent.
@@ -78,9 +85,9 @@ impl Console {
         !self.answers.is_empty()
     }
 
-    /// Sends the next line of the first answer, unless it is a table, whose lines may need a model fit.
+    /// Sends the next line of the first answer, unless it takes long: a table, whose lines may need a model fit, or deflections.
     pub(crate) fn send_quick_line(&mut self, state: &DeviceState, board: &mut impl Board) {
-        if self.answers.front().is_some_and(|answer| *answer != Answer::Table) {
+        if self.answers.front().is_some_and(|answer| !matches!(answer, Answer::Table | Answer::Deflections)) {
             self.send_line(state, board);
         }
     }
@@ -96,6 +103,9 @@ impl Console {
             Answer::Table => report_text::line(state, board, index),
             Answer::Counters => counter_line(&state.health(board), index),
             Answer::Status => status_line(state, board, index),
+            Answer::Registers => dump_line(state, board, index),
+            Answer::Measurement => measurement_line(state, board, index),
+            Answer::Deflections => deflection_line(state, board, index),
         };
         let done = match line {
             AnswerLine::End => {

@@ -4,7 +4,7 @@ use crate::bench_log::bench_log;
 use link::{Health, TextLine, text_line};
 
 /// Number of counters in [`Health`].
-const COUNTERS: usize = 46;
+const COUNTERS: usize = 47;
 /// Time between two comparisons, in µs.
 const COMPARE_US: u64 = 1_000_000;
 
@@ -74,6 +74,7 @@ pub(crate) fn counters(health: &Health) -> [Counter; COUNTERS] {
         settling,
         data_ready_masked,
         gross_errors,
+        usb_dropped,
     } = *health;
     [
         figure("bursts", bursts),
@@ -122,6 +123,7 @@ pub(crate) fn counters(health: &Health) -> [Counter; COUNTERS] {
         event("settling", settling),
         event("data_ready_masked", data_ready_masked),
         event("gross_errors", gross_errors),
+        event("usb_dropped", usb_dropped),
     ]
 }
 

@@ -2,7 +2,7 @@
 //! trouble, and its status register is read when it reports an error.
 
 use crate::bench_log::bench_log;
-use crate::board::Board;
+use crate::board::{Board, BusTiming};
 use crate::channels::{CHANNELS, ChannelSet};
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
@@ -124,6 +124,7 @@ impl DeviceState {
             sensor_resets: recovery.sensor_resets,
             reset_lines: recovery.reset_lines,
             data_ready_masked: board.sampling_activity().masked,
+            usb_dropped: board.transmit_queue(|queue| queue.usb_dropped()),
             bad_commands: self.bad_commands,
             serial_overruns: meters.serial_overruns,
             awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
@@ -207,9 +208,12 @@ impl DeviceState {
         match step {
             None | Some(RecoveryStep::Restart) => {}
             Some(RecoveryStep::Reread) => count(&mut recovery.rereads),
-            Some(RecoveryStep::BusReset) => {
+            Some(step @ (RecoveryStep::BusReset | RecoveryStep::CarefulBus)) => {
                 count(&mut recovery.bus_resets);
                 board.reset_bus();
+                if step == RecoveryStep::CarefulBus {
+                    board.set_bus_timing(BusTiming::CAREFUL);
+                }
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
             Some(RecoveryStep::ResetLine) if board.reset_sensor() => {
@@ -309,7 +313,7 @@ impl DeviceState {
 }
 
 /// Largest serial clock that the sensor takes with a configuration, in Hz.
-fn clock_limit_hz(config: Config) -> u32 {
+pub(crate) fn clock_limit_hz(config: Config) -> u32 {
     match config.sample_period().clock_mode() {
         ClockMode::Normal => BURST_LIMIT_HZ,
         ClockMode::LowPower => LOW_POWER_LIMIT_HZ,

@@ -14,6 +14,7 @@ use allan_core::regression::{Covariate, CovariateRegression, Sensitivity};
 use allan_core::{AllanPoint, Curve};
 use heapless::Vec;
 use link::{MAX_COVARIATES, ReportedShift};
+use serde::{Deserialize, Serialize};
 
 /// The statistics of a finished epoch.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +79,7 @@ impl FinishedEpoch {
 }
 
 /// A covariate with a significant sensitivity.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Regressor {
     /// Index of the covariate in [`CHANNELS`].
     pub covariate: usize,

@@ -17,6 +17,7 @@ use link::{
     LearnedMessage, MAX_DEVIATIONS, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations, ReportedModelError,
     ReportedParameter, ReportedRegressor, ValidationMessage,
 };
+use serde::{Deserialize, Serialize};
 
 /// p-value of the residual under N, B and K above which no further term is searched.
 ///
@@ -27,7 +28,7 @@ const P_VALUE_SUFFICIENT: f64 = 0.2;
 const _: () = assert!(MAX_ADDED == link::MAX_ADDED_TERMS);
 
 /// The model of one channel: only coefficients, since the device stores six of them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpochModel {
     /// N, B and K of the stream itself; `None` before the first fit.
     baseline: Option<BaselineCoefficients>,

@@ -24,11 +24,12 @@
 //! | `task_monitor` | proof that every task is alive, for the watchdog |
 //! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
 //! | `report_text`, [`number_text`] | the report as a table that people read; numbers in it |
-//! | [`console`] | answers in text |
+//! | [`console`], `bench_console` | answers in text; registers, bus times and deflections for a bench |
 //! | `counters`, `bench_log` | the counters by name; what a debug probe reads |
-//! | `transmit` | the queue to the serial port, raw stream |
+//! | `transmit`, [`usb_port`] | the queues to the serial ports, raw stream; the USB port |
 //! | [`command`], `app` | commands, main loop |
 //! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
+//! | `stored_state`, [`settings_store`] | what survives the loss of power, and the flash memory that keeps it |
 //!
 //! Sampling has a higher priority than the estimators, and these a higher one than the main loop. While a lower priority
 //! holds the lock of a shared resource, the interrupts that share it wait; locks are short.
@@ -38,6 +39,7 @@
 
 pub mod acquisition;
 mod app;
+mod bench_console;
 mod bench_log;
 mod board;
 #[cfg_attr(
@@ -69,16 +71,19 @@ pub mod retained;
 mod sample_intake;
 mod scale;
 pub mod sensor;
+pub mod settings_store;
 mod statistics;
 mod status_flags;
+mod stored_state;
 mod task_monitor;
 mod transmit;
+pub mod usb_port;
 
 pub use acquisition::{BurstQueue, EdgeAction, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
 pub use board::{
-    Board, BoardContext, BoardMeters, BrownOutLevel, BusTiming, Chip, DataReadyLine, Locks, SelectTiming, SensorBus,
-    Uptime, WatchdogExtension,
+    Board, BoardContext, BoardMeters, BrownOutLevel, BusTiming, Chip, DataReadyLine, FrameTimes, HostPort, Locks,
+    ReceivedBytes, SelectTiming, SensorBus, Uptime, WatchdogExtension,
 };
 pub use bus_frame::{BusFault, MicrosecondCounter};
 pub use crash_record::CrashRecord;

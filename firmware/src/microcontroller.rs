@@ -2,8 +2,7 @@
 //! file; start-up, interrupts and panics (`image`); load figures and the LED (`processor`); and one module for each
 //! microcontroller.
 //!
-//! A board file sets up pins and clocks in a function that returns [`BoardParts`], and names the interrupts in
-//! [`observatory!`](crate::observatory).
+//! A board is an implementation of [`BoardSupport`], and names its interrupts in [`observatory!`](crate::observatory).
 
 pub mod image;
 pub mod processor;
@@ -14,15 +13,18 @@ pub mod stm32f4;
 
 use crate::board::{BrownOutLevel, DataReadyLine, SensorBus, WatchdogExtension};
 use crate::bus_frame::MicrosecondCounter;
+use crate::settings_store::StoreError;
 use adis16405_driver::BURST_BYTES;
+use core::convert::Infallible;
 use defmt_rtt as _;
+use embedded_hal::digital::OutputPin;
 use heapless::spsc::{Consumer, Producer, Queue};
 use link::{BootCause, ClockSource};
 
 /// The bytes from the serial port to the application.
 pub type ReceiveBuffer = Queue<u8, 64>;
 
-/// The serial port's ends of the queues to and from the application.
+/// The UART's ends of the queues to and from the application.
 pub struct UartQueues {
     /// Bytes to be sent.
     pub transmit: Consumer<'static, u8>,
@@ -30,8 +32,72 @@ pub struct UartQueues {
     pub receive: Producer<'static, u8>,
 }
 
-/// What a board's start-up function returns.
-pub struct BoardParts<M, D, B, P, L> {
+/// A USB port, and the application's ends of its queues.
+pub struct UsbParts<U> {
+    /// The port.
+    pub port: U,
+    /// Bytes to be sent.
+    pub transmit: Producer<'static, u8>,
+    /// Bytes received.
+    pub receive: Consumer<'static, u8>,
+}
+
+impl<U> UsbParts<U> {
+    /// Port and queues of a board that has them.
+    #[must_use]
+    pub fn split(parts: Option<Self>) -> (Option<U>, Option<Producer<'static, u8>>, Option<Consumer<'static, u8>>) {
+        parts.map_or((None, None, None), |Self { port, transmit, receive }| (Some(port), Some(transmit), Some(receive)))
+    }
+}
+
+/// What stands for a part that a board does not have: no value of it exists.
+pub enum NotConnected {}
+
+impl embedded_hal::digital::ErrorType for NotConnected {
+    type Error = Infallible;
+}
+
+impl OutputPin for NotConnected {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        match *self {}
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        match *self {}
+    }
+}
+
+impl ServedPort for NotConnected {
+    fn serve(&mut self) -> u32 {
+        match *self {}
+    }
+}
+
+/// A board: its microcontroller, what is connected to which of its pins, and how it starts.
+pub trait BoardSupport: Sized {
+    /// The peripherals of the microcontroller.
+    type Device;
+    /// Clock, watchdog and restart.
+    type Microcontroller: Microcontroller;
+    /// The pin at DIO1 of the sensor.
+    type DataReady: DataReadyPin;
+    /// SPI with chip select.
+    type Bus: BurstBus;
+    /// The serial port to the host on pins.
+    type Uart: ServedPort;
+    /// That on USB, or [`NotConnected`].
+    type Usb: ServedPort;
+    /// An LED.
+    type Led: OutputPin;
+    /// The pin at RST of the sensor, or [`NotConnected`]. It is low for a reset.
+    type ResetLine: OutputPin;
+
+    /// Starts clocks, watchdog and pins.
+    fn start(device: Self::Device, queues: UartQueues) -> BoardParts<Self>;
+}
+
+/// What a board has after its start.
+pub struct BoardParts<B: BoardSupport> {
     /// Why the microcontroller started.
     pub cause: BootCause,
     /// What the clocks are derived from.
@@ -39,19 +105,26 @@ pub struct BoardParts<M, D, B, P, L> {
     /// Clock of the processor in Hz.
     pub core_hz: u32,
     /// The microcontroller, with running watchdog.
-    pub microcontroller: M,
+    pub microcontroller: B::Microcontroller,
     /// The data-ready pin.
-    pub data_ready: D,
+    pub data_ready: B::DataReady,
     /// The sensor's bus.
-    pub bus: B,
-    /// The serial port to the host.
-    pub port: P,
+    pub bus: B::Bus,
+    /// The serial port to the host on pins.
+    pub uart: B::Uart,
+    /// The serial port to the host on USB.
+    pub usb: Option<UsbParts<B::Usb>>,
     /// The LED.
-    pub led: L,
+    pub led: B::Led,
+    /// The reset pin of the sensor, high.
+    pub reset_line: Option<B::ResetLine>,
 }
 
 /// Clock, watchdog and restart of a microcontroller.
 pub trait Microcontroller: MicrosecondCounter {
+    /// Whether there is memory that keeps a record without power.
+    const KEEPS_RECORD: bool = false;
+
     /// Feeds the watchdog.
     fn feed(&mut self);
     /// Restarts processor and peripherals; the RAM keeps its content.
@@ -60,6 +133,19 @@ pub trait Microcontroller: MicrosecondCounter {
     fn program_brown_out() -> BrownOutLevel {
         BrownOutLevel::Fixed
     }
+    /// As [`Board::read_record`](crate::Board::read_record).
+    fn read_record(_record: &mut [u8]) -> Option<usize> {
+        None
+    }
+    /// As [`Board::write_record`](crate::Board::write_record).
+    ///
+    /// # Errors
+    /// There is no memory for it, or it does not take the record.
+    fn write_record(_record: &[u8]) -> Result<(), StoreError> {
+        Err(StoreError::NoMemory)
+    }
+    /// Starts the boot loader that takes an image over USB; returns if there is none.
+    fn start_boot_loader() {}
     /// To be called at every interrupt of SysTick, of which there are [`processor::WAKE_HZ`] a second: prolongs the time of a
     /// watchdog that is shorter than a step of the main loop.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
@@ -89,8 +175,8 @@ pub enum BurstEnd<'a> {
     Failed,
 }
 
-/// The serial port to the host.
-pub trait UartPort {
+/// A serial port to the host, served in its interrupt.
+pub trait ServedPort {
     /// Moves bytes between the peripheral and its queues as far as possible; returns how many received bytes were lost.
     fn serve(&mut self) -> u32;
 }

@@ -184,6 +184,13 @@ impl<'m> Estimators<'m> {
         self.error_flag = false;
     }
 
+    /// Sampling goes on at `now_us` after a pause of the device's own: what the sensor gave meanwhile is lost, and it is not
+    /// suspect.
+    pub(crate) fn mark_resumed(&mut self, now_us: u64) {
+        self.monitor.mark_probed(now_us);
+        self.gate.disarm();
+    }
+
     /// Starts again without samples, for a sensor that has the configuration `config` from now on. The raw stream stays on
     /// or off.
     pub fn restart(&mut self, config: Config) {
@@ -215,6 +222,11 @@ impl<'m> Estimators<'m> {
     /// Starts or stops the raw stream. Bursts that were not sent yet are dropped.
     pub fn set_raw_stream(&mut self, on: bool) {
         self.raw_stream.set(on, self.config.sens_avg());
+    }
+
+    /// Whether the raw stream is on.
+    pub(crate) fn has_raw_stream(&self) -> bool {
+        self.raw_stream.is_on()
     }
 
     /// The estimator of [`CHANNELS`]`[index]`.

@@ -44,7 +44,11 @@ pub struct ProbeScope {
 
 /// The sensor as it is addressed while its power mode may be either: with the stall of low-power mode, at a serial clock of
 /// `sck_hz`.
-fn addressed<SPI: SpiDevice<u8>, D: DelayNs>((bus, delay): (SPI, D), config: Config, sck_hz: u32) -> Adis16405<SPI, D> {
+pub(crate) fn addressed<SPI: SpiDevice<u8>, D: DelayNs>(
+    (bus, delay): (SPI, D),
+    config: Config,
+    sck_hz: u32,
+) -> Adis16405<SPI, D> {
     Adis16405::new(bus, delay, config).with_stall_ns(Timing::DEFAULT.stall_ns.low_power).with_sck_hz(sck_hz)
 }
 

@@ -1,4 +1,4 @@
-//! Transmission to the host: the queue that the serial port empties, and the packing of bursts into raw messages.
+//! Transmission to the host: the queues that the serial ports empty, and the packing of bursts into raw messages.
 
 use adis16405_driver::Burst;
 use heapless::{Vec, spsc};
@@ -8,28 +8,46 @@ use link::{Encoder, MAX_FRAME, MAX_RAW_FRAME, MAX_TEXT, MessageRef, RawBurst, Ra
 /// enclosing bytes.
 const BUFFER_SLOTS: usize = MAX_FRAME + RAW_RESERVE + MAX_TEXT + 8;
 
-/// The bytes from the application to the serial port.
+/// The bytes from the application to a serial port.
 pub type TransmitBuffer = spsc::Queue<u8, BUFFER_SLOTS>;
 
 /// Room in bytes that reports leave for the raw stream: two raw messages.
 const RAW_RESERVE: usize = 2 * MAX_RAW_FRAME;
 
-/// Encodes messages and text lines into the [`TransmitBuffer`], each completely or not at all.
+/// Encodes messages and text lines for the UART, each completely or not at all, and copies them to the USB port of a board that
+/// has one.
+///
+/// The UART, which is always emptied at its baud rate, decides what is sent. A message for which the USB port has no room is
+/// dropped there alone, and counted: a host that does not read costs what it does not read.
 pub struct TransmitQueue<'q> {
     encoder: Encoder,
-    buffer: spsc::Producer<'q, u8>,
+    uart: spsc::Producer<'q, u8>,
+    usb: Option<spsc::Producer<'q, u8>>,
+    usb_dropped: u32,
 }
 
 impl<'q> TransmitQueue<'q> {
-    /// A queue whose first message has the sequence number 0.
-    pub fn new(buffer: spsc::Producer<'q, u8>) -> Self {
-        Self { encoder: Encoder::new(), buffer }
+    /// A queue to a UART alone, whose first message has the sequence number 0.
+    pub fn new(uart: spsc::Producer<'q, u8>) -> Self {
+        Self { encoder: Encoder::new(), uart, usb: None, usb_dropped: 0 }
+    }
+
+    /// Copies everything to a USB port too, if there is one.
+    #[must_use]
+    pub fn with_usb(self, usb: Option<spsc::Producer<'q, u8>>) -> Self {
+        Self { usb, ..self }
     }
 
     /// Whether there is room for the longest message and, after it, for the raw stream's reserve.
     #[must_use]
     pub fn has_room(&self) -> bool {
-        self.free() >= MAX_FRAME + RAW_RESERVE
+        free(&self.uart) >= MAX_FRAME + RAW_RESERVE
+    }
+
+    /// Messages and text lines that the USB port had no room for.
+    #[must_use]
+    pub fn usb_dropped(&self) -> u32 {
+        self.usb_dropped
     }
 
     /// Queues a message. Returns false, and drops it, if the longest message of its kind would not fit; the receiver counts
@@ -39,10 +57,16 @@ impl<'q> TransmitQueue<'q> {
             MessageRef::Log(_) | MessageRef::Raw(_) => MAX_RAW_FRAME,
             _ => MAX_FRAME,
         };
-        let fits = self.free() >= longest;
+        let fits = free(&self.uart) >= longest;
         if fits {
-            let buffer = &mut self.buffer;
-            self.encoder.encode(message, &mut |bytes| put(buffer, bytes));
+            let mut usb = room(&mut self.usb, longest, &mut self.usb_dropped);
+            let uart = &mut self.uart;
+            self.encoder.encode(message, &mut |bytes| {
+                put(uart, bytes);
+                if let Some(usb) = &mut usb {
+                    put(usb, bytes);
+                }
+            });
         } else {
             self.encoder.skip();
         }
@@ -52,16 +76,33 @@ impl<'q> TransmitQueue<'q> {
     /// Queues a text line. Returns false if it does not fit.
     pub fn send_text(&mut self, line: &TextLine) -> bool {
         let bytes = wire_bytes(line);
-        let fits = self.free() >= bytes.len();
+        let fits = free(&self.uart) >= bytes.len();
         if fits {
-            put(&mut self.buffer, &bytes);
+            put(&mut self.uart, &bytes);
+            if let Some(usb) = room(&mut self.usb, bytes.len(), &mut self.usb_dropped) {
+                put(usb, &bytes);
+            }
         }
         fits
     }
+}
 
-    fn free(&self) -> usize {
-        self.buffer.capacity() - self.buffer.len()
+fn free(queue: &spsc::Producer<'_, u8>) -> usize {
+    queue.capacity() - queue.len()
+}
+
+/// The queue if it has room for `length` bytes; counts what is dropped otherwise.
+fn room<'a, 'q>(
+    queue: &'a mut Option<spsc::Producer<'q, u8>>,
+    length: usize,
+    dropped: &mut u32,
+) -> Option<&'a mut spsc::Producer<'q, u8>> {
+    let queue = queue.as_mut()?;
+    if free(queue) >= length {
+        return Some(queue);
     }
+    *dropped = dropped.saturating_add(1);
+    None
 }
 
 fn put(buffer: &mut spsc::Producer<'_, u8>, bytes: &[u8]) {

@@ -76,13 +76,6 @@ pub(crate) enum Command {
     /// Show a device that runs the firmware, or a recording that is replayed, while its record grows: verdict, curves, findings,
     /// health. Prints lines where standard output is no terminal.
     Monitor(MonitorArguments),
-    /// Convert an image for the Raspberry Pi Pico to the UF2 file that its boot loader takes.
-    Uf2 {
-        /// The image, an ELF.
-        elf: PathBuf,
-        /// The file to write.
-        out: PathBuf,
-    },
 }
 
 /// Recordings to analyse, and where the report goes.

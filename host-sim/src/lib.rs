@@ -1,4 +1,3 @@
 //! Parts of the command `host-sim` that tests of the whole system use as well.
 
 pub mod monitor;
-pub mod uf2;

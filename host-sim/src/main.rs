@@ -21,7 +21,7 @@ mod streaming;
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command, MonitorArguments, ReplayArguments};
-use host_sim::{monitor, uf2};
+use host_sim::monitor;
 use inspect::Question;
 use live::{DeviceSource, GrowingRecording};
 use mimalloc::MiMalloc;
@@ -29,9 +29,8 @@ use output_files::OutputFiles;
 use recordings::Printable;
 use recordings::serial::{self, SerialLink};
 use std::ffi::c_long;
-use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -121,7 +120,6 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
         }
         Some(Command::Explain(arguments)) => explain::run(&arguments),
         Some(Command::Monitor(arguments)) => monitor_source(&arguments),
-        Some(Command::Uf2 { elf, out }) => convert_image(&elf, &out),
     }
 }
 
@@ -162,14 +160,6 @@ fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Re
         return output::print(|out| writeln!(out, "{}", monitor::summary(&cable.counters())));
     }
     Ok(monitor::show(&mut cable, deadline, &mut io::stdout().lock())?)
-}
-
-fn convert_image(elf: &Path, out: &Path) -> Result<()> {
-    let files = OutputFiles::beside([elf]);
-    files.check(out)?;
-    let image = fs::read(elf).with_context(|| elf.display().to_string())?;
-    let uf2 = uf2::from_elf(&image).with_context(|| elf.display().to_string())?;
-    files.write(out, &uf2)
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

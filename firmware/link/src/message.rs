@@ -450,4 +450,6 @@ pub struct Health {
     /// Bursts of which a channel was refused as a gross error: further from the sample before than its noise makes likely, and
     /// not followed by another such sample.
     pub gross_errors: u32,
+    /// Messages and text lines that were not copied to the USB port, since the host did not read it.
+    pub usb_dropped: u32,
 }

@@ -47,27 +47,27 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
 
 /// Defines the image of a board: start-up, interrupts and main loop.
 ///
-/// `start` takes the peripherals of `device` and the [`UartQueues`](crate::microcontroller::UartQueues) and returns
-/// [`BoardParts`](crate::microcontroller::BoardParts) of the given types. The interrupts are those of the data-ready edge, of
-/// the end of a burst, of the serial port, and, for the estimators, one whose peripheral is not used.
+/// `board` implements [`BoardSupport`](crate::microcontroller::BoardSupport) for the peripherals of `device`. The interrupts are those of
+/// the data-ready edge, of the end of a burst, of the UART, of USB if the board has it, and, for the estimators, one whose
+/// peripheral is not used. The board's package needs the crates `rtic`, `heapless` and `cortex-m-rt`, and their features
+/// of this one.
 ///
 /// | priority | interrupt |
 /// |---|---|
-/// | 4 | serial port: short, so that no received byte is lost |
+/// | 4 | UART: short, so that no received byte is lost |
 /// | 3 | data ready, end of a burst |
 /// | 2 | estimators |
-/// | 1 | SysTick: blinks the LED, wakes the main loop |
+/// | 1 | SysTick: blinks the LED, wakes the main loop; USB, whose host waits |
 /// | 0 | main loop: commands, probing, reports, learning |
 #[macro_export]
 macro_rules! observatory {
     (
+        board: $board:ty;
         device: $($device:ident)::+;
-        start: $start:ident;
-        microcontroller: $microcontroller:ty;
-        data_ready: $data_ready:ty, $edge:ident;
-        bus: $bus:ty, $burst_end:ident;
-        port: $port:ty, $serial:ident;
-        led: $led:ty;
+        data_ready: $edge:ident;
+        end_of_burst: $burst_end:ident;
+        uart: $serial:ident;
+        $(usb: $usb_interrupt:ident;)?
         estimators: $free:ident;
     ) => {
         #[rtic::app(device = $($device)::+, peripherals = true)]
@@ -80,19 +80,22 @@ macro_rules! observatory {
                 Blinker, ESTIMATOR_CYCLES, Interrupts, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
             };
             use $crate::microcontroller::{
-                BoardParts, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer, UartPort as _, UartQueues,
+                BoardParts, BoardSupport, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer,
+                ServedPort as _, UartQueues, UsbParts,
             };
             use $crate::{
-                BoardContext, BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, Locks, MicrosecondCounter as _, Sampler, Start, Statistics,
-                TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
+                BoardContext, BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, Locks, MicrosecondCounter as _, ReceivedBytes, Sampler, Start,
+                Statistics, TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
             };
+
+            type Mcu = <$board as BoardSupport>::Microcontroller;
 
             #[shared]
             struct Shared {
                 uptime: Uptime,
-                bus: $bus,
+                bus: <$board as BoardSupport>::Bus,
                 sampler: Sampler<'static>,
-                line: $data_ready,
+                line: <$board as BoardSupport>::DataReady,
                 estimators: Estimators<'static>,
                 transmit_queue: TransmitQueue<'static>,
             }
@@ -100,10 +103,11 @@ macro_rules! observatory {
             #[local]
             struct Local {
                 bursts: Consumer<'static, TimedBurst>,
-                port: $port,
-                processor: Processor<$microcontroller>,
-                blinker: Blinker<$led>,
-                received: Consumer<'static, u8>,
+                uart: <$board as BoardSupport>::Uart,
+                usb: Option<<$board as BoardSupport>::Usb>,
+                processor: Processor<Mcu, <$board as BoardSupport>::ResetLine>,
+                blinker: Blinker<<$board as BoardSupport>::Led>,
+                received: ReceivedBytes<'static>,
                 start: Option<Start>,
             }
 
@@ -118,24 +122,29 @@ macro_rules! observatory {
                 let (to_port, transmit) = context.local.transmit_buffer.split();
                 let (receive, received) = context.local.receive_buffer.split();
                 let (to_estimators, bursts) = context.local.burst_queue.split();
-                let BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, port, led } =
-                    $start(context.device, UartQueues { transmit, receive });
+                let BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line } =
+                    <$board>::start(context.device, UartQueues { transmit, receive });
+                let (usb, to_usb, from_usb) = UsbParts::split(usb);
                 let interrupts = Interrupts {
-                    transmit: || rtic::pend(Interrupt::$serial),
+                    transmit: || {
+                        rtic::pend(Interrupt::$serial);
+                        $(rtic::pend(Interrupt::$usb_interrupt);)?
+                    },
                     end_burst: || rtic::pend(Interrupt::$burst_end),
                 };
-                let processor = Processor::new(microcontroller, core_hz, context.core.SYST, interrupts);
+                let processor = Processor::new((microcontroller, core_hz), context.core.SYST, interrupts, reset_line);
                 let (boot, retained) = restore(cause, clock);
                 let shared = Shared {
-                    uptime: Uptime::new(<$microcontroller>::counter()),
+                    uptime: Uptime::new(Mcu::counter()),
                     bus,
                     sampler: Sampler::new(to_estimators),
                     line: data_ready,
                     estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
-                    transmit_queue: TransmitQueue::new(to_port),
+                    transmit_queue: TransmitQueue::new(to_port).with_usb(to_usb),
                 };
                 let start = Some(Start { boot, retained, finished: context.local.finished });
-                (shared, Local { bursts, port, processor, blinker: Blinker::new(led, clock), received, start })
+                let (blinker, received) = (Blinker::new(led, clock), ReceivedBytes { uart: received, usb: from_usb });
+                (shared, Local { bursts, uart, usb, processor, blinker, received, start })
             }
 
             #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, line, estimators, transmit_queue])]
@@ -160,7 +169,7 @@ macro_rules! observatory {
                     let data_ready::SharedResources { uptime, bus, sampler, line, .. } = context.shared;
                     (uptime, bus, sampler, line).lock(|uptime, bus, sampler, line| {
                         line.clear();
-                        match sampler.data_ready(uptime.at(<$microcontroller>::counter())) {
+                        match sampler.data_ready(uptime.at(Mcu::counter())) {
                             EdgeAction::StartBurst => bus.start_burst(),
                             EdgeAction::Mask => line.set_masked(true),
                             EdgeAction::Ignore => {}
@@ -192,24 +201,32 @@ macro_rules! observatory {
                     });
                 });
                 rtic::pend(Interrupt::$serial);
+                $(rtic::pend(Interrupt::$usb_interrupt);)?
             }
 
-            #[task(binds = $serial, priority = 4, local = [port])]
-            fn port(context: port::Context) {
-                count_lost_bytes(context.local.port.serve());
+            #[task(binds = $serial, priority = 4, local = [uart])]
+            fn uart(context: uart::Context) {
+                count_lost_bytes(HostPort::Uart, context.local.uart.serve());
             }
+
+            $(#[task(binds = $usb_interrupt, priority = 1, local = [usb])]
+            fn usb(context: usb::Context) {
+                if let Some(port) = context.local.usb {
+                    count_lost_bytes(HostPort::Usb, port.serve());
+                }
+            })?
 
             #[task(binds = SysTick, priority = 1, local = [blinker, extension: WatchdogExtension = WatchdogExtension::START])]
             fn wake(context: wake::Context) {
                 context.local.blinker.tick();
-                <$microcontroller>::extend_watchdog(context.local.extension);
+                Mcu::extend_watchdog(context.local.extension);
             }
         }
 
         #[panic_handler]
         fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
             $crate::microcontroller::image::record_panic(info);
-            <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
+            <<$board as $crate::microcontroller::BoardSupport>::Microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
 
         /// Passes on the exception frame, or, if the stack has overflowed, none and the stack pointer reset to the stack's start.
@@ -233,7 +250,7 @@ macro_rules! observatory {
 
         extern "C" fn faulted(frame: Option<&cortex_m_rt::ExceptionFrame>) -> ! {
             $crate::microcontroller::image::record_fault(frame);
-            <$microcontroller as $crate::microcontroller::Microcontroller>::restart()
+            <<$board as $crate::microcontroller::BoardSupport>::Microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
     };
 }

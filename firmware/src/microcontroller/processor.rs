@@ -1,7 +1,8 @@
 //! The Cortex-M core: sleep, SysTick as the cycle counter, load figures, and the LED, which SysTick blinks.
 
 use super::Microcontroller;
-use crate::board::{BoardMeters, BrownOutLevel, Chip};
+use crate::board::{BoardMeters, BrownOutLevel, Chip, HostPort};
+use crate::settings_store::StoreError;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -12,8 +13,8 @@ use link::ClockSource;
 pub static SAMPLING_CYCLES: AtomicU32 = AtomicU32::new(0);
 /// Longest run of the estimators in cycles; written by their interrupt only.
 pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
-/// Received bytes that were lost; written by the serial port's interrupt only.
-static SERIAL_OVERRUNS: AtomicU32 = AtomicU32::new(0);
+/// Received bytes that each port has lost; written by its interrupt only.
+static SERIAL_OVERRUNS: [AtomicU32; HostPort::COUNT] = [const { AtomicU32::new(0) }; HostPort::COUNT];
 
 /// Rate in Hz at which SysTick wakes the main loop, also without a sensor. At 168 MHz the reload value fits SysTick's 24 bits.
 pub const WAKE_HZ: u32 = 16;
@@ -30,9 +31,10 @@ pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     }
 }
 
-/// Counts received bytes that were lost.
-pub fn count_lost_bytes(lost: u32) {
-    SERIAL_OVERRUNS.store(SERIAL_OVERRUNS.load(Relaxed).saturating_add(lost), Relaxed);
+/// Counts received bytes that `port` has lost.
+pub fn count_lost_bytes(port: HostPort, lost: u32) {
+    let overruns = &SERIAL_OVERRUNS[port as usize];
+    overruns.store(overruns.load(Relaxed).saturating_add(lost), Relaxed);
 }
 
 /// An LED that blinks once a second while the clocks come from the crystal, and eight times a second while they come from the
@@ -64,31 +66,37 @@ impl<L: OutputPin> Blinker<L> {
 
 /// Requests of interrupts.
 pub struct Interrupts {
-    /// That of the serial port, which transmits what is queued.
+    /// Those of the serial ports, which transmit what is queued.
     pub transmit: fn(),
     /// That of the end of a burst.
     pub end_burst: fn(),
 }
 
 /// The processor of a microcontroller.
-pub struct Processor<M> {
+pub struct Processor<M, R> {
     microcontroller: M,
     interrupts: Interrupts,
+    reset_line: Option<R>,
 }
 
-impl<M: Microcontroller> Processor<M> {
+impl<M: Microcontroller, R: OutputPin> Processor<M, R> {
     /// Starts SysTick.
-    pub fn new(microcontroller: M, core_hz: u32, mut systick: SYST, interrupts: Interrupts) -> Self {
+    pub fn new(
+        (microcontroller, core_hz): (M, u32),
+        mut systick: SYST,
+        interrupts: Interrupts,
+        reset_line: Option<R>,
+    ) -> Self {
         systick.set_clock_source(SystClkSource::Core);
         systick.set_reload(core_hz / WAKE_HZ - 1);
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        Self { microcontroller, interrupts }
+        Self { microcontroller, interrupts, reset_line }
     }
 }
 
-impl<M: Microcontroller> Chip for &mut Processor<M> {
+impl<M: Microcontroller, R: OutputPin> Chip for &mut Processor<M, R> {
     fn microseconds(&mut self) -> u32 {
         M::counter()
     }
@@ -117,15 +125,37 @@ impl<M: Microcontroller> Chip for &mut Processor<M> {
         M::restart()
     }
 
+    fn set_reset_line(&mut self, active: bool) -> bool {
+        let Some(line) = &mut self.reset_line else { return false };
+        if active { line.set_low() } else { line.set_high() }.is_ok()
+    }
+
     fn program_brown_out(&mut self) -> BrownOutLevel {
         M::program_brown_out()
+    }
+
+    fn keeps_record(&mut self) -> bool {
+        M::KEEPS_RECORD
+    }
+
+    fn read_record(&mut self, record: &mut [u8]) -> Option<usize> {
+        M::read_record(record)
+    }
+
+    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError> {
+        M::write_record(record)
+    }
+
+    fn start_boot_loader(&mut self) -> bool {
+        M::start_boot_loader();
+        false
     }
 
     fn meters(&mut self) -> BoardMeters {
         let (stack_bytes, stack_size) = stack();
         BoardMeters {
             asleep_us: 0,
-            serial_overruns: SERIAL_OVERRUNS.load(Relaxed),
+            serial_overruns: SERIAL_OVERRUNS.iter().map(|overruns| overruns.load(Relaxed)).fold(0, u32::saturating_add),
             sampling_cycles: SAMPLING_CYCLES.load(Relaxed),
             estimator_cycles: ESTIMATOR_CYCLES.load(Relaxed),
             stack_bytes,

@@ -1,12 +1,13 @@
 //! The firmware's application on the host: the same code as in the image, with the virtual sensor, in virtual time.
 
-use crate::fault_injector::{FaultyBus, InjectedFaults};
+use crate::fault_injector::{FaultEnd, FaultyBus, InjectedFaults};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
+use firmware::settings_store::StoreError;
 use firmware::{
-    App, Board, BoardMeters, BurstQueue, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, RetainedRam, Sampler,
-    SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
+    App, Board, BoardMeters, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort,
+    RetainedRam, Sampler, SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
 use heapless::spsc::Consumer;
 use link::{Boot, BootCause};
@@ -25,6 +26,9 @@ const WATCHDOG_US: u64 = 8_000_000;
 
 /// Stall before the first frame after a burst, µs: that of low-power mode, of which the time of the part may lack a fraction.
 const STALL_US: u64 = 76;
+
+/// Time for which the flash memory takes a record, µs: that of a sector that is erased and of ten pages (Winbond, W25Q16JV).
+const FLASH_WRITE_US: u64 = 50_000;
 
 /// A simulated device: the application, the virtual sensor, and both ends of the serial link, whose transfers take no
 /// virtual time.
@@ -57,6 +61,8 @@ struct SimulatedBoard {
     usable_us: u64,
     /// Data-ready edges that have raised an interrupt.
     edges: u64,
+    /// What is kept without power.
+    record: Option<Vec<u8>>,
 }
 
 impl Device {
@@ -93,6 +99,14 @@ impl Device {
     #[must_use]
     pub fn with_reset_line(mut self) -> Self {
         self.board.reset_line = true;
+        self
+    }
+
+    /// Has a board with a USB port whose host does not read.
+    #[must_use]
+    pub fn with_unread_usb(mut self) -> Self {
+        let (to_port, _unread) = Box::leak(Box::new(TransmitBuffer::new())).split();
+        self.board.transmit_queue = self.board.transmit_queue.with_usb(Some(to_port));
         self
     }
 
@@ -147,6 +161,17 @@ impl Device {
         self.board.restarts
     }
 
+    /// Switches the supply of board and sensor off and on: what is kept without power is kept, and nothing else.
+    #[must_use]
+    pub fn power_cycled(self, part: VirtualAdis16405) -> Self {
+        let record = self.board.record;
+        let memory = Self::blank_memory();
+        let mut board = SimulatedBoard::new(FaultyBus::new(EmulatedBus::with_sck_hz(part, SCK_HZ)), 0);
+        board.record = record;
+        let app = board.boot(BootCause::PowerOn, memory);
+        Self { app, board, memory, restarting: self.restarting }
+    }
+
     fn turn(&mut self) {
         let restarts = self.board.restarts;
         while self.app.turn(&mut self.board) && self.board.restarts == restarts {
@@ -186,6 +211,7 @@ impl SimulatedBoard {
             reset_line: false,
             usable_us: 0,
             edges: 0,
+            record: None,
         }
     }
 
@@ -193,8 +219,9 @@ impl SimulatedBoard {
     fn boot(&mut self, cause: BootCause, memory: &'static RetainedMemory) -> App {
         let fresh = Self::new(self.bus.clone(), self.now_us);
         let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
+        let record = self.record.take();
         let Self { restarts, fixed_clock, reset_line, usable_us, edges, .. } = *self;
-        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, edges, ..fresh };
+        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, edges, record, ..fresh };
         let start = Start {
             boot: Boot { cause, ..Boot::default() },
             retained: RetainedRam::open(memory),
@@ -289,6 +316,14 @@ impl Board for SimulatedBoard {
         self.reset_line
     }
 
+    fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
+        if timing == BusTiming::CAREFUL {
+            let mut faults = self.bus.faults().borrow_mut();
+            faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::CarefulBus);
+        }
+        true
+    }
+
     fn sampling_activity(&mut self) -> SamplingActivity {
         self.sampler.activity()
     }
@@ -301,8 +336,8 @@ impl Board for SimulatedBoard {
         access(&mut self.transmit_queue)
     }
 
-    fn receive(&mut self) -> Option<u8> {
-        self.received.pop_front()
+    fn receive(&mut self) -> Option<(HostPort, u8)> {
+        self.received.pop_front().map(|byte| (HostPort::Uart, byte))
     }
 
     fn meters(&mut self) -> BoardMeters {
@@ -315,5 +350,22 @@ impl Board for SimulatedBoard {
 
     fn restart(&mut self) {
         self.restarts += 1;
+    }
+
+    fn keeps_record(&mut self) -> bool {
+        true
+    }
+
+    fn read_record(&mut self, record: &mut [u8]) -> Option<usize> {
+        let kept = self.record.as_ref()?;
+        record.get_mut(..kept.len())?.copy_from_slice(kept);
+        Some(kept.len())
+    }
+
+    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError> {
+        let written_us = self.now_us() + FLASH_WRITE_US;
+        self.advance_to(written_us);
+        self.record = (!record.is_empty()).then(|| record.to_vec());
+        Ok(())
     }
 }

@@ -55,6 +55,8 @@ pub enum FaultEnd {
     Reset,
     /// With a pulse on the RST line.
     ResetLine,
+    /// With longer times on the bus.
+    CarefulBus,
     /// Not by itself.
     Never,
 }

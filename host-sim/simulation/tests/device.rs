@@ -471,3 +471,79 @@ fn a_failed_self_test_is_no_gate() {
     let used = after(&mut device, "r", 4 * SECOND + 1).health().used;
     assert!(f64::from(used) > 3.8 * 204.8, "{used}");
 }
+
+/// For an hour the host does not read the USB port: its output is lost there, and nothing else. No sample, no restart, no message
+/// of the UART.
+#[test]
+fn an_unread_usb_port_costs_its_output_alone() {
+    const HOUR: u64 = 3600 * SECOND;
+    let part = VirtualAdis16405::new(NoiseModel::paper(), 3);
+    let mut device = Device::new(part, Device::blank_memory()).with_restarts().with_unread_usb();
+    let heard = after(&mut device, "w 1\ri 60\r", HOUR);
+    let last = after(&mut device, "w 0\rr", HOUR + SECOND);
+    let health = last.health();
+    assert_eq!(device.restarts(), 0);
+    assert_eq!((health.used, health.recoveries), (health.bursts, 0), "{health:?}");
+    assert_eq!((health.lost_edges, health.queue_full, health.raw_dropped), (0, 0, 0), "{health:?}");
+    assert!(f64::from(health.used) > 3599.0 * 204.8, "{health:?}");
+    let streamed = heard.messages.iter().filter(|message| matches!(message, Message::Raw(_))).count();
+    assert!(streamed as f64 > 3599.0 * 204.8 / 16.0, "{streamed} messages of the raw stream");
+    // The queue holds some kB of the 20 MB that the UART has sent.
+    let sent = heard.messages.len() + heard.lines.len();
+    assert!((sent as u32 - 100..sent as u32 + 100).contains(&health.usb_dropped), "{} of {sent}", health.usb_dropped);
+}
+
+/// Settings, the raw stream, and the models of the last epoch are kept over a loss of power, which takes everything else; `forget`
+/// erases them.
+#[test]
+fn settings_and_models_survive_the_loss_of_power() {
+    let part = || VirtualAdis16405::new(NoiseModel::paper(), 5);
+    let mut device = Device::new(part(), Device::blank_memory());
+    after(&mut device, "f 819.2\rg 150\rn 3\re 20\ri 7\rw 1\r", 2 * SECOND);
+    let learned = hear(&device.run_until(30 * SECOND));
+    let models: Vec<&Message> = learned.messages.iter().filter(|m| matches!(m, Message::Learned(_))).collect();
+    assert_eq!(models.len(), 6);
+    let kept = learned.logs().into_iter().find(|line| line.starts_with("models kept")).expect("a log").to_owned();
+    assert!(kept.ends_with("not sampled for 50 ms") || kept.ends_with("not sampled for 51 ms"), "{kept}");
+
+    let mut again = device.power_cycled(part());
+    let heard = hear(&again.run_until(8 * SECOND));
+    let hello = heard.hellos()[0];
+    assert_eq!((hello.sample_rate_hz, hello.gyro_full_scale, hello.filter_taps_log2), (819.2, 150, 3));
+    assert_eq!((hello.epoch, hello.epoch_s, hello.boot.starts), (0, 20, 1), "{hello:?}");
+    assert_eq!(heard.reports(), 1, "every 7 s");
+    assert!(heard.messages.iter().any(|message| matches!(message, Message::Raw(_))), "the stream goes on");
+    // The models of before are validated on the first epoch after.
+    let heard = hear(&again.run_until(30 * SECOND));
+    let validated = heard.messages.iter().filter(|message| matches!(message, Message::Validation(_))).count();
+    assert_eq!(validated, 6);
+
+    let heard = after(&mut again, "forget\r", 31 * SECOND);
+    assert!(
+        heard.lines.iter().any(|line| line.starts_with("nothing is kept without power; not sampled")),
+        "{:?}",
+        heard.lines
+    );
+    let mut fresh = again.power_cycled(part());
+    let heard = after(&mut fresh, "r", 2 * SECOND);
+    assert_eq!(heard.hellos()[0].sample_rate_hz, 204.8);
+    assert!(!heard.messages.iter().any(|message| matches!(message, Message::Raw(_))));
+}
+
+/// The samples that a write costs are a gap: lost and counted, and no reason to probe the sensor.
+#[test]
+fn a_write_costs_a_gap_and_no_probe() {
+    let mut device = device();
+    after(&mut device, "i 0\r", 2 * SECOND);
+    let heard = after(&mut device, "persist\r", 4 * SECOND);
+    assert!(
+        heard.lines[0].starts_with("settings and models are kept without power; not sampled for 5"),
+        "{:?}",
+        heard.lines
+    );
+    let health = *after(&mut device, "r", 5 * SECOND).health();
+    assert_eq!((health.recoveries, health.rereads, health.suspect), (0, 0, 0), "{health:?}");
+    // 50 ms at 204.8 SPS.
+    assert!((10..=11).contains(&health.lost_edges), "{health:?}");
+    assert_eq!(health.used, health.bursts);
+}

@@ -55,6 +55,26 @@ fn report_after(device: &mut Device, keys: &str, seconds: f64) -> Heard {
     heard
 }
 
+/// A part that answers wrongly at the usual times of the bus: the fifth step keeps longer ones, and the log says so.
+#[test]
+fn a_part_that_needs_longer_times_gets_them() {
+    let mut device = device();
+    device.run_until(2 * SECOND);
+    device.faults().frames = Some((FrameFault::Shifted, FaultEnd::CarefulBus));
+    let heard = report_after(&mut device, "", 10.0);
+    let steps: Vec<&String> = heard.logs.iter().filter(|line| line.contains("unusable bursts: ")).collect();
+    assert_eq!(steps.len(), 5, "{:#?}", heard.logs);
+    assert!(steps[4].ends_with("careful timing of the bus"), "{}", steps[4]);
+    let health = heard.health.expect("a report");
+    assert_eq!(
+        (health.recoveries, health.rereads, health.bus_resets, health.sensor_resets),
+        (1, 1, 2, 2),
+        "{health:?}"
+    );
+    assert!(f64::from(health_after(&mut device, 2.0).used - health.used) > 1.9 * RATE_HZ, "samples flow");
+    assert_eq!(device.restarts(), 0);
+}
+
 fn health_after(device: &mut Device, seconds: f64) -> Health {
     report_after(device, "", seconds).health.expect("a report")
 }

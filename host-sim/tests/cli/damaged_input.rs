@@ -334,7 +334,7 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
         let line = refusal(&[command, &["--json", name(&file)]].concat());
         assert!(line.contains("is an input"), "{line}");
     }
-    for command in [&["uf2"][..], &["convert"], &["export", "--format", "kalibr"]] {
+    for command in [&["convert"][..], &["export", "--format", "kalibr"]] {
         let line = refusal(&[command, &[name(&file), name(&link)]].concat());
         assert!(line.contains("is an input"), "{command:?}: {line}");
     }

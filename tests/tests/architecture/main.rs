@@ -28,6 +28,8 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("allan-core-python", "allan-core"),
     ("link", ""),
     ("firmware", "adis16405-driver allan-core link"),
+    ("image-file", ""),
+    ("example-board", "firmware link"),
     ("measurement", "allan-core"),
     ("recordings", "adis16405-driver link measurement"),
     ("noise-analysis", "allan-core measurement"),

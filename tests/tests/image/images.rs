@@ -17,19 +17,24 @@ pub(crate) fn folder() -> PathBuf {
 /// Builds the image `observatory-{board}` for a target, with further features, and returns the path of its ELF: a copy, since
 /// cargo overwrites the image when it builds it with other features.
 pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
+    let (feature, bin) = (format!("board-{board}"), format!("observatory-{board}"));
+    let copy = [&[bin.as_str()], further].concat().join("-");
+    build_package(("firmware", &bin), target, &[&[feature.as_str()], further].concat(), &copy)
+}
+
+/// Builds the program of a package for a target, and returns the path of a copy of its ELF with the name `copy`.
+pub(crate) fn build_package((package, bin): (&str, &str), target: &str, features: &[&str], copy: &str) -> PathBuf {
     static BUILD: Mutex<()> = Mutex::new(());
     let _one_at_a_time = BUILD.lock();
-    let bin = format!("observatory-{board}");
-    let feature = [&[format!("board-{board}").as_str()], further].concat().join(",");
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace())
-        .args(["build", "--package", "firmware", "--bin", &bin, "--features", &feature, "--target", target])
+        .args(["build", "--package", package, "--bin", bin, "--features", &features.join(","), "--target", target])
         .args(["--profile", "image", "--locked", "--target-dir"])
         .arg(folder())
         .status()
         .expect("cargo starts");
     assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    let copy = folder().join([&[bin.as_str()], further].concat().join("-")).with_extension("elf");
+    let copy = folder().join(copy).with_extension("elf");
     // Renamed when it is whole: another run of the tests may be reading the one before.
     let partial = copy.with_extension(std::process::id().to_string());
     std::fs::copy(folder().join(target).join("image").join(bin), &partial).expect("room");

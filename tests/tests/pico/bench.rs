@@ -2,7 +2,7 @@
 
 use crate::images;
 use adis16405_driver::BURST_BYTES;
-use host_sim::uf2;
+use image_file::uf2;
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -17,17 +17,29 @@ struct Bench {
     uf2: PathBuf,
 }
 
+const TARGET: &str = "thumbv6m-none-eabi";
+
+impl Bench {
+    fn new(elf: PathBuf) -> Self {
+        let blocks = uf2::from_elf(&std::fs::read(&elf).expect("the image")).expect("an image for the Pico");
+        let uf2 = elf.with_extension("uf2");
+        std::fs::write(&uf2, blocks).expect("room");
+        Self { emulator: emulator(), elf, uf2 }
+    }
+}
+
 /// Built at most once a run; `OBSERVATORY_PICO_IMAGE` names another image.
 fn bench() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
-        let build = || images::build("pico", "thumbv6m-none-eabi", &[]);
-        let elf = std::env::var_os("OBSERVATORY_PICO_IMAGE").map_or_else(build, PathBuf::from);
-        let blocks = uf2::from_elf(&std::fs::read(&elf).expect("the image")).expect("an image for the Pico");
-        let uf2 = images::folder().join("observatory-pico.uf2");
-        std::fs::write(&uf2, blocks).expect("room");
-        Bench { emulator: emulator(), elf, uf2 }
+        let build = || images::build("pico", TARGET, &[]);
+        Bench::new(std::env::var_os("OBSERVATORY_PICO_IMAGE").map_or_else(build, PathBuf::from))
     })
+}
+
+/// The example of a board outside of `firmware`.
+fn example_bench() -> Bench {
+    Bench::new(images::build_package(("example-board", "example-board"), TARGET, &["image"], "example-board"))
 }
 
 fn emulator() -> PathBuf {
@@ -63,8 +75,16 @@ pub(crate) struct Outcome {
     pub(crate) part: VirtualAdis16405,
     /// The bytes sent to the processor in each burst, with the number of the part's latest sample at that time.
     pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
-    /// Bytes from the serial port, each with its time in ns.
+    /// Bytes from the UART, each with its time in ns.
     pub(crate) received: Vec<(u64, u8)>,
+    /// Bytes from the USB port, likewise.
+    pub(crate) received_by_usb: Vec<(u64, u8)>,
+    /// What the USB descriptors say: vendor and product, their names, the serial number, the current.
+    pub(crate) usb_device: String,
+    /// Pulses on the sensor's RST line.
+    pub(crate) resets: u32,
+    /// When the program started the boot loader, in ns.
+    pub(crate) boot_loader_at: Option<u64>,
     pub(crate) instructions: u64,
     /// Changes of the LED's level.
     pub(crate) led_changes: u64,
@@ -83,6 +103,10 @@ pub(crate) struct Outcome {
 pub(crate) struct Pico {
     pub(crate) crystal_starts: bool,
     pub(crate) fault: Option<(f64, Fault)>,
+    /// From when on a USB host reads the port, in s; `None` without a host.
+    pub(crate) usb_reads_at: Option<f64>,
+    /// The file with the flash memory that keeps the settings.
+    pub(crate) settings: Option<&'static str>,
 }
 
 /// A fault of the microcontroller, by its name in `emulator.mjs`.
@@ -98,8 +122,8 @@ pub(crate) enum Fault {
     LockUp,
 }
 
-/// A board without a fault.
-pub(crate) const SOUND: Pico = Pico { crystal_starts: true, fault: None };
+/// A board without a fault and without a USB host.
+pub(crate) const SOUND: Pico = Pico { crystal_starts: true, fault: None, usb_reads_at: None, settings: None };
 
 impl Pico {
     /// A board with one fault, at a time in s.
@@ -108,12 +132,13 @@ impl Pico {
     }
 
     /// The arguments of the emulator.
-    fn arguments(self) -> [String; 3] {
+    fn arguments(self) -> [String; 5] {
         let crystal = if self.crystal_starts { "ok" } else { "dead" };
         let (at_s, fault) = self.fault.map_or(("0".to_owned(), "none".to_owned()), |(at_s, fault)| {
             (at_s.to_string(), format!("{fault:?}").to_lowercase())
         });
-        [crystal.to_owned(), fault, at_s]
+        let usb = self.usb_reads_at.map_or_else(|| "none".to_owned(), |at_s| at_s.to_string());
+        [crystal.to_owned(), fault, at_s, usb, self.settings.unwrap_or("none").to_owned()]
     }
 }
 
@@ -122,16 +147,31 @@ pub(crate) fn image() -> &'static Path {
     &bench().elf
 }
 
-/// Boots the image from its UF2 and runs it. A key is given as `TIME=TEXT`; `events` are in order of time. Times are in
+/// Boots the image from its UF2 and runs it. A key is given as `TIME=TEXT`, or as `usb:TIME=TEXT` for the USB port; `events` are in order of time. Times are in
 /// s.
 pub(crate) fn run(
+    board: Pico,
+    part: VirtualAdis16405,
+    seconds: f64,
+    keys: &[&str],
+    events: &[(f64, Event)],
+) -> Outcome {
+    run_image(bench(), board, part, seconds, keys, events)
+}
+
+/// As [`run`], with the image of the example of a board.
+pub(crate) fn run_example(part: VirtualAdis16405, seconds: f64, keys: &[&str], events: &[(f64, Event)]) -> Outcome {
+    run_image(&example_bench(), SOUND, part, seconds, keys, events)
+}
+
+fn run_image(
+    Bench { emulator, elf, uf2 }: &Bench,
     board: Pico,
     mut part: VirtualAdis16405,
     seconds: f64,
     keys: &[&str],
     events: &[(f64, Event)],
 ) -> Outcome {
-    let Bench { emulator, elf, uf2 } = bench();
     let mut events: VecDeque<(u64, Event)> = events.iter().map(|&(at, event)| ((at * 1e9) as u64, event)).collect();
     let (mut stuck_at, mut edges_lost) = (None, false);
     let (mut announced, mut selected) = (0, false);
@@ -148,6 +188,8 @@ pub(crate) fn run(
         .expect("Node.js 18 or later starts");
     let (mut answers, mut questions) = (node.stdin.take().expect("a pipe"), node.stdout.take().expect("a pipe"));
     let (mut bursts, mut received, mut frame) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut received_by_usb, mut usb_device, mut boot_loader_at) = (Vec::new(), String::new(), None);
+    let mut resets = 0;
     let (mut instructions, mut led_changes, mut longest_unfed_s) = (0, 0, 0.0);
     let (mut registers, mut sck_hz, mut selected_at, mut shortest_slow_read_ns) = (Vec::new(), 0.0, 0, u64::MAX);
     let mut question = [0; 9];
@@ -155,7 +197,7 @@ pub(crate) fn run(
         let [kind, value @ ..] = question;
         let value = f64::from_le_bytes(value);
         let mut byte = [0];
-        if matches!(kind, b'b' | b'u') {
+        if matches!(kind, b'b' | b'u' | b'v' | b'x') {
             questions.read_exact(&mut byte).expect("a byte");
         }
         match kind {
@@ -163,13 +205,16 @@ pub(crate) fn run(
             b'l' => led_changes = value as u64,
             b'w' => longest_unfed_s = value * 1e-9,
             b'r' => registers.push(value as u32),
+            b'o' => boot_loader_at = Some(value as u64),
+            b'x' => usb_device.push(char::from(byte[0])),
+            b'v' => received_by_usb.push((value as u64, byte[0])),
             b'c' => {
                 sck_hz = value;
                 part.set_sck_hz(Some(value as u32));
             }
             _ => {}
         }
-        if matches!(kind, b'c' | b'e' | b'l' | b'r' | b'w') {
+        if matches!(kind, b'c' | b'e' | b'l' | b'o' | b'r' | b'v' | b'w' | b'x') {
             continue;
         }
         part.advance_to(value as u64);
@@ -197,6 +242,11 @@ pub(crate) fn run(
                 }
                 part.select();
                 frame.clear(); // a restart may have cut the one before
+            }
+            b'z' => part.power_off(),
+            b'Z' => {
+                part.power_on();
+                resets += 1;
             }
             b'd' => {
                 selected = false;
@@ -229,6 +279,10 @@ pub(crate) fn run(
         part,
         bursts,
         received,
+        received_by_usb,
+        usb_device,
+        resets,
+        boot_loader_at,
         instructions,
         led_changes,
         longest_unfed_s,

@@ -1,13 +1,16 @@
 // Runs an RP2040 image in rp2040js. The sensor is simulated by the parent process, to which questions go over standard
 // output, and from which answers come over standard input. The frequency of SCK goes with every frame. Arguments: the folder of
 // rp2040js, the image as UF2 and as ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, a fault and its
-// time in s, and keys as TIME=TEXT. The faults: `none`, `dma` (an error of the channel that receives a burst), `divisor` (the
-// firmware divides by 0), `exception`, `lockup`. A restart by the watchdog or by the firmware keeps the memory.
+// time in s, `none` or the time in s from which a USB host reads the serial port, `none` or a file with the flash memory that keeps
+// the settings, which is written at the end, and keys as TIME=TEXT for the UART and usb:TIME=TEXT. The faults: `none`, `dma` (an error
+// of the channel that receives a burst), `divisor` (the firmware divides by 0), `exception`, `lockup`. A restart by the watchdog or
+// by the firmware keeps the memory.
 //
 // A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `c` has a frequency of SCK in
 // Hz in the place of the time, `s` and `d` are
 // the falling and the rising edge of chip select, `b` and a further byte a transfer over SPI, `u` and a further byte an
-// output of the serial port. At the end follow, in the place of the time, `r` with the registers of which the test asserts bits
+// output of the UART, `v` and a further byte one of the USB port, `x` and a further byte a letter of what its descriptors say, `o`
+// the start of the boot loader, which ends the run, `z` and `Z` the falling and the rising edge of the sensor's RST. At the end follow, in the place of the time, `r` with the registers of which the test asserts bits
 // (SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog), `l` with the number of changes of the LED, `w` with
 // the longest time in ns for which the watchdog was not fed, and `e` with the number of instructions. The answer to `n` is
 // the number of samples and the time of the next one (two f64), that to `b` a byte; the others have none.
@@ -15,16 +18,23 @@ import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const [folder, uf2File, elfFile, seconds, crystal, fault, faultSeconds, ...keyArguments] = process.argv.slice(2);
+const [folder, uf2File, elfFile, seconds, crystal, fault, faultSeconds, usbReads, settingsFile, ...keyArguments] = process.argv.slice(2);
 const load = (file) => import(pathToFileURL(path.join(folder, 'node_modules/rp2040js/dist/esm', file)));
 const { RP2040, GPIOPinState } = await load('index.js');
 const { SimulationClock } = await load('clock/simulation-clock.js');
+const bootRom = await import(pathToFileURL(path.join(import.meta.dirname, 'boot-rom.mjs')));
+const usbHost = await import(pathToFileURL(path.join(import.meta.dirname, 'usb-host.mjs')));
 
-const PIN_SELECT = 17, PIN_DATA_READY = 20, PIN_LED = 25, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
+const PIN_SELECT = 17, PIN_DATA_READY = 20, PIN_RESET = 21, PIN_LED = 25, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
+const USB_INTERRUPT = 5; // of the NVIC (data sheet, section 2.3.2)
+const SETTINGS = 0x1f0000; // in flash, to the end of 2 MiB
 const FLASH = 0x10000000, WATCHDOG = 0x40058;
 const HARD_FAULT = 3; // number of the exception
-const keys = keyArguments.map((key) => [parseFloat(key) * 1e9, key.slice(key.indexOf('=') + 1)]);
-const end = seconds * 1e9;
+const keys = keyArguments.map((key) => {
+  const isUsb = key.startsWith('usb:');
+  return [isUsb, parseFloat(isUsb ? key.slice(4) : key) * 1e9, key.slice(key.indexOf('=') + 1)];
+});
+let end = seconds * 1e9;
 
 const diagnostics = new Map();
 const report = (from, text) => diagnostics.set(`${from}: ${text}`, true);
@@ -65,7 +75,8 @@ const ask = (kind, value, byte, answerLength) => {
   return answer;
 };
 
-// What outlasts a restart of the microcontroller: the time, the sensor's samples, the fault, the counts.
+// What outlasts a restart of the microcontroller: its settings, the time, the sensor's samples, the fault, the counts.
+let settings = fs.existsSync(settingsFile) ? fs.readFileSync(settingsFile) : undefined;
 let startedAt = 0, samples = 0, instructions = 0, ledChanges = 0, longestUnfed = 0;
 let faultAt = parseFloat(faultSeconds) * 1e9;
 
@@ -78,8 +89,9 @@ const run = (retained, reason) => {
   const mcu = new RP2040(clock);
   mcu.logger = { debug() {}, info() {}, warn: report, error: report };
   program(mcu);
+  if (settings) mcu.flash.set(settings, SETTINGS);
   if (retained) mcu.sram.set(retained);
-  // The boot ROM copies the second stage to the top of memory and calls it; rp2040js has no boot ROM.
+  // The boot ROM copies the second stage to the top of memory and calls it.
   mcu.sram.set(mcu.flash.subarray(0, 252), 0x41f00);
   Object.assign(mcu.core, { SP: 0x20041f00, LR: 0, PC: 0x20041f00 });
   // The registers with the cause of the reset of the chip, which rp2040js lacks: power-on.
@@ -133,6 +145,11 @@ const run = (retained, reason) => {
     if (state === GPIOPinState.High) ask('d', now(), undefined, 0);
   });
   const isDriven = (state) => state === GPIOPinState.Low || state === GPIOPinState.High;
+  // Where it is connected: the part is without supply while RST is low.
+  mcu.gpio[PIN_RESET].addListener((state, before) => {
+    if (state === GPIOPinState.Low && before === GPIOPinState.High) ask('z', now(), undefined, 0);
+    if (state === GPIOPinState.High && before === GPIOPinState.Low) ask('Z', now(), undefined, 0);
+  });
   mcu.gpio[PIN_LED].addListener((state, before) => (ledChanges += isDriven(state) && isDriven(before) ? 1 : 0));
   mcu.uart[0].onByte = (byte) => ask('u', now(), byte, 0);
 
@@ -149,10 +166,34 @@ const run = (retained, reason) => {
     edge.schedule(Math.max(1, Math.min(next - now(), STRIDE_NS)));
   });
   edge.schedule(1);
-  for (const [at, text] of keys) {
-    const feed = () => [...text].forEach((key) => mcu.uart[0].feedByte(key.charCodeAt(0)));
-    if (at >= now()) clock.createAlarm(feed).schedule(at - now());
+  // The processor clears a pending interrupt when it enters the handler, and sets it again if its line is still active when it
+  // returns. rp2040js clears it with the line alone, so that a request of the program, which the USB port makes, would never end.
+  const { core } = mcu;
+  const [enter, leave] = [core.exceptionEntry.bind(core), core.exceptionReturn.bind(core)];
+  core.exceptionEntry = (number) => {
+    if (number === 16 + USB_INTERRUPT) core.pendingInterrupts &= ~(1 << USB_INTERRUPT);
+    enter(number);
+  };
+  core.exceptionReturn = (...how) => {
+    const result = leave(...how);
+    if (mcu.usbCtrl.intStatus) mcu.usbCtrl.checkInterrupts();
+    return result;
+  };
+  const sendBytes = (kind, bytes) => bytes.forEach((byte) => ask(kind, now(), byte, 0));
+  const typeOverUsb = usbReads === 'none' ? undefined : usbHost.connect(
+    mcu, clock, parseFloat(usbReads) * 1e9 - startedAt,
+    (text) => sendBytes('x', Buffer.from(text)),
+    (packet) => sendBytes('v', packet),
+  );
+  const typeOverUart = (text) => [...text].forEach((key) => mcu.uart[0].feedByte(key.charCodeAt(0)));
+  for (const [isUsb, at, text] of keys) {
+    if (at >= now()) clock.createAlarm(() => (isUsb ? typeOverUsb : typeOverUart)(text)).schedule(at - now());
   }
+  bootRom.load(mcu, (ns) => clock.tick(ns), (masks) => {
+    if (masks.some((mask) => mask !== 0)) throw new Error(`boot loader with ${masks}`);
+    ask('o', now(), undefined, 0);
+    end = 0;
+  });
 
   // Faults of the processor, which happen between two instructions.
   const fail = {
@@ -180,11 +221,13 @@ const run = (retained, reason) => {
     }
   }
   startedAt = now();
+  settings = mcu.flash.slice(SETTINGS, 2 << 20);
   return mcu;
 };
 
 let mcu = run(undefined, 0);
 while (startedAt < end) mcu = run(mcu.sram, mcu.peripherals[WATCHDOG].reason);
+if (settingsFile !== 'none') fs.writeFileSync(settingsFile, settings);
 for (const diagnostic of diagnostics.keys()) console.error(diagnostic);
 for (const address of [0x4003c000, 0x40014108, 0x40058000]) ask('r', mcu.readUint32(address), undefined, 0);
 ask('l', ledChanges, undefined, 0);

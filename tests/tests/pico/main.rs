@@ -15,7 +15,7 @@ mod epochs;
 mod images;
 
 use adis16405_driver::Burst;
-use bench::{Event, Fault, Outcome, Pico, SOUND, image, run};
+use bench::{Event, Fault, Outcome, Pico, SOUND, image, run, run_example};
 use costs::{Costs, Memory, assert_within_budget, counter};
 use decoded::{Decoded, on_host};
 use epochs::{EPOCH_S, SENTENCES, assert_told, four_effects, learned_on_device, learned_on_host, warming_part};
@@ -101,6 +101,148 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert!(decoded.lines.iter().any(|line| line.contains("sensor sampled")), "{:?}", decoded.lines);
     assert!(decoded.lines.iter().any(|line| line.starts_with("start 1: PowerOn")), "{:?}", decoded.lines);
     assert_eq!(part.violations(), []);
+}
+
+/// The host finds the port by its name and the number of the board, reads a report and types commands. What USB carries is, byte for
+/// byte, what the UART has sent since the port was opened.
+#[test]
+fn usb_carries_the_report_of_the_uart() {
+    let board = Pico { usb_reads_at: Some(0.0), ..SOUND };
+    let keys = ["usb:0.5=i 0\r", "usb:1.5=v", "usb:2.0=r", "usb:11.0=k", "usb:11.5=bootsel\r"];
+    let outcome = run(board, sensor(21), 12.0, &keys, &[]);
+    println!("{}; {}", outcome.usb_device, outcome.diagnostics);
+    let name = "ADIS16405 noise observatory";
+    assert_eq!(outcome.usb_device, format!("2e8a:000a {name}, {name}, E6605838830A1234, 250 mA"));
+    let bytes = |received: &[(u64, u8)]| received.iter().map(|&(_, byte)| byte).collect::<Vec<u8>>();
+    let (usb, uart) = (bytes(&outcome.received_by_usb), bytes(&outcome.received));
+    let decoded = Decoded::decode(&outcome.received_by_usb);
+    println!("{} bytes by USB, {} by the UART: {:#?}", usb.len(), uart.len(), decoded.lines);
+    assert!(uart.ends_with(&usb), "not the bytes of the UART");
+    assert_eq!((decoded.counters.bad_frames, decoded.counters.missing), (0, 0), "{:?}", decoded.counters);
+    assert!(decoded.lines.iter().any(|line| line.starts_with("ADIS16405 noise observatory ")), "the answer to v");
+    assert_eq!((decoded.hellos().len(), decoded.channels().len()), (1, 8), "a whole report");
+    for report in decoded.channels() {
+        assert_eq!(*report, on_host(&outcome.bursts, decoded.hellos()[0], report), "bit for bit");
+    }
+    let health = decoded.healths()[0];
+    assert_eq!((health.used, health.lost_edges, health.usb_dropped), (health.bursts, 0, 0), "{health:?}");
+    assert_eq!(outcome.part.violations(), []);
+    let boot_loader_s = outcome.boot_loader_at.expect("bootsel starts the boot loader") as f64 * 1e-9;
+    assert!((11.5..11.7).contains(&boot_loader_s), "{boot_loader_s} s");
+}
+
+/// The host opens the port and reads nothing for six seconds of the raw stream at full speed: messages are lost on USB alone, whole and
+/// counted. Then it reads on.
+#[test]
+fn an_unread_usb_port_loses_output_alone() {
+    let board = Pico { usb_reads_at: Some(6.0), ..SOUND };
+    let keys = ["0.5=i 0\rf 819.2\r", "1.0=w 1\r", "5.9=w 0\r", "6.2=w 1\r", "6.35=w 0\r", "7.0=k"];
+    let outcome = run(board, sensor(22), 8.0, &keys, &[]);
+    let (uart, usb) = (Decoded::decode(&outcome.received), Decoded::decode(&outcome.received_by_usb));
+    println!("UART {:?}, USB {:?}: {:#?}", uart.counters, usb.counters, usb.lines);
+    let counter = |name: &str| counter(&uart.lines, name).unwrap_or(0);
+    assert_eq!((uart.counters.bad_frames, uart.counters.missing, usb.counters.bad_frames), (0, 0, 0));
+    assert!(uart.raw().len() as f64 > 4.8 * 819.2, "{} bursts in the stream of the UART", uart.raw().len());
+    assert!(usb.raw().len() < uart.raw().len() / 10, "{} bursts in the stream of USB", usb.raw().len());
+    // What was dropped are messages of the stream, and lines, which have no number. The next message of the stream tells how many.
+    assert!(usb.counters.missing > 200 && u64::from(counter("usb_dropped")) >= usb.counters.missing);
+    assert_eq!(
+        (counter("lost_edges"), counter("queue_full"), counter("raw_dropped"), counter("recoveries")),
+        (0, 0, 0, 0)
+    );
+    assert!((0..9).contains(&(counter("used") - counter("bursts"))), "{:?}", uart.lines);
+    let answer = uart.lines.iter().position(|line| line.starts_with("bursts ")).expect("the answer to k");
+    assert!(usb.lines.ends_with(&uart.lines[answer..]), "what is sent after six seconds arrives");
+    assert!(outcome.longest_unfed_s < 0.5, "{} s", outcome.longest_unfed_s);
+}
+
+/// Rate, range and filter are kept in flash by the functions of the boot ROM, and found after the supply was off. The write costs a
+/// gap, and no probe.
+#[test]
+fn settings_survive_power_in_the_flash_of_the_pico() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("flash.bin").to_str().expect("UTF-8").to_owned().leak();
+    let board = Pico { settings: Some(file), ..SOUND };
+    let first = run(board, sensor(23), 3.5, &["0.5=i 0\rf 102.4\rg 150\rn 3\r", "2.0=persist\r", "3.0=k"], &[]);
+    let lines = Decoded::decode(&first.received).lines;
+    println!("{lines:#?} {}", first.diagnostics);
+    let kept = "settings and models are kept without power; not sampled for ";
+    let told = lines.iter().find_map(|line| line.strip_prefix(kept)?.strip_suffix(" ms")?.parse::<u32>().ok());
+    let milliseconds = told.expect("an answer to persist");
+    // Pages of 0.4 ms and the sectors that a new ring erases, 45 ms each.
+    assert!((1..500).contains(&milliseconds), "{milliseconds} ms");
+    let counter = |name: &str| counter(&lines, name).unwrap_or(0);
+    assert!(counter("lost_edges") <= milliseconds * 102 / 1000 + 2, "{lines:?}");
+    assert_eq!((counter("recoveries"), counter("suspect")), (0, 0));
+
+    let second = run(board, sensor(23), 2.0, &["1.5=sr"], &[]);
+    let decoded = Decoded::decode(&second.received);
+    let hello = decoded.hellos()[0];
+    assert_eq!((hello.sample_rate_hz, hello.gyro_full_scale, hello.filter_taps_log2), (102.4, 150, 3), "{hello:?}");
+    assert_eq!(hello.boot.cause, link::BootCause::PowerOn);
+}
+
+/// A board outside of `firmware` connects RST: the fourth step of the recovery resets the sensor by it, and samples flow again.
+#[test]
+fn a_board_of_ones_own_resets_the_sensor_by_its_pin() {
+    let events = [(1.5, Event::Stuck(Some(0))), (5.6, Event::Stuck(None))];
+    let outcome = run_example(sensor(25), 8.5, &["0.5=i 0\r", "8.0=k"], &events);
+    let lines = Decoded::decode(&outcome.received).lines;
+    println!("{lines:#?}");
+    let counter = |name: &str| counter(&lines, name).unwrap_or(0);
+    assert!(outcome.resets >= 1 && counter("reset_lines") == outcome.resets, "{} pulses", outcome.resets);
+    assert_eq!(counter("recoveries"), 1);
+    // A second before, and more than one afterwards.
+    assert!(f64::from(counter("used")) > 2.2 * RATE_HZ, "{lines:?}");
+}
+
+/// What a person reads at the bench, of the emulated part.
+#[test]
+fn the_bench_console_reads_registers_and_times() {
+    let keys = [
+        "1.0=i 0\r",
+        "1.5=peek prod_id\r",
+        "1.6=peek 36\r",
+        "1.7=poke alm_mag1 1234\r",
+        "2.0=measure\r",
+        "3.0=deflect\r",
+        "4.5=dump\r",
+        "5.5=k",
+    ];
+    let outcome = run(SOUND, sensor(24), 6.0, &keys, &[]);
+    let lines = Decoded::decode(&outcome.received).lines;
+    println!("{lines:#?}");
+    let has = |expected: &str| assert!(lines.iter().any(|line| line.starts_with(expected)), "{expected}: {lines:?}");
+    // Data sheet of the part, Rev. B: PROD_ID is the number of the part, SMPL_PRD the divisor less 1.
+    has("PROD_ID    0x56  0x4015  16405");
+    has("SMPL_PRD   0x36  0x0007  7");
+    has("ALM_MAG1   0x40  0x1234  4660");
+    let number = |prefix: &str| -> f64 {
+        let line = lines.iter().find(|line| line.starts_with(prefix)).expect(prefix);
+        let digits = line[prefix.len()..].split_ascii_whitespace().next().expect("a number");
+        digits.parse().expect("a number")
+    };
+    // 208 bits at the clock that is set, and less than a tenth more.
+    let (set_hz, burst_us) =
+        (number("SCK: "), lines.iter().find_map(|line| line.split(" took ").nth(1)).expect("a burst"));
+    let burst_us: f64 = burst_us.split(' ').next().expect("a number").parse().expect("a number");
+    assert!((1.0..1.1).contains(&(burst_us * 1e-6 * set_hz / 208.0)), "{burst_us} us at {set_hz} Hz");
+    // The console addresses the part as in low-power mode, whose frames are 150 us apart (Table 2 of the data sheet): behind 16 bits at
+    // 299,044 Hz chip select is high for 96 us.
+    assert!((96.0..106.0).contains(&number("stall: CS high for ")), "{lines:?}");
+    assert!((204.0..206.0).contains(&number("DRDY: ")), "{lines:?}");
+    // The emulated part's pulse, within some us.
+    assert!((90.0..115.0).contains(&number("DRDY: high for ")), "{lines:?}");
+    // The deflections of the virtual part have opposite signs.
+    let deflections = ["positive ", "negative "].map(|sign| {
+        let line = lines.iter().find_map(|line| line.strip_prefix(sign)).expect(sign);
+        line.split_ascii_whitespace().map(|count| count.parse::<i32>().expect("counts")).collect::<Vec<_>>()
+    });
+    assert!(deflections.iter().all(|counts| counts.len() == 6), "{deflections:?}");
+    assert!(deflections[0].iter().zip(&deflections[1]).take(3).all(|(a, b)| a * b < 0), "{deflections:?}");
+    assert_eq!(outcome.part.violations(), []);
+    let counter = |name: &str| counter(&lines, name).unwrap_or(0);
+    assert_eq!((counter("recoveries"), counter("spurious_edges")), (0, 0), "{lines:?}");
 }
 
 /// An error of the DMA costs the burst and what comes until the transfer is abandoned, 25 ms later, and for the start-up time

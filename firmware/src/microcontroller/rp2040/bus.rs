@@ -1,7 +1,7 @@
 //! The sensor's bus: SPI0 with two DMA channels.
 
 use super::start::Rp2040;
-use crate::board::{BusTiming, SensorBus};
+use crate::board::{BusTiming, FrameTimes, SensorBus};
 use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, transfer, wait_for, wait_ns};
 use crate::microcontroller::{BurstBus, BurstEnd};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
@@ -133,6 +133,14 @@ impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> SensorBus for Sp
         let prescale = u32::from(registers().sspcpsr().read().cpsdvsr().bits());
         let rate = u32::from(registers().sspcr0().read().scr().bits());
         self.peripheral.to_Hz().div_ceil(prescale.max(1) * (rate + 1))
+    }
+
+    fn set_timing(&mut self, timing: BusTiming) {
+        self.select.timing = timing;
+    }
+
+    fn take_frame_times(&mut self) -> FrameTimes {
+        self.select.take_times()
     }
 
     fn reset(&mut self) {

@@ -1,6 +1,6 @@
 //! The serial port to the host on UART0.
 
-use crate::microcontroller::{UartPort, UartQueues};
+use crate::microcontroller::{ServedPort, UartQueues};
 use rp2040_hal::pac::UART0;
 use rp2040_hal::uart::{self, UartPeripheral, ValidUartPinout};
 
@@ -18,7 +18,7 @@ impl<W: ValidUartPinout<UART0>> Uart0Port<W> {
     }
 }
 
-impl<W: ValidUartPinout<UART0>> UartPort for Uart0Port<W> {
+impl<W: ValidUartPinout<UART0>> ServedPort for Uart0Port<W> {
     fn serve(&mut self) -> u32 {
         let mut byte = [0];
         let mut lost = 0;

@@ -1,11 +1,13 @@
 //! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
 
+use super::flash;
 use crate::board::{DataReadyLine, WatchdogExtension};
 use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
 use crate::microcontroller::{DataReadyPin, Microcontroller};
+use crate::settings_store::StoreError;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
-use embedded_hal::digital::StatefulOutputPin;
+use embedded_hal::digital::{InputPin, StatefulOutputPin};
 use link::BootCause;
 use rp2040_hal::clocks::{ClocksManager, InitError, init_clocks_and_plls};
 use rp2040_hal::fugit::ExtU32;
@@ -122,6 +124,8 @@ impl MicrosecondCounter for Rp2040 {
 }
 
 impl Microcontroller for Rp2040 {
+    const KEEPS_RECORD: bool = true;
+
     fn feed(&mut self) {
         self.watchdog.feed();
         FEEDINGS.store(FEEDINGS.load(Relaxed).wrapping_add(1), Relaxed);
@@ -143,6 +147,21 @@ impl Microcontroller for Rp2040 {
             cortex_m::asm::nop();
         }
     }
+
+    fn read_record(record: &mut [u8]) -> Option<usize> {
+        flash::read_record(record)
+    }
+
+    fn write_record(record: &[u8]) -> Result<(), StoreError> {
+        flash::write_record(record)
+    }
+
+    /// Has the boot ROM show itself as a drive and to picotool, without an LED for its activity.
+    fn start_boot_loader() {
+        // SAFETY: the boot ROM, which does not feed the watchdog, takes over.
+        unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.enable().clear_bit()) };
+        rp2040_hal::rom_data::reset_to_usb_boot(0, 0);
+    }
 }
 
 impl<I: PinId> DataReadyPin for Pin<I, FunctionSioInput, PullNone> {
@@ -157,5 +176,10 @@ impl<I: PinId> DataReadyLine for Pin<I, FunctionSioInput, PullNone> {
             self.clear_interrupt(Interrupt::EdgeHigh);
             self.set_interrupt_enabled(Interrupt::EdgeHigh, !masked);
         }
+    }
+
+    fn is_active(&mut self) -> bool {
+        let Ok(high) = InputPin::is_high(self);
+        high
     }
 }

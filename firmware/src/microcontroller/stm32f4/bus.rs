@@ -1,7 +1,7 @@
 //! The sensor's bus: SPI1 with two streams of DMA2.
 
 use super::start::Stm32f4;
-use crate::board::{BusTiming, SensorBus};
+use crate::board::{BusTiming, FrameTimes, SensorBus};
 use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, transfer, wait_for, wait_ns};
 use crate::microcontroller::{BurstBus, BurstEnd};
 use crate::sensor::{BURST_LIMIT_HZ, largest_clock_hz, prescaled_clock_hz};
@@ -125,6 +125,14 @@ impl<S: OutputPin<Error = Infallible>> SensorBus for Spi1Bus<S> {
         registers().cr1().modify(|_, w| w.br().set(field));
         registers().cr1().modify(|_, w| w.spe().set_bit());
         prescaled_clock_hz(self.bus_hz, registers().cr1().read().br().bits())
+    }
+
+    fn set_timing(&mut self, timing: BusTiming) {
+        self.select.timing = timing;
+    }
+
+    fn take_frame_times(&mut self) -> FrameTimes {
+        self.select.take_times()
     }
 
     fn reset(&mut self) {

@@ -1,6 +1,6 @@
 //! The serial port to the host on a USART.
 
-use crate::microcontroller::{UartPort, UartQueues};
+use crate::microcontroller::{ServedPort, UartQueues};
 use stm32f4xx_hal::nb;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Instance, Rx, RxListen, Serial, Tx, TxISR, TxListen};
@@ -24,7 +24,7 @@ impl<U: Instance> UsartPort<U> {
     }
 }
 
-impl<U: Instance> UartPort for UsartPort<U> {
+impl<U: Instance> ServedPort for UsartPort<U> {
     fn serve(&mut self) -> u32 {
         // Read regardless of the flags: an overrun raises the interrupt too, and only a read clears it.
         let lost = match self.rx.read() {

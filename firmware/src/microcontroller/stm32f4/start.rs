@@ -181,4 +181,8 @@ impl<const P: char, const N: u8> DataReadyLine for Pin<P, N, Input> {
             mask.modify(|r, w| unsafe { w.bits(r.bits() & !(1 << N) | u32::from(!masked) << N) });
         }
     }
+
+    fn is_active(&mut self) -> bool {
+        self.is_high()
+    }
 }

@@ -2,9 +2,7 @@
 //!
 //! The format is <https://github.com/microsoft/uf2>: blocks of 512 bytes, each with a page of 256 bytes of flash.
 
-use object::Endianness::Little;
-use object::elf::{FileHeader32, PT_LOAD};
-use object::read::elf::{FileHeader, ProgramHeader};
+use crate::flash_contents::{ImageError, segments};
 use std::collections::BTreeMap;
 
 /// Bytes of flash in a block.
@@ -20,69 +18,18 @@ const RP2040: u32 = 0xE48B_FF56;
 /// Addresses at which the RP2040 maps its flash: 16 MiB at most.
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
-/// Why an image was not converted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Uf2Error {
-    /// The file is not a complete little-endian 32-bit ELF.
-    #[error("no complete 32-bit little-endian ELF: {0}")]
-    Elf(#[from] object::read::Error),
-    /// The contents of a segment lie outside of the file.
-    #[error("the ELF is cut short: the segment at {0:#010x} is not in it")]
-    CutShort(u32),
-    /// A segment ends beyond the flash of an RP2040.
-    #[error("the segment at {0:#010x} ends beyond the flash at 0x11000000")]
-    BeyondFlash(u32),
-    /// Two segments fill the same bytes.
-    #[error("the segment at {0:#010x} overlaps another")]
-    Overlap(u32),
-    /// No segment is loaded to the flash of an RP2040.
-    #[error("nothing in it is for the flash at 0x10000000: is it an image for the Pico?")]
-    NoFlash,
-}
-
 /// Converts those loadable segments of an ELF image that lie in flash to the blocks of a UF2 file, in the order of their
 /// addresses. Bytes of a page that no segment fills are zero.
 ///
 /// # Errors
-/// The file is no complete ELF, nothing in it is for the flash of an RP2040, or its segments overlap or do not fit there.
-pub fn from_elf(elf: &[u8]) -> Result<Vec<u8>, Uf2Error> {
-    let header = FileHeader32::<object::Endianness>::parse(elf)?;
-    let endian = header.endian()?;
-    if endian != Little {
-        return Err(Uf2Error::NoFlash);
-    }
-    let mut segments: Vec<(u32, &[u8])> = Vec::new();
-    for segment in header.program_headers(endian, elf)? {
-        let address = segment.p_paddr(endian);
-        if segment.p_type(endian) != PT_LOAD || !FLASH.contains(&address) {
-            continue;
-        }
-        let bytes = segment.data(endian, elf).map_err(|()| Uf2Error::CutShort(address))?;
-        if bytes.len() > (FLASH.end - address) as usize {
-            return Err(Uf2Error::BeyondFlash(address));
-        }
-        segments.push((address, bytes));
-    }
-    // Before a byte is copied: so many headers may name the same bytes of a small file that copying them would take minutes.
-    segments.sort_by_key(|(address, bytes)| (*address, bytes.len()));
-    for pair in segments.windows(2) {
-        if let [(first, bytes), (second, others)] = pair
-            && !others.is_empty()
-            && (*second as usize) < *first as usize + bytes.len()
-        {
-            return Err(Uf2Error::Overlap(*second));
-        }
-    }
+/// Those of [`segments`].
+pub fn from_elf(elf: &[u8]) -> Result<Vec<u8>, ImageError> {
     let mut pages = BTreeMap::<u32, [u8; PAGE_BYTES]>::new();
-    for (address, bytes) in segments {
+    for (address, bytes) in segments(elf, FLASH)? {
         for (at, &byte) in (address..FLASH.end).zip(bytes) {
             let page = pages.entry(at & !(PAGE_BYTES as u32 - 1)).or_insert([0; PAGE_BYTES]);
             page[at as usize % PAGE_BYTES] = byte;
         }
-    }
-    if pages.is_empty() {
-        return Err(Uf2Error::NoFlash);
     }
     let count = pages.len() as u32;
     let block = |(number, (address, page)): (u32, (u32, [u8; PAGE_BYTES]))| {
@@ -137,8 +84,8 @@ mod tests {
 
     #[test]
     fn what_is_no_image_for_the_pico_is_refused() {
-        assert!(matches!(from_elf(b"MZ"), Err(Uf2Error::Elf(_))));
-        assert_eq!(from_elf(&elf(0x0800_0000, &[1])), Err(Uf2Error::NoFlash));
+        assert!(matches!(from_elf(b"MZ"), Err(ImageError::Elf(_))));
+        assert_eq!(from_elf(&elf(0x0800_0000, &[1])), Err(ImageError::NoFlash(0x1000_0000)));
         let whole = elf(0x1000_0000, &[1, 2, 3]);
         for length in 0..whole.len() {
             assert!(from_elf(&whole[..length]).is_err(), "{length} bytes");
@@ -161,10 +108,10 @@ mod tests {
     #[test]
     fn segments_that_overlap_or_do_not_fit_are_refused_at_once() {
         let began = std::time::Instant::now();
-        assert_eq!(from_elf(&repeated(2000, 0x1000_0000, 4 << 20)), Err(Uf2Error::Overlap(0x1000_0000)));
+        assert_eq!(from_elf(&repeated(2000, 0x1000_0000, 4 << 20)), Err(ImageError::Overlap(0x1000_0000)));
         // Copying 8 GB byte by byte takes a minute.
         assert!(began.elapsed().as_secs() < 10, "{:?}", began.elapsed());
-        assert_eq!(from_elf(&elf(0x10FF_FFFE, &[1, 2, 3])), Err(Uf2Error::BeyondFlash(0x10FF_FFFE)));
+        assert_eq!(from_elf(&elf(0x10FF_FFFE, &[1, 2, 3])), Err(ImageError::BeyondFlash(0x10FF_FFFE)));
         assert!(from_elf(&elf(0x10FF_FFFD, &[1, 2, 3])).is_ok());
     }
 

@@ -1,0 +1,237 @@
+//! What a person at a bench asks for: registers by name, the times of the bus and of the data-ready line as they are, and the
+//! deflections of the self-test. Everything is read while nothing is sampled; the samples that this costs are a gap.
+
+use crate::board::{Board, FrameTimes};
+use crate::device::{DeviceState, clock_limit_hz};
+use crate::number_text::Decimal;
+use crate::report_text::AnswerLine;
+use crate::sensor::{LOW_POWER_LIMIT_HZ, addressed};
+use adis16405_driver::{Access, Adis16405, BURST_BYTES, Config, Error, Register, Stimulus};
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::SpiDevice;
+use link::{TextLine, text_line};
+
+/// The register with this name, or with this address in hexadecimal: `smpl_prd`, `36`, `0x36`.
+pub(crate) fn register(name: &str) -> Option<Register> {
+    let address = hexadecimal(name).and_then(|address| u8::try_from(address).ok());
+    let is_meant = |register: &&Register| {
+        register.name().eq_ignore_ascii_case(name) || address.is_some_and(|address| register.address() == address & !1)
+    };
+    Register::ALL.iter().find(is_meant).copied()
+}
+
+/// A number of at most 16 bits in hexadecimal, with or without `0x`.
+pub(crate) fn hexadecimal(digits: &str) -> Option<u16> {
+    let digits = digits.strip_prefix("0x").unwrap_or(digits);
+    // `from_str_radix` also takes a sign.
+    digits.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| u16::from_str_radix(digits, 16).ok())?
+}
+
+/// What is asked of the sensor.
+trait Request {
+    type Answer;
+    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(
+        self,
+        sensor: &mut Adis16405<SPI, D>,
+    ) -> Result<Self::Answer, Error<SPI::Error>>;
+}
+
+struct Read(Register);
+
+impl Request for Read {
+    type Answer = u16;
+    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(self, sensor: &mut Adis16405<SPI, D>) -> Result<u16, Error<SPI::Error>> {
+        sensor.read_register(self.0)
+    }
+}
+
+struct Write(Register, u16);
+
+impl Request for Write {
+    type Answer = ();
+    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(self, sensor: &mut Adis16405<SPI, D>) -> Result<(), Error<SPI::Error>> {
+        sensor.write_register(self.0, self.1)
+    }
+}
+
+impl Request for Stimulus {
+    type Answer = [i16; 6];
+    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(
+        self,
+        sensor: &mut Adis16405<SPI, D>,
+    ) -> Result<[i16; 6], Error<SPI::Error>> {
+        sensor.stimulus_response(self)
+    }
+}
+
+/// Asks the sensor while nothing is sampled, at the clock and with the stall that it takes in either power mode. The error is one to be
+/// printed.
+#[allow(clippy::result_large_err, reason = "the text of an error is made where its type is known, and printed")]
+fn ask<R: Request>(request: R, state: &DeviceState, board: &mut impl Board) -> Result<R::Answer, TextLine> {
+    board.set_sampling(false);
+    let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
+    let answer = request
+        .ask(&mut addressed(board.sensor_bus(), state.config, sck_hz))
+        .map_err(|error| text_line(format_args!("{error}")));
+    board.set_clock_limit(clock_limit_hz(state.config));
+    resume(state, board);
+    answer
+}
+
+/// Samples again if that was done before.
+fn resume(state: &DeviceState, board: &mut impl Board) {
+    if state.is_sampled() {
+        let now_us = board.now_us();
+        board.estimators(|estimators| estimators.mark_resumed(now_us));
+        board.set_sampling(true);
+    }
+}
+
+fn line(register: Register, read: Result<u16, TextLine>) -> TextLine {
+    let (name, address) = (register.name(), register.address());
+    match read {
+        Ok(value) => text_line(format_args!("{name:<10} {address:#04x}  {value:#06x}  {}", value as i16)),
+        Err(error) => text_line(format_args!("{name:<10} {address:#04x}  {error}")),
+    }
+}
+
+/// Reads a register.
+pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
+    if register.access() == Access::Write {
+        return text_line(format_args!("{} cannot be read", register.name()));
+    }
+    line(register, ask(Read(register), state, board))
+}
+
+/// Writes a register and, if it can be read, reads it back. The device does not know of the change: `check` sets rate, range, filter and
+/// data ready as it has them.
+pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {
+    match register.access() {
+        Access::Read => text_line(format_args!("{} cannot be written", register.name())),
+        access => match ask(Write(register, value), state, board) {
+            Ok(()) if access == Access::Write => text_line(format_args!("{} written", register.name())),
+            Ok(()) => line(register, ask(Read(register), state, board)),
+            Err(error) => text_line(format_args!("{}: {error}", register.name())),
+        },
+    }
+}
+
+/// The line at an index of the dump: the registers that can be read, in the order of their addresses. DIAG_STAT is cleared by it.
+pub(crate) fn dump_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
+    match Register::ALL.get(index) {
+        Some(register) if register.access() == Access::Write => AnswerLine::Skip,
+        Some(&register) => AnswerLine::Text(read_register(register, state, board)),
+        None => AnswerLine::End,
+    }
+}
+
+/// Longest time for which a pulse of data ready is waited for, in µs.
+const PULSE_US: u32 = 250_000;
+
+/// The line at an index of the measurement.
+pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
+    let hz = |hz: f64| Decimal::significant(hz, 5);
+    AnswerLine::Text(match index {
+        0 => {
+            let burst_us = board.frame_times().map_or(0, |times| times.low_us);
+            let bits = 8 * BURST_BYTES as u32;
+            match (state.is_sampled(), burst_us) {
+                (true, 1..) => text_line(format_args!(
+                    "SCK: {} Hz set; the last burst of {bits} bits took {burst_us} us: {} Hz with its gaps",
+                    state.spi_clock_hz,
+                    hz(f64::from(bits) * 1e6 / f64::from(burst_us))
+                )),
+                _ => text_line(format_args!("SCK: {} Hz set; no burst to measure", state.spi_clock_hz)),
+            }
+        }
+        1 => match register_frames(state, board) {
+            Some(FrameTimes { shortest_high_us, shortest_period_us, .. }) => text_line(format_args!(
+                "stall: CS high for {shortest_high_us} us or more; read rate: {shortest_period_us} us or more a frame"
+            )),
+            None => text_line(format_args!("stall: not measured on this board")),
+        },
+        2 => {
+            let measured = board.estimators(|estimators| estimators.measured_hz());
+            let programmed_hz = state.config.sample_period().hz();
+            match measured {
+                Some(measured) => {
+                    let period_us = Decimal::significant(1e6 / measured, 6);
+                    text_line(format_args!(
+                        "DRDY: {} Hz, period {period_us} us, {} Hz set",
+                        hz(measured),
+                        hz(programmed_hz)
+                    ))
+                }
+                None => text_line(format_args!("DRDY: fewer than 64 edges; {} Hz set", hz(programmed_hz))),
+            }
+        }
+        3 => {
+            board.set_sampling(false);
+            let width = board.data_ready_width_us(PULSE_US);
+            resume(state, board);
+            match width {
+                Some(us) => text_line(format_args!("DRDY: high for {us} us, within some us")),
+                None => text_line(format_args!("DRDY: no pulse in {} ms", PULSE_US / 1000)),
+            }
+        }
+        _ => return AnswerLine::End,
+    })
+}
+
+/// Reads a register as often as makes the times of single frames known.
+fn register_frames(state: &DeviceState, board: &mut impl Board) -> Option<FrameTimes> {
+    board.frame_times()?;
+    ask(Read(Register::ProdId), state, board).ok()?;
+    board.frame_times()
+}
+
+/// The line at an index of the self-test with deflections: of gyros x, y, z and accelerometers x, y, z, in counts.
+pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
+    let (sign, stimulus) = match index {
+        0 => {
+            return AnswerLine::Text(text_line(format_args!(
+                "deflections in counts: gyros x y z, accelerometers x y z"
+            )));
+        }
+        1 => ("positive", Stimulus::Positive),
+        2 => ("negative", Stimulus::Negative),
+        _ => return AnswerLine::End,
+    };
+    let test_s = deflection_s(state.config);
+    if test_s > LONGEST_TEST_S {
+        let test_s = Decimal::significant(test_s, 2);
+        return AnswerLine::Text(text_line(format_args!(
+            "{sign} not run, it takes {test_s} s: another rate or filter"
+        )));
+    }
+    let response = ask(stimulus, state, board);
+    // The filter holds samples that were displaced.
+    let now_us = board.now_us();
+    board.estimators(|estimators| estimators.mark_probed(now_us));
+    AnswerLine::Text(match response {
+        Ok([a, b, c, d, e, f]) => text_line(format_args!("{sign} {a} {b} {c}  {d} {e} {f}")),
+        Err(error) => text_line(format_args!("{sign} {error}")),
+    })
+}
+
+/// Longest test with one stimulus, in s: nothing else is done meanwhile.
+const LONGEST_TEST_S: f64 = 3.0;
+
+/// Time of a test with one stimulus in s: twice the filter settles, and eight samples are read.
+fn deflection_s(config: Config) -> f64 {
+    let samples = (2 << config.filter_taps_log2()) + 8;
+    2.0 * f64::from(samples) / config.sample_period().hz()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_are_found_by_name_and_by_address() {
+        assert_eq!(["smpl_prd", "SMPL_PRD", "36", "0x36", "37"].map(register), [Some(Register::SmplPrd); 5]);
+        assert_eq!(["", "smpl", "0x", "fff", "58", "+36", "0x0x36"].map(register), [None; 7]);
+        assert_eq!(["0400", "0x400", "ffff"].map(hexadecimal), [Some(0x400), Some(0x400), Some(0xFFFF)]);
+        assert_eq!(["", "10000", "-1", "0x", "g"].map(hexadecimal), [None; 5]);
+    }
+}

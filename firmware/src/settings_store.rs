@@ -1,0 +1,106 @@
+//! A record in flash memory that survives the loss of power at any time: after a write that was cut short the record before it is
+//! found.
+//!
+//! The pages of the flash are a ring (crate `sequential-storage`): a record is appended, with its checksum, and only then replaces the one
+//! before; a page is erased when the ring comes round to it and nothing in it is needed.
+
+use core::future::Future;
+use core::ops::Range;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+use embedded_storage_async::nor_flash::NorFlash;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{MapConfig, MapStorage};
+
+/// Key of the record.
+const KEY: u8 = 1;
+/// Most bytes of a record.
+pub const MAX_RECORD: usize = 3072;
+/// The record with its key, aligned to the words of any flash.
+#[repr(align(8))]
+struct RecordBuffer([u8; MAX_RECORD + 8]);
+
+/// Why a record was not written. The one before is still there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StoreError {
+    /// The board has no memory for settings.
+    NoMemory,
+    /// The record is longer than [`MAX_RECORD`].
+    TooLong,
+    /// The flash was not written, or is damaged.
+    Flash,
+}
+
+impl core::fmt::Display for StoreError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NoMemory => "this board keeps no settings without power",
+            Self::TooLong => "they take too many bytes",
+            Self::Flash => "the flash memory does not take them",
+        })
+    }
+}
+
+/// A record in a range of a flash memory.
+pub struct SettingsStore<F: NorFlash> {
+    map: MapStorage<u8, F, Cache<Uncached, Uncached, Uncached, u8>>,
+}
+
+impl<F: NorFlash> SettingsStore<F> {
+    /// A store in `range`, two pages of `flash` at least. `None` if the range is none of whole pages.
+    pub fn new(flash: F, range: Range<u32>) -> Option<Self> {
+        let config = MapConfig::try_new(range).ok()?;
+        Some(Self { map: MapStorage::new(flash, config, Cache::new_uncached()) })
+    }
+
+    /// Copies the record to `record` and returns its length; `None` if there is none.
+    pub fn read(&mut self, record: &mut [u8]) -> Option<usize> {
+        let mut buffer = RecordBuffer([0; _]);
+        let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY))?.ok()??;
+        record.get_mut(..found.len())?.copy_from_slice(found);
+        Some(found.len())
+    }
+
+    /// Replaces the record. Memory whose pages hold something else than a ring is erased first.
+    ///
+    /// # Errors
+    /// The record is too long, or the flash does not take it.
+    pub fn write(&mut self, record: &[u8]) -> Result<(), StoreError> {
+        if record.len() > MAX_RECORD {
+            return Err(StoreError::TooLong);
+        }
+        let mut buffer = RecordBuffer([0; _]);
+        let mut store = || complete(self.map.store_item(&mut buffer.0, &KEY, &record));
+        match store() {
+            Some(Ok(())) => Ok(()),
+            Some(Err(sequential_storage::Error::Corrupted { .. })) => {
+                complete(self.map.erase_all()).and_then(Result::ok).ok_or(StoreError::Flash)?;
+                complete(self.map.store_item(&mut buffer.0, &KEY, &record))
+                    .and_then(Result::ok)
+                    .ok_or(StoreError::Flash)
+            }
+            _ => Err(StoreError::Flash),
+        }
+    }
+
+    /// Erases the record.
+    ///
+    /// # Errors
+    /// The flash is not erased.
+    pub fn erase(&mut self) -> Result<(), StoreError> {
+        complete(self.map.erase_all()).and_then(Result::ok).ok_or(StoreError::Flash)
+    }
+
+    /// Gives the flash back.
+    pub fn into_flash(self) -> F {
+        self.map.destroy().0
+    }
+}
+
+/// The result of a future that does not wait, as those of a flash memory that blocks; `None` if it does.
+fn complete<T>(future: impl Future<Output = T>) -> Option<T> {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(result) => Some(result),
+        Poll::Pending => None,
+    }
+}

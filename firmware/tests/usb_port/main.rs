@@ -1,0 +1,258 @@
+//! The USB port on a bus without wires: what the emulator of the Pico cannot show, such as line coding, suspending and
+//! unplugging, and a host that does not read for an hour.
+
+mod host;
+
+use firmware::usb_port::{PRODUCT, UsbIdentity, UsbPort};
+use firmware::{TransmitBuffer, TransmitQueue};
+use heapless::spsc::{Consumer, Queue};
+use host::MockBus;
+use link::{Decoder, MessageRef, Received, text_line};
+use usb_device::bus::UsbBusAllocator;
+
+const IDENTITY: UsbIdentity<'static> =
+    UsbIdentity { vendor: 0x2E8A, product: 0x000A, serial_number: "E66058388309A1B2" };
+
+// Requests of USB 2.0, section 9.4, and of the class for communication devices (PSTN 1.2, sections 6.3.10 to 6.3.12).
+const SET_ADDRESS: [u8; 8] = [0x00, 5, 7, 0, 0, 0, 0, 0];
+const SET_CONFIGURATION: [u8; 8] = [0x00, 9, 1, 0, 0, 0, 0, 0];
+const GET_DEVICE: [u8; 8] = [0x80, 6, 0, 1, 0, 0, 18, 0];
+const SET_LINE_CODING: [u8; 8] = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
+const GET_LINE_CODING: [u8; 8] = [0xA1, 0x21, 0, 0, 0, 0, 7, 0];
+/// DTR, and RTS: a terminal opens the port.
+const OPEN: [u8; 8] = [0x21, 0x22, 3, 0, 0, 0, 0, 0];
+const CLOSE: [u8; 8] = [0x21, 0x22, 0, 0, 0, 0, 0, 0];
+
+/// The endpoints that carry the bytes: behind that of the notifications, by order of allocation.
+const DATA_IN: usize = 2;
+const DATA_OUT: usize = 1;
+
+/// A device on the bus, with a UART that is always emptied.
+struct Bench {
+    bus: MockBus,
+    port: UsbPort<'static, MockBus>,
+    queue: TransmitQueue<'static>,
+    uart: Consumer<'static, u8>,
+    received: Consumer<'static, u8>,
+}
+
+fn leak<T>(value: T) -> &'static mut T {
+    Box::leak(Box::new(value))
+}
+
+impl Bench {
+    fn new() -> Self {
+        let bus = MockBus::default();
+        let allocator = leak(UsbBusAllocator::new(bus.clone()));
+        let (to_uart, uart) = leak(TransmitBuffer::new()).split();
+        let (to_usb, usb) = leak(TransmitBuffer::new()).split();
+        let (receive, received) = leak(Queue::<u8, 64>::new()).split();
+        let port = UsbPort::new(allocator, IDENTITY, (usb, receive)).expect("enough endpoints");
+        Self { bus, port, queue: TransmitQueue::new(to_uart).with_usb(Some(to_usb)), uart, received }
+    }
+
+    fn control(&mut self, setup: [u8; 8], data: &[u8]) -> Option<Vec<u8>> {
+        let port = &mut self.port;
+        self.bus.control(setup, data, || {
+            port.serve();
+        })
+    }
+
+    /// The host finds the device and configures it.
+    fn enumerate(&mut self) {
+        self.bus.reset_bus();
+        self.port.serve();
+        assert_eq!(self.control(SET_ADDRESS, &[]), Some(vec![]));
+        assert_eq!(self.control(SET_CONFIGURATION, &[]), Some(vec![]));
+    }
+
+    fn open(&mut self) {
+        assert_eq!(self.control(OPEN, &[]), Some(vec![]));
+    }
+
+    /// Sends a text, which the UART has sent on return.
+    fn print(&mut self, text: &str) -> Vec<u8> {
+        assert!(self.queue.send_text(&text_line(format_args!("{text}"))), "the UART has room");
+        self.port.serve();
+        self.uart()
+    }
+
+    fn uart(&mut self) -> Vec<u8> {
+        std::iter::from_fn(|| self.uart.dequeue()).collect()
+    }
+
+    /// What the host reads, until the device has nothing more.
+    fn read(&mut self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while let Some(packet) = self.bus.read(DATA_IN) {
+            bytes.extend(packet);
+            self.port.serve();
+        }
+        bytes
+    }
+
+    fn string(&mut self, number: u8) -> String {
+        let bytes = self.control([0x80, 6, number, 3, 0x09, 0x04, 255, 0], &[]).expect("a string");
+        let units: Vec<u16> = bytes[2..].chunks(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+        String::from_utf16(&units).unwrap()
+    }
+}
+
+fn lines(bytes: &[u8]) -> Vec<String> {
+    let mut decoder = Decoder::new();
+    let received = bytes.iter().filter_map(|&byte| decoder.push(byte));
+    let lines = received.map(|received| match received {
+        Received::Text(line) => line.as_str().to_owned(),
+        Received::Message { message, .. } => format!("{message:?}"),
+    });
+    let lines = lines.collect();
+    assert_eq!(decoder.counters().bad_frames, 0, "{:?}", decoder.counters());
+    lines
+}
+
+#[test]
+fn the_host_finds_a_serial_port_with_a_name_and_a_number() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    let device = bench.control(GET_DEVICE, &[]).expect("the descriptor");
+    // USB 2.0, table 9-8, and the class of communication devices.
+    assert_eq!((device[0], device[1], device[4]), (18, 1, 2));
+    assert_eq!(device[8..12], [0x8A, 0x2E, 0x0A, 0x00]);
+    let strings = [14, 15, 16].map(|field| bench.string(device[field]));
+    assert_eq!(strings, [PRODUCT, PRODUCT, IDENTITY.serial_number]);
+}
+
+/// The baud rate has no meaning on USB; a terminal that sets it must get it back.
+#[test]
+fn any_line_coding_is_taken() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    // 9,600 and 3,000,000 Bd, stop bits, parity and data bits.
+    for coding in [[0x80, 0x25, 0, 0, 0, 0, 8], [0xC0, 0xC6, 0x2D, 0, 2, 1, 7]] {
+        assert_eq!(bench.control(SET_LINE_CODING, &coding), Some(vec![]));
+        assert_eq!(bench.control(GET_LINE_CODING, &[]), Some(coding.to_vec()));
+    }
+    bench.open();
+    let sent = bench.print("sampling");
+    assert_eq!(bench.read(), sent);
+}
+
+#[test]
+fn usb_has_the_bytes_of_the_uart_and_takes_commands() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    bench.open();
+    let (mut uart, mut usb) = (Vec::new(), Vec::new());
+    // Packets of all lengths up to the longest, a full one at the end among them.
+    for length in 1..=120 {
+        uart.extend(bench.print(&"x".repeat(length)));
+        usb.extend(bench.read());
+    }
+    assert_eq!(usb, uart);
+    assert!(bench.queue.send(MessageRef::Log("a message")));
+    bench.port.serve();
+    assert_eq!(bench.read(), bench.uart());
+    bench.bus.send(DATA_OUT, b"f 819.2\r");
+    assert_eq!(bench.port.serve(), 0);
+    let typed: Vec<u8> = std::iter::from_fn(|| bench.received.dequeue()).collect();
+    assert_eq!(typed, b"f 819.2\r");
+}
+
+/// More is typed than the receive queue holds: what is lost is counted, and the packets do not stay in the endpoint, whose
+/// interrupt would not end.
+#[test]
+fn too_much_input_is_counted() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    (0..3).for_each(|_| bench.bus.send(DATA_OUT, &[b'?'; 64]));
+    let lost: u32 = (0..8).map(|_| bench.port.serve()).sum();
+    assert_eq!(lost, 3 * 64 - 63);
+    assert_eq!(std::iter::from_fn(|| bench.received.dequeue()).count(), 63);
+}
+
+/// Nobody reads for an hour, in which 600 lines are printed a minute; then a terminal reads on. It has the lines that the
+/// queue held, whole, and what is sent from then on; the others are counted.
+#[test]
+fn a_host_that_does_not_read_costs_what_it_does_not_read() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    bench.open();
+    for number in 0..36_000 {
+        assert_eq!(lines(&bench.print(&format!("line {number}"))), [format!("line {number}")], "the UART is complete");
+        assert!(bench.queue.has_room());
+    }
+    let kept = lines(&bench.read());
+    assert_eq!(kept.len() + bench.queue.usb_dropped() as usize, 36_000);
+    assert!(kept.len() > 100 && kept.iter().enumerate().all(|(number, line)| *line == format!("line {number}")));
+    let sent = bench.print("read again");
+    assert_eq!(bench.read(), sent);
+}
+
+/// A cable without a host, or a charger: nothing is kept, and nothing counts as lost.
+#[test]
+fn without_a_host_nothing_waits() {
+    let mut bench = Bench::new();
+    (0..1000).for_each(|number| drop(bench.print(&format!("line {number}"))));
+    assert_eq!(bench.queue.usb_dropped(), 0);
+    bench.enumerate();
+    bench.open();
+    let sent = bench.print("the first line for the host");
+    assert_eq!(bench.read(), sent);
+}
+
+/// What was printed while the port was closed is not told to the terminal that opens it.
+#[test]
+fn a_terminal_begins_with_what_comes_after_it() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    bench.open();
+    bench.print("half read");
+    assert_eq!(bench.control(CLOSE, &[]), Some(vec![]));
+    (0..500).for_each(|number| drop(bench.print(&format!("unread {number}"))));
+    bench.bus.read(DATA_IN); // packets that the class holds go out first
+    bench.open();
+    bench.read();
+    let sent = bench.print("after it was opened");
+    assert_eq!(bench.read(), sent);
+}
+
+/// The host sleeps and wakes: the device goes on where it was, and what it had no room for is counted.
+#[test]
+fn a_suspended_bus_is_survived() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    bench.open();
+    bench.bus.suspend_bus();
+    bench.port.serve();
+    for number in 0..1000 {
+        bench.print(&format!("line {number}"));
+        assert_eq!(bench.bus.read(DATA_IN), None, "nothing is sent on a suspended bus");
+    }
+    bench.bus.resume_bus();
+    bench.port.serve();
+    let kept = lines(&bench.read());
+    assert!(kept.len() > 100 && kept[0] == "line 0", "{} lines", kept.len());
+    assert_eq!(kept.len() + bench.queue.usb_dropped() as usize, 1000);
+    let sent = bench.print("awake");
+    assert_eq!(bench.read(), sent);
+}
+
+/// Unplugged at any byte of a line and plugged in again, a hundred times: the device is found again, and begins with whole lines.
+#[test]
+fn unplugging_is_survived() {
+    let mut bench = Bench::new();
+    for attempt in 0..100 {
+        bench.enumerate();
+        bench.open();
+        let sent = bench.print(&format!("plugged in {attempt} times"));
+        assert_eq!(bench.read(), sent, "attempt {attempt}");
+        // Some packets are read before the cable is pulled; the device, which the sensor's supply may feed, goes on.
+        bench.print(&"y".repeat(attempt));
+        bench.print(&"z".repeat(110));
+        (0..attempt % 4).for_each(|_| drop(bench.bus.read(DATA_IN)));
+        bench.port.serve();
+        bench.bus.suspend_bus();
+        bench.port.serve();
+        bench.print("nobody is there");
+    }
+}
