@@ -1,6 +1,6 @@
 //! What the images of all boards share beside the application: traits of a microcontroller and its peripherals, in this
-//! file; start-up, interrupts and panics (`image`); load figures and the LED (`processor`); and one module for each
-//! microcontroller.
+//! file; start-up, interrupts and panics (`image`); load figures and the LED (`processor`); the flash memory that keeps the settings
+//! (`settings_flash`); and one module for each microcontroller.
 //!
 //! A board is an implementation of [`BoardSupport`], and names its interrupts in [`observatory!`](crate::observatory).
 
@@ -8,18 +8,19 @@ pub mod image;
 pub mod processor;
 #[cfg(feature = "rp2040")]
 pub mod rp2040;
+pub mod settings_flash;
 #[cfg(feature = "stm32f4")]
 pub mod stm32f4;
 
 use crate::board::{BrownOutLevel, DataReadyLine, SensorBus, WatchdogExtension};
 use crate::bus_frame::MicrosecondCounter;
-use crate::settings_store::StoreError;
 use adis16405_driver::BURST_BYTES;
 use core::convert::Infallible;
 use defmt_rtt as _;
 use embedded_hal::digital::OutputPin;
 use heapless::spsc::{Consumer, Producer, Queue};
 use link::{BootCause, ClockSource};
+use settings_flash::FlashMemory;
 
 /// The bytes from the serial port to the application.
 pub type ReceiveBuffer = Queue<u8, 64>;
@@ -122,8 +123,8 @@ pub struct BoardParts<B: BoardSupport> {
 
 /// Clock, watchdog and restart of a microcontroller.
 pub trait Microcontroller: MicrosecondCounter {
-    /// Whether there is memory that keeps a record without power.
-    const KEEPS_RECORD: bool = false;
+    /// The flash memory, of which the memory map leaves a part for the settings.
+    type Flash: FlashMemory;
 
     /// Feeds the watchdog.
     fn feed(&mut self);
@@ -132,17 +133,6 @@ pub trait Microcontroller: MicrosecondCounter {
     /// Programs the level of the supply below which the microcontroller is reset.
     fn program_brown_out() -> BrownOutLevel {
         BrownOutLevel::Fixed
-    }
-    /// As [`Board::read_record`](crate::Board::read_record).
-    fn read_record(_record: &mut [u8]) -> Option<usize> {
-        None
-    }
-    /// As [`Board::write_record`](crate::Board::write_record).
-    ///
-    /// # Errors
-    /// There is no memory for it, or it does not take the record.
-    fn write_record(_record: &[u8]) -> Result<(), StoreError> {
-        Err(StoreError::NoMemory)
     }
     /// Starts the boot loader that takes an image over USB; returns if there is none.
     fn start_boot_loader() {}

@@ -61,33 +61,31 @@ impl<F: NorFlash> SettingsStore<F> {
         Some(found.len())
     }
 
-    /// Replaces the record. Memory whose pages hold something else than a ring is erased first.
+    /// Replaces the record, or erases it if `record` is empty. Memory whose pages hold something else than a ring is erased first.
+    /// What was written is read back.
     ///
     /// # Errors
     /// The record is too long, or the flash does not take it.
-    pub fn write(&mut self, record: &[u8]) -> Result<(), StoreError> {
+    pub fn replace(&mut self, record: &[u8]) -> Result<(), StoreError> {
         if record.len() > MAX_RECORD {
             return Err(StoreError::TooLong);
         }
-        let mut buffer = RecordBuffer([0; _]);
-        let mut store = || complete(self.map.store_item(&mut buffer.0, &KEY, &record));
-        match store() {
-            Some(Ok(())) => Ok(()),
-            Some(Err(sequential_storage::Error::Corrupted { .. })) => {
-                complete(self.map.erase_all()).and_then(Result::ok).ok_or(StoreError::Flash)?;
-                complete(self.map.store_item(&mut buffer.0, &KEY, &record))
-                    .and_then(Result::ok)
-                    .ok_or(StoreError::Flash)
-            }
-            _ => Err(StoreError::Flash),
+        if record.is_empty() {
+            return self.erase();
         }
+        let mut buffer = RecordBuffer([0; _]);
+        let written = match complete(self.map.store_item(&mut buffer.0, &KEY, &record)) {
+            Some(Err(sequential_storage::Error::Corrupted { .. })) => {
+                self.erase()?;
+                complete(self.map.store_item(&mut buffer.0, &KEY, &record))
+            }
+            written => written,
+        };
+        let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY)).and_then(Result::ok).flatten();
+        if matches!(written, Some(Ok(()))) && found == Some(record) { Ok(()) } else { Err(StoreError::Flash) }
     }
 
-    /// Erases the record.
-    ///
-    /// # Errors
-    /// The flash is not erased.
-    pub fn erase(&mut self) -> Result<(), StoreError> {
+    fn erase(&mut self) -> Result<(), StoreError> {
         complete(self.map.erase_all()).and_then(Result::ok).ok_or(StoreError::Flash)
     }
 

@@ -6,6 +6,7 @@
 //! | A1, A2, A3 | PA5, PA6, PA7 | SPI1 SCK, MISO, MOSI, mode 3 | SCLK, DOUT, DIN |
 //! | A4 | PC4 | data ready, rising edge | DIO1 |
 //! | TX, RX | PB10, PB11 | USART3, 460 800 Bd 8N1 | to the host |
+//! | USB | PA11, PA12 | with the feature `feather-usb`, which has not run yet: serial port (CDC-ACM) | to the host |
 //!
 //! SCK, MO and MI of the board are SPI2 and not used. The sensor runs from 5 V, which USB gives; its outputs are connected to
 //! 5 V tolerant pins without a pull, and its inputs accept 3.3 V.
@@ -16,6 +17,8 @@ use firmware::BusTiming;
 use firmware::microcontroller::stm32f4::bus::{Spi1Bus, spi1_bus};
 use firmware::microcontroller::stm32f4::port::{BAUD, UsartPort};
 use firmware::microcontroller::stm32f4::start::{Started, Stm32f4, data_ready_input};
+#[cfg(feature = "feather-usb")]
+use firmware::microcontroller::stm32f4::usb::{Stm32UsbPort, usb_port};
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PC1, PC4};
 use stm32f4xx_hal::pac::{self, USART3};
@@ -32,6 +35,9 @@ impl BoardSupport for Feather {
     type DataReady = PC4<Input>;
     type Bus = Spi1Bus<PA4<Output>>;
     type Uart = UsartPort<USART3>;
+    #[cfg(feature = "feather-usb")]
+    type Usb = Stm32UsbPort;
+    #[cfg(not(feature = "feather-usb"))]
     type Usb = NotConnected;
     type Led = PC1<Output>;
     type ResetLine = NotConnected;
@@ -50,9 +56,15 @@ impl BoardSupport for Feather {
         let data_ready = data_ready_input(gpioc.pc4, (device.EXTI, device.SYSCFG), &mut rcc);
         let led = gpioc.pc1.into_push_pull_output();
 
+        #[cfg(not(feature = "feather-usb"))]
+        let usb = None;
+        #[cfg(feature = "feather-usb")]
+        let usb = {
+            let registers = (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK);
+            usb_port(registers, (gpioa.pa11, gpioa.pa12), &rcc.clocks)
+        };
         let (core_hz, uart) = (rcc.clocks.hclk().raw(), UsartPort::new(usart, queues));
-        let (usb, reset_line) = (None, None);
-        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line }
+        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line: None }
     }
 }
 
@@ -62,5 +74,6 @@ firmware::observatory! {
     data_ready: EXTI4;
     end_of_burst: DMA2_STREAM0;
     uart: USART3;
+    usb: OTG_FS;
     estimators: CAN1_TX; // software-triggered: the interrupt of CAN1, a peripheral that is not used
 }

@@ -17,6 +17,7 @@ use firmware::BusTiming;
 use firmware::microcontroller::rp2040::bus::Spi0Bus;
 use firmware::microcontroller::rp2040::port::Uart0Port;
 use firmware::microcontroller::rp2040::start::{ClockParts, Rp2040, boot_cause};
+#[cfg(feature = "pico-usb")]
 use firmware::microcontroller::rp2040::usb::{Rp2040UsbPort, usb_port};
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
 use firmware::sensor::BURST_LIMIT_HZ;
@@ -49,7 +50,10 @@ impl BoardSupport for Pico {
     type DataReady = Pin<Gpio20, FunctionSioInput, PullNone>;
     type Bus = Spi0Bus<Wires, Pin<Gpio17, FunctionSioOutput>>;
     type Uart = Uart0Port<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart, PullUp>)>;
+    #[cfg(feature = "pico-usb")]
     type Usb = Rp2040UsbPort;
+    #[cfg(not(feature = "pico-usb"))]
+    type Usb = NotConnected;
     type Led = Pin<Gpio25, FunctionSioOutput>;
     type ResetLine = NotConnected;
 
@@ -83,6 +87,9 @@ impl BoardSupport for Pico {
         let mode = spi::FrameFormat::MotorolaSpi(embedded_hal::spi::MODE_3);
         let spi = spi.init(&mut resets, peripheral, BURST_LIMIT_HZ.Hz(), mode);
         let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
+        #[cfg(not(feature = "pico-usb"))]
+        let usb = None;
+        #[cfg(feature = "pico-usb")]
         let usb = usb_port((device.USBCTRL_REGS, device.USBCTRL_DPRAM), clocks.usb_clock, &mut resets);
         let bus = Spi0Bus::new((spi, peripheral), select, device.DMA, &mut resets, BusTiming::SAFE);
 

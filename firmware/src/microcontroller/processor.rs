@@ -1,6 +1,7 @@
 //! The Cortex-M core: sleep, SysTick as the cycle counter, load figures, and the LED, which SysTick blinks.
 
 use super::Microcontroller;
+use super::settings_flash::SettingsFlash;
 use crate::board::{BoardMeters, BrownOutLevel, Chip, HostPort};
 use crate::settings_store::StoreError;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -135,15 +136,15 @@ impl<M: Microcontroller, R: OutputPin> Chip for &mut Processor<M, R> {
     }
 
     fn keeps_record(&mut self) -> bool {
-        M::KEEPS_RECORD
+        SettingsFlash::<M::Flash>::store().is_some()
     }
 
     fn read_record(&mut self, record: &mut [u8]) -> Option<usize> {
-        M::read_record(record)
+        SettingsFlash::<M::Flash>::store()?.read(record)
     }
 
     fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError> {
-        M::write_record(record)
+        SettingsFlash::<M::Flash>::store().ok_or(StoreError::NoMemory)?.replace(record)
     }
 
     fn start_boot_loader(&mut self) -> bool {

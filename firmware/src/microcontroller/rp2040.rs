@@ -1,4 +1,4 @@
-//! RP2040: SPI0 with two DMA channels, UART0, the timer as the clock, the watchdog.
+//! RP2040: SPI0 with two DMA channels, UART0, USB, the timer as the clock, the watchdog, flash memory for the settings.
 
 pub mod bus;
 pub mod flash;

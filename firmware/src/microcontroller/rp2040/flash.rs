@@ -1,16 +1,14 @@
-//! The flash memory of the board by the functions of the boot ROM (RP2040 data sheet, section 2.8.3.1.3).
+//! The flash memory of a board with an RP2040, by the functions of the boot ROM (RP2040 data sheet, section 2.8.3.1.3).
 //!
 //! While the flash takes commands nothing can be read from it: what runs meanwhile lies in RAM, with interrupts disabled. Then the
 //! second stage of the boot loader, copied to RAM, makes it readable again.
 
-use crate::settings_store::{SettingsStore, StoreError};
-use core::ops::Range;
+use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
 use core::sync::atomic::{Ordering, compiler_fence};
-use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use rp2040_hal::rom_data;
 
 /// Where the flash is read; the second stage of the boot loader is at its beginning.
-const FLASH: *const u32 = 0x1000_0000 as *const u32;
+const FLASH: *const u32 = Rp2040Flash::ORIGIN as *const u32;
 /// Words of the second stage.
 const BOOT2_WORDS: usize = 64;
 /// Bytes of the unique number of a W25Q16, the instruction that reads it, and the dummy bytes after that (Winbond, W25Q16JV,
@@ -107,14 +105,11 @@ unsafe extern "C" fn read_unique_id(command: &Command) {
     }
 }
 
-/// Bytes of the flash of a Pico, of a sector, which is erased at once, and of a page, which is programmed at once.
-const FLASH_BYTES: usize = 2 << 20;
+/// Bytes of a sector, which is erased at once, and of a page, which is programmed at once.
 const SECTOR: usize = 4096;
 const PAGE: usize = 256;
 /// The instruction that erases a sector, for the boot ROM, which also takes a larger block and its instruction.
 const ERASE_SECTOR: u8 = 0x20;
-/// The last sectors, which the memory map leaves free: for what survives the loss of power.
-const SETTINGS: Range<u32> = (FLASH_BYTES - 16 * SECTOR) as u32..FLASH_BYTES as u32;
 
 /// Erases the sector at the command's offset.
 #[inline(never)]
@@ -144,62 +139,22 @@ unsafe extern "C" fn program_page(command: &Command) {
     }
 }
 
-/// The flash memory, of which the settings have the last sectors. Interrupts are disabled while a sector is erased, 45 ms typically and
-/// 400 ms at most, or a page is programmed, 0.4 and 3 ms (Winbond, W25Q16JV, AC electrical characteristics).
-struct SettingsFlash;
+/// The flash memory. Interrupts are disabled while a sector is erased, 45 ms typically and 400 ms at most, or a page is programmed, 0.4
+/// and 3 ms (Winbond, W25Q16JV, AC electrical characteristics).
+pub struct Rp2040Flash;
 
-/// The bytes are not of the memory of the settings.
-#[derive(Debug)]
-struct OutOfBounds;
+impl FlashMemory for Rp2040Flash {
+    const ORIGIN: usize = 0x1000_0000;
+    const SECTOR: usize = SECTOR;
 
-impl NorFlashError for OutOfBounds {
-    fn kind(&self) -> NorFlashErrorKind {
-        NorFlashErrorKind::OutOfBounds
-    }
-}
-
-/// Whether `length` bytes from `offset` on are of the memory of the settings, and whole `units`.
-fn check(offset: u32, length: usize, unit: usize) -> Result<(), OutOfBounds> {
-    let (begin, end) = (offset as usize, (offset as usize).saturating_add(length));
-    let is_inside = begin >= SETTINGS.start as usize && end <= SETTINGS.end as usize;
-    if is_inside && begin % unit == 0 && end % unit == 0 { Ok(()) } else { Err(OutOfBounds) }
-}
-
-impl ErrorType for SettingsFlash {
-    type Error = OutOfBounds;
-}
-
-impl ReadNorFlash for SettingsFlash {
-    const READ_SIZE: usize = 1;
-
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), OutOfBounds> {
-        check(offset, bytes.len(), Self::READ_SIZE)?;
-        for (index, byte) in bytes.iter_mut().enumerate() {
-            // SAFETY: flash, which is readable here.
-            *byte = unsafe { FLASH.cast::<u8>().add(offset as usize + index).read_volatile() };
-        }
+    fn erase(offset: u32) -> Result<(), FlashError> {
+        run(erase_sector, offset, core::ptr::null_mut());
         Ok(())
     }
 
-    fn capacity(&self) -> usize {
-        FLASH_BYTES
-    }
-}
-
-impl NorFlash for SettingsFlash {
     /// Fewer bytes than a page can be programmed: those around them are written as ones, which changes nothing.
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SECTOR;
-
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), OutOfBounds> {
-        check(from, to.saturating_sub(from) as usize, SECTOR)?;
-        (from..to).step_by(SECTOR).for_each(|offset| run(erase_sector, offset, core::ptr::null_mut()));
-        Ok(())
-    }
-
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), OutOfBounds> {
-        check(offset, bytes.len(), Self::WRITE_SIZE)?;
-        let (mut at, mut rest) = (offset as usize, bytes);
+    fn program(offset: u32, words: &[u8]) -> Result<(), FlashError> {
+        let (mut at, mut rest) = (offset as usize, words);
         while !rest.is_empty() {
             let (page, begin) = (at - at % PAGE, at % PAGE);
             let (now, later) = rest.split_at(rest.len().min(PAGE - begin));
@@ -210,23 +165,4 @@ impl NorFlash for SettingsFlash {
         }
         Ok(())
     }
-}
-
-/// The store of the settings.
-fn settings() -> Option<SettingsStore<SettingsFlash>> {
-    SettingsStore::new(SettingsFlash, SETTINGS)
-}
-
-/// Copies the record of the settings to `record` and returns its length.
-pub fn read_record(record: &mut [u8]) -> Option<usize> {
-    settings()?.read(record)
-}
-
-/// Replaces the record, or erases it if `record` is empty. To be used while no DMA transfer runs.
-///
-/// # Errors
-/// The flash does not take it.
-pub fn write_record(record: &[u8]) -> Result<(), StoreError> {
-    let mut settings = settings().ok_or(StoreError::NoMemory)?;
-    if record.is_empty() { settings.erase() } else { settings.write(record) }
 }

@@ -1,11 +1,10 @@
 //! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
 
-use super::flash;
+use super::flash::Rp2040Flash;
 use crate::board::{DataReadyLine, WatchdogExtension};
 use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
 use crate::microcontroller::{DataReadyPin, Microcontroller};
-use crate::settings_store::StoreError;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use embedded_hal::digital::{InputPin, StatefulOutputPin};
 use link::BootCause;
@@ -124,7 +123,7 @@ impl MicrosecondCounter for Rp2040 {
 }
 
 impl Microcontroller for Rp2040 {
-    const KEEPS_RECORD: bool = true;
+    type Flash = Rp2040Flash;
 
     fn feed(&mut self) {
         self.watchdog.feed();
@@ -146,14 +145,6 @@ impl Microcontroller for Rp2040 {
         loop {
             cortex_m::asm::nop();
         }
-    }
-
-    fn read_record(record: &mut [u8]) -> Option<usize> {
-        flash::read_record(record)
-    }
-
-    fn write_record(record: &[u8]) -> Result<(), StoreError> {
-        flash::write_record(record)
     }
 
     /// Has the boot ROM show itself as a drive and to picotool, without an LED for its activity.

@@ -1,5 +1,6 @@
 //! Start of an STM32F4: cause, watchdog, brown-out level, clocks; and the data-ready input.
 
+use super::flash::Stm32Flash;
 use crate::board::{BrownOutLevel, DataReadyLine};
 use crate::bus_frame::{MicrosecondCounter, wait_for};
 use crate::microcontroller::{DataReadyPin, Microcontroller};
@@ -78,6 +79,8 @@ impl Stm32f4 {
             ClockSource::Crystal => Config::hse(crystal_hz.Hz()),
             ClockSource::Internal => Config::hsi(),
         };
+        // With the 48 MHz that USB needs.
+        let source = source.require_pll48clk();
         let config = source.sysclk(CORE_HZ.Hz()).pclk1(PERIPHERAL_HZ.Hz()).pclk2(PERIPHERAL_HZ.Hz());
         let mut rcc = rcc.freeze(config);
         TIM2::enable(&mut rcc);
@@ -115,6 +118,8 @@ impl MicrosecondCounter for Stm32f4 {
 }
 
 impl Microcontroller for Stm32f4 {
+    type Flash = Stm32Flash;
+
     fn feed(&mut self) {
         self.watchdog.feed();
     }

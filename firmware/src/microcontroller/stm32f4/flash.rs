@@ -1,0 +1,87 @@
+//! The flash memory of an STM32F405 (RM0090 chapter 3), of which the last sectors keep the settings.
+//!
+//! The program is in the same memory: while a sector is erased or a word programmed, the processor waits at the next instruction
+//! that it fetches (section 3.6), interrupts included.
+
+use crate::bus_frame::wait_for;
+use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
+use stm32f4xx_hal::pac::{FLASH, flash::RegisterBlock};
+
+/// Bytes that are programmed at once, as the supply of 2.7 to 3.6 V allows (Table 7), and their code in PSIZE of FLASH_CR.
+const WORD: usize = 4;
+const PSIZE_32: u8 = 0b10;
+/// Sectors 0 to 4 have as many bytes together as each of the sectors 5 to 11 (Table 5).
+const SECTORS_BEFORE: usize = 4;
+/// Keys that unlock FLASH_CR (section 3.6.1).
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// Waits of 0.4 ms at least until an operation is given up: a sector is erased within 2 s, a word programmed within 0.1 ms
+/// (STM32F405 data sheet, flash memory programming).
+const WAITS: u32 = 10_000;
+
+/// The flash memory. Its sectors 0 to 4, which are shorter, are not for settings.
+pub struct Stm32Flash;
+
+impl FlashMemory for Stm32Flash {
+    const ORIGIN: usize = 0x0800_0000;
+    const SECTOR: usize = 128 << 10;
+
+    fn erase(offset: u32) -> Result<(), FlashError> {
+        let sector = SECTORS_BEFORE + offset as usize / Self::SECTOR;
+        operate(|flash| {
+            // SAFETY: a width that the supply allows, and the number of a sector.
+            flash.cr().modify(|_, w| unsafe { w.psize().bits(PSIZE_32).snb().bits(sector as u8).ser().set_bit() });
+            flash.cr().modify(|_, w| w.strt().set_bit());
+            finish(flash)
+        })
+    }
+
+    fn program(offset: u32, words: &[u8]) -> Result<(), FlashError> {
+        operate(|flash| {
+            // SAFETY: a width that the supply allows.
+            flash.cr().modify(|_, w| unsafe { w.psize().bits(PSIZE_32).pg().set_bit() });
+            let (words, _no_rest) = words.as_chunks::<WORD>();
+            words.iter().enumerate().try_for_each(|(index, word)| {
+                let address = (Self::ORIGIN + offset as usize + index * WORD) as *mut u32;
+                // SAFETY: the caller programs the memory of the settings alone.
+                unsafe { address.write_volatile(u32::from_le_bytes(*word)) };
+                finish(flash)
+            })
+        })
+    }
+}
+
+/// Runs `operation` with the controller unlocked and its errors of before cleared.
+fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> Result<(), FlashError> {
+    // SAFETY: after the start only the main loop uses the registers of the flash memory.
+    let flash = unsafe { &*FLASH::ptr() };
+    if flash.cr().read().lock().bit_is_set() {
+        for key in KEYS {
+            // SAFETY: the values that unlock the register.
+            flash.keyr().write(|w| unsafe { w.bits(key) });
+        }
+    }
+    // SAFETY: flags, each cleared by a one.
+    flash.sr().modify(|r, w| unsafe { w.bits(r.bits()) });
+    let done = if flash.cr().read().lock().bit_is_clear() { operation(flash) } else { Err(FlashError::Refused) };
+    flash.cr().modify(|_, w| w.ser().clear_bit().pg().clear_bit().lock().set_bit());
+    // The data cache may hold what was there before (section 3.5.2); it is emptied while it is off.
+    flash.acr().modify(|_, w| w.dcen().clear_bit());
+    flash.acr().modify(|_, w| w.dcrst().set_bit());
+    flash.acr().modify(|_, w| w.dcrst().clear_bit());
+    flash.acr().modify(|_, w| w.dcen().set_bit());
+    done
+}
+
+/// Waits for the end of an operation.
+fn finish(flash: &RegisterBlock) -> Result<(), FlashError> {
+    let is_ready = (0..WAITS).any(|_| wait_for(|| flash.sr().read().bsy().bit_is_clear()));
+    let status = flash.sr().read();
+    let errors = [
+        status.operr().bit_is_set(),
+        status.wrperr().bit_is_set(),
+        status.pgaerr().bit_is_set(),
+        status.pgperr().bit_is_set(),
+        status.pgserr().bit_is_set(),
+    ];
+    if is_ready && !errors.contains(&true) { Ok(()) } else { Err(FlashError::Refused) }
+}
