@@ -11,6 +11,9 @@ use std::{env, fs};
 /// A board whose image this checkout builds.
 struct Board {
     name: &'static str,
+    /// Program and features of the package `firmware`.
+    program: &'static str,
+    features: &'static str,
     target: &'static str,
     extension: &'static str,
     convert: fn(&[u8]) -> Result<Vec<u8>, ImageError>,
@@ -22,9 +25,11 @@ struct Board {
 const DFU: &str = "connect BOOT0 to 3.3 V, press reset, and type
   dfu-util --alt 0 --dfuse-address 0x08000000:leave --download FILE";
 
-const BOARDS: [Board; 3] = [
+const BOARDS: [Board; 4] = [
     Board {
         name: "pico",
+        program: "observatory-pico",
+        features: "board-pico",
         target: "thumbv6m-none-eabi",
         extension: "uf2",
         convert: uf2::from_elf,
@@ -33,6 +38,18 @@ a board that runs this firmware shows the drive after the command bootsel",
     },
     Board {
         name: "feather",
+        program: "observatory-feather",
+        features: "board-feather",
+        target: "thumbv7em-none-eabihf",
+        extension: "bin",
+        convert: flash_contents::stm32f405,
+        load: DFU,
+    },
+    // With a serial port on USB, which has not run yet.
+    Board {
+        name: "feather-usb",
+        program: "observatory-feather",
+        features: "board-feather,feather-usb",
         target: "thumbv7em-none-eabihf",
         extension: "bin",
         convert: flash_contents::stm32f405,
@@ -40,6 +57,8 @@ a board that runs this firmware shows the drive after the command bootsel",
     },
     Board {
         name: "h405",
+        program: "observatory-h405",
+        features: "board-h405",
         target: "thumbv7em-none-eabihf",
         extension: "bin",
         convert: flash_contents::stm32f405,
@@ -79,10 +98,9 @@ fn build(board: &Board) -> Result<PathBuf, Box<dyn Error>> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     // As in the tests: cargo, which runs this program, may hold the lock of its own folder.
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from).join("image");
-    let bin = format!("observatory-{}", board.name);
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(&workspace)
-        .args(["build", "--package", "firmware", "--bin", &bin, "--features", &format!("board-{}", board.name)])
+        .args(["build", "--package", "firmware", "--bin", board.program, "--features", board.features])
         .args(["--profile", "image", "--locked", "--target", board.target, "--target-dir"])
         .arg(&target)
         .status()
@@ -92,5 +110,5 @@ fn build(board: &Board) -> Result<PathBuf, Box<dyn Error>> {
             format!("the image does not build; its target comes with: rustup target add {}", board.target).into()
         );
     }
-    Ok(target.join(board.target).join("image").join(bin))
+    Ok(target.join(board.target).join("image").join(board.program))
 }

@@ -67,7 +67,7 @@ fn the_feather_boots_what_is_written() {
 #[test]
 fn a_wrong_name_is_answered_with_the_right_ones() {
     for (arguments, expected) in
-        [(&["uno"][..], "no board uno: there are pico, feather, h405"), (&[], "usage: cargo run")]
+        [(&["uno"][..], "no board uno: there are pico, feather, feather-usb, h405"), (&[], "usage: cargo run")]
     {
         let output = Command::new(env!("CARGO_BIN_EXE_image-file")).args(arguments).output().expect("it starts");
         let errors = String::from_utf8_lossy(&output.stderr);

@@ -1,6 +1,7 @@
 //! The loop on the device: one epoch fits a model, the next one checks it on data that the fit has not seen.
 
 use adis16405_driver::Channel;
+use embedded_hal::spi::SpiDevice;
 use link::{
     ChannelMessage, Decoder, Health, LearnedMessage, Message, Received, ReportedRegressor, ReportedTerm,
     ValidationMessage,
@@ -176,6 +177,31 @@ fn a_gauss_markov_process_is_named_in_every_epoch() {
     }
     println!("named in {named} of 40 epochs, error halved in {foretold} of 20");
     assert_eq!((named, foretold), (40, 20));
+}
+
+/// SENS_AVG, lower byte, of the sensor's register map (data sheet Rev. B, Table 8): sixteen taps a stage.
+const SIXTEEN_TAPS: [u8; 2] = [0xB8, 0x04];
+
+/// The sensor's filter at another setting than the firmware has programmed, and does not look at again, is named in all channels.
+#[test]
+fn another_filter_in_the_sensor_is_named() {
+    let part = VirtualAdis16405::new(NoiseModel::paper(), SEED);
+    let mut device = Device::new(part, Device::blank_memory());
+    device.press(b"i0\re60\r");
+    device.run_until(SECOND);
+    let Ok(()) = device.bus().clone().write(&SIXTEEN_TAPS);
+    device.press(b"clear\r");
+    let heard = Transcript::decode(&device.run_until(123 * SECOND));
+    device.press(b"t");
+    let lines = Transcript::decode(&device.run_until(124 * SECOND)).lines;
+    lines.iter().for_each(|line| println!("{line}"));
+    assert!(lines.iter().any(|line| line.contains("all channels") && line.contains("low-pass filter of 16 taps")));
+    assert_eq!(heard.checked.len(), 6);
+    for checked in &heard.checked {
+        let (before, after) = (checked.before.expect("a model"), checked.after.expect("a model"));
+        println!("{}: {:.1} -> {:.2}", checked.channel, before.deviance_per_point, after.deviance_per_point);
+        assert!(before.deviance_per_point > 2.0 * after.deviance_per_point, "{checked:?}");
+    }
 }
 
 #[test]

@@ -35,6 +35,9 @@ const DMA2_S0CR: u64 = 0x4002_6410;
 const TCIE: u64 = 1 << 4;
 /// Its bit that lets the stream run.
 const EN: u64 = 1;
+/// Status and control of the flash interface (RM0090 sections 3.9.6 and 3.9.8).
+pub(crate) const FLASH_SR: u64 = 0x4002_3C0C;
+pub(crate) const FLASH_CR: u64 = 0x4002_3C10;
 /// Option bytes (RM0090 section 3.9.10).
 pub(crate) const FLASH_OPTCR: u64 = 0x4002_3C14;
 /// Control register 1 of SPI1, whose bits 0 and 1 are CPHA and CPOL (RM0090 section 28.5.1).
@@ -48,8 +51,18 @@ pub(crate) const EXTI_FTSR: u64 = 0x4001_3C0C;
 /// What stops while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
 pub(crate) const DBGMCU_APB1_FZ: u64 = 0xE004_2008;
 /// Registers that a run returns beside the pulls.
-const CONFIGURATION: [u64; 8] =
-    [FLASH_OPTCR, SPI1_CR1, SYSCFG_EXTICR[0], SYSCFG_EXTICR[1], EXTI_IMR, EXTI_RTSR, EXTI_FTSR, DBGMCU_APB1_FZ];
+const CONFIGURATION: [u64; 10] = [
+    FLASH_SR,
+    FLASH_CR,
+    FLASH_OPTCR,
+    SPI1_CR1,
+    SYSCFG_EXTICR[0],
+    SYSCFG_EXTICR[1],
+    EXTI_IMR,
+    EXTI_RTSR,
+    EXTI_FTSR,
+    DBGMCU_APB1_FZ,
+];
 /// Longest time that the emulator runs between two looks at the sensor's clock and the events.
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
@@ -71,17 +84,19 @@ pub(crate) const H405: Wiring = Wiring { crystal_hz: 8_000_000, data_ready: (1, 
 /// Adafruit Feather STM32F405 Express: 12 MHz, PC4 (A4), USART3 (TX, RX), PC1 (D13).
 pub(crate) const FEATHER: Wiring = Wiring { crystal_hz: 12_000_000, data_ready: (2, 4), usart: 2, led: (2, 1) };
 
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+
 /// The image for the Olimex STM32-H405, built at most once a run; `OBSERVATORY_IMAGE` names another.
 pub(crate) fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    let build = || images::build("h405", "thumbv7em-none-eabihf", &[]);
+    let build = || images::build("h405", TARGET, &[]);
     IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
 }
 
 /// The image for the Adafruit Feather STM32F405, built at most once a run.
 pub(crate) fn feather_image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    IMAGE.get_or_init(|| images::build("feather", "thumbv7em-none-eabihf", &[]))
+    IMAGE.get_or_init(|| images::build("feather", TARGET, &[]))
 }
 
 /// Address of the register at `offset` of a GPIO port.
@@ -163,6 +178,8 @@ pub(crate) enum Event {
     SensorReset,
     /// The sensor is put to sleep, without end.
     SensorSleep,
+    /// Something else writes this frame to the sensor.
+    WriteRegister(u16),
     /// The data line to the processor is held at this byte, or released.
     Stuck(Option<u8>),
     /// The data-ready line changes its level every 4 us for this time, in ns.
@@ -231,6 +248,11 @@ impl Plant {
             Event::SensorReset => {
                 sensor.part.select();
                 sensor.part.transfer(0xBE80); // GLOB_CMD bit 7
+                sensor.part.deselect();
+            }
+            Event::WriteRegister(frame) => {
+                sensor.part.select();
+                sensor.part.transfer(frame);
                 sensor.part.deselect();
             }
             Event::SensorSleep => {

@@ -19,16 +19,19 @@ pub(crate) fn folder() -> PathBuf {
 pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
     let (feature, bin) = (format!("board-{board}"), format!("observatory-{board}"));
     let copy = [&[bin.as_str()], further].concat().join("-");
-    build_package(("firmware", &bin), target, &[&[feature.as_str()], further].concat(), &copy)
+    let features = [&[feature.as_str()], further].concat().join(",");
+    build_package(("firmware", &bin), target, &["--features", &features], &copy)
 }
 
-/// Builds the program of a package for a target, and returns the path of a copy of its ELF with the name `copy`.
-pub(crate) fn build_package((package, bin): (&str, &str), target: &str, features: &[&str], copy: &str) -> PathBuf {
+/// Builds the program of a package for a target, with further arguments of cargo, and returns the path of a copy of its ELF with the
+/// name `copy`.
+pub(crate) fn build_package((package, bin): (&str, &str), target: &str, further: &[&str], copy: &str) -> PathBuf {
     static BUILD: Mutex<()> = Mutex::new(());
     let _one_at_a_time = BUILD.lock();
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace())
-        .args(["build", "--package", package, "--bin", bin, "--features", &features.join(","), "--target", target])
+        .args(["build", "--package", package, "--bin", bin, "--target", target])
+        .args(further)
         .args(["--profile", "image", "--locked", "--target-dir"])
         .arg(folder())
         .status()

@@ -5,7 +5,7 @@ use adis16405_driver::BURST_BYTES;
 use image_file::uf2;
 use std::collections::VecDeque;
 use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use virtual_sensor::VirtualAdis16405;
@@ -39,7 +39,18 @@ fn bench() -> &'static Bench {
 
 /// The example of a board outside of `firmware`.
 fn example_bench() -> Bench {
-    Bench::new(images::build_package(("example-board", "example-board"), TARGET, &["image"], "example-board"))
+    Bench::new(images::build_package(
+        ("example-board", "example-board"),
+        TARGET,
+        &["--features", "image"],
+        "example-board",
+    ))
+}
+
+/// The image without its serial port on USB.
+fn bench_without_usb() -> Bench {
+    let arguments = ["--no-default-features", "--features", "board-pico"];
+    Bench::new(images::build_package(("firmware", "observatory-pico"), TARGET, &arguments, "observatory-pico-uart"))
 }
 
 fn emulator() -> PathBuf {
@@ -142,11 +153,6 @@ impl Pico {
     }
 }
 
-/// The path of the image.
-pub(crate) fn image() -> &'static Path {
-    &bench().elf
-}
-
 /// Boots the image from its UF2 and runs it. A key is given as `TIME=TEXT`, or as `usb:TIME=TEXT` for the USB port; `events` are in order of time. Times are in
 /// s.
 pub(crate) fn run(
@@ -162,6 +168,18 @@ pub(crate) fn run(
 /// As [`run`], with the image of the example of a board.
 pub(crate) fn run_example(part: VirtualAdis16405, seconds: f64, keys: &[&str], events: &[(f64, Event)]) -> Outcome {
     run_image(&example_bench(), SOUND, part, seconds, keys, events)
+}
+
+/// What [`run`] gives, with the path of the image: as it is flashed, with a USB host that reads, or without its port on USB.
+pub(crate) fn run_to_measure(usb: bool, part: VirtualAdis16405, seconds: f64, keys: &[&str]) -> (Outcome, PathBuf) {
+    let uart_alone;
+    let (bench, board) = if usb {
+        (bench(), Pico { usb_reads_at: Some(0.0), ..SOUND })
+    } else {
+        uart_alone = bench_without_usb();
+        (&uart_alone, SOUND)
+    };
+    (run_image(bench, board, part, seconds, keys, &[]), bench.elf.clone())
 }
 
 fn run_image(

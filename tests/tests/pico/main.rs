@@ -15,7 +15,7 @@ mod epochs;
 mod images;
 
 use adis16405_driver::Burst;
-use bench::{Event, Fault, Outcome, Pico, SOUND, image, run, run_example};
+use bench::{Event, Fault, Outcome, Pico, SOUND, run, run_example, run_to_measure};
 use costs::{Costs, Memory, assert_within_budget, counter};
 use decoded::{Decoded, on_host};
 use epochs::{EPOCH_S, SENTENCES, assert_told, four_effects, learned_on_device, learned_on_host, warming_part};
@@ -304,9 +304,20 @@ fn without_a_crystal_the_led_blinks_fast() {
 #[test]
 #[ignore = "long: 150 emulated seconds with software floating point take some minutes; run with --long"]
 fn the_pico_learns_from_an_epoch() {
+    assert_learns("Raspberry Pi Pico", true);
+}
+
+/// What USB costs, from the difference.
+#[test]
+#[ignore = "long: 150 emulated seconds with software floating point take some minutes; run with --long"]
+fn the_pico_learns_from_an_epoch_without_usb() {
+    assert_learns("Raspberry Pi Pico, no USB", false);
+}
+
+fn assert_learns(board: &str, usb: bool) {
     const SECONDS: f64 = 150.0;
     let keys = ["0.1=i 0\rf 819.2\re 10\r", "8.0=k", "11.0=e 0\r"];
-    let outcome = run(SOUND, sensor(14), SECONDS, &keys, &[]);
+    let (outcome, image) = run_to_measure(usb, sensor(14), SECONDS, &keys);
     let decoded = Decoded::decode(&outcome.received);
     println!("{:#?}", decoded.lines);
     println!("the watchdog was not fed for {:.2} s at most", outcome.longest_unfed_s);
@@ -320,8 +331,7 @@ fn the_pico_learns_from_an_epoch() {
     // RP2040 data sheet, section 2.6.2; the stack is the rest of 264 KiB.
     let memory = Memory { flash: 2 << 20, ram: 200 << 10 };
     let awake_percent = f64::from(counter(&decoded.lines, "awake_permille").expect("the counters")) / 10.0;
-    let (board, image) = ("Raspberry Pi Pico", image());
-    assert_within_budget(&Costs { board, memory, image, core_mhz: 125.0, awake_percent, health });
+    assert_within_budget(&Costs { board, memory, image: &image, core_mhz: 125.0, awake_percent, health });
 }
 
 /// As on the other boards: names, parameters and errors of four hidden effects are the host's on the same samples, bit for bit, and
