@@ -182,7 +182,9 @@ fn a_gauss_markov_process_is_named_in_every_epoch() {
 /// SENS_AVG, lower byte, of the sensor's register map (data sheet Rev. B, Table 8): sixteen taps a stage.
 const SIXTEEN_TAPS: [u8; 2] = [0xB8, 0x04];
 
-/// The sensor's filter at another setting than the firmware has programmed, and does not look at again, is named in all channels.
+/// The sensor's filter at another setting than the firmware has programmed, and does not look at again, is named on the gyros. An
+/// accelerometer's count of 3.33 mg is three times the deviation of its noise behind the filter, 0.34 mg·√s·√(204.8 Hz·0.0417) = 1.0 mg,
+/// and rounding makes its curve another than the filter's: what is named there has to foretell the next epoch as well.
 #[test]
 fn another_filter_in_the_sensor_is_named() {
     let part = VirtualAdis16405::new(NoiseModel::paper(), SEED);
@@ -195,12 +197,12 @@ fn another_filter_in_the_sensor_is_named() {
     device.press(b"t");
     let lines = Transcript::decode(&device.run_until(124 * SECOND)).lines;
     lines.iter().for_each(|line| println!("{line}"));
-    assert!(lines.iter().any(|line| line.contains("all channels") && line.contains("low-pass filter of 16 taps")));
+    assert!(lines.iter().any(|line| line.contains("gyros") && line.contains("low-pass filter of 16.0 taps")));
     assert_eq!(heard.checked.len(), 6);
     for checked in &heard.checked {
         let (before, after) = (checked.before.expect("a model"), checked.after.expect("a model"));
         println!("{}: {:.1} -> {:.2}", checked.channel, before.deviance_per_point, after.deviance_per_point);
-        assert!(before.deviance_per_point > 2.0 * after.deviance_per_point, "{checked:?}");
+        assert!(before.deviance_per_point > 10.0 * after.deviance_per_point, "{checked:?}");
     }
 }
 
