@@ -50,7 +50,7 @@ pub use first_order_filter::FirstOrderFilter;
 pub(crate) use kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 pub use knock::NoisyInterval;
 pub use markov_process::{MarkovEvidence, MarkovProcess};
-pub use motion::MotionInterval;
+pub use motion::{MotionInterval, MotionScale};
 pub use noise_below_count::NoiseBelowCount;
 pub use output_filter::OutputFilter;
 pub use rate_ramp::{LinearDrift, LinearDriftEvidence};

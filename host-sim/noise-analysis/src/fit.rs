@@ -3,6 +3,7 @@
 pub(crate) mod channel_fit;
 pub mod contradiction;
 pub(crate) mod covariates;
+pub(crate) mod event_share;
 pub mod gauss_markov;
 pub(crate) mod minimum;
 pub(crate) mod noise_terms;

@@ -27,7 +27,7 @@ mod tracked_parameters;
 mod tests;
 
 pub use common_mode_regression::{CommonModeRegression, HoldOutGain, OctaveShares};
-pub(crate) use epochs::EpochCurves;
+pub(crate) use epochs::{EpochCurves, quarter_curves};
 pub use epochs::{FittedPart, Stationarity};
 pub use prediction::{Baselines, TrackingErrors};
 pub use prediction_intervals::IntervalCoverage;
@@ -112,7 +112,16 @@ impl ChannelEpochs {
     /// Compares the two quarters of the first half of `curves`; `model` describes both together.
     pub(crate) fn compare(curves: EpochCurves, model: &Model) -> Self {
         let quarters = Stationarity::compare(&curves.quarters[0], &curves.quarters[1], model);
-        Self { part: FittedPart::select(quarters), quarters, curves }
+        let part = match FittedPart::select(quarters) {
+            FittedPart::LaterQuarter if !curves.quarters_differ_beyond_epochs() => FittedPart::FirstHalf,
+            part => part,
+        };
+        Self { part, quarters, curves }
+    }
+
+    /// The curves of the two quarters of the first half, the earlier first.
+    pub(crate) fn quarter_curves(&self) -> &[Curve<OCTAVES>; 2] {
+        &self.curves.quarters
     }
 
     /// The curve that a model of what follows is fitted to, if it is not that of the whole first half: of noise that changes,

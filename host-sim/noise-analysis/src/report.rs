@@ -13,6 +13,8 @@ pub use crate::bounds::{BoundedEstimate, Parameter};
 pub use crate::effects::Effect;
 pub use crate::effects::findings::{ChannelEffect, Finding, Validation};
 pub use crate::fit::contradiction::Contradiction;
+use crate::fit::event_share::EventShare;
+pub use crate::fit::event_share::EventsReport;
 pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
 use crate::report::assessment::Assessment;
 use crate::units::coefficient_unit;
@@ -273,6 +275,9 @@ pub struct ModelReport {
     /// absent where they exclude nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen_excluding: Option<ModelErrorReport>,
+    /// The spikes and knocks that the model foretells; absent where the first half has none, and of the baseline model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub events: Option<EventsReport>,
 }
 
 /// One term of a noise model of a channel.
@@ -446,17 +451,41 @@ impl ModelErrorReport {
         }
     }
 
-    /// The error on `curve` of another curve, `other`, taken for a model, with the degrees of freedom of `model`. Octaves that
-    /// `other` lacks are left out.
-    #[must_use]
-    pub fn of_curve<const POINTS: usize>(other: &Curve<POINTS>, curve: &Curve<POINTS>, model: &Model) -> Self {
+    /// The error against `curve` of `model` with the spikes and knocks that are foretold.
+    pub(crate) fn with_events<const POINTS: usize>(model: &Model, events: &EventShare, curve: &Curve<POINTS>) -> Self {
+        if events.is_empty() {
+            return Self::new(model, curve);
+        }
+        let predicted = |point: &AllanPoint| events.predicted(model, point);
+        let error = Self::by_points(curve, |point| Some(predicted(point)));
+        Self { contradiction: Contradiction::find_by(model, curve, predicted), ..error }
+    }
+
+    /// The error on `curve` of another curve, `other`, taken for a model, with the degrees of freedom of `model` and of the `events` in
+    /// it. Octaves that `other` lacks are left out.
+    pub(crate) fn of_curve<const POINTS: usize>(
+        other: &Curve<POINTS>,
+        curve: &Curve<POINTS>,
+        model: &Model,
+        events: &EventShare,
+    ) -> Self {
+        Self::by_points(curve, |point| {
+            let of = other.points().iter().find(|of| of.n == point.n && of.avar * point.avar > 0.0)?;
+            Some((of.avar, events.degrees_of_freedom(model.edf(point), (events.avar(of.n) / of.avar).min(1.0))))
+        })
+    }
+
+    /// The error against `curve` of what is `modelled` at each of its points: the Allan variance, and the degrees of freedom of one that
+    /// measures it. Points without are left out.
+    fn by_points<const POINTS: usize>(
+        curve: &Curve<POINTS>,
+        modelled: impl Fn(&AllanPoint) -> Option<(f64, f64)>,
+    ) -> Self {
         let (mut deviance, mut square, mut points) = (0.0, 0.0, 0.0);
         let (mut sigma, mut tau, mut ratio) = (0.0_f64, None, None);
         for point in curve.points() {
-            let Some(of) = other.points().iter().find(|of| of.n == point.n && of.avar * point.avar > 0.0) else {
-                continue;
-            };
-            let (measured, edf) = (point.avar / of.avar, model.edf(point));
+            let Some((avar, edf)) = modelled(point) else { continue };
+            let measured = point.avar / avar;
             let deviation = cube_root_deviation(measured, edf);
             if deviation.abs() > sigma.abs() {
                 (sigma, tau, ratio) = (deviation, Some(point.tau), Some((1.0 / measured).sqrt()));

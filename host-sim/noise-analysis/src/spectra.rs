@@ -45,7 +45,7 @@ pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
 pub use line_envelope::Modulation;
 pub use lines::find_lines;
-pub(crate) use lines::{find_lines_over, without_slow_sines};
+pub(crate) use lines::{find_lines_over, without_sines, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;
 pub use smooth_shape::{SpectralBand, SpectralShape};
 pub use welch::Welch;

@@ -1,10 +1,10 @@
 //! What an effect was told by, in words: what was measured, against which threshold, and the usual causes.
 
 use crate::formatting::enumerated;
-use crate::rounding::quantity_digits;
+use crate::rounding::{quantity_digits, significant};
 use noise_analysis::effects::{
-    BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, Multiples,
-    Observation, OutputFilter, Refutation, TelegraphEvidence, Unexplained,
+    BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, MotionScale,
+    Multiples, Observation, OutputFilter, Refutation, TelegraphEvidence, Unexplained,
 };
 use noise_analysis::report::Finding;
 
@@ -276,10 +276,17 @@ impl Wording {
             }
             Effect::MotionInterval(of) => text(
                 format!(
-                    "the mean of a second leaves the median by up to {:.3} {unit}, more than three times the {:.3} {unit} by which the \
-                     biases of parts differ, in {} stretches of together {} s: the platform was moved",
+                    "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} stretches of together {} s: the \
+                     platform was moved",
                     of.size.value,
-                    of.bias_error,
+                    match of.scale {
+                        MotionScale::BiasError(error) => format!(
+                            "more than three times the {error:.3} {} by which the biases of parts differ",
+                            of.size.unit
+                        ),
+                        MotionScale::Scatter(scatter) =>
+                            format!("where such means scatter by {} {}", significant(scatter, 2), of.size.unit),
+                    },
                     of.stretches,
                     of.moved_s,
                     unit = of.size.unit

@@ -111,13 +111,23 @@ pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
 /// The terms, and the errors on the second half.
 fn model(channel: &ChannelReport) -> String {
     let terms: Vec<String> = channel.after.terms.iter().map(|term| words(term.kind())).collect();
-    let excluding = channel.after.unseen_excluding.as_ref().map_or_else(String::new, |error| {
-        format!(" ({} without the samples that the rules of the first half exclude)", deviance(error))
+    let excluding = channel.before.unseen_excluding.as_ref().zip(channel.after.unseen_excluding.as_ref());
+    let excluding = excluding.map_or_else(String::new, |(before, after)| {
+        format!(" Without the spikes and knocks of both halves {} become {}.", deviance(before), deviance(after))
+    });
+    let events = channel.after.events.as_ref().map_or_else(String::new, |events| {
+        let rate = &events.rate_per_hour;
+        format!(
+            ", with {} spikes and knocks an hour [{}, {}], as the first half has them",
+            significant(rate.value, 2),
+            significant(rate.low, 2),
+            significant(rate.high, 2)
+        )
     });
     format!(
         "N, B and K of the first half leave a deviance of {} a point on the second half; 1 is a true model on its own data. The \
-         model with its effects ({}) leaves {}{excluding}. The curve of the first half itself, taken for a model, leaves {}: a \
-         model of stationary noise cannot be expected to do better.",
+         model with its effects ({}{events}) leaves {}. The curve of the first half itself, taken for a model, leaves {}: a \
+         model of stationary noise cannot be expected to do better.{excluding}",
         deviance(&channel.before.unseen),
         terms.join(", "),
         deviance(&channel.after.unseen),

@@ -55,7 +55,11 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     }
     writeln!(out, "by PSD: σ(τ) by equation (5), from the measured spectrum instead of differences of means.")?;
     if report.channels.iter().any(|channel| channel.after.unseen_excluding.is_some()) {
-        writeln!(out, "excluding: without what the first half's rules for spikes and knocks find in the unseen half.")?;
+        writeln!(
+            out,
+            "excluding: without what the first half's rules for spikes and knocks find in the unseen half; the"
+        )?;
+        writeln!(out, "models after foretell these in the unseen half as recorded, at the rate of the first half.")?;
     }
     writeln!(
         out,

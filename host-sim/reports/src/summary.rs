@@ -174,14 +174,9 @@ pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
     Some(Parameter::new(value, low, high, unit))
 }
 
-/// The error of a model on the unseen half, without what the first half's rules exclude where they exclude anything.
-fn unseen(model: &noise_analysis::report::ModelReport) -> &ModelErrorReport {
-    model.unseen_excluding.as_ref().unwrap_or(&model.unseen)
-}
-
-/// Deviance a point of the models `before` and `after` on the unseen half, as the table has them.
+/// Deviance a point of the models `before` and `after` on the unseen half as recorded, as the table has them.
 pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
-    [&channel.before, &channel.after].map(|model| unseen(model).deviance_per_point)
+    [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point)
 }
 
 /// Deviance a point before and after; nothing where no model has met unseen data yet.
@@ -200,8 +195,7 @@ pub(crate) fn deviance_per_point(of: f64) -> String {
 
 /// Whether the model with its effects fails on the unseen half.
 fn is_high(channel: &ChannelReport) -> bool {
-    let error = unseen(&channel.after);
-    error.deviance_per_point.is_some_and(|of| of > HIGH_DEVIANCE)
+    channel.after.unseen.deviance_per_point.is_some_and(|of| of > HIGH_DEVIANCE)
 }
 
 /// Gyros and accelerometers.
@@ -252,6 +246,7 @@ pub fn record_sentences(report: &Report) -> Vec<String> {
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
     sentences.extend(length_advice(report));
     sentences.extend(recent_fit(report));
+    sentences.extend(without_events(report));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
 }
@@ -334,7 +329,16 @@ fn rest(report: &Report) -> String {
     match least {
         _ if !least.is_finite() => String::new(),
         least if least >= THROUGHOUT * length => "At rest throughout.".to_owned(),
-        least => format!("It moved: at rest for {} of {}.", span(least), span(length)),
+        least => {
+            let stretches = inertial(report).flat_map(|channel| &channel.at_rest);
+            let longest = stretches.max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
+            let longest = longest.map_or_else(String::new, |of| {
+                // In whole seconds, none of which is moved.
+                let (from, to) = (of.from_s.ceil(), of.to_s.floor());
+                format!(", the longest time from {from} s to {to} s: --from {from} --to {to}")
+            });
+            format!("It moved: at rest for {} of {}{longest}.", span(least), span(length))
+        }
     }
 }
 
@@ -423,6 +427,23 @@ fn recent_fit(report: &Report) -> Option<String> {
         format!(
             "The noise changes: the error of {} is that of a fit to the later quarter of the first half.",
             channel_list(&recent)
+        )
+    })
+}
+
+/// What the errors mean where there are spikes or knocks, and what they are without them; `None` where there are none.
+fn without_events(report: &Report) -> Option<String> {
+    let excluding = inertial(report).filter_map(|channel| {
+        let [before, after] = [&channel.before, &channel.after].map(|model| model.unseen_excluding.as_ref());
+        let change = error_change([before?, after?].map(|error| error.deviance_per_point));
+        Some(format!("{} {change}", channel_list(std::slice::from_ref(&channel.name))))
+    });
+    let excluding: Vec<String> = excluding.collect();
+    (!excluding.is_empty()).then(|| {
+        format!(
+            "The errors are on the data as recorded; the models after foretell its spikes and knocks at the rate of the first half. \
+             Without them: {}.",
+            excluding.join(", ")
         )
     })
 }
@@ -543,7 +564,7 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     let mut told = Vec::new();
     let mut far: Vec<(&ChannelReport, &ModelErrorReport, f64)> = inertial(report)
         .filter_map(|channel| {
-            let error = unseen(&channel.after);
+            let error = &channel.after.unseen;
             let sigma = error.worst_sigma.filter(|sigma| sigma.abs() > FAR_OFF)?;
             Some((channel, error, sigma))
         })
@@ -620,10 +641,7 @@ pub fn next_steps(report: &Report) -> Vec<String> {
 /// The models that fail on the unseen half. Where the first half's own curve fails too, no model of the first half can hold: the
 /// noise has changed. Where it does not, the model lacks something.
 fn failures(report: &Report) -> Vec<String> {
-    // The curve is compared with the second half as recorded, so not with an error that excludes samples.
-    let own_curve = |channel: &ChannelReport| {
-        channel.first_half_curve.deviance_per_point.filter(|_| channel.after.unseen_excluding.is_none())
-    };
+    let own_curve = |channel: &ChannelReport| channel.first_half_curve.deviance_per_point;
     let failed = || inertial(report).filter(|channel| is_high(channel));
     let told = |wanted: &dyn Fn(Option<f64>) -> bool, reason: &dyn Fn(&str) -> String| {
         let channels: Vec<&ChannelReport> = failed().filter(|channel| wanted(own_curve(channel))).collect();

@@ -297,6 +297,7 @@ fn report(found: &[Found]) -> Report {
         fitted: ModelErrorReport::default(),
         unseen: ModelErrorReport::default(),
         unseen_excluding: None,
+        events: None,
     };
     let effect = |(_, effect): &Found| ChannelEffect { effect: effect.clone(), finding: 0 };
     let channel = |channel: Channel| ChannelReport {

@@ -9,6 +9,7 @@ use super::noise_levels::{
     DIFFERENCES, HALF_EFFICIENCY, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, averaging_factors, doublings,
     exceedance, freedom_by_scatter, longer_levels, median, neighbouring_level, neighbours_freedom,
 };
+use super::spikes::Disturbance;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 use crate::effects::NoisyInterval;
@@ -362,26 +363,60 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     }
 }
 
+impl From<Disturbance> for Knock {
+    /// Its level is that of the samples that stand out, against single samples.
+    fn from(of: Disturbance) -> Self {
+        let bounded = |value: u64, low: u64, high: u64| BoundedSlot { value, low, high };
+        // Of a mean square of so many degrees of freedom.
+        let half = NORMAL_975 * (0.5 / of.count as f64).sqrt();
+        Self {
+            from: bounded(of.certain.start, of.slots.start, of.certain.start),
+            to: bounded(of.certain.end, of.certain.end, of.slots.end),
+            slots: of.slots,
+            level: of.level,
+            level_bounds: (of.level * (-half).exp(), of.level * half.exp()),
+            n: 1,
+            p_value: of.p_value,
+        }
+    }
+}
+
 impl Knock {
+    /// Adds the disturbances that single samples show to the knocks of a channel, up to the part of it that knocks may have.
+    pub(crate) fn add_disturbances(knocks: &mut Vec<Self>, disturbances: Vec<Disturbance>, series: &Series) {
+        let mut with = knocks.clone();
+        disturbances.into_iter().for_each(|disturbance| join(&mut with, disturbance.into()));
+        let share: u64 = with.iter().map(|knock| knock.slots.end - knock.slots.start).sum();
+        if share as f64 <= LARGEST_SHARE * series.values.len() as f64 {
+            with.sort_by_key(|knock| knock.slots.start);
+            *knocks = with;
+        }
+    }
+
     /// Whether both have a sample period in common.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         self.slots.start < other.slots.end && other.slots.start < self.slots.end
     }
 
-    /// The knock as it is reported; `channels` are the names of those that show it, the channel's own included.
+    /// The knock of a series as it is reported; `channels` are the names of those that show it, the channel's own included.
     pub(crate) fn detection(&self, series: &Series, channels: &[&'static str]) -> Detection {
-        let time = |slot: u64| slot as f64 * series.period_s;
+        let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
+        let effect = self.interval(series.period_s, channels).into();
+        Detection { effect, correction: Some(Correction::Exclude(excluded)) }
+    }
+
+    /// The same of samples of this period, s.
+    pub(crate) fn interval(&self, period_s: f64, channels: &[&'static str]) -> NoisyInterval {
+        let time = |slot: u64| slot as f64 * period_s;
         let bounded = |of: BoundedSlot| BoundedEstimate::new(time(of.value), time(of.low), time(of.high));
         let (low, high) = self.level_bounds;
-        let interval = NoisyInterval {
+        NoisyInterval {
             from_s: bounded(self.from),
             to_s: bounded(self.to),
             level: BoundedEstimate::new(self.level, low, high),
-            tau_s: self.n as f64 * series.period_s,
+            tau_s: self.n as f64 * period_s,
             p_value: self.p_value,
             channels: channels.to_vec(),
-        };
-        let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
-        Detection { effect: interval.into(), correction: Some(Correction::Exclude(excluded)) }
+        }
     }
 }

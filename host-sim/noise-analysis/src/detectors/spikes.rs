@@ -5,7 +5,7 @@
 //! interpolation error is normal, so the threshold for N samples comes from N times the normal tail.
 
 use crate::bounds::BoundedEstimate;
-use crate::distributions::{NORMAL_975, density, poisson_bounds, quantile, upper_tail};
+use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
 use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
@@ -26,6 +26,12 @@ const CLIP: f64 = 4.5;
 /// the bias.
 const SETTLED: f64 = 0.5;
 
+/// A disturbance ends where it would have decayed, exponentially, to this part of the deviation of the interpolation error: the rest of
+/// its energy is below that of half a sample of noise for each of its time constants.
+const DECAYED: f64 = 0.3;
+/// Most that a disturbance is longer on either side than the samples that stand out, in the length of these.
+const LONGEST_DECAY: f64 = 4.0;
+
 /// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
 const LEAST_DETECTED: f64 = 0.05;
 
@@ -36,7 +42,7 @@ pub(crate) struct SpikeRule {
 }
 
 /// What a rule finds in samples of its channel.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct FoundSpikes {
     /// Sample periods, in ascending order within what was looked at.
     pub slots: Vec<u64>,
@@ -44,6 +50,22 @@ pub(crate) struct FoundSpikes {
     sizes: Vec<f64>,
     /// Candidates that are jumps of the bias.
     jumps: usize,
+}
+
+/// Samples in a row that do not belong to the noise: longer than the interpolation reaches over, and so no spikes that a filter has
+/// spread.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Disturbance {
+    /// Sample periods from the first sample that stands out to the last one.
+    pub certain: Range<u64>,
+    /// Those in which it may be more than a part of the noise.
+    pub slots: Range<u64>,
+    /// Root mean square of the interpolation errors that stand out, in standard deviations.
+    pub level: f64,
+    /// How many stand out.
+    pub count: usize,
+    /// Probability that independent spikes stand as close together anywhere.
+    pub p_value: f64,
 }
 
 impl FoundSpikes {
@@ -65,6 +87,35 @@ impl FoundSpikes {
         self.slots.extend(later.slots);
         self.sizes.extend(later.sizes);
         self.jumps += later.jumps;
+    }
+
+    /// The sample period and the interpolation error of each.
+    pub(crate) fn samples(&self) -> impl Iterator<Item = (u64, f64)> {
+        self.slots.iter().copied().zip(self.sizes.iter().copied())
+    }
+
+    /// Positions of the samples that stand out with no more than [`REACH`] sample periods between them.
+    fn events(&self) -> Vec<Range<usize>> {
+        let mut events: Vec<Range<usize>> = Vec::new();
+        for at in 0..self.slots.len() {
+            match events.last_mut() {
+                Some(event) if self.slots[at] - self.slots[at - 1] <= REACH as u64 => event.end = at + 1,
+                _ => events.push(at..at + 1),
+            }
+        }
+        events
+    }
+
+    /// The sizes of the spikes in `samples` samples: what a filter or the platform spreads over several samples is one spike, of the
+    /// largest size. Where independent spikes stand as close together as often, each is one.
+    fn sizes_of_events(&self, samples: u64) -> Vec<f64> {
+        let events = self.events();
+        let joined = (self.slots.len() - events.len()) as u64;
+        let expected = events.len() as f64 * near_by_chance(events.len(), samples);
+        if poisson_tail(joined, expected) >= SIGNIFICANCE {
+            return self.sizes.clone();
+        }
+        events.into_iter().map(|event| self.sizes[event].iter().copied().fold(0.0, f64::max)).collect()
     }
 
     /// Whether there are spikes, and more of them than jumps of the bias.
@@ -115,14 +166,68 @@ impl SpikeRule {
         }
     }
 
-    /// The spikes of a channel in `unit` that was looked at for `hours`, as they are reported; `None` if there are none, or if jumps
-    /// of the bias are at least as frequent.
-    pub(crate) fn detection(&self, found: &FoundSpikes, hours: f64, unit: &'static str) -> Option<Detection> {
+    /// What was found in `samples` samples as single spikes and as disturbances, in ascending order.
+    ///
+    /// Samples that stand out with no more than [`REACH`] sample periods between them are of one event. Of events at the rate that is
+    /// found, the next one follows as closely with the probability `1 − exp(−rate·REACH)`. An event that is longer than an interpolation
+    /// reaches over, and that chance does not make of single ones, is a disturbance.
+    pub(crate) fn separate(&self, found: FoundSpikes, samples: u64) -> (FoundSpikes, Vec<Disturbance>) {
+        let events = found.events();
+        let near = near_by_chance(events.len(), samples);
+        let disturbance = |event: &Range<usize>| {
+            let certain = found.slots[event.start]..found.slots[event.end - 1] + 1;
+            let length = certain.end - certain.start;
+            let p_value = (events.len() as f64 * near.powi(event.len() as i32 - 1)).min(1.0);
+            if length <= 2 * REACH as u64 || p_value >= SIGNIFICANCE {
+                return None;
+            }
+            let sizes = || found.sizes[event.clone()].iter().map(|size| size / self.interpolation.deviation);
+            let threshold = self.threshold / self.interpolation.deviation;
+            let times = (threshold / DECAYED).ln() / (sizes().fold(threshold, f64::max) / threshold).ln();
+            let decay = (times.min(LONGEST_DECAY) * length as f64).ceil() as u64;
+            Some(Disturbance {
+                slots: certain.start.saturating_sub(decay)..certain.end + decay,
+                level: (sizes().map(|size| size * size).sum::<f64>() / event.len() as f64).sqrt(),
+                count: event.len(),
+                p_value,
+                certain,
+            })
+        };
+        let mut disturbances: Vec<Disturbance> = Vec::new();
+        for next in events.iter().filter_map(disturbance) {
+            match disturbances.last_mut() {
+                Some(last) if next.slots.start < last.slots.end => last.join(next),
+                _ => disturbances.push(next),
+            }
+        }
+        let is_single = |slot: &u64| !disturbances.iter().any(|of| of.slots.contains(slot));
+        let kept: Vec<usize> = (0..found.slots.len()).filter(|&at| is_single(&found.slots[at])).collect();
+        let singles = FoundSpikes {
+            slots: kept.iter().map(|&at| found.slots[at]).collect(),
+            sizes: kept.iter().map(|&at| found.sizes[at]).collect(),
+            jumps: found.jumps,
+        };
+        (singles, disturbances)
+    }
+
+    /// The disturbances in a part of the same channel.
+    pub(crate) fn disturbances(&self, series: &Series) -> Vec<Disturbance> {
+        self.separate(self.find(series), series.values.len() as u64).1
+    }
+
+    /// The spikes of a channel in `unit` that was looked at for `hours`, in `samples` samples, as they are reported; `None` if there are
+    /// none, or if jumps of the bias are at least as frequent.
+    pub(crate) fn detection(
+        &self,
+        found: &FoundSpikes,
+        (hours, samples): (f64, u64),
+        unit: &'static str,
+    ) -> Option<Detection> {
         if !found.are_spikes() {
             return None;
         }
         let Self { interpolation, threshold } = self;
-        let sizes = &found.sizes;
+        let sizes = &found.sizes_of_events(samples);
         let largest = sizes.iter().copied().fold(0.0, f64::max);
         let size = SpikeSize::estimate(sizes, *threshold, interpolation.deviation);
         let count = sizes.len() as f64;
@@ -143,11 +248,29 @@ impl SpikeRule {
     }
 }
 
+impl Disturbance {
+    /// Adds a later one that it overlaps.
+    fn join(&mut self, later: Self) {
+        let (own, other) = (self.count as f64, later.count as f64);
+        let squares = own * self.level.powi(2) + other * later.level.powi(2);
+        self.level = (squares / (own + other)).sqrt();
+        self.certain.end = later.certain.end;
+        self.slots = self.slots.start.min(later.slots.start)..self.slots.end.max(later.slots.end);
+        self.count += later.count;
+        self.p_value = self.p_value.min(later.p_value);
+    }
+}
+
 /// Looks for spikes in one channel. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let rule = SpikeRule::fit(series)?;
-    rule.detection(&rule.find(series), series.duration_s() / 3600.0, series.unit)
+    rule.detection(&rule.find(series), (series.duration_s() / 3600.0, series.values.len() as u64), series.unit)
+}
+
+/// Probability that the next of so many independent events in `samples` samples follows within [`REACH`] sample periods.
+fn near_by_chance(events: usize, samples: u64) -> f64 {
+    -(-(events as f64 * REACH as f64) / samples.max(1) as f64).exp_m1()
 }
 
 /// The best linear interpolation of a sample from its neighbours.

@@ -3,6 +3,15 @@
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
+/// By how much the mean of a second of a channel at rest may leave the median.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MotionScale {
+    /// By how much the biases of parts differ (1 σ), by the data sheet, in the unit of the channel.
+    BiasError(f64),
+    /// The scatter of the channel's own means of a second (1 σ), where no data sheet is known, in the unit of the channel.
+    Scatter(f64),
+}
+
 /// A motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionInterval {
@@ -12,8 +21,8 @@ pub struct MotionInterval {
     pub to_s: BoundedEstimate,
     /// Largest distance of the mean of a second from the median.
     pub size: ChannelEstimate,
-    /// By which the biases of parts differ, in the unit of the channel.
-    pub bias_error: f64,
+    /// What the distance is compared with.
+    pub scale: MotionScale,
     /// Number of stretches.
     pub stretches: usize,
     /// Their length together, s.

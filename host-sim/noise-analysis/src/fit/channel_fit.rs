@@ -5,7 +5,7 @@ use crate::bounds::BoundedEstimate;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_white, line_frequency};
 use crate::fit::part_filter::PartFilter;
-use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual};
+use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual, within_measured};
 use crate::record::estimators::RecordEstimators;
 use crate::spectra::MarkovEstimate;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
@@ -52,8 +52,9 @@ pub(crate) struct ChannelFit {
 
 impl ChannelFit {
     fn new(covariates: CovariateFit, trace: Trace) -> Self {
-        let traced = TracedModel::new(&trace);
-        Self { covariates, before: trace.before, traced, markov_by_spectrum: None, recent: None, refuted: Vec::new() }
+        let traced = TracedModel::new(&trace, &covariates.curve);
+        let before = within_measured(&trace.before, &covariates.curve);
+        Self { covariates, before, traced, markov_by_spectrum: None, recent: None, refuted: Vec::new() }
     }
 
     /// The baseline model alone.
@@ -95,6 +96,43 @@ impl ChannelFit {
         let terms: Vec<PlannedTerm> = self.traced.terms().collect();
         self.traced = self.traced.replaced(recent, &terms, Shapes::AllButFilters);
         self.recent = Some(recent.clone());
+    }
+
+    /// Takes other terms where these, fitted to the `earlier` of two stretches of the part, foretell the `later` one better: those that
+    /// the curve shows by itself, or none beyond the baseline and the filter.
+    ///
+    /// The gain in the deviance is compared with [`MAX_DEVIANCE_RISE`] in units of what the better one leaves for each octave: where the
+    /// stretches differ, all models fail by that.
+    pub(crate) fn take_terms_that_foretell(&mut self, [earlier, later]: &[Curve<OCTAVES>; 2]) {
+        if self.traced.added_at().is_empty() {
+            return;
+        }
+        let curve = &self.covariates.curve;
+        let own_model = self.after();
+        let is_compared = |point: &&AllanPoint| point.n <= later.samples() / 8 && point.avar > 0.0;
+        let compared: Vec<(&AllanPoint, f64)> =
+            later.points().iter().filter(is_compared).map(|point| (point, own_model.edf(point))).collect();
+        let left = |terms: &[PlannedTerm]| {
+            let model = TracedModel::fit(earlier, terms, Shapes::AllButFilters);
+            let deviance = |(point, edf): &(&AllanPoint, f64)| {
+                let ratio = point.avar / model.model().avar(point.n);
+                edf * (ratio - 1.0 - ratio.ln())
+            };
+            compared.iter().map(deviance).sum::<f64>()
+        };
+        let own: Vec<PlannedTerm> = self.traced.terms().collect();
+        let is_basic = |kind: &NoiseTerm| is_filter(kind) || NoiseTerm::BASELINE.contains(kind);
+        let basic: Vec<PlannedTerm> = own.iter().filter(|(kind, _)| is_basic(kind)).copied().collect();
+        let filters: Vec<MovingAverageFilter> = own.iter().filter_map(|(kind, _)| filter_of(kind)).collect();
+        let by_curve = TracedModel::new(&trace(curve, LineCandidates::Curve, &filters), curve);
+        let of_own = left(&own);
+        let others = [by_curve.terms().collect::<Vec<PlannedTerm>>(), basic];
+        let best = others.into_iter().map(|terms| (left(&terms), terms)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((of_best, terms)) = best else { return };
+        let unit = (of_best / compared.len().max(1) as f64).max(1.0);
+        if of_own - of_best > MAX_DEVIANCE_RISE * unit {
+            self.traced = self.traced.replaced(curve, &terms, Shapes::AllButFilters);
+        }
     }
 
     /// The curve that the model with added terms is fitted to.
@@ -159,7 +197,7 @@ impl ChannelFit {
             None if self.traced.has_filter() => {
                 let lines: Vec<NoiseTerm> = self.traced.terms().map(|(kind, _)| kind).filter(is_line).collect();
                 let trace = trace(&self.covariates.curve, LineCandidates::Spectrum(&lines), &[]);
-                self.traced = TracedModel::new(&trace);
+                self.traced = TracedModel::new(&trace, &self.covariates.curve);
             }
             None => {}
         }
@@ -188,7 +226,7 @@ impl ChannelFit {
         let mut best = with_filter(curve, &self.traced, common);
         // The channel's own terms may have stood in for the filter.
         if !had || best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
-            let again = TracedModel::new(&trace(curve, LineCandidates::Curve, &[common.filter]));
+            let again = TracedModel::new(&trace(curve, LineCandidates::Curve, &[common.filter]), curve);
             let other = with_filter(curve, &again, common);
             best = if other.cost() < best.cost() { other } else { best };
         }
@@ -302,6 +340,14 @@ impl ChannelFit {
     }
 }
 
+/// The filter that a term is.
+fn filter_of(kind: &NoiseTerm) -> Option<MovingAverageFilter> {
+    match kind {
+        NoiseTerm::Filtered(filter) => Some(*filter),
+        _ => None,
+    }
+}
+
 /// The terms of `traced` with the common filter in place of its white noise, fitted to `curve`. Terms that this leaves without an
 /// amplitude are left out.
 fn with_filter(curve: &Curve<OCTAVES>, traced: &TracedModel, common: &PartFilter) -> TracedModel {
@@ -339,7 +385,7 @@ fn traced_behind(curve: &Curve<OCTAVES>, filter: MovingAverageFilter) -> TracedM
     traced.after = fit(curve, &kinds);
     traced.after_goodness = allan_core::fit::goodness(curve, &traced.after);
     let _ = trace_while(&mut traced, curve, LineCandidates::Curve, &[], &mut || true);
-    TracedModel::new(&traced)
+    TracedModel::new(&traced, curve)
 }
 
 /// Whether a line of `model` is `line`, one of the `lines` of the spectrum: a line that was traced with the frequency of one of

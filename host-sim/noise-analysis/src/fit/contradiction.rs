@@ -35,12 +35,23 @@ impl Contradiction {
     /// ([`independent_points`]), as Bonferroni's bound has it.
     #[must_use]
     pub fn find<const POINTS: usize>(model: &Model, curve: &Curve<POINTS>) -> Option<Self> {
+        Self::find_by(model, curve, |point| (model.avar(point.n), model.edf(point)))
+    }
+
+    /// The same of `model` with what is added to it: `predicted` has the Allan variance of both at a point, and the degrees of freedom
+    /// of a variance that measures it.
+    pub(crate) fn find_by<const POINTS: usize>(
+        model: &Model,
+        curve: &Curve<POINTS>,
+        predicted: impl Fn(&AllanPoint) -> (f64, f64),
+    ) -> Option<Self> {
         let compared: Vec<&AllanPoint> =
             curve.points().iter().filter(|point| point.avar > 0.0 && model.avar(point.n) > 0.0).collect();
         let tests = 2.0 * independent_points(model, &compared);
         let of = |point: &&AllanPoint| {
-            let ratio = point.avar / model.avar(point.n);
-            let probability = (tests * tail(ratio, model.edf(point))?).min(1.0);
+            let (modelled, edf) = predicted(point);
+            let ratio = point.avar / modelled;
+            let probability = (tests * tail(ratio, edf)?).min(1.0);
             Some(Self { tau_s: point.tau, ratio: 1.0 / ratio.sqrt(), probability })
         };
         let least = compared.iter().filter_map(of).min_by(|a, b| a.probability.total_cmp(&b.probability))?;

@@ -3,13 +3,14 @@
 
 use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
-use crate::fit::noise_terms::{is_filter, is_white};
+use crate::fit::noise_terms::{filter_length_s, is_filter, is_white};
 use crate::fit::octave_covariance::with_bounds_behind_a_filter;
 use allan_core::fit::{Goodness, fit, goodness};
 use allan_core::host::fit_shapes_except;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::trace::{Residual, Trace};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Smallest share of a line in the variance of a point of the curve, in standard deviations of it, that moves the other terms: a
 /// smaller one is hidden by the scatter of each point.
@@ -18,6 +19,12 @@ const VISIBLE_SIGMAS: f64 = 0.5;
 const LEAST_LEFT: f64 = 0.1;
 /// Least decrease of the deviance by a term of two parameters that a trace adds.
 const COST_OF_A_TERM: f64 = 18.0;
+
+/// Averaging time, in lengths of the filter, from which on the Allan variance of white noise behind it is that of white noise within a
+/// percent or two.
+const LONG_AGAINST_FILTER: f64 = 8.0;
+/// Probability that a truth is above its upper 95 % bound.
+const BEYOND_A_BOUND: f64 = 0.025;
 
 /// What added a term to the baseline model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,13 +63,14 @@ pub(crate) struct TracedModel {
 }
 
 impl TracedModel {
-    /// The model of a trace.
-    pub(crate) fn new(trace: &Trace) -> Self {
+    /// The model of a trace of `curve`.
+    pub(crate) fn new(trace: &Trace, curve: &Curve<OCTAVES>) -> Self {
         let mut additions = vec![None; trace.after.terms().len()];
         for (rank, found) in (0..).zip(&trace.added) {
             additions[found.term] = Some(Addition { score: found.score, residual: found.residual, rank });
         }
-        Self { model: trace.after.clone(), additions, goodness: trace.after_goodness, decimation: None }
+        let model = within_measured(&trace.after, curve);
+        Self { model, additions, goodness: trace.after_goodness, decimation: None }
     }
 
     /// The model of at most the first [`MAX_TERMS`] of these `terms` that fits `curve` best, with the bounds of that fit.
@@ -75,7 +83,7 @@ impl TracedModel {
             Shapes::AllButFilters => fit_shapes_except(curve, &kinds, &filters()),
         };
         let additions = terms.iter().map(|(_, addition)| *addition).take(MAX_TERMS).collect();
-        Self { goodness: goodness(curve, &model), model, additions, decimation: None }
+        Self { goodness: goodness(curve, &model), model: within_measured(&model, curve), additions, decimation: None }
     }
 
     /// The model itself.
@@ -183,7 +191,7 @@ impl TracedModel {
             FittedTerm { low: scaled(old.low, 0.0), high: scaled(old.high, new.high), shape: old.shape, ..*new }
         };
         let kept = fitted.terms().iter().zip(model.terms()).map(kept);
-        let model = Model::new(period_s, kept.chain(lines.iter().copied()));
+        let model = within_measured(&Model::new(period_s, kept.chain(lines.iter().copied())), curve);
         let additions = self.additions.iter().copied().chain(lines.iter().map(|_| None)).collect();
         Some(Self { goodness: goodness(curve, &model), model, additions, decimation: self.decimation })
     }
@@ -212,7 +220,8 @@ impl TracedModel {
             term
         };
         let bounded = with_bounds_behind_a_filter(curve, &self.model);
-        self.model = Model::new(bounded.sample_period(), bounded.terms().iter().map(resolved));
+        let model = Model::new(bounded.sample_period(), bounded.terms().iter().map(resolved));
+        self.model = within_measured(&model, curve);
         self.decimation = decimation;
         self
     }
@@ -231,6 +240,33 @@ impl TracedModel {
     }
 }
 
+/// `model` with no upper bound of N, B or K beyond what `curve` allows: all terms are positive, so that none of them alone exceeds the
+/// upper bound of what was measured, at any averaging time that is long against the filter. A term that the data does not show has the
+/// smallest of these limits; that of one that it shows is at the level of the smallest of so many bounds.
+pub(crate) fn within_measured(model: &Model, curve: &Curve<OCTAVES>) -> Model {
+    let from = LONG_AGAINST_FILTER * filter_length_s(model).max(curve.sample_period());
+    let points: Vec<&AllanPoint> = curve.points().iter().filter(|point| point.tau >= from).collect();
+    let limit = |kind: &NoiseTerm, bound: &dyn Fn(&AllanPoint) -> f64| {
+        let of = |point: &&AllanPoint| (bound(point) / kind.avar(point.n, curve.sample_period())).sqrt();
+        points.iter().map(of).filter(|limit| !limit.is_nan()).fold(f64::INFINITY, f64::min)
+    };
+    let of_all = |point: &AllanPoint| {
+        let chance = BEYOND_A_BOUND / points.len() as f64;
+        let quantile = ChiSquared::new(point.edf).map(|distribution| distribution.inverse_cdf(chance));
+        quantile.map_or(f64::INFINITY, |quantile| (point.avar * point.edf / quantile).max(point.high))
+    };
+    let bounded = |term: &FittedTerm| {
+        let is_limited = NoiseTerm::BASELINE.contains(&term.kind) || is_filter(&term.kind);
+        let least = if is_limited { limit(&term.kind, &|point| point.high) } else { f64::INFINITY };
+        if term.high <= least {
+            return *term;
+        }
+        let limit = if term.low > 0.0 { limit(&term.kind, &of_all) } else { least };
+        FittedTerm { high: term.high.min(limit.max(term.value)), ..*term }
+    };
+    Model::new(model.sample_period(), model.terms().iter().map(bounded))
+}
+
 /// The residual of a model at a point of a curve.
 pub(crate) fn residual(model: &Model, point: &AllanPoint) -> Residual {
     let excess = (point.avar / model.avar(point.n)).sqrt() - 1.0;
@@ -246,5 +282,42 @@ fn resolvable(name: &str, curve: &Curve<OCTAVES>) -> Option<(f64, f64)> {
         "time_constant" => Some((period, duration)),
         "frequency" | "bandwidth" => Some((1.0 / duration, 0.5 / period)),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::within_measured;
+    use crate::OVERLAP;
+    use allan_core::model::FittedTerm;
+    use allan_core::{Cascade, Model, NoiseTerm};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// White noise of 100 counts at 100 Hz has N = 10 counts·√s. A fit that says nothing of N, B and K cannot allow more than was
+    /// measured: N of 10 within some percent, B of less than the smallest deviation over 0.664.
+    #[test]
+    fn no_bound_is_beyond_what_was_measured() {
+        for seed in 0..10 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut cascade = Cascade::<{ crate::OCTAVES }, OVERLAP>::new();
+            (0..1 << 16).for_each(|_| cascade.push((100.0 * random.sample::<f64, _>(StandardNormal)).round() as i32));
+            let curve = cascade.curve(0.01);
+            let nothing = |kind| FittedTerm { low: 0.0, high: 7400.0, ..FittedTerm::exact(kind, 0.0) };
+            let known = FittedTerm { low: 9.95, high: 10.05, ..FittedTerm::exact(NoiseTerm::AngleRandomWalk, 10.0) };
+            let bounded = within_measured(&Model::new(0.01, NoiseTerm::BASELINE.map(nothing)), &curve);
+            let [n, b, k] = bounded.terms() else { panic!("three terms") };
+            for point in curve.points().iter().filter(|point| point.tau >= 0.08) {
+                let upper = point.high.sqrt();
+                assert!(n.high <= upper * point.tau.sqrt() * (1.0 + 1e-9), "{n:?}");
+                assert!(b.high <= upper / 0.664 * (1.0 + 1e-3), "{b:?}");
+                assert!(k.high <= upper * (3.0 / point.tau).sqrt() * (1.0 + 1e-9), "{k:?}");
+            }
+            assert!(n.high > 8.0, "seed {seed}: {n:?}");
+            // What the fit knows better stays.
+            let bounded = within_measured(&Model::new(0.01, [known]), &curve);
+            assert_eq!(bounded.terms(), [known], "seed {seed}");
+        }
     }
 }

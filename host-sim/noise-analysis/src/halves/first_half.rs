@@ -1,12 +1,12 @@
 //! Models of the first half of a recording, and their errors on the second half, which they have not seen.
 
 use crate::OCTAVES;
-use crate::detectors::bias::{self, BiasSensitivity};
 use crate::fit::channel_fit::ChannelFit;
 use crate::fit::covariates::CovariateFit;
+use crate::fit::event_share::EventShare;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::halves::traced_record::TracedRecord;
-use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
+use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel, quarter_curves};
 use crate::parallel::per_channel;
 use crate::record::estimators::{RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
@@ -16,7 +16,7 @@ use crate::report::{
 };
 use crate::samples::exclusion::Exclusion;
 use crate::samples::series::Series;
-use allan_core::{Curve, Model};
+use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelId, PerChannel, SensorProfile};
 
 /// The models of every channel by the first half alone.
@@ -25,6 +25,8 @@ pub(crate) struct FirstHalf {
     pub part: TracedPart,
     /// The baseline models of the first half as it was recorded, with its spikes and knocks.
     raw: PerChannel<Model>,
+    /// What these add to the models of `part`.
+    events: PerChannel<EventShare>,
 }
 
 /// How the noise of each channel changes.
@@ -44,8 +46,8 @@ impl FirstHalf {
         let middle = record.measurement().middle();
         let halves = series.map(|series| series.before(middle));
         let biases = per_channel(series.ids(), |channel| BiasByBlocks {
-            has_ramp: preprocessing.has_ramp(channel),
-            sensitivities: sensitivities(record, &halves, channel),
+            has_ramp: preprocessing.has_ramp(channel, Exclusion::ByFirstHalf),
+            sensitivities: preprocessing.sensitivities(channel, Exclusion::ByFirstHalf).to_vec(),
         });
         let samples =
             PartSamples { record: record.record, series: &halves, biases: biases.clone(), seeks_signals: false };
@@ -63,6 +65,17 @@ impl FirstHalf {
             let covariates = CovariateFit::estimate(raw, channel, bias.has_ramp, |to| bias.sensitivity(to));
             ChannelFit::fit_baseline(covariates).before
         });
+        let events = per_channel(series.ids(), |channel| {
+            if !record.has_rules(channel) {
+                return EventShare::default();
+            }
+            let covariates = &part.channels[channel].fit.covariates;
+            let with = covariates.compensated(&estimators.raw[0], channel);
+            let recorded = preprocessing.series(record.measurement(), channel, Exclusion::None).before(middle);
+            let excluded = preprocessing.excluded_events(channel, middle);
+            let screened = &record.record.channels[channel].screened;
+            EventShare::of_first_half((&recorded, &excluded), screened, (&with, &covariates.curve))
+        });
         let channels = per_channel(series.ids(), |channel| {
             let (fit, own) = (&part.channels[channel].fit, &series[channel]);
             let followed = fit.covariates.compensated_series(own, &series);
@@ -71,18 +84,26 @@ impl FirstHalf {
             let curves = curves.in_samples(&record.record.channels[channel].samples);
             Some(ChannelEpochs::compare(curves, fit.after()))
         });
-        for (trace, epochs) in part.channels.iter_mut().zip(&channels) {
+        for ((trace, epochs), own) in part.channels.iter_mut().zip(&channels).zip(&series) {
+            match epochs {
+                Some(epochs) => trace.fit.take_terms_that_foretell(epochs.quarter_curves()),
+                None if record.record.samples_per_mean == 1 && trace.fit.covariates.is_empty() => {
+                    trace.fit.take_terms_that_foretell(&quarter_curves(own, middle));
+                }
+                None => {}
+            }
             if let Some(recent) = epochs.as_ref().and_then(ChannelEpochs::recent_curve) {
                 trace.fit.fit_to(&recent);
             }
         }
-        (Self { part, raw }, Epochs { series, channels })
+        (Self { part, raw, events }, Epochs { series, channels })
     }
 
     /// The models by the curves of the halves alone.
     pub(crate) fn fit_curves(profile: &SensorProfile, estimators: &RecordEstimators) -> Self {
         let part = TracedPart::fit(&PartData { profile, curves: &estimators.ruled[0], samples: None });
-        Self { raw: part.channels.map(|trace| trace.fit.before.clone()), part }
+        let raw = part.channels.map(|trace| trace.fit.before.clone());
+        Self { raw, events: part.channels.map(|_| EventShare::default()), part }
     }
 
     /// What is reported of a channel by the curves and the models of the first half and of the `whole`. Where the first half `has_rules`
@@ -103,7 +124,7 @@ impl FirstHalf {
         // The model with the added terms, fitted to the whole record, with the errors of `after`.
         let refitted = ModelReport {
             terms: term_reports(fit.after(), unit),
-            adev: fit.deviations(estimators, channel, &curve),
+            adev: with_events(&self.events[channel], &curve, fit.deviations(estimators, channel, &curve)),
             ..after.clone()
         };
         ChannelReport {
@@ -125,11 +146,11 @@ impl FirstHalf {
         }
     }
 
-    /// The error on the second half of the curve of the first half itself.
+    /// The error on the second half of the curve of the first half itself, both as they were recorded.
     fn curve_error(&self, estimators: &RecordEstimators, channel: ChannelId) -> ModelErrorReport {
         let fit = &self.part.channels[channel].fit;
-        let unseen = fit.covariates.compensated(&estimators.raw[1], channel);
-        ModelErrorReport::of_curve(&fit.covariates.curve, &unseen, fit.after())
+        let [first, second] = [0, 1].map(|half| fit.covariates.compensated(&estimators.raw[half], channel));
+        ModelErrorReport::of_curve(&first, &second, fit.after(), &self.events[channel])
     }
 
     /// The baseline model of the first half as it was recorded, at the points of the curve of the `whole` record.
@@ -148,6 +169,7 @@ impl FirstHalf {
             fitted: error(&estimators.raw[0]),
             unseen: error(&estimators.raw[1]),
             unseen_excluding: has_rules.then(|| error(&estimators.ruled[1])),
+            events: None,
         }
     }
 
@@ -161,31 +183,23 @@ impl FirstHalf {
     ) -> ModelReport {
         let fit = &self.part.channels[channel].fit;
         let model = fit.after();
-        let unseen = |part: &RecordPart| ModelErrorReport::new(model, &fit.covariates.compensated(part, channel));
+        let events = &self.events[channel];
+        let unseen = |part: &RecordPart| fit.covariates.compensated(part, channel);
         ModelReport {
             terms: term_reports(model, estimators.both.channels[channel].unit),
-            adev: fit.deviations(estimators, channel, whole),
+            adev: with_events(events, whole, fit.deviations(estimators, channel, whole)),
             fitted: ModelErrorReport::new(model, fit.fitted_curve()),
-            unseen: unseen(&estimators.raw[1]),
-            unseen_excluding: has_rules.then(|| unseen(&estimators.ruled[1])),
+            unseen: ModelErrorReport::with_events(model, events, &unseen(&estimators.raw[1])),
+            unseen_excluding: has_rules.then(|| ModelErrorReport::new(model, &unseen(&estimators.ruled[1]))),
+            events: events.report(whole.points().iter().map(|point| point.n)),
         }
     }
 }
 
-/// Sensitivities of a channel to temperature and supply by the block means of the first half.
-fn sensitivities(
-    record: &TracedRecord,
-    halves: &PerChannel<Series>,
-    channel: ChannelId,
-) -> Vec<(ChannelId, BiasSensitivity)> {
-    if !record.record.is_traced(channel) {
-        return Vec::new();
-    }
-    let quantity = |of: ChannelId| record.measurement()[of].profile.quantity;
-    let slow: Vec<ChannelId> = halves.ids().filter(|&of| quantity(of).is_environment()).collect();
-    let regressors: Vec<&Series> = slow.iter().map(|&of| &halves[of]).collect();
-    let found = bias::find(&halves[channel], &regressors, &[], &record.noise_grids);
-    found.sensitivities.into_iter().map(|(number, sensitivity)| (slow[number], sensitivity)).collect()
+/// The Allan deviations of a model at the points of the curve of the `whole` record, with the share of the events.
+fn with_events(events: &EventShare, whole: &Curve<OCTAVES>, deviations: Vec<f64>) -> Vec<f64> {
+    let with = |(point, deviation): (&AllanPoint, f64)| (deviation * deviation + events.avar(point.n)).sqrt();
+    if events.is_empty() { deviations } else { whole.points().iter().zip(deviations).map(with).collect() }
 }
 
 impl Epochs {

@@ -21,8 +21,6 @@ use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 /// A recording with what was found in all of it.
 pub(crate) struct TracedRecord<'a> {
     pub record: &'a CondensedRecord<'a>,
-    /// Covariances of the block means of each channel's noise, computed once.
-    pub noise_grids: NoiseGrids,
     pub preprocessing: Preprocessing,
     pub estimators: RecordEstimators,
     /// After preprocessing.
@@ -36,24 +34,24 @@ impl<'a> TracedRecord<'a> {
     /// What `record` shows.
     pub(crate) fn new(record: &'a CondensedRecord<'a>) -> Self {
         let measurement = record.means.as_ref();
-        let noise_grids = NoiseGrids::default();
-        let preprocessing = Preprocessing::detect(record, &noise_grids);
+        let preprocessing = Preprocessing::detect(record, &NoiseGrids::default());
         let estimators = RecordEstimators::estimate(record, &preprocessing);
         let motions = per_channel(measurement.ids(), |channel| {
             let find = || motion::find(&preprocessing.measured(measurement, channel), &measurement[channel].profile);
             record.is_traced(channel).then(find).flatten()
         });
+        let motions = motion::told_by_two(motions);
         let series =
             per_channel(measurement.ids(), |channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
         let bias = |channel: ChannelId| BiasByBlocks {
-            has_ramp: preprocessing.has_ramp(channel),
-            sensitivities: preprocessing.sensitivities(channel).to_vec(),
+            has_ramp: preprocessing.has_ramp(channel, Exclusion::ByWhole),
+            sensitivities: preprocessing.sensitivities(channel, Exclusion::ByWhole).to_vec(),
         };
         let biases = measurement.ids().map(bias).collect();
         let samples = PartSamples { record, series: &series, biases, seeks_signals: true };
         let data = PartData { profile: &measurement.profile, curves: &estimators.both, samples: Some(samples) };
         let part = TracedPart::fit(&data);
-        Self { record, noise_grids, preprocessing, estimators, series, part, motions }
+        Self { record, preprocessing, estimators, series, part, motions }
     }
 
     /// The samples, or their means.

@@ -1,6 +1,7 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
 use crate::OCTAVES;
+use crate::distributions::quantile;
 use crate::record::sample_curves::SampleCurves;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::exclusion::Exclusion;
@@ -8,11 +9,14 @@ use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::series::Series;
 use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 use std::ops::Range;
 
 /// Highest probability, over all that is compared in a channel, at which stationary noise is taken to be non-stationary.
 pub(crate) const SIGNIFICANCE: f64 = 0.01;
+
+/// Median of the absolute value of a standard normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_75;
 
 /// An epoch's Allan variance is used up to averaging factors of a `MIN_AVERAGES`th of its samples.
 pub(crate) const MIN_AVERAGES: u64 = 64;
@@ -43,12 +47,11 @@ impl EpochCurves {
     /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch.
     #[must_use]
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
-        let (from, to) = (series.span.start, series.span.end);
+        let to = series.span.end;
         let (epoch, ranges) = epochs(series.span.clone(), middle)?;
         let curves = |ranges: &[Range<u64>]| ranges.iter().map(|range| curve(series, range.clone())).collect();
-        let quarter = from + (middle - from) / 2;
         let curves = Self {
-            quarters: [curve(series, from..quarter), curve(series, quarter..middle)],
+            quarters: quarter_curves(series, middle),
             unseen: curve(series, middle..to),
             epoch,
             epoch_s: epoch as f64 * series.period_s,
@@ -92,6 +95,21 @@ impl EpochCurves {
         &self.fitted_epochs[self.fitted_epochs.len() / 2..]
     }
 
+    /// Whether the quarters differ by more than their epochs do among themselves, at an octave that an epoch has. A level that goes up and
+    /// down in a shorter time than a quarter makes quarters differ, and the mean of both foretells what follows better than the later one.
+    ///
+    /// Student's t of the logarithms of the epochs' variances, over all octaves. Where single epochs stand out of the others, their mean
+    /// says nothing of the rest; where the epochs have no such octave they say nothing either: both are taken to differ.
+    #[must_use]
+    pub(crate) fn quarters_differ_beyond_epochs(&self) -> bool {
+        let (earlier, later) = (&self.fitted_epochs[..self.fitted_epochs.len() / 2], self.latest_epochs());
+        let octaves: Vec<u64> = self.quarters[1].points().iter().map(|point| point.n).collect();
+        let p_values: Vec<f64> =
+            octaves.into_iter().filter_map(|n| t_test(&levels(earlier, n)?, &levels(later, n)?)).collect();
+        let least = p_values.iter().copied().fold(f64::INFINITY, f64::min);
+        p_values.is_empty() || least * (p_values.len() as f64) < SIGNIFICANCE
+    }
+
     /// The curve of the later quarter with the median of its epochs at the octaves with at least 64 averages in an epoch.
     ///
     /// Some minutes of vibration raise the mean of the quarter and hardly the median of its epochs. The median of variances
@@ -105,11 +123,51 @@ impl EpochCurves {
     }
 }
 
+/// The curves of the two quarters up to the sample period `middle`.
+pub(crate) fn quarter_curves(series: &Series, middle: u64) -> [Curve<OCTAVES>; 2] {
+    let from = series.span.start;
+    let quarter = from + middle.saturating_sub(from) / 2;
+    [curve(series, from..quarter), curve(series, quarter..middle)]
+}
+
 /// The curve of the sample periods `slots`.
 pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
     let range = position(slots.start)..position(slots.end);
     GappedCascade::of_series(series, range).curve(series.period_s).scaled(series.resolution)
+}
+
+/// Logarithms of the variances of some epochs at an averaging factor; `None` where an epoch has too few averages.
+fn levels(epochs: &[Curve<OCTAVES>], n: u64) -> Option<Vec<f64>> {
+    let level = |epoch: &Curve<OCTAVES>| {
+        let point = epoch.points().iter().find(|point| point.n == n)?;
+        (n * MIN_AVERAGES <= epoch.samples() && point.avar > 0.0).then(|| point.avar.ln())
+    };
+    epochs.iter().map(level).collect()
+}
+
+/// Probability by chance that the means of two groups of levels of the same scatter differ as much; 0 where a level stands out of its
+/// group. `None` for groups of one.
+fn t_test(earlier: &[f64], later: &[f64]) -> Option<f64> {
+    let freedom = (earlier.len() + later.len()).checked_sub(2).filter(|freedom| *freedom > 0)? as f64;
+    let mean = |levels: &[f64]| levels.iter().sum::<f64>() / levels.len() as f64;
+    let squares = |levels: &[f64]| levels.iter().map(|level| (level - mean(levels)).powi(2)).sum::<f64>();
+    let deviation = ((squares(earlier) + squares(later)) / freedom).sqrt();
+    let stands_out = |levels: &[f64]| {
+        let mut sorted = levels.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted[sorted.len() / 2];
+        let mut distances: Vec<f64> = sorted.iter().map(|level| (level - median).abs()).collect();
+        distances.sort_by(f64::total_cmp);
+        let limit = quantile(0.5 * SIGNIFICANCE / levels.len() as f64) * distances[distances.len() / 2] / NORMAL_MEDIAN;
+        distances.last().is_some_and(|largest| *largest > limit)
+    };
+    if stands_out(earlier) || stands_out(later) {
+        return Some(0.0);
+    }
+    let error = deviation * (1.0 / earlier.len() as f64 + 1.0 / later.len() as f64).sqrt();
+    let t = (mean(later) - mean(earlier)) / error;
+    StudentsT::new(0.0, 1.0, freedom).ok().map(|distribution| 2.0 * distribution.sf(t.abs()))
 }
 
 fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {

@@ -39,6 +39,9 @@ pub(crate) struct CondensedChannel {
     pub effects: Vec<Effect>,
     /// The same of the first half of the recording, as far as it is known.
     pub effects_of_first_half: Vec<Effect>,
+    /// Samples of the first half that are left out of the means as spikes or knocks, and how far each is from its neighbours, in the
+    /// channel's unit.
+    pub screened: Vec<(u64, f64)>,
     /// Samples that are refused in the channel alone, by cause.
     pub refused: BTreeMap<&'static str, u64>,
 }
@@ -58,6 +61,7 @@ impl<'a> CondensedRecord<'a> {
                 faster_lines: Vec::new(),
                 effects: shown.of(id).cloned().collect(),
                 effects_of_first_half: Vec::new(),
+                screened: Vec::new(),
                 refused: channel.refused.iter().map(|(&cause, of)| (cause, of.len() as u64)).collect(),
             }
         };

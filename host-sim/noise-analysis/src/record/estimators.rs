@@ -121,8 +121,9 @@ impl RecordEstimators {
         let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
         // Nothing is estimated twice.
         let mut distinct = vec![Exclusion::None];
-        let is_distinct =
-            |of: Exclusion| preprocessing.excludes_any(of) || (of == both && preprocessing.has_responses());
+        let is_distinct = |of: Exclusion| {
+            preprocessing.excludes_any(of) || (of == both && preprocessing.corrects_otherwise_by_whole())
+        };
         distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
         let work: Vec<(Exclusion, Half)> =
             distinct.iter().flat_map(|&of| [Half::First, Half::Second].map(|half| (of, half))).collect();

@@ -221,15 +221,17 @@ impl LongRecordReader {
         let period_s = description.period_s();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
         let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
-        let spikes = screen.spikes(description.periods, period_s).zip(screen.spikes(middle, period_s));
+        let screened: Vec<Vec<(u64, f64)>> = screen.found_before(middle).collect();
+        let [events, of_first_half] = [description.periods, middle].map(|periods| screen.effects(periods, period_s));
         let mut condensed = Vec::new();
-        for ((((channel, fast), profile), faster_lines), (spikes, spikes_of_first_half)) in
-            channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(spikes)
+        let events = events.into_iter().zip(of_first_half).zip(screened);
+        for ((((channel, fast), profile), faster_lines), ((events, events_of_first_half), screened)) in
+            channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(events)
         {
             let is_inertial = profile.quantity.is_inertial();
             let saturation = channel.values.saturation(profile, fast.resolution);
             let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
-            let found = found.chain(saturation.into_iter().chain(spikes).map(|found| found.effect));
+            let found = found.chain(saturation.map(|found| found.effect)).chain(events);
             let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
             condensed.push(CondensedChannel {
                 samples: SampleCurves {
@@ -250,7 +252,8 @@ impl LongRecordReader {
                 can_show_spikes: false,
                 faster_lines,
                 effects: found.filter(|_| is_inertial).collect(),
-                effects_of_first_half: spikes_of_first_half.map(|found| found.effect).into_iter().collect(),
+                effects_of_first_half: events_of_first_half,
+                screened,
                 refused: channel.screened.refused,
             });
         }

@@ -47,10 +47,18 @@ pub(crate) struct Preprocessing {
 struct ChannelPreprocessing {
     effects: Vec<Effect>,
     exclusion: ChannelExclusion,
-    /// The first sample period from which on an offset is subtracted, and the offset in the channel's unit.
-    offset: Option<(u64, f64)>,
-    /// Responses to temperature and vibration that are subtracted, as the first half and as the whole record show them.
-    responses: [Vec<BiasResponse>; 2],
+    /// As the first half and as the whole record show it.
+    bias: [ChannelBias; 2],
+}
+
+/// What changes the bias of a channel, as a part of the recording shows it.
+#[derive(Default, PartialEq)]
+struct ChannelBias {
+    /// The first sample periods from which on offsets are subtracted, and the offsets in the channel's unit.
+    offsets: Vec<(u64, f64)>,
+    has_ramp: bool,
+    /// Responses to temperature and vibration that are subtracted.
+    responses: Vec<BiasResponse>,
     /// The temperature or supply that it depends on, and how much.
     sensitivities: Vec<(ChannelId, BiasSensitivity)>,
 }
@@ -64,7 +72,7 @@ impl Preprocessing {
         let counts_per_step = record.channels.map(|of| of.counts_per_step);
         let preprocessing = Self { slots, counts_per_step, repeated: record.repeated.clone(), channels };
         let series = per_channel(measurement.ids(), |channel| preprocessing.measured(measurement, channel));
-        let knocks = KnocksInChannels::find(measurement, &series);
+        let knocks = KnocksInChannels::find(record, &series);
         // What a channel may depend on, without its own knocks.
         let quiet: PerChannel<Series> =
             series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
@@ -89,13 +97,21 @@ impl Preprocessing {
 
     /// Whether the series of a channel is the same for two exclusions.
     pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
-        let responses = |exclusion| self.channels[channel].responses(exclusion);
-        responses(one) == responses(other) && self.excluded(channel, one) == self.excluded(channel, other)
+        let bias = |exclusion| self.channels[channel].bias(exclusion);
+        let is_same = bias(one).offsets == bias(other).offsets && bias(one).responses == bias(other).responses;
+        is_same && self.excluded(channel, one) == self.excluded(channel, other)
     }
 
     /// Sample periods that a channel does not use, in ascending order.
     pub(crate) fn excluded(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
         merged([&self.repeated, &self.channels[channel].exclusion.slots(exclusion)])
+    }
+
+    /// Sample periods of the spikes and knocks of a channel before that of the `middle`, by the rules of the first half.
+    pub(crate) fn excluded_events(&self, channel: ChannelId, middle: u64) -> Vec<u64> {
+        let mut slots = self.channels[channel].exclusion.slots(Exclusion::ByFirstHalf);
+        slots.truncate(slots.partition_point(|&slot| slot < middle));
+        slots
     }
 
     /// Samples of a channel that arrived and are not used, by cause.
@@ -107,20 +123,22 @@ impl Preprocessing {
 
     /// Whether anything is subtracted from samples of a channel.
     pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
-        let own = &self.channels[channel];
-        own.offset.is_some() || !own.responses(exclusion).is_empty()
+        let bias = self.channels[channel].bias(exclusion);
+        !bias.offsets.is_empty() || !bias.responses.is_empty()
     }
 
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
     pub(crate) fn offset(&self, channel: ChannelId, exclusion: Exclusion, slot: u64) -> f64 {
-        let own = &self.channels[channel];
-        let step = own.offset.filter(|(from, _)| slot >= *from).map(|(_, size)| size);
-        step.into_iter().chain(own.responses(exclusion).iter().map(|response| response.bias(slot))).sum()
+        let bias = self.channels[channel].bias(exclusion);
+        let steps = bias.offsets.iter().filter(|(from, _)| slot >= *from).map(|(_, size)| *size);
+        steps.chain(bias.responses.iter().map(|response| response.bias(slot))).sum()
     }
 
-    /// Whether the first half may show other responses to temperature and vibration than the whole record.
-    pub(crate) fn has_responses(&self) -> bool {
-        self.channels.iter().any(|of| !of.responses(Exclusion::ByWhole).is_empty())
+    /// Whether other offsets and responses are subtracted by the first half than by the whole record.
+    pub(crate) fn corrects_otherwise_by_whole(&self) -> bool {
+        let is_other =
+            |[half, whole]: &[ChannelBias; 2]| half.offsets != whole.offsets || half.responses != whole.responses;
+        self.channels.iter().any(|of| is_other(&of.bias))
     }
 
     /// A channel's series as measured, with its resolution.
@@ -132,25 +150,25 @@ impl Preprocessing {
     /// A channel's series after preprocessing.
     pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelId, exclusion: Exclusion) -> Series {
         let mut series = self.measured(measurement, channel);
-        let own = &self.channels[channel];
-        if let Some((from, size)) = own.offset {
+        let bias = self.channels[channel].bias(exclusion);
+        for &(from, size) in &bias.offsets {
             series = series.lowered_from(from, size);
         }
-        for response in own.responses(exclusion) {
+        for response in &bias.responses {
             let values = Arc::make_mut(&mut series.values);
             values.iter_mut().zip(series.slots.iter()).for_each(|(value, slot)| *value -= response.bias(*slot));
         }
         series.without(&self.excluded(channel, exclusion))
     }
 
-    /// Whether a ramp was found in a channel.
-    pub(crate) fn has_ramp(&self, channel: ChannelId) -> bool {
-        self.effects(channel).iter().any(|effect| matches!(effect, Effect::LinearDrift(_)))
+    /// Whether a ramp was found in a channel, by the first half or by the whole record.
+    pub(crate) fn has_ramp(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
+        self.channels[channel].bias(exclusion).has_ramp
     }
 
-    /// The temperature and supply that a channel depends on, and how much.
-    pub(crate) fn sensitivities(&self, channel: ChannelId) -> &[(ChannelId, BiasSensitivity)] {
-        &self.channels[channel].sensitivities
+    /// The temperature and supply that a channel depends on, and how much, by the first half or by the whole record.
+    pub(crate) fn sensitivities(&self, channel: ChannelId, exclusion: Exclusion) -> &[(ChannelId, BiasSensitivity)] {
+        &self.channels[channel].bias(exclusion).sensitivities
     }
 
     /// The effects of a channel.
@@ -178,41 +196,51 @@ impl ChannelPreprocessing {
         let regressors: Vec<ChannelId> =
             measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
         let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
-        let own = without_slow_lines(quiet[channel].clone().without(&exclusion.spikes));
-        let BiasChanges { step, ramp, sensitivities, responses } =
-            bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids);
-        let responses_of_first_half = if responses.is_empty() {
-            Vec::new()
-        } else {
-            let others: Vec<Series> = others.iter().map(|of| of.before(middle)).collect();
-            let others: Vec<&Series> = others.iter().collect();
+        let own = without_lines(quiet[channel].clone().without(&exclusion.spikes));
+        let whole = bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids);
+        let half = {
             let all = series.map(|of| of.before(middle));
-            let own = all[channel].clone().without(&exclusion.by_first_half);
-            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids).responses
-        };
-        let offset = match &step {
-            Some(Detection { correction: Some(Correction::Offset { from, size }), .. }) => Some((*from, *size)),
-            _ => None,
+            let quiet = |&of: &ChannelId| all[of].clone().without(&slots_within(&all[of], &knocks.by_first_half[of]));
+            let others: Vec<Series> = regressors.iter().map(quiet).collect();
+            let others: Vec<&Series> = others.iter().collect();
+            let own = without_lines(all[channel].clone().without(&exclusion.by_first_half));
+            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids)
         };
         // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its own drift.
-        let slow = sensitivities.into_iter().map(|(place, sensitivity)| (regressors[place], sensitivity));
+        let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
+        let of_part = |found: &BiasChanges| ChannelBias {
+            offsets: offset(found).into_iter().collect(),
+            has_ramp: found.ramp.is_some(),
+            responses: found.responses.clone(),
+            sensitivities: found
+                .sensitivities
+                .iter()
+                .map(|&(place, sensitivity)| (regressors[place], sensitivity))
+                .filter(|(regressor, _)| is_slow(*regressor))
+                .collect(),
+        };
+        let mut bias = [of_part(&half), of_part(&whole)];
+        // What the second half is compared with has no step that happens in it.
+        bias[0].offsets.extend(offset(&whole).filter(|(from, _)| *from >= middle));
+        let BiasChanges { step, ramp, responses, .. } = whole;
         let found = knocks.detections(measurement, &series[channel], channel).into_iter();
         let found = found.chain(spikes).chain(step).chain(ramp).map(|detection| detection.effect);
-        Self {
-            effects: responses.iter().map(|of| of.effect.clone()).chain(found).collect(),
-            exclusion,
-            offset,
-            responses: [responses_of_first_half, responses],
-            sensitivities: slow
-                .filter(|(regressor, _)| measurement[*regressor].profile.quantity.is_environment())
-                .collect(),
-        }
+        let effects = responses.iter().map(|of| of.effect.clone()).chain(found).collect();
+        Self { effects, exclusion, bias }
     }
 
-    /// The responses to temperature and vibration that are subtracted from the samples.
-    fn responses(&self, exclusion: Exclusion) -> &[BiasResponse] {
-        let [first_half, whole] = &self.responses;
+    /// What changes the bias, by the whole record or else by its first half.
+    fn bias(&self, exclusion: Exclusion) -> &ChannelBias {
+        let [first_half, whole] = &self.bias;
         if exclusion == Exclusion::ByWhole { whole } else { first_half }
+    }
+}
+
+/// The first sample period behind a step, and its size.
+fn offset(found: &BiasChanges) -> Option<(u64, f64)> {
+    match found.step.as_ref()?.correction {
+        Some(Correction::Offset { from, size }) => Some((from, size)),
+        _ => None,
     }
 }
 
@@ -234,7 +262,8 @@ struct KnocksInChannels {
 }
 
 impl KnocksInChannels {
-    fn find(measurement: &Measurement, series: &PerChannel<Series>) -> Self {
+    fn find(record: &CondensedRecord, series: &PerChannel<Series>) -> Self {
+        let measurement = record.means.as_ref();
         let (middle, dithered) = (measurement.middle(), measurement.profile.dithered_avar_counts2);
         let inertial: Vec<ChannelId> = measurement.inertial().collect();
         let of_all = |part: &dyn Fn(&Series) -> Series| inertial.iter().map(|&of| part(&series[of])).collect();
@@ -249,7 +278,36 @@ impl KnocksInChannels {
             by_whole[channel] = found;
             by_first_half[channel] = parts.iter().flat_map(|part| part[at].clone()).collect();
         }
-        Self { by_whole, by_first_half }
+        let mut knocks = Self { by_whole, by_first_half };
+        knocks.add_disturbances(record, series, middle);
+        knocks
+    }
+
+    /// Adds what is too short for a level of the noise, and is no single sample.
+    fn add_disturbances(&mut self, record: &CondensedRecord, series: &PerChannel<Series>, middle: u64) {
+        let found = per_channel(series.ids(), |channel| {
+            if !record.channels[channel].can_show_spikes {
+                return None;
+            }
+            let quiet = |knocks: &PerChannel<Vec<Knock>>| {
+                let own = &series[channel];
+                own.clone().without(&slots_within(own, &knocks[channel]))
+            };
+            let whole = quiet(&self.by_whole);
+            let by_whole = SpikeRule::fit(&whole).map(|rule| rule.disturbances(&whole));
+            let halves = quiet(&self.by_first_half);
+            let (first, second) = (halves.before(middle), halves.from(middle));
+            let by_first_half =
+                SpikeRule::fit(&first).map(|rule| [rule.disturbances(&first), rule.disturbances(&second)].concat());
+            Some([by_whole.unwrap_or_default(), by_first_half.unwrap_or_default()])
+        });
+        for ((found, own), (by_whole, by_first_half)) in
+            found.into_vec().into_iter().zip(series).zip(self.by_whole.iter_mut().zip(&mut self.by_first_half))
+        {
+            let Some([whole, halves]) = found else { continue };
+            Knock::add_disturbances(by_whole, whole, own);
+            Knock::add_disturbances(by_first_half, halves, own);
+        }
     }
 
     /// The series of a channel without the knocks of the whole record.
@@ -288,17 +346,15 @@ fn accelerations<'s>(
     measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
 }
 
-/// A series without sinusoids of a few periods, which the regressions on its block means would take for ramps and steps; the
-/// series itself where there are none, or where a long gap splits it.
-fn without_slow_lines(series: Series) -> Series {
+/// A series without sinusoids, of which those of a few periods are ramps and steps to the regressions on its block means, and faster
+/// ones are noise; the series itself where a long gap splits it.
+fn without_lines(series: Series) -> Series {
     let uniform = UniformSeries::from_series(&series);
     if uniform.values().len() as u64 != series.span.end.saturating_sub(series.span.start) {
         return series;
     }
-    let (without, lines) = spectra::without_slow_sines(uniform);
-    if lines.is_empty() {
-        return series;
-    }
+    let (without, _) = spectra::without_slow_sines(uniform);
+    let without = spectra::without_sines(without);
     let value = |slot: &u64| without.values()[(slot - series.span.start) as usize];
     let values = series.slots.iter().map(value).collect();
     Series { values, ..series }

@@ -1,7 +1,8 @@
-//! Leaves spikes and repeated samples out of a recording that is read in blocks, by rules that are known beforehand.
+//! Leaves spikes, knocks and repeated samples out of a recording that is read in blocks, by rules that are known beforehand.
 
+use crate::detectors::knocks::Knock;
 use crate::detectors::spikes::{FoundSpikes, SpikeRule};
-use crate::effects::findings::Detection;
+use crate::effects::Effect;
 use crate::parallel::in_parallel;
 use crate::samples::interpolation::REACH;
 use crate::samples::series::Series;
@@ -11,7 +12,7 @@ use std::ops::Range;
 /// Samples that are looked at together: the bias around which a spike stands out is that of their mean.
 const TOGETHER: usize = 1 << 16;
 
-/// Marks spikes and repeated samples.
+/// Marks spikes, knocks of a few samples and repeated samples.
 pub(crate) struct SampleScreen {
     /// Of each channel, the rule for its spikes, if any are sought, and what it has found.
     rules: Vec<Option<SpikeRule>>,
@@ -32,8 +33,8 @@ impl SampleScreen {
         Self { rules, found, leaves_out_repeated, held, settled: 0 }
     }
 
-    /// Takes the next samples, and passes on those whose neighbours on both sides are known. Spikes and repeated samples are refused
-    /// in these.
+    /// Takes the next samples, and passes on those whose neighbours on both sides are known. Spikes, knocks and repeated samples are
+    /// refused in these.
     pub(crate) fn push(&mut self, block: &SampleBlock, mut pass: impl FnMut(&SampleBlock)) {
         let mut from = 0;
         while from < block.slots.len() {
@@ -54,25 +55,45 @@ impl SampleScreen {
         self.settle(self.held.slots.len())
     }
 
-    /// The spikes of each channel in the first `periods` sample periods of `period_s` s each.
-    pub(crate) fn spikes(&self, periods: u64, period_s: f64) -> impl Iterator<Item = Option<Detection>> {
+    /// The spikes and knocks of each channel in the first `periods` sample periods of `period_s` s each.
+    pub(crate) fn effects(&self, periods: u64, period_s: f64) -> Vec<Vec<Effect>> {
         let hours = periods as f64 * period_s / 3600.0;
-        let of_channel = move |((rule, found), channel): ((&Option<SpikeRule>, &FoundSpikes), &MeasuredChannel)| {
-            let rule = rule.as_ref()?;
+        let of_channel = |((rule, found), channel): ((&Option<SpikeRule>, &FoundSpikes), &MeasuredChannel)| {
+            let Some(rule) = rule else { return (None, Vec::new()) };
+            let (singles, disturbances) = rule.separate(found.before(periods), periods);
             // Where they are no spikes in the whole recording, those of a part of it are none.
-            rule.detection(found, hours, channel.profile.unit)?;
-            rule.detection(&found.before(periods), hours, channel.profile.unit)
+            let spikes = rule.detection(found, (hours, periods), channel.profile.unit);
+            let spikes = spikes.and_then(|_| rule.detection(&singles, (hours, periods), channel.profile.unit));
+            (spikes.map(|found| found.effect), disturbances.into_iter().map(Knock::from).collect::<Vec<Knock>>())
         };
-        self.rules.iter().zip(&self.found).zip(&self.held.channels).map(of_channel)
+        let found: Vec<(Option<Effect>, Vec<Knock>)> =
+            self.rules.iter().zip(&self.found).zip(&self.held.channels).map(of_channel).collect();
+        let shown = |knock: &Knock| {
+            let overlaps = |(_, knocks): &(Option<Effect>, Vec<Knock>)| knocks.iter().any(|of| of.overlaps(knock));
+            let all = found.iter().zip(&self.held.channels);
+            all.filter(|(of, _)| overlaps(of)).map(|(_, channel)| channel.profile.name).collect::<Vec<_>>()
+        };
+        let interval = |knock: &Knock| Effect::from(knock.interval(period_s, &shown(knock)));
+        found
+            .iter()
+            .map(|(spikes, knocks)| spikes.iter().cloned().chain(knocks.iter().map(interval)).collect())
+            .collect()
     }
 
-    /// The samples up to `end` that were not passed on, with those refused that are spikes or repeated.
+    /// What stands out in each channel before the sample period `middle`, with its distance from its neighbours.
+    pub(crate) fn found_before(&self, middle: u64) -> impl Iterator<Item = Vec<(u64, f64)>> {
+        self.found.iter().map(move |found| found.before(middle).samples().collect())
+    }
+
+    /// The samples up to `end` that were not passed on, with those refused that are spikes, of a knock, or repeated.
     fn settle(&mut self, end: usize) -> SampleBlock {
         let mut settled = part(&self.held, self.settled..end);
         let numbered: Vec<usize> = (0..self.rules.len()).collect();
         let spikes = in_parallel(&numbered, |&at| {
-            let found = self.rules[at].as_ref()?.find(&series(&self.held, at));
-            Some(found.within(*settled.slots.first()?..settled.slots.last()? + 1))
+            let rule = self.rules[at].as_ref()?;
+            let own = series(&self.held, at);
+            let found = rule.find(&own).within(*settled.slots.first()?..settled.slots.last()? + 1);
+            Some((rule.separate(found.clone(), own.values.len() as u64), found))
         });
         let is_repeated = |&at: &usize| {
             let at = at + self.settled;
@@ -81,11 +102,15 @@ impl SampleScreen {
         let all = if self.leaves_out_repeated { settled.slots.len() } else { 0 };
         let repeated: Vec<usize> = (0..all).filter(is_repeated).collect();
         for ((channel, found), spikes) in settled.channels.iter_mut().zip(&mut self.found).zip(spikes) {
-            let spikes = spikes.unwrap_or_default();
+            let ((singles, disturbances), spikes) = spikes.unwrap_or_default();
             let position = |slot: &u64| settled.slots.binary_search(slot).ok();
-            for (cause, positions) in
-                [("spikes", spikes.slots.iter().filter_map(position).collect()), ("repeated", repeated.clone())]
-            {
+            let within = |slots: &Range<u64>| {
+                let [from, to] = [slots.start, slots.end].map(|end| settled.slots.partition_point(|slot| *slot < end));
+                from..to
+            };
+            let knocks: Vec<usize> = disturbances.iter().flat_map(|of| within(&of.slots)).collect();
+            let spikes_alone: Vec<usize> = singles.slots.iter().filter_map(position).collect();
+            for (cause, positions) in [("spikes", spikes_alone), ("knock", knocks), ("repeated", repeated.clone())] {
                 if !positions.is_empty() {
                     channel.refused.insert(cause, positions);
                 }

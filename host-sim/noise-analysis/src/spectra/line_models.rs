@@ -45,6 +45,12 @@ impl Sine {
         Self { cosine: self.cosine * cosine - self.sine * sine, sine: self.cosine * sine + self.sine * cosine, ..self }
     }
 
+    /// The same sinusoid, so many times as large.
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        let [cosine, sine] = [self.cosine, self.sine].map(|part| factor * part);
+        Self { cosine, sine, power: factor * factor * self.power, ..self }
+    }
+
     pub(super) fn amplitude(&self) -> f64 {
         self.cosine.hypot(self.sine)
     }
@@ -61,7 +67,7 @@ impl Sine {
 
     /// The same sinusoid with the opposite sign.
     pub(super) fn negative(self) -> Self {
-        Self { cosine: -self.cosine, sine: -self.sine, ..self }
+        self.scaled(-1.0)
     }
 
     /// The series without the sinusoid.

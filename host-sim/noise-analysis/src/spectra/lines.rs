@@ -11,7 +11,9 @@ use super::periodogram::{PADDING, Periodogram};
 use super::whitened_spectrum::{
     Candidate, FEWEST_PERIODS, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit, sine_line,
 };
+use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
+use std::f64::consts::{LN_2, PI};
 
 /// Largest number of lines that are returned.
 pub(super) const MOST: usize = 6;
@@ -39,6 +41,8 @@ const SLOW_BLOCKS: usize = 4096;
 /// [`SLOW_LEFT`] there too.
 const COARSE_BLOCKS: usize = 1024;
 const SLOW_ROUNDS: usize = 6;
+/// Ordinates on either side whose median is the noise of one.
+const NEARBY: usize = 32;
 
 /// The lines of a series with a p-value below 2·10⁻⁴, the strongest first; at most 6.
 ///
@@ -107,6 +111,50 @@ pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, V
         series = sine.delayed(delay).subtracted_from(&series);
     }
     (series, found.into_iter().map(|(_, line)| line).collect())
+}
+
+/// The series without the sinusoids that stand out of the means of [`SLOW_BLOCKS`] blocks or more. A regression on the means of fewer
+/// blocks has `sin(πfw)/(πfw)` of one of the frequency f in means over w, which is to it as much noise.
+pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
+    let size = (series.values().len() / SLOW_BLOCKS).max(1);
+    let width = size as f64 * series.sample_period();
+    // A block's mean belongs to its middle.
+    let delay = 0.5 * (size as f64 - 1.0) * series.sample_period();
+    let mut means = series.averaged(size).detrended();
+    for _ in 0..MOST {
+        let Some(sine) = sine_that_stands_out(&means) else { break };
+        means = sine.subtracted_from(&means);
+        let (half_turn, count) = (PI * sine.frequency * width, size as f64);
+        let gain = half_turn.sin() / (count * (half_turn / count).sin());
+        series = sine.scaled(1.0 / gain).delayed(delay).subtracted_from(&series);
+    }
+    series
+}
+
+/// The sinusoid of the largest ordinate over those around it, if chance gives one as large in fewer than [`SIGNIFICANCE`] of all records:
+/// ordinates of noise over their mean are exponential variables.
+fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
+    let spectrum = Periodogram::new(series)?;
+    let ordinates = spectrum.independent();
+    let over_others = |at: usize| {
+        let around = at.saturating_sub(NEARBY).max(FEWEST_PERIODS)..(at + NEARBY + 1).min(ordinates.len());
+        let mut others: Vec<f64> = around.filter(|&of| of.abs_diff(at) > 1).map(|of| ordinates[of]).collect();
+        let middle = others.len() / 2;
+        let (_, median, _) = others.select_nth_unstable_by(middle, f64::total_cmp);
+        // The median of an exponential variable is ln 2 times its mean.
+        ordinates[at] * LN_2 / *median
+    };
+    // Means hold little of what is faster than half of their rate.
+    let searched = FEWEST_PERIODS..ordinates.len() / 2;
+    if searched.len() <= 2 * NEARBY {
+        return None;
+    }
+    let limit = (searched.len() as f64 / SIGNIFICANCE).ln();
+    let (largest, ratio) = searched.map(|at| (at, over_others(at))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let at = (PADDING * largest - 1..=PADDING * largest + 1)
+        .max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b]))?;
+    let spacing = spectrum.resolution() / PADDING as f64;
+    (ratio > limit).then(|| Sine::fit_near(series, at as f64 * spacing, spacing))
 }
 
 /// The sinusoids of [`without_slow_sines`], with time counted from the first sample of `series`.

@@ -129,7 +129,16 @@ pub(super) fn examples() -> Vec<Effect> {
             from_s: estimate(),
             to_s: estimate(),
             size: size(),
-            bias_error: 3.0,
+            scale: MotionScale::BiasError(3.0),
+            stretches: 2,
+            moved_s: 12,
+        }
+        .into(),
+        MotionInterval {
+            from_s: estimate(),
+            to_s: estimate(),
+            size: size(),
+            scale: MotionScale::Scatter(0.3),
             stretches: 2,
             moved_s: 12,
         }

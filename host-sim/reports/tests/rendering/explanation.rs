@@ -7,7 +7,9 @@ use noise_analysis::effects::{Effect, LineEvidence, LineSource, ResonantLine, Sp
 use noise_analysis::nonstationarity::{
     Baselines, EpochParameters, FittedPart, IntervalCoverage, RelatedLine, Stationarity, TrackedSet, TrackingErrors,
 };
-use noise_analysis::report::{CommonModeRegression, Finding, Nonstationarity, Report, Validation};
+use noise_analysis::report::{
+    CommonModeRegression, EventsReport, Finding, Nonstationarity, Parameter, Report, Validation,
+};
 use reports::{explanation, summary};
 use std::collections::BTreeSet;
 
@@ -101,7 +103,11 @@ fn the_documentation_explains_every_sentence_of_the_explanation() {
     let with = |change: &dyn Fn(&mut Nonstationarity)| {
         let mut report = followed();
         report.channels[2].nonstationarity.iter_mut().for_each(change);
-        report.channels[2].after.unseen_excluding = Some(report.channels[2].after.unseen.clone());
+        let channel = &mut report.channels[2];
+        channel.before.unseen_excluding = Some(channel.before.unseen.clone());
+        channel.after.unseen_excluding = Some(channel.after.unseen.clone());
+        let rate_per_hour = Parameter { value: 34.5, low: 23.4, high: 45.6, unit: "1/h".to_owned() };
+        channel.after.events = Some(EventsReport { count: 17, rate_per_hour, scatter_percent: 35.0, adev: Vec::new() });
         report
     };
     let forms = [

@@ -63,8 +63,14 @@ pub(crate) fn empty() -> Report {
     channel.curve.clear();
     channel.read_off = SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None };
     let error = ModelErrorReport::default();
-    channel.before =
-        ModelReport { terms: vec![], adev: vec![], fitted: error.clone(), unseen: error, unseen_excluding: None };
+    channel.before = ModelReport {
+        terms: vec![],
+        adev: vec![],
+        fitted: error.clone(),
+        unseen: error,
+        unseen_excluding: None,
+        events: None,
+    };
     channel.after = channel.before.clone();
     channel.refitted = channel.before.clone();
     channel.assessment = Assessment::default();
@@ -82,6 +88,7 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
         fitted: error(1.042, 2.317),
         unseen: error(1.385, 3.946),
         unseen_excluding: None,
+        events: None,
     };
     let value = |value: f64, per: &str, from_s: f64, to_s: f64| {
         Some(SlopeMethodValue { value: value * scale, unit: rate_unit(unit, per), from_s, to_s })

@@ -149,8 +149,11 @@ fn what_is_not_known_is_not_claimed() {
     }
     let screen = plain(&report, 80).join("\n");
     assert!(!screen.contains("rest throughout") && !screen.contains("For ±20 %"), "{screen}");
-    report.channels[0].at_rest = vec![Stretch { from_s: 0.0, to_s: 600.0 }];
-    assert!(plain(&report, 80).join("\n").contains("It moved: at rest for 10 min of 2 h 47 min."));
+    report.channels[0].at_rest = vec![Stretch { from_s: 9418.5, to_s: 10018.9 }];
+    let moved =
+        "It moved: at rest for 10 min of 2 h 47 min, the longest time from 9419 s to 10018 s: --from 9419 --to 10018.";
+    let sentences = reports::summary::record_sentences(&report);
+    assert!(sentences.iter().any(|sentence| sentence == moved), "{sentences:#?}");
 }
 
 /// A magnetometer with this N, in gauss/√Hz, and deviance on the unseen half.
@@ -179,31 +182,48 @@ fn magnetometers_have_their_digits_and_a_prefix_and_those_whose_model_fails_have
 
 #[test]
 fn a_failing_model_is_held_beside_the_first_half_s_own_curve() {
-    let warnings = |own_curve: f64, excluding: bool| {
+    let warnings = |own_curve: f64| {
         let mut report = report();
         let channel = &mut report.channels[4];
         channel.first_half_curve.deviance_per_point = Some(own_curve);
-        channel.after.unseen_excluding = excluding.then(|| channel.after.unseen.clone());
         let steps = reports::summary::next_steps(&report);
         steps.into_iter().filter(|step| step.starts_with('!')).collect::<Vec<_>>()
     };
     // The curve of the first half fails as well: nothing that the first half shows holds in the second.
     assert_eq!(
-        warnings(41.4, false),
+        warnings(41.4),
         [
             "! The model of accel y fails on the unseen half, and so does the first half's own curve (41): the noise has changed."
         ]
     );
     // It holds, so the model is what is wrong.
     assert_eq!(
-        warnings(1.71, false),
+        warnings(1.71),
         [
             "! The model of accel y fails on the unseen half: its error is far above 1. The first half's own curve holds (1.7): \
           the model lacks something."
         ]
     );
-    // The curve's error includes samples that the model's error leaves out: the two are not compared.
-    assert_eq!(warnings(41.4, true), ["! The model of accel y fails on the unseen half: its error is far above 1."]);
+}
+
+/// The pair of the table is that of the data as recorded, as in the JSON; the pair without spikes and knocks has its own sentence.
+#[test]
+fn the_errors_without_spikes_and_knocks_are_told_beside_those_as_recorded() {
+    let mut report = report();
+    assert!(reports::summary::record_sentences(&report).iter().all(|sentence| !sentence.contains("spikes")));
+    let channel = &mut report.channels[0];
+    for (model, [recorded, excluding]) in [(&mut channel.before, [193.0, 104.0]), (&mut channel.after, [2.4, 1.3])] {
+        model.unseen.deviance_per_point = Some(recorded);
+        let error =
+            noise_analysis::report::ModelErrorReport { deviance_per_point: Some(excluding), ..Default::default() };
+        model.unseen_excluding = Some(error);
+    }
+    let tables = reports::summary::coefficient_tables(&report);
+    assert_eq!(tables[0].rows[0].error, "193 → 2.4");
+    let sentences = reports::summary::record_sentences(&report);
+    let told = "The errors are on the data as recorded; the models after foretell its spikes and knocks at the rate of the first half. \
+                Without them: gyro x 104 → 1.3.";
+    assert!(sentences.iter().any(|sentence| sentence == told), "{sentences:#?}");
 }
 
 #[test]

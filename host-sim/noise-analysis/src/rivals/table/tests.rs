@@ -107,7 +107,8 @@ fn spikes() -> Effect {
 
 fn motion(size_g: f64) -> Effect {
     let (from_s, to_s) = (BoundedEstimate::exact(40.0), BoundedEstimate::exact(50.0));
-    MotionInterval { from_s, to_s, size: size(size_g), bias_error: 0.05, stretches: 1, moved_s: 10 }.into()
+    MotionInterval { from_s, to_s, size: size(size_g), scale: MotionScale::BiasError(0.05), stretches: 1, moved_s: 10 }
+        .into()
 }
 
 fn temperature() -> Effect {
