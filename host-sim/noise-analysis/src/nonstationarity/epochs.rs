@@ -166,7 +166,11 @@ fn t_test(earlier: &[f64], later: &[f64]) -> Option<f64> {
         return Some(0.0);
     }
     let error = deviation * (1.0 / earlier.len() as f64 + 1.0 / later.len() as f64).sqrt();
-    let t = (mean(later) - mean(earlier)) / error;
+    let difference = mean(later) - mean(earlier);
+    if error == 0.0 {
+        return Some(if difference == 0.0 { 1.0 } else { 0.0 });
+    }
+    let t = difference / error;
     StudentsT::new(0.0, 1.0, freedom).ok().map(|distribution| 2.0 * distribution.sf(t.abs()))
 }
 
