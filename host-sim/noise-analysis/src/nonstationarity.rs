@@ -27,7 +27,7 @@ mod tracked_parameters;
 mod tests;
 
 pub use common_mode_regression::{CommonModeRegression, HoldOutGain, OctaveShares};
-pub(crate) use epochs::{EpochCurves, quarter_curves};
+pub(crate) use epochs::EpochCurves;
 pub use epochs::{FittedPart, Stationarity};
 pub use prediction::{Baselines, TrackingErrors};
 pub use prediction_intervals::IntervalCoverage;

@@ -6,7 +6,7 @@ use crate::fit::covariates::CovariateFit;
 use crate::fit::event_share::EventShare;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::halves::traced_record::TracedRecord;
-use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel, quarter_curves};
+use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
 use crate::parallel::per_channel;
 use crate::record::estimators::{RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
@@ -84,13 +84,9 @@ impl FirstHalf {
             let curves = curves.in_samples(&record.record.channels[channel].samples);
             Some(ChannelEpochs::compare(curves, fit.after()))
         });
-        for ((trace, epochs), own) in part.channels.iter_mut().zip(&channels).zip(&series) {
-            match epochs {
-                Some(epochs) => trace.fit.take_terms_that_foretell(epochs.quarter_curves()),
-                None if record.record.samples_per_mean == 1 && trace.fit.covariates.is_empty() => {
-                    trace.fit.take_terms_that_foretell(&quarter_curves(own, middle));
-                }
-                None => {}
+        for (trace, epochs) in part.channels.iter_mut().zip(&channels) {
+            if let Some(epochs) = epochs {
+                trace.fit.take_terms_that_foretell(epochs.quarter_curves());
             }
             if let Some(recent) = epochs.as_ref().and_then(ChannelEpochs::recent_curve) {
                 trace.fit.fit_to(&recent);

@@ -124,7 +124,7 @@ impl EpochCurves {
 }
 
 /// The curves of the two quarters up to the sample period `middle`.
-pub(crate) fn quarter_curves(series: &Series, middle: u64) -> [Curve<OCTAVES>; 2] {
+fn quarter_curves(series: &Series, middle: u64) -> [Curve<OCTAVES>; 2] {
     let from = series.span.start;
     let quarter = from + middle.saturating_sub(from) / 2;
     [curve(series, from..quarter), curve(series, quarter..middle)]
