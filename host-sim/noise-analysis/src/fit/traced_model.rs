@@ -245,7 +245,9 @@ impl TracedModel {
 /// smallest of these limits; that of one that it shows is at the level of the smallest of so many bounds.
 pub(crate) fn within_measured(model: &Model, curve: &Curve<OCTAVES>) -> Model {
     let from = LONG_AGAINST_FILTER * filter_length_s(model).max(curve.sample_period());
-    let points: Vec<&AllanPoint> = curve.points().iter().filter(|point| point.tau >= from).collect();
+    // A variance of 0, of an octave without differences or of counts that repeat, has no upper bound.
+    let points: Vec<&AllanPoint> =
+        curve.points().iter().filter(|point| point.tau >= from && point.avar > 0.0).collect();
     let limit = |kind: &NoiseTerm, bound: &dyn Fn(&AllanPoint) -> f64| {
         let of = |point: &&AllanPoint| (bound(point) / kind.avar(point.n, curve.sample_period())).sqrt();
         points.iter().map(of).filter(|limit| !limit.is_nan()).fold(f64::INFINITY, f64::min)
