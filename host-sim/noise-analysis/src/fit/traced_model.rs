@@ -23,6 +23,8 @@ const COST_OF_A_TERM: f64 = 18.0;
 /// Averaging time, in lengths of the filter, from which on the Allan variance of white noise behind it is that of white noise within a
 /// percent or two.
 const LONG_AGAINST_FILTER: f64 = 8.0;
+/// Fewest degrees of freedom for which the bounds of a point of a curve are derived.
+const LEAST_EDF: f64 = 3.0;
 /// Probability that a truth is above its upper 95 % bound.
 const BEYOND_A_BOUND: f64 = 0.025;
 
@@ -245,9 +247,9 @@ impl TracedModel {
 /// smallest of these limits; that of one that it shows is at the level of the smallest of so many bounds.
 pub(crate) fn within_measured(model: &Model, curve: &Curve<OCTAVES>) -> Model {
     let from = LONG_AGAINST_FILTER * filter_length_s(model).max(curve.sample_period());
-    // A variance of 0, of an octave without differences or of counts that repeat, has no upper bound.
-    let points: Vec<&AllanPoint> =
-        curve.points().iter().filter(|point| point.tau >= from && point.avar > 0.0).collect();
+    // With fewer degrees of freedom, and of counts that repeat, the measured bounds are none.
+    let has_bounds = |point: &&AllanPoint| point.edf >= LEAST_EDF && point.avar > 0.0;
+    let points: Vec<&AllanPoint> = curve.points().iter().filter(|point| point.tau >= from).filter(has_bounds).collect();
     let limit = |kind: &NoiseTerm, bound: &dyn Fn(&AllanPoint) -> f64| {
         let of = |point: &&AllanPoint| (bound(point) / kind.avar(point.n, curve.sample_period())).sqrt();
         points.iter().map(of).filter(|limit| !limit.is_nan()).fold(f64::INFINITY, f64::min)
