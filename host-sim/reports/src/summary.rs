@@ -7,17 +7,24 @@ use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span, unit};
 use noise_analysis::bounds::BoundedEstimate;
+use noise_analysis::distributions::quantile;
 use noise_analysis::effects::Effect;
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;
+use noise_analysis::report::assessment::Innovations;
 use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
 use noise_analysis::units::conversions;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
 /// half to the other leaves up to 3.
 const HIGH_DEVIANCE: f64 = 3.0;
-/// Standard deviations from which the largest deviation of a model is told.
-const FAR_OFF: f64 = 4.0;
+/// Most records with true models of which the same sentence says that the data contradicts the model of some channel.
+const CHANCE: f64 = 0.01;
+/// Variance of what the fit to another half does not know of an octave, over that of the octave in the unseen half: it has as many
+/// samples.
+const FITTED_TO_HALF: f64 = 1.0;
+/// The same of the fit to the medians of the later quarter: half as many samples, and the median scatters by a fourth more than the mean.
+const FITTED_TO_QUARTER: f64 = 2.0 * 1.25 * 1.25;
 /// Part of the record that has to be at rest for "throughout".
 const THROUGHOUT: f64 = 0.999;
 /// Minimum of the Allan deviation over B: `sqrt(2 ln 2/π)`.
@@ -562,10 +569,16 @@ fn related_line(report: &Report, finding: &noise_analysis::report::Finding) -> O
 #[must_use]
 pub fn contradictions(report: &Report) -> Vec<String> {
     let mut told = Vec::new();
+    let channels = inertial(report).count() as f64;
+    let is_far_off = |channel: &ChannelReport, sigma: f64| {
+        let fitted = if is_fitted_to_later_quarter(channel) { FITTED_TO_QUARTER } else { FITTED_TO_HALF };
+        let octaves = channel.curve.len() as f64;
+        sigma.abs() > (1.0 + fitted).sqrt() * quantile(CHANCE / 2.0 / (channels * octaves).max(1.0))
+    };
     let mut far: Vec<(&ChannelReport, &ModelErrorReport, f64)> = inertial(report)
         .filter_map(|channel| {
             let error = &channel.after.unseen;
-            let sigma = error.worst_sigma.filter(|sigma| sigma.abs() > FAR_OFF)?;
+            let sigma = error.worst_sigma.filter(|&sigma| is_far_off(channel, sigma))?;
             Some((channel, error, sigma))
         })
         .collect();
@@ -601,8 +614,9 @@ pub fn contradictions(report: &Report) -> Vec<String> {
             ));
         }
     }
+    let is_unsure = |of: &Innovations| channels * of.chance_of_small_claim() < CHANCE;
     let unsure: Vec<String> = inertial(report)
-        .filter(|channel| channel.assessment.innovations.as_ref().is_some_and(|of| of.normalised > of.high))
+        .filter(|channel| channel.assessment.innovations.as_ref().is_some_and(is_unsure))
         .map(|channel| channel.name.clone())
         .collect();
     if !unsure.is_empty() {

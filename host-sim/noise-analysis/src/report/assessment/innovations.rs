@@ -3,6 +3,7 @@
 //! The innovations of a filter with the true model are white and have the variance that the filter expects. The measurements
 //! are means over [`BLOCK_S`]; half an hour has 7200 of them.
 
+use crate::distributions::mean_ratio_tail;
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::{Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
@@ -35,6 +36,17 @@ pub struct Innovations {
     pub correlation: f64,
     /// Probability that white innovations show as much correlation over [`LAGS`] lags (G. Ljung and G. Box, 1978).
     pub whiteness_p: f64,
+}
+
+impl Innovations {
+    /// Probability that a true model, fitted to as long a stretch as this one, claims as small an error: the mean squares of both
+    /// stretches scatter.
+    #[must_use]
+    pub fn chance_of_small_claim(&self) -> f64 {
+        // A square of a normal number is worth half an exponential one.
+        let half = self.count as f64 / 2.0;
+        mean_ratio_tail(self.normalised, half, half)
+    }
 }
 
 /// Runs the filter of `model` over `unseen` samples; `None` for a record of fewer than 228 blocks or a model without noise.
@@ -227,5 +239,21 @@ impl KalmanFilter {
             }
             (at..at + mode.size()).for_each(|number| covariance[(number, number)] += mode.process_noise);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Innovations;
+
+    /// From tables of Fisher's distribution: with 120 and 120 degrees of freedom 1.53 is exceeded with a probability of 1 %.
+    #[test]
+    fn the_chance_of_a_small_claim_is_that_of_two_mean_squares() {
+        let of = |normalised| {
+            Innovations { count: 120, normalised, low: 0.0, high: 0.0, correlation: 0.0, whiteness_p: 1.0 }
+                .chance_of_small_claim()
+        };
+        assert!((of(1.533) - 0.01).abs() < 2e-4, "{}", of(1.533));
+        assert!((of(1.0) - 0.5).abs() < 1e-9);
     }
 }
