@@ -71,6 +71,22 @@ fn a_write_to_a_cold_part_is_lost() {
     assert_eq!(read(&mut part, 0x36), 0x0001);
 }
 
+/// Table 1 gives 12 ms at SMPL_PRD = 0x01; taken as so many samples that is 48 ms at 0x07, of four times the period.
+#[test]
+fn the_self_test_takes_as_many_samples_at_a_slower_rate() {
+    for (smpl_prd, hold_ms) in [(0x01, 12), (0x07, 48)] {
+        let mut part = part();
+        frame_after(&mut part, 40_000, 0xB600 | smpl_prd);
+        // MSC_CTRL, bit 10, which clears at the end of the test.
+        frame_after(&mut part, 40_000, 0xB504);
+        let begun = part.now();
+        part.advance_to(begun + (hold_ms - 1) * MS);
+        assert_eq!(read(&mut part, 0x34) & 1 << 10, 1 << 10, "SMPL_PRD {smpl_prd:#x}");
+        part.advance_to(begun + (hold_ms + 1) * MS);
+        assert_eq!(read(&mut part, 0x34) & 1 << 10, 0, "SMPL_PRD {smpl_prd:#x}");
+    }
+}
+
 #[test]
 fn a_start_up_takes_longer_in_low_power_mode_or_as_long_as_is_set() {
     let mut part = part();

@@ -56,8 +56,13 @@ fn run_on(
 ) -> Epochs {
     const PRESSED_S: f64 = EPOCH_S + 5.0;
     let end_s = 2.0 * EPOCH_S + longest_fit_s;
-    let keys =
-        vec![(0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()), (PRESSED_S, b"v".to_vec()), (end_s, b"t".to_vec())];
+    let keys = vec![
+        (0.5, format!("i 0\re {EPOCH_S}\r").into_bytes()),
+        (PRESSED_S, b"v".to_vec()),
+        // No third epoch, during whose fit the table would wait.
+        (2.0 * EPOCH_S + 10.0, b"e 3600\r".to_vec()),
+        (end_s, b"t".to_vec()),
+    ];
     let sensor = Some(warming_sensor(effects));
     let scenario = Scenario { wiring, sensor, keys, events, seconds: end_s + 3.0, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, .. } = run(image, scenario);
