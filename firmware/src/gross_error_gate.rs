@@ -11,8 +11,9 @@
 //! eight channels at 819.2 samples a second in a year. Noise behind the sensor's filter has fewer degrees of freedom, ν = 1,792/N
 //! at least, and rounding to counts, for which the limit is three counts wider.
 //!
-//! **What passes.** Of the flips of single bits those by less than the limit: with a noise of 10 counts the lower 6 of 14 bits, whose
-//! flips add 0.1 counts² × 10⁻² to a variance of 110 at a bit error rate of 10⁻⁶.
+//! **What passes.** Of the flips of single bits those by less than the limit: with a noise of 10 counts the lower 7 of 14 bits, whose
+//! flips add (4⁷ − 1)/3·10⁻⁶ = 0.005 counts² to a variance of 110 at a bit error rate of 10⁻⁶. Any passes in the first block, before the
+//! noise is known, and in the sixteen samples that are not judged.
 
 use crate::channels::{CHANNELS, ChannelSet};
 
