@@ -97,7 +97,9 @@ lint_images() { # where the tests build them, so that their build scripts are co
     local image=(--profile image --target-dir "$TARGET/image" --package firmware)
     lint "${image[@]}" --bin observatory-h405 --features board-h405 --target "$MCU"
     lint "${image[@]}" --bin observatory-feather --features board-feather --target "$MCU"
+    lint "${image[@]}" --bin observatory-feather --features board-feather,feather-usb --target "$MCU"
     lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
+    lint "${image[@]}" --bin observatory-pico --no-default-features --features board-pico --target "$SMALL"
     lint --profile image --target-dir "$TARGET/image" --package example-board --features image --target "$SMALL"
 }
 lint_examples() { # two workspaces with the same frameworks, which are compiled once
