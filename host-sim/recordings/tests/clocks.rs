@@ -9,6 +9,7 @@ use recordings::ColumnSelection;
 use recordings::any_sensor::ReadOptions;
 use recordings::file_format::InputFile;
 use recordings::recording::{Recorder, TimeStamp};
+use recordings::sample_stream::{KeptInMemory, SampleStream};
 use recordings::time_base::{EstimatedTimeBase, TimeBaseError, time_base};
 
 fn base(times: impl IntoIterator<Item = f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
@@ -124,6 +125,54 @@ fn a_rate_that_changes_is_no_loss() {
         if row < 30_000.0 { row / 100.0 } else { 300.0 + (row - 30_000.0) / 95.0 }
     };
     assert_eq!(found(kept.iter().map(time)).1, 60_000 - kept.len() as u64);
+}
+
+/// Rate and missing samples of the same stamps in a table of which the first 16,384 rows are read in memory, and what is noted.
+fn streamed(times: &[f64]) -> (f64, u64, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("counts.csv");
+    let rows = times.iter().enumerate().map(|(at, time)| format!("{time:.6},{}\n", at % 100));
+    std::fs::write(&file, format!("time_s,gyro_x_counts\n{}", rows.collect::<String>())).expect("a table");
+    let kept = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0, irregular: true };
+    let input = InputFile::open(&file).expect("a table");
+    let stream = SampleStream::counts(input, GyroRange::Dps300, None, kept).expect("a time base");
+    assert!(!stream.is_in_memory(), "{:?}", stream.notes());
+    let description = stream.description();
+    (description.sample_rate_hz, description.dropped["gap"], stream.notes().to_vec())
+}
+
+/// Stamps in whole µs of samples that are read up to 0.2 ms late; `period_s` says how long after each row the next one is taken.
+fn late_stamps(rows: u32, period_s: impl Fn(u32) -> f64) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut time = 0.0f64;
+    let mut stamp = |row| {
+        let now = ((time + rng.random_range(0.0..2e-4)) * 1e6).round() / 1e6;
+        time += period_s(row);
+        now
+    };
+    (0..rows).map(&mut stamp).collect()
+}
+
+/// Rows that are read in blocks, whose rate changes in the rows that are read first or after them.
+#[test]
+fn a_rate_that_changes_is_followed_in_blocks() {
+    for (first, part) in [(36_360, 0.05), (36_360, -0.1), (50_001, 0.1), (8_000, 0.05)] {
+        let times = late_stamps(72_720, |row| 0.01 * if row < first { 1.0 } else { 1.0 + part });
+        let (rate_hz, missing, notes) = streamed(&times);
+        assert_eq!(missing, 0, "{part} from row {first}");
+        assert!((rate_hz * times[72_719] / 72_719.0 - 1.0).abs() < 1e-5, "{part} from row {first}: {rate_hz} Hz");
+        assert!(notes.iter().any(|note| note.contains("changes from")), "{part} from row {first}: {notes:?}");
+        // Every 1000th sample is lost.
+        let kept: Vec<f64> = times.iter().enumerate().filter(|(row, _)| row % 1000 != 500).map(|(_, t)| *t).collect();
+        assert_eq!(streamed(&kept).1, 73, "{part} from row {first}");
+    }
+    // One that wanders by 5 % in a minute, and one that does not change.
+    let wandering = |row| 0.01 * (1.0 + 0.05 * (std::f64::consts::TAU * f64::from(row) / 6000.0).sin());
+    assert_eq!(streamed(&late_stamps(60_000, wandering)).1, 0);
+    let (rate_hz, missing, notes) = streamed(&late_stamps(60_000, |_| 0.01));
+    assert_eq!((missing, notes.len()), (0, 0), "{notes:?}");
+    // The slope of 60,000 stamps with a standard deviation of 0.2 ms/sqrt(12): 3.5e-10 of the period.
+    assert!((rate_hz / 100.0 - 1.0).abs() < 3e-9, "{rate_hz}");
 }
 
 /// A host that empties a queue at irregular times, now and then late by tenths of a second: the stamps are those of the reading.

@@ -82,8 +82,8 @@ struct Values {
     source: Source<ReadOptions>,
     time_unit_s: f64,
     columns: Vec<StreamedColumn>,
-    /// What the user should know of rows that are left out.
-    note: Option<String>,
+    /// What the user should know of rows that are left out, and of their times.
+    notes: Vec<String>,
 }
 
 /// A file that is read more than once.
@@ -266,7 +266,7 @@ impl SampleStream {
         let (base, _) = SensorRecording::new(table, &source.options.sensor).time_base(stated_hz)?;
         let beginning = base.measurement.before(BEGINNING);
         drop(base);
-        let values = Values { source, time_unit_s, columns: Vec::new(), note: None };
+        let values = Values { source, time_unit_s, columns: Vec::new(), notes: Vec::new() };
         let content = Content::Values(Box::new(values));
         let mut stream = Self { content, beginning, description, notes: Vec::new(), monitor: monitor.clone() };
         stream.survey()?;
@@ -394,10 +394,10 @@ impl SampleStream {
                 description.flagged.extend(pass.clock().warnings());
                 description.sample_rate_hz =
                     source.stated_hz.or(pass.clock().rate_hz()).ok_or(TimeBaseError::NoRate)?;
-                notes.clear();
+                *notes = pass.clock().note().into_iter().collect();
             }
             Content::Values(values) => {
-                let Values { source, time_unit_s, columns, note } = values.as_mut();
+                let Values { source, time_unit_s, columns, notes } = values.as_mut();
                 let mut pass = open_values(source, *time_unit_s, monitor)?;
                 let mut samples: Vec<ColumnSample> = pass.columns.iter().map(|_| ColumnSample::new()).collect();
                 while let Some(rows) = pass.next()? {
@@ -424,7 +424,7 @@ impl SampleStream {
                     sample,
                 };
                 *columns = pass.columns.iter().zip(samples).map(streamed).collect();
-                *note = backwards.map(|(_, note)| note);
+                *notes = backwards.map(|(_, note)| note).into_iter().chain(pass.clock().note()).collect();
                 self.describe_columns();
             }
         }
@@ -438,9 +438,9 @@ impl SampleStream {
     /// The channels with the size of their counts, and what the user should know of it.
     fn describe_columns(&mut self) {
         let Content::Values(values) = &self.content else { return };
-        let Values { columns, note, .. } = values.as_ref();
+        let Values { columns, notes, .. } = values.as_ref();
         self.description.channels.clear();
-        self.notes = note.iter().cloned().collect();
+        self.notes.clone_from(notes);
         for StreamedColumn { column: ValueColumn { profile, factor, label }, quantizer, .. } in columns {
             match quantizer {
                 Some(quantizer) => {

@@ -27,6 +27,14 @@ pub struct StampQuality {
     pub clock_steps: Vec<ClockStep>,
 }
 
+/// What the user should know of a rate that changes.
+pub(crate) fn changing_rate(rate: RateEstimate) -> String {
+    format!(
+        "the rate of the samples, or of the clock that stamped them, changes from {:.4} to {:.4} Hz; {:.4} Hz is the mean",
+        rate.low_hz, rate.high_hz, rate.hz
+    )
+}
+
 impl StampQuality {
     /// Of samples that have an index and time stamps, s.
     pub(crate) fn of_index(indices: &[u64], times: &[f64]) -> Self {
@@ -61,12 +69,7 @@ impl StampQuality {
                 "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
             ));
         }
-        if let (Some(rate), true) = (self.rate, self.is_rate_changing) {
-            notes.push(format!(
-                "the rate of the samples, or of the clock that stamped them, changes from {:.4} to {:.4} Hz; {:.4} Hz is the mean",
-                rate.low_hz, rate.high_hz, rate.hz
-            ));
-        }
+        notes.extend(self.rate.filter(|_| self.is_rate_changing).map(changing_rate));
         if let (Some(rate), true) = (self.rate, self.least_loss > 1) {
             notes.push(format!(
                 "samples come in bursts: losses of fewer than {} samples cannot be told from late delivery, and none is counted; the \

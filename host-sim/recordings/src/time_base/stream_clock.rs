@@ -3,14 +3,16 @@
 //! With time stamps alone, the rule is that of [`lateness_track`](crate::time_base::lateness_track) for stamps that are finer than the sample
 //! period: a lost sample lifts the lower envelope of the lateness for good, a late delivery for as long as the queue is. The
 //! period is that of the first rows, and the envelope is sought over as many rows as there, so that a row is placed when those
-//! of the queue behind it are known.
+//! of the queue behind it are known. Before that a rate that changes is [followed](crate::time_base::clock_rate).
 
+use crate::time_base::clock_rate::SteadyStream;
 use crate::time_base::indexed_clock::{STEP_PERIODS, STEP_S};
 use crate::time_base::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY};
 use crate::time_base::lower_envelope::{MinimumBehind, minimum_ahead};
 use crate::time_base::sample_slots::is_too_sparse;
 use crate::time_base::stamp_alignment::MAX_QUEUE;
-use crate::time_base::stamp_quality::StampQuality;
+use crate::time_base::stamp_alignment::RateEstimate;
+use crate::time_base::stamp_quality::{StampQuality, changing_rate};
 use crate::time_base::time_base_error::{MIN_SAMPLES, TimeBaseError};
 use std::collections::BTreeMap;
 
@@ -56,8 +58,12 @@ pub(crate) struct StreamClock {
     /// Lateness of the rows that are not placed yet, and their times, s.
     ahead: Vec<f64>,
     times_s: Vec<f64>,
+    /// The stamps as a steady clock would have written them; `None` where they do not tell the sample periods.
+    steady: Option<SteadyStream>,
     level: MinimumBehind,
     line: Line,
+    /// The last period that was placed, counted from the first row, and its time, s.
+    end: (u64, f64),
     late: u64,
     uncertain: u64,
     /// Smallest step of the index.
@@ -78,9 +84,8 @@ impl StreamClock {
                 let reason = format!("they are {:.1} sample periods wide", head.width);
                 return Err(TimeBaseError::Irregular(reason));
             }
-            (false, Some(head)) if head.is_rate_changing || head.least_loss > 1 => {
-                let reason = if head.is_rate_changing { "their rate changes" } else { "they come in bursts" };
-                return Err(TimeBaseError::Irregular(reason.to_owned()));
+            (false, Some(head)) if head.least_loss > 1 => {
+                return Err(TimeBaseError::Irregular("they come in bursts".to_owned()));
             }
             (false, Some(_)) => Source::Stamps(period_s.ok_or(TimeBaseError::NoPeriod)?),
         };
@@ -92,6 +97,8 @@ impl StreamClock {
             last: Stamp::default(),
             ahead: Vec::new(),
             times_s: Vec::new(),
+            steady: if let Source::Stamps(period_s) = source { Some(SteadyStream::new(period_s)) } else { None },
+            end: (0, 0.0),
             level: MinimumBehind::new(MEMORY),
             line: Line::default(),
             late: 0,
@@ -118,12 +125,17 @@ impl StreamClock {
                 .collect()),
             Source::Index(period_s) => rows.map(|row| self.by_index(row, period_s)).collect(),
             Source::Stamps(period_s) => {
-                for row in rows {
+                let mut origin_s = self.origin_s;
+                let times = rows.map(|row| {
                     let time_s = row.time_s.unwrap_or_default();
-                    let origin_s = *self.origin_s.get_or_insert(time_s);
+                    time_s - *origin_s.get_or_insert(time_s)
+                });
+                let steady = self.steady.as_mut().map(|steady| steady.steady(times, is_last)).unwrap_or_default();
+                self.origin_s = origin_s;
+                for (time_s, steady_s) in steady {
                     let number = self.placed + self.ahead.len() as u64;
-                    self.ahead.push((time_s - origin_s) / period_s - number as f64);
-                    self.times_s.push(time_s - origin_s);
+                    self.ahead.push(steady_s / period_s - number as f64);
+                    self.times_s.push(time_s);
                 }
                 Ok(self.by_stamps(is_last))
             }
@@ -173,6 +185,7 @@ impl StreamClock {
                 self.late += 1;
             }
             placed.push(Placed { period, missing: self.missing });
+            self.end = (period, time_s);
         }
         self.ahead.drain(..ready);
         self.times_s.drain(..ready);
@@ -181,7 +194,20 @@ impl StreamClock {
 
     /// The sample rate by the stamps of the rows that were placed, Hz.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
-        self.line.slope().map(f64::recip).filter(|hz| hz.is_finite() && *hz > 0.0)
+        let changing = self.changing_rate().map(|rate| rate.hz);
+        changing.or(self.line.slope().map(f64::recip)).filter(|hz| hz.is_finite() && *hz > 0.0)
+    }
+
+    /// The mean rate and its range, where it changes.
+    fn changing_rate(&self) -> Option<RateEstimate> {
+        let [shortest_s, longest_s] = self.steady.as_ref()?.periods_s()?;
+        let (period, time_s) = self.end;
+        Some(RateEstimate { hz: period as f64 / time_s, low_hz: longest_s.recip(), high_hz: shortest_s.recip() })
+    }
+
+    /// What the user should know of the rows that were placed, as of [`StampQuality::notes`].
+    pub(crate) fn note(&self) -> Option<String> {
+        self.changing_rate().map(changing_rate)
     }
 
     /// Warnings that a report counts, by cause, as those of [`StampQuality::warnings`].
