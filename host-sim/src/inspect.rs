@@ -217,11 +217,11 @@ fn write_table(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resul
     }
     match duration_s {
         Some(duration) => write!(f, " in {duration:.2} s")?,
-        None if table.has_times() => write!(f, "; times of an unknown unit")?,
+        None if table.has("time") => write!(f, "; times of an unknown unit")?,
         None => write!(f, "; no time stamps")?,
     }
     match missing {
-        _ if !table.has_places() => writeln!(f),
+        _ if !table.has("time") && !table.has("sample") => writeln!(f),
         0 => writeln!(f, "; no sample missing"),
         missing => writeln!(f, "; {missing} samples missing in {gaps} gaps"),
     }?;

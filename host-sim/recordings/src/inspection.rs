@@ -130,16 +130,9 @@ impl InspectedTable {
         inspected
     }
 
-    /// Whether a column has times.
+    /// Whether a column is taken for `channel`, which is a channel's name, `time` or `sample`.
     #[must_use]
-    pub fn has_times(&self) -> bool {
-        self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == "time"))
-    }
-
-    /// Whether times or running numbers tell which samples are missing.
-    #[must_use]
-    pub fn has_places(&self) -> bool {
-        let is_place = |guess: &ColumnGuess| matches!(guess.channel, "time" | "sample");
-        self.columns.iter().any(|column| column.guess.as_ref().is_some_and(is_place))
+    pub fn has(&self, channel: &str) -> bool {
+        self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == channel))
     }
 }

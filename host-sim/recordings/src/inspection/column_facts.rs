@@ -3,7 +3,7 @@
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
 use crate::inspection::time_unit::time_unit;
-use crate::tables::quantizer::{Quantizer, difference_noise};
+use crate::tables::quantizer::{difference_noise, step};
 use crate::tables::whole_table::WholeColumn;
 
 /// Part of the rows that may be before the row above in a column of times.
@@ -40,13 +40,12 @@ impl<'a> ColumnFacts<'a> {
     pub(crate) fn new(of: &'a WholeColumn) -> Self {
         let WholeColumn { column, values } = of;
         let finite = || values.iter().copied().filter(|value| value.is_finite());
-        let quantizer = Quantizer::new(values);
         Self {
             column,
             values,
             mean: finite().sum::<f64>() / finite().count() as f64,
             noise: difference_noise(values),
-            step: quantizer.cost.is_none().then_some(quantizer.lsb),
+            step: step(values).map(|(step, _)| step),
         }
     }
 

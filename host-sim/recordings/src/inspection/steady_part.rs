@@ -2,12 +2,16 @@
 
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
-use crate::tables::quantizer::MEDIAN_OF_NORMAL;
+use crate::tables::quantizer::{MEDIAN_OF_NORMAL, noise_at_lag};
 use std::ops::Range;
 
-/// Rows of a block.
+/// Rows of a block whose noise is independent, and most times as many where a filter makes neighbours alike.
 const BLOCK: usize = 128;
-/// How many times the standard deviation of the quietest eighth of the blocks a steady block has at most. That of 128 samples scatters by 10 %.
+const MOST_ALIKE: usize = 16;
+/// How many times the noise at half of a lag that at the lag is where the noise is still alike.
+const GROWS: f64 = 1.1;
+/// How many times the standard deviation of the quietest eighth of the blocks a steady block has at most. That of 128 independent samples
+/// scatters by 10 %.
 const MOST_NOISE: f64 = 3.0;
 /// How far deviation and mean of a block may differ from those of a sensor at rest, deg/s and g: noise and vibration of a table are below,
 /// a hand is above.
@@ -28,7 +32,9 @@ impl SteadyPart {
     pub(crate) fn find(columns: &[ColumnFacts], sensors: &[SensorGuess]) -> Option<Self> {
         let inertial: Vec<(usize, Option<f64>)> = sensors.iter().flat_map(SensorGuess::inertial).collect();
         let rows = columns[inertial.first()?.0].values.len();
-        let blocks = rows.div_ceil(BLOCK);
+        let alike = inertial.iter().map(|(at, _)| rows_alike(columns[*at].values)).max().unwrap_or(1);
+        let block = BLOCK * alike;
+        let blocks = rows.div_ceil(block);
         let mut is_steady = vec![true; blocks];
         for &(at, factor) in &inertial {
             let ColumnFacts { values, step, .. } = &columns[at];
@@ -36,7 +42,7 @@ impl SteadyPart {
                 let limit = if sensors.iter().any(|sensor| sensor.is_force(at)) { REST_G } else { REST_DEG_S };
                 limit / factor
             });
-            let moments: Vec<(f64, f64)> = values.chunks(BLOCK).map(moments).collect();
+            let moments: Vec<(f64, f64)> = values.chunks(block).map(moments).collect();
             let sorted = |part: fn(&(f64, f64)) -> f64| {
                 let mut all: Vec<f64> = moments.iter().map(part).filter(|value| value.is_finite()).collect();
                 all.sort_by(f64::total_cmp);
@@ -60,9 +66,19 @@ impl SteadyPart {
         if longest.end < blocks && longest.len() > 2 {
             longest.end -= 1;
         }
-        let rows = longest.start * BLOCK..(longest.end * BLOCK).min(rows);
+        let rows = longest.start * block..(longest.end * block).min(rows);
         Some(Self { rows, is_rest: inertial.iter().all(|(_, factor)| factor.is_some()) })
     }
+}
+
+/// Rows until the noise is as good as independent: those at which the differences stop to grow.
+fn rows_alike(values: &[f64]) -> usize {
+    let grows = |lag: &usize| noise_at_lag(values, 2 * lag) > GROWS * noise_at_lag(values, *lag);
+    let mut lag = 1;
+    while lag < MOST_ALIKE && grows(&lag) {
+        lag *= 2;
+    }
+    lag
 }
 
 /// The longest run of true.

@@ -15,9 +15,9 @@ const MIN_DISTINCT: usize = 3;
 const ON_STEP: f64 = 0.02;
 /// Largest part of the numbers that may lie beyond the largest count; where more do, the LSB is raised.
 const MAX_BEYOND: f64 = 1e-3;
-/// Finest step, in standard deviations of the noise, that is kept: the many digits of a text are no counts of a converter, and
-/// the estimator's sums of fourth powers have room for noise of some thousand counts.
-const FINEST_STEP: f64 = 1e-3;
+/// Largest noise in counts: of a finer step, as of the many digits of a text, counts would leave no room in the estimator's sums of
+/// fourth powers.
+const MOST_NOISE_COUNTS: f64 = (1u32 << 17) as f64;
 /// The median of the absolute values of a normal distribution, in standard deviations.
 pub(crate) const MEDIAN_OF_NORMAL: f64 = 0.674_5;
 
@@ -36,9 +36,8 @@ pub(crate) struct Quantizer {
 impl Quantizer {
     /// The quantizer of `values`; those that are not finite have no influence.
     pub(crate) fn new(values: &[f64]) -> Self {
-        let largest = values.iter().copied().filter(|value| value.is_finite()).map(f64::abs).fold(0.0, f64::max);
         let noise = difference_noise(values);
-        match step(values, largest).filter(|(lsb, _)| *lsb >= FINEST_STEP * noise) {
+        match step(values).filter(|(lsb, _)| noise <= MOST_NOISE_COUNTS * lsb) {
             Some((lsb, offset)) => Self { lsb, offset, cost: None },
             None => Self::without_step(values),
         }
@@ -75,9 +74,11 @@ impl Quantizer {
 
 /// The step that all `values` are multiples of, but for an offset below one step, and the offset; `None` where there is none.
 ///
-/// Of numbers that were rounded, the smallest distance of two is one, two or three steps. The step is then refined at growing
-/// distances from the median, like a vernier, as long as every number lies on it.
-fn step(values: &[f64], largest: f64) -> Option<(f64, f64)> {
+/// Of the numbers of a converter the smallest distance of two is one, two or three steps, of others the step is the greatest common divisor
+/// of the distances between neighbours in the order of size. It is refined at growing distances from the median, like a vernier, as long as
+/// every number lies on it.
+pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
+    let largest = values.iter().copied().filter(|value| value.is_finite()).map(f64::abs).fold(0.0, f64::max);
     let stride = values.len().div_ceil(EXAMINED).max(1);
     let mut examined: Vec<f64> = values.iter().copied().step_by(stride).filter(|value| value.is_finite()).collect();
     examined.sort_by(f64::total_cmp);
@@ -88,7 +89,8 @@ fn step(values: &[f64], largest: f64) -> Option<(f64, f64)> {
     if examined.len() < MIN_DISTINCT {
         return None;
     }
-    let smallest = examined.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    let mut between: Vec<f64> = examined.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    between.sort_by(f64::total_cmp);
     let origin = examined[examined.len() / 2];
     let mut distances: Vec<f64> = examined.iter().map(|value| (value - origin).abs()).filter(|d| *d > 0.0).collect();
     distances.sort_by(f64::total_cmp);
@@ -100,8 +102,10 @@ fn step(values: &[f64], largest: f64) -> Option<(f64, f64)> {
         let is_resolved = 2.0 * rounding < ON_STEP * step && largest / step < MAX_COUNT;
         is_resolved && values.iter().all(|&value| !value.is_finite() || is_on_step(value))
     };
-    [1.0, 2.0, 3.0].into_iter().find_map(|parts| {
-        let step = refined(smallest / parts, &distances)?;
+    let smallest = *between.first()?;
+    let coarse = [1.0, 2.0, 3.0].into_iter().map(|parts| smallest / parts);
+    coarse.chain(common_divisor(&between, 2.0 * rounding)).find_map(|step| {
+        let step = refined(step, &distances)?;
         // If the numbers themselves are multiples, their distance from 0 tells the step better than those from each other.
         let (squares, products) = examined.iter().fold((0.0, 0.0), |(squares, products), &value| {
             let steps = (value / step).round();
@@ -114,6 +118,32 @@ fn step(values: &[f64], largest: f64) -> Option<(f64, f64)> {
         let offset = origin - (origin / step).round() * step;
         is_multiple(step, offset).then_some((step, offset))
     })
+}
+
+/// The greatest common divisor of `distances` (in ascending order), each of which is off by `error` at most: Euclid's algorithm, with the
+/// error of each remainder. `None` where it is not larger than what the errors leave.
+fn common_divisor(distances: &[f64], error: f64) -> Option<f64> {
+    let mut divisor = *distances.first()?;
+    let mut of_divisor = error;
+    let mut at = 0;
+    while let Some(&distance) = distances.get(at) {
+        let times = (distance / divisor).round();
+        let rest = (distance - times * divisor).abs();
+        let of_rest = error + times * of_divisor;
+        if of_rest > ON_STEP * divisor {
+            // Farther than the divisor is known.
+            break;
+        }
+        if rest > 2.0 * of_rest {
+            (divisor, of_divisor, at) = (rest, of_rest, 0);
+            continue;
+        }
+        if error < times * of_divisor {
+            (divisor, of_divisor) = (distance / times, error / times);
+        }
+        at += 1;
+    }
+    (of_divisor < ON_STEP * divisor).then_some(divisor)
 }
 
 /// The step near `step` of which all `distances` (in ascending order) are multiples.
@@ -131,9 +161,14 @@ fn refined(mut step: f64, distances: &[f64]) -> Option<f64> {
 /// Standard deviation of the noise by the median difference of neighbours, which slow changes and single outliers do not move;
 /// by all differences where most are 0.
 pub(crate) fn difference_noise(values: &[f64]) -> f64 {
+    noise_at_lag(values, 1)
+}
+
+/// The same by the differences of values that are `lag` apart.
+pub(crate) fn noise_at_lag(values: &[f64], lag: usize) -> f64 {
     let stride = values.len().div_ceil(1 << 17).max(1);
-    let pairs =
-        values.windows(2).step_by(stride).map(|pair| pair[1] - pair[0]).filter(|difference| difference.is_finite());
+    let pairs = values.windows(lag + 1).step_by(stride).map(|pair| pair[lag] - pair[0]);
+    let pairs = pairs.filter(|difference| difference.is_finite());
     let mut differences: Vec<f64> = pairs.map(f64::abs).collect();
     if differences.is_empty() {
         return 0.0;
@@ -150,7 +185,7 @@ pub(crate) fn difference_noise(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{MAX_COST, Quantizer};
+    use super::{MAX_COST, Quantizer, step};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -215,10 +250,37 @@ mod tests {
         assert!((added - cost).abs() < 5.0 * 6e-5, "{added} for {cost}");
     }
 
+    /// A vibration of 0.1 rad/s at a quarter of the sample rate, written with six decimals: neighbours differ by 10⁵ steps, and none of
+    /// the numbers that are examined lie beside each other.
+    #[test]
+    fn the_step_of_a_vibrating_channel_is_that_of_its_numbers() {
+        let noise = noise(6, 20_000);
+        for deviation in [30.0, 1e4, 1e5] {
+            let vibration = |at: usize| 1e5 * (1.57 * at as f64).sin();
+            let counts: Vec<i32> =
+                noise.iter().enumerate().map(|(at, x)| (deviation * x + vibration(at)).round() as i32).collect();
+            let values: Vec<f64> = counts.iter().map(|&count| f64::from(count) * 1e-6).collect();
+            let quantizer = Quantizer::new(&values);
+            assert_eq!(quantizer.cost, None, "{deviation}: {quantizer:?}");
+            let found: Vec<i32> = values.iter().map(|&value| quantizer.count(value).expect("in range")).collect();
+            assert_eq!(found, counts, "{deviation}");
+        }
+    }
+
+    /// Numbers of which no two are closer than two and three steps.
+    #[test]
+    fn a_step_that_no_two_neighbours_have_is_found() {
+        let values: Vec<f64> =
+            noise(7, 20_000).iter().map(|x| (6.0 * x).round() * 6.0 + if *x > 0.0 { 2.0 } else { 5.0 }).collect();
+        assert_eq!(step(&values), Some((3.0, -1.0)));
+    }
+
     /// Nine decimals of a noise of 0.09 are multiples of 1e-9: 9e7 counts would be more than the estimator has room for.
     #[test]
     fn the_digits_of_a_text_are_no_counts() {
         let values: Vec<f64> = noise(5, 20_000).iter().map(|x| (9e7 * x).round() * 1e-9).collect();
+        let (step, _) = step(&values).expect("nine decimals");
+        assert!((step / 1e-9 - 1.0).abs() < 1e-6, "{step}");
         let quantizer = Quantizer::new(&values);
         assert!(quantizer.lsb > 1e-3 && quantizer.cost.is_some(), "{quantizer:?}");
     }
