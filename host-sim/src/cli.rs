@@ -165,12 +165,12 @@ pub(crate) enum RecordingFormat {
 pub(crate) struct ConvertArguments {
     /// The recording.
     #[command(flatten)]
-    pub(crate) input: InputArguments,
+    pub(crate) recording: RecordingArguments,
     /// The file to write.
     pub(crate) out: PathBuf,
     /// Its format [default: by its name, npy or table].
     #[arg(long, value_enum)]
-    pub(crate) to: Option<RecordingFormat>,
+    pub(crate) format: Option<RecordingFormat>,
 }
 
 /// What to simulate.

@@ -87,7 +87,7 @@ fn every_format_has_the_same_samples() {
     let report = analyzed(&dir, &["replay", &frames]);
     assert_eq!(report["dropped"]["no_new_data"], 7, "{}", report["dropped"]);
     // A table as bursts, and these as a table.
-    run(&["convert", &table, &frames, "--to", "frames", "--range", "75"]);
+    run(&["convert", &table, &frames, "--format", "frames", "--range", "75"]);
     let notes = run(&["convert", &frames, &back]);
     assert!(notes.contains("--range 75") && notes.contains("1 transactions that are no bursts"), "{notes}");
     assert_eq!(std::fs::read(&table).expect("a table"), std::fs::read(&back).expect("a table"));
@@ -140,7 +140,7 @@ fn what_cannot_be_simulated_or_converted_is_refused_before_anything_is_written()
         assert!(!Path::new(&out).exists());
     }
     std::fs::write(&out, "gyro_x_counts\n1\n2\n").expect("written");
-    let output = host_sim(&["convert", &out, &path(&dir, "y.csv"), "--to", "frames"]);
+    let output = host_sim(&["convert", &out, &path(&dir, "y.csv"), "--format", "frames"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("sample 0 has no time"));
     let output = host_sim(&["convert", &out, &out]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("it would be overwritten"));
@@ -154,13 +154,14 @@ fn options_are_those_that_a_subcommand_uses() {
         &["replay", "a", "--sensor", "generic"],
         &["replay", "a", "--columns", "gyro_x=0"],
         &["replay", "a", "--topic", "t"],
-        &["convert", "a", "b", "--rate", "100"],
         &["compare", "a", "b", "--page", "d"],
     ] {
         let output = host_sim(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && errors.contains("unexpected argument"), "{arguments:?}: {errors}");
     }
+    let output = host_sim(&["convert", "a", "b", "--rate", "100"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("--rate says where --from and --to are"));
     let output = host_sim(&["--seed", "3", "analyze", "x.csv"]);
     assert_eq!(output.status.code(), Some(2), "options of the simulation before a subcommand would be ignored");
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {

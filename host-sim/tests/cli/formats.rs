@@ -184,7 +184,7 @@ fn every_format_is_converted() {
         // Counts are rounded anew in each unit, see above: 5·√2·10⁻²/√5956.
         assert!((one / other - 1.0).abs() < 1e-3, "{one} {other}");
     }
-    let output = host_sim(&["convert", bag, back, "--to", "frames"]);
+    let output = host_sim(&["convert", bag, back, "--format", "frames"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("register counts of an ADIS16405"));
 }
 

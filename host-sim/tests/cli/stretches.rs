@@ -46,6 +46,22 @@ fn a_part_is_what_a_file_of_it_would_be() {
     }
 }
 
+/// A part that is converted is the table of its rows.
+#[test]
+fn a_part_is_converted() {
+    let dir = tempdir().expect("a folder");
+    let rows: String = (0..3000).map(|row| format!("{}.{:02},{}\n", row / 100, row % 100, row * 7919 % 41)).collect();
+    let file = write(&dir, "rows.csv", format!("time_s,gyro_x [dps]\n{rows}").as_bytes());
+    let part = dir.path().join("part.csv");
+    let arguments = ["convert", name(&file), name(&part), "--from", "5", "--to", "10", "--format", "table"];
+    let output = host_sim(&arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(&part).expect("a table");
+    let found: Vec<&str> = text.lines().skip(1).filter_map(|line| line.rsplit(',').next()).collect();
+    let expected: Vec<String> = (500..1000).map(|row| (row * 7919 % 41).to_string()).collect();
+    assert_eq!(found, expected);
+}
+
 #[test]
 fn a_part_without_a_sample_is_refused() {
     let dir = tempdir().expect("a folder");
